@@ -1,0 +1,49 @@
+# make demo    sets up, then runs the paper's press: derive, generate, compile, simulate, figures
+# make test    sets up, then runs the whole test suite
+# make lint    style, types, import contract, freshness of the committed artefact
+# make docs    builds the documentation into docs/_build/html
+# make generated   derives the committed artefact anew
+
+PYTHON ?= python3
+VENV ?= .venv
+export PYTHON VENV
+BIN := $(VENV)/bin
+
+.PHONY: demo test lint docs generated clean
+.DEFAULT_GOAL := demo
+
+demo: $(VENV)/.ready
+	$(BIN)/raceway run scenes/punching_press.toml
+
+test: $(VENV)/.ready-dev
+	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+lint: $(VENV)/.ready-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python scripts/import_contract.py
+	$(BIN)/raceway derive --check scenes/punching_press.toml
+
+docs: $(VENV)/.ready-docs
+	$(BIN)/raceway equations scenes/punching_press.toml > docs/theory/equations_punching_press.md
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	@echo docs/_build/html/index.html
+
+generated: $(VENV)/.ready
+	$(BIN)/raceway derive scenes/punching_press.toml
+
+clean:
+	rm -rf results docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+$(VENV)/.ready: pyproject.toml requirements.txt scripts/setup.sh
+	@scripts/setup.sh
+	@touch $@
+
+$(VENV)/.ready-dev: pyproject.toml requirements.txt scripts/setup.sh
+	@scripts/setup.sh dev
+	@touch $@ $(VENV)/.ready
+
+$(VENV)/.ready-docs: pyproject.toml requirements.txt scripts/setup.sh
+	@scripts/setup.sh dev,docs
+	@touch $@ $(VENV)/.ready $(VENV)/.ready-dev

@@ -1,0 +1,284 @@
+"""From functions to files: the generated folder of a scene.
+
+In: a scene file.  Out: ``generated/<scene>/`` with
+
+model.c, model.h   every function and the integrators as C99
+model.casadi       the same functions serialised, for machines without a compiler
+EQUATIONS.md       the derivation for people
+manifest.json      the contract with the runtime, written last
+
+The same scene gives the same bytes on every run.  `Manifest.signature` covers the scene's structure, the deriving sources and the
+versions of CasADi and SymPy: numbers are not in it, so a changed number rewrites the manifest's defaults and nothing else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+
+import casadi as ca
+
+from raceway.derive.equations import equations
+from raceway.derive.linkage import check_assembly
+from raceway.derive.lower import Functions, lower, operations
+from raceway.derive.read import read_scene
+from raceway.derive.scene import Scene
+from raceway.derive.system import System, derive
+from raceway.runtime import manifest as mf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """Result of comparing a folder with what its scene derives today; `stale` names the files that differ."""
+
+    folder: Path
+    stale: tuple[str, ...]
+
+
+def generate(
+    scene: str | Path | Scene,
+    out: str | Path | None = None,
+    *,
+    force: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> Path:
+    """Write the generated folder of a scene unless it is there and fresh.
+
+    Parameters
+    ----------
+    scene : path of a scene file, or a scene
+    out : folder to write; ``./generated/<scene name>`` by default
+    force : derive again even where nothing changed
+    progress : called with the name of each stage
+
+    Returns
+    -------
+    The folder.
+
+    Raises
+    ------
+    SceneError
+        Nothing is written then.
+    """
+    say = progress or (lambda _: None)
+    read = scene if isinstance(scene, Scene) else read_scene(scene)
+    folder = Path(out) if out is not None else Path("generated") / read.name
+    present = None if force else _fresh(folder, read)
+    if present is not None:
+        _refresh(folder, present, read)
+        return folder
+    system, functions = _derive_and_lower(read, say)
+    say("emit")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{read.name}-", dir=folder.parent) as made:
+        _write(Path(made), system, functions)
+        _move(Path(made), folder)
+    return folder
+
+
+def check(scene: str | Path | Scene, out: str | Path | None = None) -> Check:
+    """Derive a scene afresh and compare with the folder, byte for byte; writes nothing to it."""
+    read = scene if isinstance(scene, Scene) else read_scene(scene)
+    folder = Path(out) if out is not None else Path("generated") / read.name
+    system, functions = _derive_and_lower(read, lambda _: None)
+    with tempfile.TemporaryDirectory() as made:
+        _write(Path(made), system, functions)
+        names = sorted({p.name for p in Path(made).iterdir()} | _files(folder))
+        stale = tuple(n for n in names if _digest(Path(made) / n) != _digest(folder / n))
+    return Check(folder=folder, stale=stale)
+
+
+def _derive_and_lower(scene: Scene, say: Callable[[str], None]) -> tuple[System, Functions]:
+    say("derive")
+    system = derive(scene)
+    if system.linkage is not None:
+        check_assembly(system.linkage, {q.path: q.value for q in scene.quantities})
+    say("lower")
+    return system, lower(system)
+
+
+def signature(scene: Scene) -> str:
+    """Digest of everything but numbers that decides what is generated."""
+    text = repr((mf.SCHEMA, scene.structure(), _sources(), _versions()))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _sources() -> str:
+    """Digest of the deriving modules: a changed derivation makes every artefact stale."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def _versions() -> tuple[tuple[str, str], ...]:
+    return tuple((name, version(name)) for name in ("raceway", "casadi", "sympy"))
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+
+
+def _files(folder: Path) -> set[str]:
+    return {p.name for p in folder.iterdir()} if folder.is_dir() else set()
+
+
+def _fresh(folder: Path, scene: Scene) -> mf.Manifest | None:
+    """The folder's manifest where signature and file digests agree with the scene, else None: then it is derived anew."""
+    try:
+        present = mf.read_manifest(folder)
+        mf.check_files(folder, present)
+    except mf.ArtefactError:
+        return None
+    return present if present.signature == signature(scene) else None
+
+
+def _refresh(folder: Path, present: mf.Manifest, scene: Scene) -> None:
+    """Bring the numbers of a fresh folder up to the scene's."""
+    values = {q.path: q.value for q in scene.quantities}
+    updated = replace(
+        present,
+        title=scene.title,
+        parameters=tuple(replace(p, default=values[p.name]) for p in present.parameters),
+        run=_run(scene),
+    )
+    if updated == present:
+        return
+    if scene.mechanism is not None:
+        check_assembly(derive(scene).linkage, values)
+    mf.write(folder, updated)
+
+
+def _write(folder: Path, system: System, functions: Functions) -> None:
+    _write_c(folder, functions)
+    pack = ca.FileSerializer(str(folder / "model.casadi"))
+    pack.pack(len(functions.functions))
+    for function, _ in functions.functions:
+        pack.pack(function)
+    del pack  # closes the file
+    (folder / "EQUATIONS.md").write_text(equations(system), encoding="utf-8", newline="\n")
+    files = tuple((p.name, _digest(p)) for p in sorted(folder.iterdir()))
+    mf.write(folder, _manifest(system, functions, files))
+
+
+def _write_c(folder: Path, functions: Functions) -> None:
+    generator = ca.CodeGenerator("model.c", {"with_header": True})
+    for function, _ in (*functions.functions, *functions.integrators):
+        generator.add(function)
+    generator.generate(f"{folder}{os.sep}")
+
+
+def _move(made: Path, folder: Path) -> None:
+    """Replace the folder's files one by one, the manifest last: a break in between leaves digests that do not match."""
+    folder.mkdir(exist_ok=True)
+    names = sorted(_files(made), key=lambda name: (name == mf.FILE_NAME, name))
+    for name in sorted(_files(folder) - set(names)):
+        path = folder / name
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    for name in names:
+        os.replace(made / name, folder / name)
+
+
+def _run(scene: Scene) -> mf.RunInfo:
+    run = scene.run
+    return mf.RunInfo(
+        cycles=run.cycles,
+        duration=run.duration,
+        transient_cycles=run.transient_cycles,
+        samples_per_cycle=run.samples_per_cycle,
+        method=run.method,
+        rtol=run.rtol,
+    )
+
+
+def _manifest(system: System, functions: Functions, files: tuple[tuple[str, str], ...]) -> mf.Manifest:
+    scene = system.scene
+    return mf.Manifest(
+        scene=scene.name,
+        title=scene.title,
+        signature=signature(scene),
+        versions=_versions(),
+        parameters=tuple(
+            mf.ParameterInfo(name=p.name, unit=p.unit, description=p.description, latex=p.latex, default=p.default)
+            for p in system.parameters
+        ),
+        constants=tuple(
+            mf.VariableInfo(name=c.name, unit=c.unit, description=c.description, latex=c.latex)
+            for c in functions.constants
+        ),
+        states=tuple(
+            mf.VariableInfo(name=s.name, unit=s.unit, description=s.description, latex=s.latex) for s in system.states
+        ),
+        initial=system.initial,
+        inputs=tuple(
+            mf.InputInfo(
+                name=i.name,
+                kind=i.kind,
+                offset=i.offset,
+                rate=i.rate,
+                windows=i.windows,
+                times=i.times,
+                values=i.values,
+            )
+            for i in system.inputs
+        ),
+        outputs=tuple(
+            mf.VariableInfo(
+                name=o.name,
+                unit=o.unit,
+                description=o.description,
+                size=system.bearing.ball.count if o.per_ball and system.bearing else 1,
+            )
+            for o in system.outputs
+        ),
+        functions=tuple(
+            mf.FunctionInfo(
+                name=f.name(),
+                inputs=tuple((f.name_in(k), f.size1_in(k)) for k in range(f.n_in())),
+                outputs=tuple((f.name_out(k), f.size1_out(k)) for k in range(f.n_out())),
+                operations=operations(f) if f.is_a("SXFunction") else 0,
+                description=words,
+            )
+            for f, words in (*functions.functions, *functions.integrators)
+        ),
+        smoothness=tuple((name, s.value) for name, s in system.smoothness),
+        mechanism=_mechanism(system),
+        bearing=_bearing(system),
+        run=_run(scene),
+        files=files,
+    )
+
+
+def _mechanism(system: System) -> mf.MechanismInfo | None:
+    mechanism, linkage = system.scene.mechanism, system.linkage
+    if mechanism is None or linkage is None:
+        return None
+    return mf.MechanismInfo(
+        driver_joint=mechanism.driver.joint,
+        speed=mechanism.driver.speed.path,
+        start_angle=mechanism.driver.start_angle.path,
+        joints=tuple((j.name, j.kind, j.bodies[0], j.points[0], j.bodies[1], j.points[1]) for j in mechanism.joints),
+        points=tuple(mf.PointInfo(body=p.body, point=p.point) for p in linkage.points),
+        margins=tuple(mf.MarginInfo(joint=m.joint, description=m.description) for m in linkage.margins),
+    )
+
+
+def _bearing(system: System) -> mf.BearingInfo | None:
+    bearing, scene = system.scene.bearing, system.scene
+    if bearing is None:
+        return None
+    speed = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
+    assert speed is not None
+    return mf.BearingInfo(
+        balls=bearing.balls,
+        joint=bearing.joint or "",
+        shaft_speed=speed.path,
+        outer_ring=bearing.outer is not None,
+        damping_law=bearing.damping.law,
+    )

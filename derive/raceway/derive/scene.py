@@ -1,0 +1,359 @@
+"""What the user asked for: the scene as frozen records in SI units.
+
+In: nothing but values that `read.py` has checked.  Out: one `Scene`.
+
+Every number of a scene is a `Quantity` whose `path` is its place in the TOML file
+("mechanism.bodies.crank.mass").  That path is the parameter's name everywhere: in ``--set``, in
+``model.simulate(parameters=...)``, in the manifest.  Records hold structure; quantities hold numbers.
+`Scene.structure` leaves the numbers out: two scenes with the same structure share one generated model.
+
+Frame: x right, y up, angles counter-clockwise from +x.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, Literal
+
+DampingLaw = Literal["none", "one-sided", "one-sided-gated", "two-sided-gated", "tangent"]
+DAMPING_LAWS: tuple[DampingLaw, ...] = ("none", "one-sided", "one-sided-gated", "two-sided-gated", "tangent")
+
+#: Name of the body that does not move.
+FRAME = "frame"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """One number of the scene, in SI.
+
+    Attributes
+    ----------
+    path : dotted place in the scene file; the parameter's name
+    value : magnitude in SI [unit]
+    unit : SI unit as text, "kg*m^2"; "1" when dimensionless
+    description : one line for people, without the unit
+    latex : symbol in the derived equations
+    """
+
+    path: str
+    value: float
+    unit: str
+    description: str
+    latex: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vector:
+    """A plane vector with as many numbers as the file gave it.
+
+    ``zero`` has none.  ``axis`` has one, along the axis its user defines (body x axis for points,
+    −y for gravity).  ``cartesian`` has x and y.  ``polar`` has a length and an angle from +x.
+    """
+
+    kind: Literal["zero", "axis", "cartesian", "polar"]
+    first: Quantity | None = None
+    second: Quantity | None = None
+
+    def quantities(self) -> tuple[Quantity, ...]:
+        return tuple(q for q in (self.first, self.second) if q is not None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamedPoint:
+    """A point of a body in body axes (of the frame: in the frame's axes) [m]."""
+
+    name: str
+    position: Vector
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Body:
+    """A moving rigid body.
+
+    `inertia` is about the centre of mass [kg*m^2]; None for a body that does not rotate and whose moment balance
+    nobody asked for.
+    """
+
+    name: str
+    mass: Quantity
+    inertia: Quantity | None
+    center_of_mass: Vector
+    points: tuple[NamedPoint, ...]
+
+    def point(self, name: str) -> Vector:
+        return next(p.position for p in self.points if p.name == name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Joint:
+    """A revolute or prismatic joint between two bodies, each at a named point.
+
+    Revolute: the two points coincide.
+    Prismatic: the guide belongs to ``bodies[0]``: a line through ``points[0]`` along `direction`, an angle
+    [rad] in that body's axes.  ``points[1]`` of ``bodies[1]`` (the slider) stays on the line; the slider's axes stay
+    parallel to those of ``bodies[0]``.
+
+    `branch` is set at the inner revolute joint of a dyad, else None:
+    RRR ``left``/``right``: the joint lies left/right of the directed line from the outer joint of ``bodies[0]``
+    to the outer joint of ``bodies[1]``.
+    RRP ``ahead``/``behind``: the joint lies ahead of/behind the foot of the perpendicular dropped from the rod's
+    outer joint onto the joint's path, seen along the guide's direction.
+
+    The joint's reaction is the force of ``bodies[1]`` on ``bodies[0]``.
+    """
+
+    name: str
+    kind: Literal["revolute", "prismatic"]
+    bodies: tuple[str, str]
+    points: tuple[str, str]
+    direction: Quantity | None
+    branch: Literal["left", "right", "ahead", "behind"] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Driver:
+    """The joint (revolute, frame to a body) turned at constant speed [rad/s] from `start_angle` [rad] at t = 0.
+
+    The driver's angle is that of the driven body's x axis from +x.
+    """
+
+    joint: str
+    speed: Quantity
+    start_angle: Quantity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Window:
+    """Driver angles [rad] between which a load acts: from `start` on, up to and without `end`, modulo a turn."""
+
+    start: Quantity
+    end: Quantity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AppliedForce:
+    """A force [N] with constant components in the frame's axes on a named point of a body.
+
+    Without windows it acts always.
+    """
+
+    name: str
+    body: str
+    point: str
+    force: Vector
+    windows: tuple[Window, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AppliedTorque:
+    """A torque [N*m], counter-clockwise, on a body."""
+
+    name: str
+    body: str
+    torque: Quantity
+    windows: tuple[Window, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mechanism:
+    """A planar linkage with one driver.  `gravity` (axis kind: magnitude along −y) or None."""
+
+    gravity: Vector | None
+    driver: Driver
+    frame_points: tuple[NamedPoint, ...]
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    forces: tuple[AppliedForce, ...]
+    torques: tuple[AppliedTorque, ...]
+
+    def body(self, name: str) -> Body:
+        return next(b for b in self.bodies if b.name == name)
+
+    def joint(self, name: str) -> Joint:
+        return next(j for j in self.joints if j.name == name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shaft:
+    """Rotation of the inner ring where no mechanism gives it: constant speed [rad/s]."""
+
+    speed: Quantity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConstantLoad:
+    """Constant force on the inner ring [N]."""
+
+    force: Vector
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HarmonicLoad:
+    """``mean + amplitude * cos(2 pi frequency t + phase)`` on the inner ring [N], [Hz], [rad]."""
+
+    mean: Vector
+    amplitude: Vector
+    frequency: Quantity
+    phase: Quantity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableLoad:
+    """Force on the inner ring, linear between rows, constant before the first and behind the last.
+
+    `time` [s] strictly increasing, `x` and `y` [N]; all of one length of at least two.
+    """
+
+    time: tuple[Quantity, ...]
+    x: tuple[Quantity, ...]
+    y: tuple[Quantity, ...]
+
+
+Load = ConstantLoad | HarmonicLoad | TableLoad
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Material:
+    """Young's modulus [Pa] and Poisson's ratio [1]."""
+
+    young_modulus: Quantity
+    poisson_ratio: Quantity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HertzContact:
+    """Contact stiffness from geometry: groove radii [m] and materials; `ball` None means as the rings."""
+
+    inner_groove_radius: Quantity
+    outer_groove_radius: Quantity
+    ring: Material
+    ball: Material | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GivenContact:
+    """Contact stiffness of one ball between both raceways, k_b [N/m^1.5], as a number."""
+
+    stiffness: Quantity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Damping:
+    """Damping law at the ball and its coefficient.
+
+    One of `coefficient` c_b [N*s/m] and `ratio`; neither for the law ``none``.  `ratio` times k_b is c_b: [s*m^0.5] for
+    the laws with a constant coefficient; for ``tangent`` it is the time constant beta [s] and the only form allowed.
+    """
+
+    law: DampingLaw
+    coefficient: Quantity | None
+    ratio: Quantity | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EquivalentMass:
+    """Eq. (3): ring mass m_i, crankpin mass m_x [kg], crank counted whole or halved (a pair of bearings carries it)."""
+
+    ring: Quantity
+    crankpin: Quantity
+    crank: Literal["whole", "half"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InnerRing:
+    """Mass moved by the inner ring: a number [kg] or Eq. (3).  `damping` to the frame [N*s/m] or None."""
+
+    mass: Quantity | EquivalentMass
+    damping: Quantity | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OuterRing:
+    """Outer ring on an elastic housing: mass [kg], stiffness [N/m], damping [N*s/m]."""
+
+    mass: Quantity
+    stiffness: Quantity
+    damping: Quantity
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InitialState:
+    """Ring centres [m] and velocities [m/s] at t = 0: inner x, y, (outer x, y); outer empty when it is fixed."""
+
+    position: tuple[Quantity, ...]
+    velocity: tuple[Quantity, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bearing:
+    """A deep groove ball bearing.
+
+    `joint` names the revolute joint whose reaction loads it (None without mechanism), `share` the part of the reaction it
+    takes.  `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
+    `outer` is None for a fixed outer ring.
+    """
+
+    joint: str | None
+    share: Quantity | None
+    balls: int
+    ball_diameter: Quantity
+    pitch_diameter: Quantity
+    clearance: Quantity
+    ball_angle: Quantity
+    contact: HertzContact | GivenContact
+    damping: Damping
+    inner: InnerRing
+    outer: OuterRing | None
+    initial: InitialState
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """How long to run and what to keep.  Exactly one of `cycles` (turns of driver or shaft) and `duration` [s]."""
+
+    cycles: float | None
+    duration: float | None
+    transient_cycles: float
+    samples_per_cycle: int
+    method: str
+    rtol: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """A checked scene.
+
+    `outputs` are the patterns of the file (``"inner.*"``); `derive` resolves them.  `quantities` lists every number in the
+    order of the file's schema: the model's parameters.
+    """
+
+    name: str
+    title: str
+    mechanism: Mechanism | None
+    shaft: Shaft | None
+    load: Load | None
+    bearing: Bearing | None
+    outputs: tuple[str, ...]
+    run: Run
+    quantities: tuple[Quantity, ...]
+
+    def structure(self) -> object:
+        """Nested tuples of everything but numbers, run settings and title: what is compiled (law 1)."""
+        return (
+            self.name,
+            _structure(self.mechanism),
+            _structure(self.shaft),
+            _structure(self.load),
+            _structure(self.bearing),
+            self.outputs,
+        )
+
+
+def _structure(value: Any) -> object:
+    if isinstance(value, Quantity):
+        return (value.path, value.unit, value.description, value.latex)
+    if is_dataclass(value) and not isinstance(value, type):
+        return (type(value).__name__, *((f.name, _structure(getattr(value, f.name))) for f in fields(value)))
+    if isinstance(value, tuple):
+        return tuple(_structure(v) for v in value)
+    return value

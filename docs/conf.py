@@ -1,0 +1,60 @@
+"""Sphinx configuration: MyST pages, autodoc of the public interface, furo."""
+
+from __future__ import annotations
+
+import re
+from importlib.metadata import version as installed_version
+from typing import Any
+
+project = "raceway"
+author = "the raceway authors"
+project_copyright = "2026, the raceway authors"
+release = version = installed_version("raceway")
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+]
+exclude_patterns = ["_build"]
+html_theme = "furo"
+html_title = f"raceway {release}"
+
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+default_role = "code"  # single backquotes in docstrings are names
+autodoc_typehints = "signature"
+autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+napoleon_numpy_docstring = True
+napoleon_google_docstring = False
+napoleon_use_ivar = True  # attributes of records as a list, not as objects that autodoc lists again
+
+_SECTION = re.compile(r"^(Parameters|Attributes)$")
+_ENTRY = re.compile(r"^(\w+(?:, \w+)*) : (.*)$")
+
+
+def describe_entries(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Move the text behind ``name :`` to a line of its own.
+
+    Types stand in the signatures here, so that the place numpydoc keeps for the type holds the description.
+    """
+    inside = False
+    rewritten: list[str] = []
+    for number, line in enumerate(lines):
+        following = lines[number + 1] if number + 1 < len(lines) else ""
+        if following and set(following) == {"-"}:
+            inside = bool(_SECTION.match(line))
+        entry = _ENTRY.match(line) if inside else None
+        if entry is None:
+            rewritten.append(line)
+        else:
+            rewritten += [entry[1], f"    {entry[2]}"]
+    lines[:] = rewritten
+
+
+def setup(app: Any) -> None:
+    # before napoleon, which listens with the default priority of 500
+    app.connect("autodoc-process-docstring", describe_entries, priority=400)

@@ -1,0 +1,179 @@
+"""Which inputs hold at a time, and when they change: phases, gates, tables.
+
+In: the manifest's inputs and a look-up of values by name.  Out: numbers for ``u``, times of breakpoints.
+
+Angles are reduced modulo a turn here, so that the generated code sees small arguments in the thousandth turn as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from raceway.runtime.errors import RequestError
+from raceway.runtime.manifest import InputInfo, Manifest
+
+TURN = 2.0 * math.pi
+
+#: Angles closer than this are one angle [rad]: an edge hit by rounding belongs to the window that starts there.
+ANGLE_RESOLUTION = 1e-11
+
+#: Times closer than this fraction of the interval under study are one time [1].
+TIME_RESOLUTION = 1e-12
+
+Values = Mapping[str, float]
+
+
+def period(manifest: Manifest, values: Values) -> float:
+    """Time of one turn of driver or shaft [s]; infinite when it stands or none exists."""
+    speed = shaft_speed(manifest, values)
+    return TURN / abs(speed) if speed != 0.0 else math.inf
+
+
+def shaft_speed(manifest: Manifest, values: Values) -> float:
+    """Speed of the driver, else of the shaft, counter-clockwise [rad/s]; 0 when the model has neither."""
+    if manifest.mechanism is not None:
+        return values[manifest.mechanism.speed]
+    if manifest.bearing is not None:
+        return values[manifest.bearing.shaft_speed]
+    return 0.0
+
+
+def crank_angle(manifest: Manifest, values: Values, t: float) -> float:
+    """Angle of the driver (of the shaft: from its position at t = 0) in [0, 2 pi) [rad]."""
+    start = values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
+    return (start + shaft_speed(manifest, values) * t) % TURN
+
+
+def inputs_at(inputs: Sequence[InputInfo], values: Values, t: float, inside: float | None = None) -> np.ndarray:
+    """Inputs ``u`` with reference time `t`.
+
+    Parameters
+    ----------
+    inputs : the manifest's inputs
+    values : parameters and derived constants by name
+    t : reference time of phases and table values [s]
+    inside : a time within the open interval for which gates and slopes hold [s].  Default: `t`, where an edge belongs
+        to what follows in angle (gates) and in time (tables).
+
+    Returns
+    -------
+    array, shape (inputs,)
+    """
+    inside = t if inside is None else inside
+    return np.array([_input(item, values, t, inside) for item in inputs], dtype=float)
+
+
+def breakpoints(inputs: Sequence[InputInfo], values: Values, t0: float, t1: float) -> np.ndarray:
+    """Times in the open interval (t0, t1) at which a gate switches or a table has a knot.
+
+    A window of zero width and one of a turn or more never switch.
+
+    Returns
+    -------
+    array, shape (breakpoints,), increasing [s]
+    """
+    found: list[float] = []
+    for item in inputs:
+        if item.kind == "gate":
+            offset, rate = values[item.offset], values[item.rate]
+            if rate != 0.0:
+                for start, width in _windows(item, values):
+                    if 0.0 < width < TURN:
+                        found += _passages(start, offset, rate, t0, t1)
+                        found += _passages(start + width, offset, rate, t0, t1)
+        elif item.kind in ("table", "table_rate"):
+            found += list(_knots(item, values)[0])
+    near = TIME_RESOLUTION * max(abs(t0), abs(t1))
+    times: list[float] = []
+    for time in sorted(found):
+        if t0 + near < time < t1 - near and (not times or time - times[-1] > near):
+            times.append(time)
+    return np.array(times, dtype=float)
+
+
+def input_derivatives(inputs: Sequence[InputInfo], values: Values, t: float) -> list[tuple[int, str, float]]:
+    """Nonzero partial derivatives of ``inputs_at(t)``: (row of u, name of parameter or constant, derivative).
+
+    A gate is flat between its edges; at an edge the derivative does not exist, and the flat one is given.
+    """
+    entries: list[tuple[int, str, float]] = []
+    for row, item in enumerate(inputs):
+        if item.kind == "phase":
+            entries += [(row, item.offset, 1.0), (row, item.rate, t)]
+        elif item.kind in ("table", "table_rate"):
+            times, heights = _knots(item, values)
+            k = int(np.searchsorted(times, t, side="right"))
+            if k in (0, len(times)):
+                if item.kind == "table":
+                    entries.append((row, item.values[0 if k == 0 else -1], 1.0))
+                continue
+            span = times[k] - times[k - 1]
+            slope = (heights[k] - heights[k - 1]) / span
+            share = (t - times[k - 1]) / span
+            weights = (1.0 - share, share) if item.kind == "table" else (-1.0 / span, 1.0 / span)
+            for weight, knot in zip(weights, (k - 1, k), strict=True):
+                entries += [(row, item.values[knot], weight), (row, item.times[knot], -slope * weight)]
+    return entries
+
+
+def _input(item: InputInfo, values: Values, t: float, inside: float) -> float:
+    if item.kind == "phase":
+        return (values[item.offset] + values[item.rate] * t) % TURN
+    if item.kind == "gate":
+        angle = values[item.offset] + values[item.rate] * inside
+        return 1.0 if any(_covers(angle, start, width) for start, width in _windows(item, values)) else 0.0
+    times, heights = _knots(item, values)
+    k = int(np.searchsorted(times, inside, side="right"))
+    if k in (0, len(times)):
+        return 0.0 if item.kind == "table_rate" else float(heights[0 if k == 0 else -1])
+    slope = (heights[k] - heights[k - 1]) / (times[k] - times[k - 1])
+    return float(slope) if item.kind == "table_rate" else float(heights[k - 1] + slope * (t - times[k - 1]))
+
+
+def _windows(item: InputInfo, values: Values) -> list[tuple[float, float]]:
+    """(start in [0, 2 pi), width) of each window [rad]; an end before the start lies in the next turn."""
+    windows = []
+    for first, last in item.windows:
+        start, end = values[first], values[last]
+        width = end - start
+        if width < 0.0:
+            width %= TURN
+            if TURN - width < ANGLE_RESOLUTION:
+                width = 0.0
+        elif width > TURN - ANGLE_RESOLUTION:
+            width = TURN
+        windows.append((start % TURN, width))
+    return windows
+
+
+def _covers(angle: float, start: float, width: float) -> bool:
+    """Whether `angle` lies in [start, start + width), with edges hit by rounding counted as exact."""
+    if width <= 0.0 or width >= TURN:
+        return width >= TURN
+    past = (angle - start) % TURN
+    if TURN - past < ANGLE_RESOLUTION:
+        past = 0.0
+    return past < width - ANGLE_RESOLUTION
+
+
+def _passages(edge: float, offset: float, rate: float, t0: float, t1: float) -> list[float]:
+    """Times in [t0, t1] at which ``offset + rate t`` passes `edge` modulo a turn [s]."""
+    turns = sorted(((offset + rate * t0 - edge) / TURN, (offset + rate * t1 - edge) / TURN))
+    first, last = math.ceil(turns[0] - 1e-9), math.floor(turns[1] + 1e-9)
+    return [(edge - offset + TURN * turn) / rate for turn in range(first, last + 1)]
+
+
+def _knots(item: InputInfo, values: Values) -> tuple[np.ndarray, np.ndarray]:
+    times = np.array([values[name] for name in item.times])
+    heights = np.array([values[name] for name in item.values])
+    steps = np.diff(times)
+    if np.any(steps <= 0.0):
+        k = int(np.argmax(steps <= 0.0))
+        raise RequestError(
+            f"The times of a table must increase: {item.times[k + 1]} = {times[k + 1]:g} s was given after "
+            f"{item.times[k]} = {times[k]:g} s. Change one of the two."
+        )
+    return times, heights

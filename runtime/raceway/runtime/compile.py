@@ -1,0 +1,297 @@
+"""From generated C to a shared library in the user's cache.
+
+In: C sources.  Out: a `CompiledLibrary` whose file name carries the key of everything that made it: content of the
+sources, compiler, flags, versions, processor.  A library is compiled under a temporary name and moved into place, so
+that a second process sees the whole file or none.  CasADi keeps the code of a path it has opened: a changed source gets
+another key, hence another path.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import importlib.metadata
+import importlib.util
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import platformdirs
+
+from raceway.runtime.errors import CompileError, RequestError
+from raceway.runtime.manifest import Manifest
+
+#: Name of the C source in a generated folder.
+SOURCE = "model.c"
+
+#: Environment variable that moves the cache.
+CACHE_VARIABLE = "RACEWAY_CACHE_DIR"
+
+#: -ffp-contract=off: the same bits with and without fused multiply-add, so that results do not depend on the processor.
+FLAGS = ("-O2", "-fPIC", "-shared", "-std=c99", "-ffp-contract=off")
+
+#: Longest a compiler may take [s]; a generated file takes about one second, ten with a cold ziglang.
+TIMEOUT = 300.0
+
+
+class NoCompilerWarning(UserWarning):
+    """No C compiler was found: the functions run in CasADi's virtual machine."""
+
+
+class CacheWarning(UserWarning):
+    """The cache cannot be written: libraries are compiled anew in every process."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Compiler:
+    """A C compiler: command, flags and what identifies it (path and version)."""
+
+    command: tuple[str, ...]
+    flags: tuple[str, ...]
+    identity: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CompiledLibrary:
+    """A shared library.
+
+    Attributes
+    ----------
+    path : the file; its name carries `key`
+    key : sha256 of all that made it
+    compiler : identity of the compiler
+    cached : whether it was there already
+    seconds : time the compiler took, 0 when cached [s]
+    """
+
+    path: Path
+    key: str
+    compiler: str
+    cached: bool
+    seconds: float
+
+
+def compile_model(folder: str | Path, manifest: Manifest, compiler: str | None = None) -> CompiledLibrary | None:
+    """Library with the functions of a generated folder; None, with a warning, where there is no compiler.
+
+    Parameters
+    ----------
+    folder : generated folder with ``model.c``
+    manifest : its manifest; the scene's name starts the library's file name
+    compiler : command of the compiler.  Default: $CC, cc, gcc, clang, ziglang, in this order
+
+    Raises
+    ------
+    RequestError
+        `compiler` or $CC names no program.
+    CompileError
+        The compiler failed.
+    """
+    found = find_compiler(compiler)
+    if found is None:
+        warnings.warn(
+            "No C compiler was found ($CC, cc, gcc, clang, ziglang): the model runs in CasADi's virtual machine. Results "
+            "are the same; a simulation takes about five times as long. Install gcc or clang, or "
+            "`pip install raceway[compiler]` for a compiler from PyPI.",
+            NoCompilerWarning,
+            stacklevel=3,
+        )
+        return None
+    return compile_sources((Path(folder) / SOURCE,), found, label=manifest.scene)
+
+
+def find_compiler(command: str | None = None) -> Compiler | None:
+    """The compiler to use, or None.
+
+    Parameters
+    ----------
+    command : a command with or without arguments, used as it is.  Default: $CC, else the first of cc, gcc, clang, ziglang
+
+    Raises
+    ------
+    RequestError
+        `command`, or $CC, names no program.
+    """
+    origin = "compiler" if command else "the environment variable CC"
+    asked = command or os.environ.get("CC", "").strip()
+    if asked:
+        words = shlex.split(asked)
+        path = shutil.which(words[0])
+        if path is None:
+            raise RequestError(
+                f"{origin} names {asked!r}, but there is no program {words[0]!r}. Give the command of a C compiler "
+                "(gcc, clang), or leave it unset."
+            )
+        return _describe((path, *words[1:]))
+    for name in ("cc", "gcc", "clang"):
+        path = shutil.which(name)
+        if path is not None:
+            return _describe((path,))
+    if importlib.util.find_spec("ziglang") is not None:
+        # zig compiles for the processor at hand without being told
+        return Compiler(
+            command=(sys.executable, "-m", "ziglang", "cc"),
+            flags=FLAGS,
+            identity=f"ziglang {importlib.metadata.version('ziglang')}",
+        )
+    return None
+
+
+def compile_sources(sources: Sequence[Path], compiler: Compiler, *, label: str = "model") -> CompiledLibrary:
+    """Compile C sources together into one shared library, or find it in the cache.
+
+    Parameters
+    ----------
+    sources : C files; their order and content enter the key, their place does not
+    compiler : see `find_compiler`
+    label : start of the library's file name
+
+    Raises
+    ------
+    CompileError
+        The compiler failed, took too long, or a source cannot be read; with command and output.
+    """
+    key = library_key(sources, compiler)
+    name = f"{_file_name(label)}-{key[:32]}{_suffix()}"
+    ready = _cache_folder() / name
+    if ready.exists():
+        return CompiledLibrary(path=ready, key=key, compiler=compiler.identity, cached=True, seconds=0.0)
+    folder = _writable_cache_folder()
+    target = folder / name
+    descriptor, temporary = tempfile.mkstemp(dir=folder, prefix=f".{name}-", suffix=".tmp")
+    os.close(descriptor)
+    started = time.perf_counter()
+    try:
+        _run((*compiler.command, *compiler.flags, *(str(path) for path in sources), "-o", temporary, "-lm"), folder)
+        os.chmod(temporary, 0o755)
+        os.replace(temporary, target)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    seconds = time.perf_counter() - started
+    return CompiledLibrary(path=target, key=key, compiler=compiler.identity, cached=False, seconds=seconds)
+
+
+def library_key(sources: Sequence[Path], compiler: Compiler) -> str:
+    """sha256 over content of the sources, compiler, flags, versions, system and processor."""
+    digest = hashlib.sha256()
+    facts = (
+        compiler.identity,
+        *compiler.command[1:],
+        *compiler.flags,
+        f"casadi {importlib.metadata.version('casadi')}",
+        f"raceway {importlib.metadata.version('raceway')}",
+        f"{platform.system()} {platform.machine()} {sys.maxsize > 2**32}",
+        _processor(),
+    )
+    for fact in facts:
+        digest.update(fact.encode() + b"\0")
+    for path in sources:
+        try:
+            content = path.read_bytes()
+        except OSError as fault:
+            raise CompileError(f"{path}: cannot be read ({fault.strerror}). Write the folder again.") from fault
+        digest.update(str(len(content)).encode() + b"\0" + content)
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=16)
+def _describe(command: tuple[str, ...]) -> Compiler:
+    """Ask a compiler for its version, and whether it can compile for the processor at hand."""
+    version = _ask((*command, "--version"))
+    identity = f"{command[0]} {version.stdout.strip() if version is not None else ''}"
+    native = _ask((*command, "-march=native", "-x", "c", "-E", os.devnull))
+    flags = (FLAGS[0], "-march=native", *FLAGS[1:]) if native is not None and native.returncode == 0 else FLAGS
+    return Compiler(command=command, flags=flags, identity=identity)
+
+
+def _ask(command: tuple[str, ...]) -> subprocess.CompletedProcess[str] | None:
+    """Answer of a short command, None where it cannot run; a compiler that is broken fails, loudly, when it compiles."""
+    try:
+        return subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=60.0, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+
+
+def _run(command: tuple[str, ...], folder: Path) -> None:
+    shown = shlex.join(command)
+    try:
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=TIMEOUT, check=False
+        )
+    except subprocess.TimeoutExpired as fault:
+        raise CompileError(
+            f"The C compiler did not finish within {TIMEOUT:g} s.\n  {shown}\nTry another compiler: set CC."
+        ) from fault
+    except OSError as fault:
+        raise CompileError(
+            f"The C compiler cannot be run ({fault}).\n  {shown}\nTry another compiler: set CC."
+        ) from fault
+    if done.returncode != 0:
+        output = "\n".join(text for text in (done.stdout.strip(), done.stderr.strip()) if text) or "(no output)"
+        raise CompileError(
+            f"The C compiler failed with exit code {done.returncode}.\n  {shown}\n{output}\n"
+            "Nothing was written. Check the compiler's installation, or set CC to another one."
+        )
+
+
+def _cache_folder() -> Path:
+    return Path(os.environ.get(CACHE_VARIABLE) or platformdirs.user_cache_dir("raceway")).absolute()
+
+
+def _writable_cache_folder() -> Path:
+    """The cache, made when missing; a folder of this process, with a warning, where the cache cannot be written."""
+    folder = _cache_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as fault:
+        warnings.warn(
+            f"The cache {folder} cannot be written ({fault.strerror}): the model is compiled anew in every process. "
+            f"Set {CACHE_VARIABLE} to a folder you may write.",
+            CacheWarning,
+            stacklevel=5,
+        )
+        return _private_folder()
+    return folder
+
+
+@lru_cache(maxsize=1)
+def _private_folder() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="raceway-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+@lru_cache(maxsize=1)
+def _processor() -> str:
+    """What -march=native depends on: a cache on a shared disk serves machines with different processors."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return platform.processor()
+    facts = {}
+    for line in lines:
+        label, _, value = line.partition(":")
+        if label.strip() in ("model name", "flags", "Features", "CPU part", "isa"):
+            facts.setdefault(label.strip(), value.strip())
+    return repr(sorted(facts.items()))
+
+
+def _file_name(label: str) -> str:
+    return "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in label) or "model"
+
+
+def _suffix() -> str:
+    return {"Darwin": ".dylib", "Windows": ".dll"}.get(platform.system(), ".so")

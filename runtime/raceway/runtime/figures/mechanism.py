@@ -1,0 +1,237 @@
+"""The mechanism at one moment: links, joints, frame, guide and slider block, and the forces on the frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, Polygon
+
+from raceway.runtime.figures.canvas import GREY, INK, SAND, SIGNAL
+from raceway.runtime.figures.record import Array, Record
+
+FRAME = "frame"
+
+#: Positions in which the paths of moving joints are traced.
+_TRACE = 72
+
+_Points = dict[tuple[str, str], Array]
+
+
+def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
+    """Draw the mechanism at a sample of the record, with the paths of its joints and the reactions on the frame."""
+    mechanism = record.manifest.mechanism
+    assert mechanism is not None  # drawn of scenes with a mechanism only
+    now = record.points(float(record.t[sample]))
+    trace = _traces(record, sample)
+    used = list(
+        dict.fromkeys((body, point) for _, _, b, p, c, q in mechanism.joints for body, point in ((b, p), (c, q)))
+    )
+    everything = np.vstack([trace[key] for key in used])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    size = max(float(np.max(high - low)), 1e-9)
+
+    for key in used:
+        path = trace[key]
+        if float(np.max(np.ptp(path, axis=0))) > 1e-9 * size:
+            axes.plot(path[:, 0], path[:, 1], color="#adb5bd", linewidth=0.9, linestyle=(0, (3, 2)), zorder=1)
+    for _, kind, first, guide, second, block in mechanism.joints:
+        if kind == "prismatic":
+            direction = _guide_direction(record, now, trace, (first, guide), (second, block))
+            _draw_guide(axes, trace[second, block], now[second, block], direction, size, fixed=first == FRAME)
+    _draw_links(axes, used, now, size)
+    for _, kind, first, point, second, _ in mechanism.joints:
+        if kind == "revolute":
+            if FRAME in (first, second):
+                _draw_ground(axes, now[first, point], size)
+            axes.add_patch(
+                Circle(
+                    tuple(now[first, point]), 0.017 * size, facecolor="white", edgecolor=INK, linewidth=1.5, zorder=6
+                )
+            )
+    _draw_names(axes, record, now, size)
+    reach = _draw_reactions(axes, record, now, sample, size)
+    corners = np.vstack([everything, *reach])
+    margin = 0.16 * size
+    axes.set_xlim(corners[:, 0].min() - margin, corners[:, 0].max() + margin)
+    axes.set_ylim(corners[:, 1].min() - margin, corners[:, 1].max() + margin)
+    axes.set_aspect("equal")
+    axes.axis("off")
+
+
+def _traces(record: Record, sample: int) -> _Points:
+    """Positions of every point through a turn: (body, point) -> (_TRACE + 1, 2) [m]."""
+    length = record.cycle_length
+    times = (
+        [float(record.t[sample])]
+        if length is None
+        else [float(t) for t in record.t[sample] + np.linspace(0.0, length, _TRACE + 1)]
+    )
+    poses = [record.points(t) for t in times]
+    return {key: np.array([pose[key] for pose in poses]) for key in poses[0]}
+
+
+def _draw_links(axes: Axes, used: list[tuple[str, str]], now: _Points, size: float) -> None:
+    """Each moving body: a bar between two joints, a plate between more."""
+    for body in dict.fromkeys(name for name, _ in used if name != FRAME):
+        joints: list[Array] = []
+        for key in used:
+            if key[0] == body and all(np.hypot(*(now[key] - other)) > 1e-6 * size for other in joints):
+                joints.append(now[key])
+        corners = np.array(joints)
+        if len(joints) == 2:
+            axes.plot(corners[:, 0], corners[:, 1], color=INK, linewidth=8, solid_capstyle="round", zorder=3)
+            axes.plot(corners[:, 0], corners[:, 1], color="#8fa3bf", linewidth=5.4, solid_capstyle="round", zorder=3)
+        elif len(joints) > 2:
+            centre = corners.mean(axis=0)
+            order = np.argsort(np.arctan2(*(corners - centre).T[::-1]))
+            axes.add_patch(
+                Polygon(corners[order], facecolor="#8fa3bf", edgecolor=INK, linewidth=1.6, joinstyle="round", zorder=3)
+            )
+        center = now.get((body, "center_of_mass"))
+        if center is not None:
+            axes.plot(*center, marker="o", markersize=6, color="white", markeredgecolor=INK, zorder=4)
+            axes.plot(*center, marker="+", markersize=6, color=INK, zorder=4)
+
+
+def _draw_ground(axes: Axes, at: Array, size: float) -> None:
+    """Pin on a hatched base."""
+    half, height = 0.05 * size, 0.07 * size
+    base = at[1] - height
+    axes.add_patch(
+        Polygon(
+            [at, (at[0] - half, base), (at[0] + half, base)],
+            facecolor="#e9ecef",
+            edgecolor=INK,
+            linewidth=1.3,
+            zorder=2,
+        )
+    )
+    _hatched_wall(
+        axes, np.array([at[0] - 1.5 * half, base]), np.array([at[0] + 1.5 * half, base]), np.array([0.0, -1.0]), size
+    )
+
+
+def _hatched_wall(axes: Axes, start: Array, end: Array, outward: Array, size: float) -> None:
+    depth = 0.022 * size * outward
+    axes.add_patch(
+        Polygon(
+            [start, end, end + depth, start + depth],
+            facecolor="white",
+            edgecolor=GREY,
+            hatch="/////",
+            linewidth=0.0,
+            zorder=0.8,
+        )
+    )
+    axes.plot(*np.array([start, end]).T, color=INK, linewidth=1.5, zorder=2)
+
+
+def _guide_direction(
+    record: Record, now: _Points, trace: _Points, guide: tuple[str, str], block: tuple[str, str]
+) -> Array:
+    """Unit vector along the guide.
+
+    The slider's point stays on the line through the guide's point: one to the other.  On the frame, along the path.
+    """
+    ways = (trace[block] - trace[block][0]) if guide[0] == FRAME else (now[block] - now[guide])[None, :]
+    longest = ways[int(np.argmax(np.hypot(*ways.T)))]
+    length = float(np.hypot(*longest))
+    return longest / length if length > 0.0 else np.array([1.0, 0.0])
+
+
+def _draw_guide(axes: Axes, path: Array, at: Array, direction: Array, size: float, *, fixed: bool) -> None:
+    """Slider block between the two walls of its guide."""
+    normal = np.array([-direction[1], direction[0]])
+    half_length, half_width = 0.085 * size, 0.055 * size
+    corners = [
+        at + a * half_length * direction + b * half_width * normal for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    ]
+    axes.add_patch(Polygon(corners, facecolor=SAND, edgecolor=INK, linewidth=1.5, alpha=1.0, zorder=2.5))
+    if not fixed:
+        ends = np.array([at - 3.0 * half_length * direction, at + 3.0 * half_length * direction])
+        axes.plot(*ends.T, color=INK, linewidth=1.2, zorder=2)
+        return
+    along = (path - at) @ direction
+    first, last = at + (along.min() - 1.5 * half_length) * direction, at + (along.max() + 1.5 * half_length) * direction
+    for side in (-1.0, 1.0):
+        shift = 1.08 * side * half_width * normal
+        _hatched_wall(axes, first + shift, last + shift, side * normal, size)
+
+
+def _draw_names(axes: Axes, record: Record, now: _Points, size: float) -> None:
+    """Names of the joints, those at one place together."""
+    mechanism = record.manifest.mechanism
+    assert mechanism is not None
+    places: list[tuple[Array, list[str]]] = []
+    for name, _, _, _, body, point in mechanism.joints:
+        at = now[body, point]
+        for place, names in places:
+            if float(np.hypot(*(place - at))) < 0.01 * size:
+                names.append(name)
+                break
+        else:
+            places.append((at, [name]))
+    slides = {(body, point) for _, kind, _, _, body, point in mechanism.joints if kind == "prismatic"}
+    blocks = [now[key] for key in slides if key in now]
+    for number, (place, names) in enumerate(places):
+        others = [other for k, (other, _) in enumerate(places) if k != number]
+        # away from the nearest other joint: a short crank has room for its letters on the outsides only
+        away = place - min(others, key=lambda other: float(np.hypot(*(other - place))), default=place)
+        side = 1.0 if away[0] >= 0.0 else -1.0
+        on_block = any(float(np.hypot(*(block - place))) < 0.01 * size for block in blocks)
+        axes.text(
+            place[0] + side * (0.11 if on_block else 0.035) * size,
+            place[1] + 0.02 * size,
+            ", ".join(names),
+            ha="left" if side > 0.0 else "right",
+            va="center",
+            fontsize=10,
+            fontweight="bold",
+            color="#212529",
+            zorder=8,
+        )
+
+
+def _draw_reactions(axes: Axes, record: Record, now: _Points, sample: int, size: float) -> list[Array]:
+    """Arrows of the forces on the frame at the revolute joints whose reaction was asked for; their ends."""
+    mechanism = record.manifest.mechanism
+    assert mechanism is not None
+    arrows: list[tuple[Array, Array]] = []
+    for name, kind, first, point, second, _ in mechanism.joints:
+        if (
+            kind != "revolute"
+            or FRAME not in (first, second)
+            or not record.has(f"reaction.{name}.x", f"reaction.{name}.y")
+        ):
+            continue
+        # the reaction is the force of the second body on the first
+        sign = 1.0 if first == FRAME else -1.0
+        force = sign * np.array([record.solution[f"reaction.{name}.{axis}"][sample] for axis in "xy"])
+        arrows.append((now[first, point], force))
+    greatest = max((float(np.hypot(*force)) for _, force in arrows), default=0.0)
+    ends: list[Array] = []
+    for at, force in arrows:
+        strength = float(np.hypot(*force))
+        if strength <= 0.02 * greatest:
+            continue
+        tip = at + (0.08 + 0.24 * strength / greatest) * size * force / strength
+        axes.annotate(
+            "",
+            xy=tuple(tip),
+            xytext=tuple(at),
+            arrowprops={"arrowstyle": "-|>", "color": SIGNAL, "linewidth": 2.6, "mutation_scale": 17},
+            zorder=7,
+        )
+        right = force[0] >= 0.0
+        axes.text(
+            *(tip + np.array([0.02 * size if right else -0.02 * size, 0.0])),
+            f"{strength:.0f} N",
+            ha="left" if right else "right",
+            va="center",
+            color=SIGNAL,
+            fontweight="bold",
+            fontsize=9.5,
+            zorder=8,
+        )
+        ends.append(tip[None, :])
+    return ends

@@ -1,0 +1,372 @@
+"""Integrate a model from breakpoint to breakpoint and sample it.
+
+In: a model, numbers, a request.  Out: a `Solution`.
+
+The run is split where a load switches and at every whole turn.  Within such a segment gates and slopes are constant, the
+phases are taken anew at its start, and the integrator lands exactly on its end.  Samples lie on one uniform grid; one
+that meets a breakpoint shows the state there with the loads behind it.
+"""
+
+from __future__ import annotations
+
+import math
+import time as clocks
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from raceway.runtime import clock
+from raceway.runtime.errors import RequestError
+from raceway.runtime.integrators import METHODS, Frozen, Integrator, available_methods
+from raceway.runtime.kernel import EvaluationError, evaluate_many
+from raceway.runtime.parameters import Parameters, unknown_name
+from raceway.runtime.scales import Scales, find_scales
+from raceway.runtime.solution import Solution, Statistics
+from raceway.runtime.status import IntegrationError, Status
+
+if TYPE_CHECKING:
+    from raceway.runtime.model import Model
+
+#: `auto` takes ``rosenbrock`` above this ratio of fastest decay to fastest natural frequency.  An explicit method follows
+#: the natural motion with some 6 right-hand sides per 0.2 rad and must keep steps below 3.3 / decay; the implicit step
+#: costs some 25 right-hand sides: they break even where decay is some tens of natural frequencies.
+STIFF_RATIO = 20.0
+
+#: Smallest and largest relative tolerance [1].
+TOLERANCES = (1e-13, 1e-1)
+
+#: Moments of the run that are looked at for magnitudes: so many between breakpoints, and so many evenly spread.
+MOMENTS = 32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What to simulate; None takes the scene's run settings.
+
+    Attributes
+    ----------
+    cycles, duration : turns of the driver or shaft, or time [s]; one of them
+    method : a name of `METHODS`, or "auto"
+    rtol : relative tolerance [1]
+    samples_per_cycle : samples in a turn; in the whole run where nothing turns
+    initial : state at the start, shape (states,)
+    transient_cycles : turns at the start that `Solution.steady` leaves out
+    progress : called with the finished fraction of the run
+    """
+
+    cycles: float | None = None
+    duration: float | None = None
+    method: str | None = None
+    rtol: float | None = None
+    samples_per_cycle: int | None = None
+    initial: np.ndarray | None = None
+    transient_cycles: float | None = None
+    progress: Callable[[float], None] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Numbers:
+    """The numbers of one run: parameters and constants, as vectors and by name."""
+
+    parameters: Parameters
+    p: np.ndarray
+    c: np.ndarray
+    values: dict[str, float]
+
+
+@dataclass(slots=True, kw_only=True)
+class Trajectory:
+    """Samples on the way: times, states, and the reference time and inputs each sample is evaluated with."""
+
+    t: np.ndarray
+    x: np.ndarray
+    reference: np.ndarray
+    u: np.ndarray
+    segments: int = 0
+    calls: int = 0
+    finished: int = 0
+
+
+class Interrupted(Exception):
+    """The integration ended early; the trajectory holds `finished` samples."""
+
+    def __init__(self, status: Status, time: float, detail: str) -> None:
+        super().__init__(detail)
+        self.status, self.time, self.detail = status, time, detail
+
+
+def simulate(model: Model, numbers: Numbers, request: Request) -> Solution:
+    """Run a model.
+
+    Raises
+    ------
+    RequestError
+        A wrong request: unknown method, tolerance or duration out of range, a linkage that cannot be assembled.
+    IntegrationError
+        The computation failed; the samples so far are in its attribute ``partial``.
+    """
+    started = clocks.perf_counter()
+    run = model.manifest.run
+    turn = clock.period(model.manifest, numbers.values)
+    duration = _duration(model, request, turn)
+    per_cycle = _whole("samples_per_cycle", request.samples_per_cycle, run.samples_per_cycle)
+    count = max(1, round(per_cycle * duration / turn)) if math.isfinite(turn) else per_cycle
+    transient = run.transient_cycles if request.transient_cycles is None else float(request.transient_cycles)
+    if not 0.0 <= transient < math.inf:
+        raise RequestError(f"transient: a number of cycles from 0 on is expected, not {transient!r}.")
+    rtol = run.rtol if request.rtol is None else float(request.rtol)
+    if not TOLERANCES[0] <= rtol <= TOLERANCES[1]:
+        raise RequestError(f"rtol: a number from {TOLERANCES[0]:g} to {TOLERANCES[1]:g} is expected, not {rtol!r}.")
+    initial = _initial(model, numbers, request.initial)
+
+    if len(initial):
+        scales = model_scales(model, numbers, initial, duration, turn)
+        magnitude = scales.magnitude
+        method, reason = choose_method(model, request.method or run.method, scales)
+        integrator: Integrator | None = METHODS[method].make(model)
+    else:
+        magnitude, integrator = np.zeros(0), None
+        method, reason = "none", "the model has no states: its outputs follow from time alone"
+
+    times = duration * (np.arange(count + 1) / count)
+    trajectory = start_trajectory(times, initial, len(model.manifest.inputs))
+    failure = None
+    try:
+        integrate(model, numbers, integrator, rtol * magnitude, trajectory, turn, request.progress)
+    except Interrupted as end:
+        failure = end
+
+    outputs = evaluate_outputs(model, numbers, trajectory)
+    done = trajectory.finished
+    solution = Solution(
+        t=trajectory.t[:done],
+        x=trajectory.x[:done],
+        outputs=outputs,
+        parameters=dict(numbers.parameters),
+        constants={info.name: numbers.values[info.name] for info in model.manifest.constants},
+        cycle_length=turn if math.isfinite(turn) else None,
+        transient_cycles=transient,
+        manifest=model.manifest,
+        statistics=Statistics(
+            method=method,
+            reason=reason,
+            rtol=rtol,
+            magnitudes=tuple(float(value) for value in magnitude),
+            steps=integrator.steps if integrator else 0,
+            rejected=integrator.rejected if integrator else 0,
+            segments=trajectory.segments,
+            calls=trajectory.calls,
+            wall_time=clocks.perf_counter() - started,
+            compiled=model.compiled and method != "cvodes",
+        ),
+        status=Status.DONE if failure is None else failure.status,
+    )
+    if failure is not None:
+        raise IntegrationError(
+            failure.status,
+            time=failure.time,
+            crank_angle=clock.crank_angle(model.manifest, numbers.values, failure.time),
+            method=method,
+            detail=failure.detail,
+            partial=solution,
+        )
+    return solution
+
+
+def start_trajectory(times: np.ndarray, initial: np.ndarray, inputs: int) -> Trajectory:
+    """Memory for samples at `times`, with the first state in place."""
+    x = np.empty((len(times), len(initial)))
+    x[0] = initial
+    return Trajectory(t=times, x=x, reference=np.empty(len(times)), u=np.empty((len(times), inputs)))
+
+
+def integrate(
+    model: Model,
+    numbers: Numbers,
+    integrator: Integrator | None,
+    scale: np.ndarray,
+    trajectory: Trajectory,
+    turn: float,
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Fill the samples of `trajectory`, whose times are uniform; without integrator only references and inputs."""
+    times = trajectory.t
+    begin, end = float(times[0]), float(times[-1])
+    near = 1e-9 * (times[1] - times[0])
+    inputs = model.manifest.inputs
+    edges = segment_edges(model, numbers, begin, end, turn)
+    state = trajectory.x[0].copy()
+    first = 0
+    for left, right in zip(edges[:-1], edges[1:], strict=True):
+        last = right >= end
+        stop = len(times) if last else int(np.searchsorted(times, right - near))
+        u = clock.inputs_at(inputs, numbers.values, left, 0.5 * (left + right))
+        trajectory.reference[first:stop] = left
+        trajectory.u[first:stop] = u
+        trajectory.segments += 1
+        if integrator is None:
+            trajectory.finished = stop
+        else:
+            frozen = Frozen(scale=scale, u=u, p=numbers.p, c=numbers.c)
+            state = _segment(integrator, frozen, trajectory, state, (left, right), (first, stop), near)
+        first = stop
+        if progress is not None:
+            progress((right - begin) / (end - begin))
+
+
+def _segment(
+    integrator: Integrator,
+    frozen: Frozen,
+    trajectory: Trajectory,
+    state: np.ndarray,
+    interval: tuple[float, float],
+    samples: tuple[int, int],
+    near: float,
+) -> np.ndarray:
+    """Integrate over one segment; the state at its end."""
+    left, right = interval
+    k, stop = samples
+    times = trajectory.t
+    now = left
+
+    def go(until: float, intervals: int) -> np.ndarray:
+        nonlocal now, state
+        trajectory.calls += 1
+        try:
+            block = integrator.advance(state, now - left, until - now, intervals, frozen)
+        except EvaluationError as fault:
+            raise Interrupted(Status.INTEGRATOR_FAILED, now, str(fault)) from fault
+        finite = np.isfinite(block).all(axis=1)
+        if not finite.all():
+            trajectory.finished = k
+            raise Interrupted(Status.NOT_FINITE, now, "")
+        now, state = until, block[-1]
+        return block
+
+    if k < stop:
+        if times[k] > now + near:
+            go(float(times[k]), 1)
+        trajectory.x[k] = state
+        k += 1
+        trajectory.finished = k
+        for size in integrator.pieces(stop - k):
+            trajectory.x[k : k + size] = go(float(times[k + size - 1]), size)
+            k += size
+            trajectory.finished = k
+    if right > now + near:
+        go(right, 1)
+    return state
+
+
+def segment_edges(model: Model, numbers: Numbers, begin: float, end: float, turn: float) -> np.ndarray:
+    """Begin, breakpoints, whole turns and end, increasing, none twice [s]."""
+    cuts = list(clock.breakpoints(model.manifest.inputs, numbers.values, begin, end))
+    if math.isfinite(turn):
+        near = clock.TIME_RESOLUTION * max(abs(begin), abs(end), turn)
+        for k in range(math.floor(begin / turn) + 1, math.ceil(end / turn)):
+            whole = k * turn
+            if begin + near < whole < end - near and all(abs(whole - cut) > near for cut in cuts):
+                cuts.append(whole)
+    return np.array([begin, *sorted(cuts), end])
+
+
+def evaluate_outputs(model: Model, numbers: Numbers, trajectory: Trajectory) -> dict[str, np.ndarray]:
+    """Outputs at the finished samples: shape (samples,), or (samples, balls)."""
+    infos = model.manifest.outputs
+    done = trajectory.finished
+    if not infos:
+        return {}
+    varying = {
+        "t": trajectory.t[:done] - trajectory.reference[:done],
+        "x": trajectory.x[:done],
+        "u": trajectory.u[:done],
+    }
+    results = evaluate_many(model.function("outputs"), done, varying, {"p": numbers.p, "c": numbers.c})
+    samples = {}
+    states = [state.name for state in model.manifest.states]
+    for info, values in zip(infos, results.values(), strict=True):
+        if info.name in states:  # the very numbers, not a copy that rounding might touch
+            values = trajectory.x[:done, [states.index(info.name)]]
+        samples[info.name] = np.ascontiguousarray(values if info.size > 1 else values[:, 0])
+    return samples
+
+
+def model_scales(model: Model, numbers: Numbers, initial: np.ndarray, duration: float, turn: float) -> Scales:
+    """Magnitudes and stiffness of a run, from its most loaded moments (see `scales`)."""
+    horizon = min(duration, turn)
+    edges = segment_edges(model, numbers, 0.0, duration, turn)
+    middles = 0.5 * (edges[:-1] + edges[1:])
+    picked = middles[np.unique(np.linspace(0, len(middles) - 1, MOMENTS).astype(int))]
+    moments = np.concatenate([picked, horizon * (np.arange(MOMENTS) + 0.5) / MOMENTS])
+    inputs = [clock.inputs_at(model.manifest.inputs, numbers.values, float(t)) for t in moments]
+    fixed = {"t": 0.0, "p": numbers.p, "c": numbers.c}
+    rhs, jacobian = model.kernel("rhs"), model.kernel("rhs_jac_x")
+    return find_scales(
+        lambda u, x: rhs({**fixed, "u": u, "x": x}),
+        lambda u, x: jacobian({**fixed, "u": u, "x": x}).reshape(len(x), len(x)),
+        inputs,
+        initial,
+        horizon,
+    )
+
+
+def choose_method(model: Model, asked: str, scales: Scales) -> tuple[str, str]:
+    """Name of the method and the reason for it.
+
+    Raises
+    ------
+    RequestError
+        No such method, or the model was generated without it.
+    """
+    available = available_methods(model)
+    if asked == "auto":
+        ratio = f"fastest decay {scales.decay:.3g} 1/s, fastest natural frequency {scales.frequency:.3g} rad/s"
+        name, why = ("rosenbrock", "stiff") if scales.stiffness > STIFF_RATIO else ("erk", "not stiff")
+        if name in available:
+            return name, f"{why}: {ratio}"
+        if available:
+            return available[-1], f"{why}: {ratio}; the model was generated without {name}"
+        raise RequestError("The model has no right-hand side to integrate. Generate it again with `raceway derive`.")
+    if asked not in available:
+        raise RequestError(unknown_name("method", asked, ("auto", *available)))
+    return asked, "asked for"
+
+
+def _duration(model: Model, request: Request, turn: float) -> float:
+    run = model.manifest.run
+    cycles, duration = request.cycles, request.duration
+    if cycles is not None and duration is not None:
+        raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
+    if cycles is None and duration is None:
+        cycles, duration = run.cycles, run.duration
+    if cycles is not None:
+        if not 0.0 < cycles < math.inf:
+            raise RequestError(f"cycles: a number above 0 is expected, not {cycles!r}.")
+        if not math.isfinite(turn):
+            raise RequestError("cycles: nothing turns in this model (its speed is zero). Give duration in seconds.")
+        return float(cycles) * turn
+    if duration is None or not 0.0 < duration < math.inf:
+        raise RequestError(f"duration: a time above 0 s is expected, not {duration!r}.")
+    return float(duration)
+
+
+def _initial(model: Model, numbers: Numbers, given: np.ndarray | None) -> np.ndarray:
+    if given is None:
+        return np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
+    names = [state.name for state in model.manifest.states]
+    initial = np.array(given, dtype=float)
+    if initial.shape != (len(names),) or not np.all(np.isfinite(initial)):
+        raise RequestError(
+            f"initial: {len(names)} finite numbers are expected ({', '.join(names)}), "
+            f"not an array of shape {initial.shape}{'' if np.all(np.isfinite(initial)) else ' with NaN or inf'}."
+        )
+    return initial
+
+
+def _whole(name: str, given: int | None, default: int) -> int:
+    value = default if given is None else given
+    if isinstance(value, bool) or int(value) != value or value < 1:
+        raise RequestError(f"{name}: a whole number from 1 on is expected, not {value!r}.")
+    return int(value)

@@ -1,0 +1,237 @@
+"""What a simulation gives: samples of states and outputs, with all that is needed to read them later."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from raceway.runtime.errors import RequestError
+from raceway.runtime.manifest import Manifest, VariableInfo
+from raceway.runtime.parameters import unknown_name
+from raceway.runtime.status import Status
+
+if TYPE_CHECKING:
+    import xarray
+
+#: Number of the layout of saved files.
+FILE_SCHEMA = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Statistics:
+    """How a solution came about.
+
+    Attributes
+    ----------
+    method : the integrator that ran, and `reason` why
+    rtol : relative tolerance, and `magnitudes` of the states it refers to
+    steps, rejected : accepted and rejected steps; None where the integrator does not tell (compiled ones do not)
+    segments : intervals between breakpoints, integrated one by one
+    calls : calls of the integrator
+    wall_time : time the simulation took [s]
+    compiled : whether generated C ran, else CasADi's virtual machine
+    """
+
+    method: str
+    reason: str
+    rtol: float
+    magnitudes: tuple[float, ...]
+    steps: int | None
+    rejected: int | None
+    segments: int
+    calls: int
+    wall_time: float
+    compiled: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solution:
+    """Samples of a simulation, in SI.
+
+    ``solution["inner.y"]`` is an output or a state by name: shape (samples,), or (samples, balls).
+
+    Attributes
+    ----------
+    t : times, shape (samples,) [s]
+    x : states, shape (samples, states), in the order of the manifest
+    outputs : output name to samples; at a breakpoint, the value behind it
+    parameters, constants : numbers of the run by name
+    cycle_length : time of one turn [s]; None where nothing turns
+    transient_cycles : turns at the start that `steady` leaves out
+    manifest : names, units and descriptions
+    statistics : how the solution came about
+    status : how the simulation ended
+    """
+
+    t: np.ndarray
+    x: np.ndarray
+    outputs: Mapping[str, np.ndarray]
+    parameters: Mapping[str, float]
+    constants: Mapping[str, float]
+    cycle_length: float | None
+    transient_cycles: float
+    manifest: Manifest
+    statistics: Statistics
+    status: Status
+
+    def __post_init__(self) -> None:
+        for array in (self.t, self.x, *self.outputs.values()):
+            array.flags.writeable = False
+        for name in ("outputs", "parameters", "constants"):
+            object.__setattr__(self, name, dict(getattr(self, name)))
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name in self.outputs:
+            return self.outputs[name]
+        names = self.states
+        if name in names:
+            return self.x[:, names.index(name)]
+        hint = unknown_name("output or state", name, dict.fromkeys((*self.outputs, *names)))
+        raise RequestError(f"{hint} The scene's run.outputs says which outputs are computed.")
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        span = f"{self.t[0]:.6g} ... {self.t[-1]:.6g} s" if len(self.t) else "no samples"
+        return (
+            f"Solution({self.manifest.scene}: {len(self.t)} samples, {span}; {self.statistics.method}, "
+            f"rtol {self.statistics.rtol:g}; {self.status.name.lower()}; outputs: {', '.join(self.outputs) or 'none'})"
+        )
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the columns of `x`."""
+        return tuple(state.name for state in self.manifest.states)
+
+    def steady(self) -> Solution:
+        """The samples behind the transient cycles; times are kept.
+
+        Raises
+        ------
+        RequestError
+            Nothing turns, or the simulation ended within the transient cycles.
+        """
+        if self.transient_cycles == 0.0:
+            return self
+        if self.cycle_length is None:
+            raise RequestError("Transient cycles are turns, and nothing turns in this run: set transient to 0.")
+        start = self.transient_cycles * self.cycle_length
+        keep = self.t >= start * (1.0 - 1e-12)
+        if np.count_nonzero(keep) < 2:
+            last = self.t[-1] if len(self.t) else 0.0
+            raise RequestError(
+                f"The run of {last / self.cycle_length:g} cycles lies within its {self.transient_cycles:g} transient "
+                "cycles: nothing is left. Simulate more cycles, or set fewer transient ones."
+            )
+        outputs = {name: samples[keep] for name, samples in self.outputs.items()}
+        return replace(self, t=self.t[keep], x=self.x[keep], outputs=outputs)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions."""
+        import xarray
+
+        variables: dict[str, Any] = {}
+        for k, state in enumerate(self.manifest.states):
+            variables[state.name] = ("time", self.x[:, k], _attributes(state))
+        infos = {info.name: info for info in self.manifest.outputs}
+        balls = 0
+        for name, samples in self.outputs.items():
+            if samples.ndim == 2:
+                balls = samples.shape[1]
+            variables[name] = (("time", "ball")[: samples.ndim], samples, _attributes(infos[name]))
+        coordinates: dict[str, Any] = {"time": ("time", self.t, {"units": "s", "long_name": "time"})}
+        if balls:
+            coordinates["ball"] = ("ball", np.arange(1, balls + 1), {"units": "1", "long_name": "number of the ball"})
+        facts = {
+            "title": self.manifest.title,
+            "scene": self.manifest.scene,
+            "status": self.status.name,
+            "raceway_schema": FILE_SCHEMA,
+            "raceway_parameters": json.dumps(dict(self.parameters)),
+            "raceway_constants": json.dumps(dict(self.constants)),
+            "raceway_run": json.dumps({"cycle_length": self.cycle_length, "transient_cycles": self.transient_cycles}),
+            "raceway_outputs": json.dumps(list(self.outputs)),
+            "raceway_statistics": json.dumps(asdict(self.statistics)),
+            "raceway_manifest": self.manifest.to_json(),
+        }
+        return xarray.Dataset(variables, coords=coordinates, attrs=facts)
+
+    def save(self, path: str | Path) -> Path:
+        """Write NetCDF-4: the old file or the new one, never half of it.  `load_solution` reads it back.
+
+        Raises
+        ------
+        RequestError
+            The folder does not exist or cannot be written.
+        """
+        target = Path(path)
+        try:
+            descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}-", suffix=".nc")
+        except OSError as fault:
+            raise RequestError(
+                f"{target}: cannot be written ({fault.strerror}). Give a folder you may write."
+            ) from fault
+        os.close(descriptor)
+        try:
+            self.to_xarray().to_netcdf(temporary, engine="h5netcdf")
+            mask = os.umask(0)
+            os.umask(mask)
+            os.chmod(temporary, 0o666 & ~mask)
+            os.replace(temporary, target)
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
+        return target
+
+
+def load_solution(path: str | Path) -> Solution:
+    """Read a solution that `Solution.save` wrote.
+
+    Raises
+    ------
+    RequestError
+        There is no such file, or it is none of ours.
+    """
+    import xarray
+
+    if not Path(path).is_file():
+        raise RequestError(f"{path}: there is no such file. `Solution.save` and `raceway run` write one.")
+    try:
+        with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as stored:
+            dataset = stored.load()
+    except (OSError, ValueError) as fault:
+        raise RequestError(f"{path}: not a NetCDF-4 file ({fault}).") from fault
+    facts = dataset.attrs
+    schema = facts.get("raceway_schema")
+    if schema is None or int(schema) != FILE_SCHEMA:
+        raise RequestError(
+            f"{path}: layout {schema!r} was found, this version reads layout {FILE_SCHEMA} written by `Solution.save`."
+        )
+    manifest = Manifest.from_json(facts["raceway_manifest"], source=f"{path}, manifest")
+    statistics = json.loads(facts["raceway_statistics"])
+    statistics["magnitudes"] = tuple(statistics["magnitudes"])
+    columns = [np.asarray(dataset[state.name].values) for state in manifest.states]
+    t = np.asarray(dataset["time"].values)
+    return Solution(
+        t=t,
+        x=np.stack(columns, axis=1) if columns else np.zeros((len(t), 0)),
+        outputs={name: np.asarray(dataset[name].values) for name in json.loads(facts["raceway_outputs"])},
+        parameters=json.loads(facts["raceway_parameters"]),
+        constants=json.loads(facts["raceway_constants"]),
+        manifest=manifest,
+        statistics=Statistics(**statistics),
+        status=Status[facts["status"]],
+        **json.loads(facts["raceway_run"]),
+    )
+
+
+def _attributes(info: VariableInfo) -> dict[str, str]:
+    return {"units": info.unit, "long_name": info.description}

@@ -1,0 +1,50 @@
+"""How a simulation ended; each value is the message and the remedy."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from raceway.runtime.errors import SimulationError
+
+if TYPE_CHECKING:
+    from raceway.runtime.solution import Solution
+
+
+class Status(Enum):
+    """How a simulation ended."""
+
+    DONE = "The simulation reached its end."
+    NOT_FINITE = (
+        "The motion stopped being finite. The model diverges from this state or a parameter is out of its range: "
+        "check initial state, damping and units, or start nearer to rest."
+    )
+    INTEGRATOR_FAILED = (
+        "The integrator could not go on: the tolerance asks for steps too small or too many. "
+        'Try method="rosenbrock" for a stiff model, a looser rtol, or check initial state and parameters.'
+    )
+
+
+class IntegrationError(SimulationError):
+    """A simulation that ended early.
+
+    Attributes
+    ----------
+    status : why
+    time : how far it came [s]
+    crank_angle : angle of driver or shaft at that time [rad]
+    partial : the samples up to that time
+    """
+
+    def __init__(
+        self, status: Status, *, time: float, crank_angle: float, method: str, detail: str, partial: Solution
+    ) -> None:
+        degrees = crank_angle * 57.29577951308232
+        super().__init__(
+            f"{status.value}\nMethod {method}, t = {time:.9g} s, crank angle {degrees:.4f} deg, "
+            f"{len(partial.t)} samples kept in .partial. {detail}".rstrip()
+        )
+        self.status = status
+        self.time = time
+        self.crank_angle = crank_angle
+        self.partial = partial

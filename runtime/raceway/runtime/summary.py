@@ -1,0 +1,250 @@
+"""The numbers people read first, as one JSON-ready mapping and as a table for the terminal.
+
+In: a `Model` and its `Solution`.  Out: a dict; every number stands in an object with its ``unit``.
+
+Extremes and means are those of the steady samples, transient cycles dropped.  Extremes are of samples: a spike between two of
+them is missed.  ``rms`` is the plain root mean square; ``std`` that of the deviation from the mean.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.table import Table
+
+from raceway.runtime.clock import breakpoints
+from raceway.runtime.errors import SimulationError
+from raceway.runtime.observables import drive_work, kinematic_frequencies, statistics, turns
+
+if TYPE_CHECKING:
+    from raceway.runtime.model import Model
+    from raceway.runtime.solution import Solution
+
+#: Packages whose version may change a number.
+_TOOLS = ("raceway", "casadi", "numpy", "scipy")
+
+#: Outputs of which mean, rms and std are told besides the extremes.
+_MOTIONS = ("inner.x", "inner.y", "inner.vx", "inner.vy", "outer.x", "outer.y", "outer.vx", "outer.vy")
+
+#: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
+_COLUMNS = ("value", "min", "max", "mean", "rms", "std")
+
+
+def summarize(model: Model, sol: Solution) -> dict[str, Any]:
+    """Key numbers of a run.
+
+    Returns
+    -------
+    mapping with, as far as the scene has them and their outputs were asked for:
+
+    ``scene``, ``title``, ``status``, ``method``, ``compiled``, ``damping_law``, ``versions``
+        words
+    ``steps``, ``wall_time``, ``rtol``, ``transient_cycles_dropped``, ``steady_cycles``, ``samples``, ``cycle_length``
+        ``{"value": , "unit": }``
+    ``reaction.<joint>.x`` and other reactions, ``drive_torque``, ``load.x``, ``load.y``
+        ``{"min": , "max": , "unit": }``
+    ``drive_work``
+        work of the drive in a turn, mean over the steady turns: ``{"value": , "unit": "J"}``
+    ``peak_ball_force``
+        highest sample of any ball: ``{"elastic": , "total": , "unit": "N"}``
+    ``inner.x`` and other motions of the rings
+        ``{"min": , "max": , "mean": , "rms": , "std": , "unit": }``
+    ``k_b`` and other derived constants
+        ``{"value": , "unit": }``
+    ``frequencies``
+        ``{"shaft": , "cage": , "ball_pass_outer": , "ball_pass_inner": , "ball_spin": , "unit": "Hz"}``
+
+    Raises
+    ------
+    RequestError
+        The run lies within its transient cycles.
+    SimulationError
+        An output holds values that are not finite.
+    """
+    steady = sol.steady()
+    manifest, statistic = model.manifest, sol.statistics
+    summary: dict[str, Any] = {
+        "scene": manifest.scene,
+        "title": manifest.title,
+        "status": sol.status.name.lower(),
+        "method": statistic.method,
+        "compiled": statistic.compiled,
+        "rtol": _value(statistic.rtol, "1", "rtol"),
+        # compiled integrators do not tell their steps: null
+        "steps": {"value": statistic.steps, "unit": "1"},
+        "wall_time": _value(statistic.wall_time, "s", "wall_time"),
+        "transient_cycles_dropped": _value(sol.transient_cycles, "1", "transient cycles"),
+        "samples": {"value": len(steady.t), "unit": "1"},
+    }
+    if steady.cycle_length is not None:
+        summary["cycle_length"] = _value(steady.cycle_length, "s", "cycle_length")
+        summary["steady_cycles"] = _value((steady.t[-1] - steady.t[0]) / steady.cycle_length, "1", "steady_cycles")
+    summary |= _forces(steady)
+    summary |= _balls(steady)
+    summary |= _motions(steady)
+    summary |= _constants(steady)
+    summary["versions"] = _versions(steady)
+    return summary
+
+
+def _forces(sol: Solution) -> dict[str, Any]:
+    """Extremes of reactions, load and drive torque; the work of the drive."""
+    found: dict[str, Any] = {}
+    for info in sol.manifest.outputs:
+        if info.name.startswith(("reaction.", "load.")) or info.name == "drive_torque":
+            signal = sol[info.name]
+            found[info.name] = {
+                "min": _finite(np.min(signal), info.name),
+                "max": _finite(np.max(signal), info.name),
+                "unit": info.unit,
+            }
+    mechanism = sol.manifest.mechanism
+    length = sol.cycle_length
+    if mechanism is not None and "drive_torque" in found and length is not None and turns(sol.t, length):
+        values = {**sol.parameters, **sol.constants}
+        work = drive_work(
+            sol.t,
+            sol["drive_torque"],
+            speed=sol.parameters[mechanism.speed],
+            cycle_length=length,
+            steps=breakpoints(sol.manifest.inputs, values, float(sol.t[0]), float(sol.t[-1])),
+        )
+        found["drive_work"] = _value(np.mean(work), "J", "drive_torque")
+    return found
+
+
+def _balls(sol: Solution) -> dict[str, Any]:
+    peaks = {
+        key: _finite(np.max(sol[name]), name)
+        for key, name in (("elastic", "ball.elastic_force"), ("total", "ball.force"))
+        if name in sol.outputs
+    }
+    return {"peak_ball_force": {**peaks, "unit": "N"}} if peaks else {}
+
+
+def _motions(sol: Solution) -> dict[str, Any]:
+    units = {info.name: info.unit for info in (*sol.manifest.states, *sol.manifest.outputs)}
+    found: dict[str, Any] = {}
+    for name in _MOTIONS:
+        if name in units:
+            values = statistics(sol.t, sol[name])
+            found[name] = {
+                "min": _finite(values.minimum, name),
+                "max": _finite(values.maximum, name),
+                "mean": _finite(values.mean, name),
+                "rms": _finite(values.rms, name),
+                "std": _finite(values.std, name),
+                "unit": units[name],
+            }
+    return found
+
+
+def _constants(sol: Solution) -> dict[str, Any]:
+    """Derived constants by the last part of their name, and the kinematic frequencies."""
+    bearing = sol.manifest.bearing
+    if bearing is None:
+        return {}
+    units = {info.name: info.unit for info in sol.manifest.constants}
+    found: dict[str, Any] = {}
+    for key in ("k_i", "k_o", "k_b", "c_b", "m_ei", "cage_ratio"):
+        name = f"bearing.{key}"
+        if name in units:
+            found[key] = _value(sol.constants[name], units[name], name)
+    frequencies = kinematic_frequencies(
+        bearing.balls,
+        sol.parameters["bearing.ball_diameter"],
+        sol.parameters["bearing.pitch_diameter"],
+        sol.parameters[bearing.shaft_speed],
+    )
+    found["frequencies"] = {
+        "shaft": frequencies.shaft,
+        "cage": frequencies.cage,
+        "ball_pass_outer": frequencies.ball_pass_outer,
+        "ball_pass_inner": frequencies.ball_pass_inner,
+        "ball_spin": frequencies.ball_spin,
+        "unit": "Hz",
+    }
+    found["damping_law"] = bearing.damping_law
+    return found
+
+
+def _versions(sol: Solution) -> dict[str, Any]:
+    """Versions of the tools that generated the model, and of those that ran it."""
+    running = {"python": platform.python_version()} | {name: version(name) for name in _TOOLS}
+    return {"generated_with": dict(sol.manifest.versions), "run_with": running}
+
+
+def _value(value: float, unit: str, name: str) -> dict[str, Any]:
+    return {"value": _finite(value, name), "unit": unit}
+
+
+def _finite(value: float, name: str) -> float:
+    number = float(value)
+    if not isfinite(number):
+        raise SimulationError(
+            f"{name} holds {number}; allowed: finite values; the run diverged or a parameter is out of range: check the scene"
+        )
+    return number
+
+
+#: Unit of a number in the file -> factor and unit in the table, so that six digits of a displacement are six digits.
+_TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
+
+#: What the table's caption tells of the run, and with which words.
+_RUN = {
+    "rtol": "rtol {}",
+    "steps": "{} steps",
+    "wall_time": "{} s wall time",
+    "transient_cycles_dropped": "{} transient cycles dropped",
+    "steady_cycles": "{} steady",
+    "samples": "{} samples",
+}
+
+
+def render_summary(summary: Mapping[str, Any]) -> Table:
+    """The summary as a table for a terminal of 80 columns; mean and standard deviation are in the file only.
+
+    Parameters
+    ----------
+    summary : what `summarize` gave
+    """
+    columns = ("value", "min", "max", "rms")
+    table = Table(
+        title=f"{summary['title']}: {summary['method']}",
+        caption=_caption(summary),
+        title_justify="left",
+        caption_justify="left",
+        header_style="bold",
+    )
+    table.add_column("quantity", no_wrap=True)
+    for key in columns:
+        table.add_column(key, justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    for name, item in summary.items():
+        if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
+            continue
+        factor, unit = _TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
+        cells = [f"{factor * item[key]:.5g}" if key in item else "" for key in columns]
+        if any(cells):
+            table.add_row(name, *cells, unit)
+        for key, value in item.items():
+            if key not in _COLUMNS and key != "unit":
+                # a named part of a quantity, as the peak's elastic one
+                table.add_row(f"{name}.{key}", f"{factor * value:.5g}", "", "", "", unit)
+    return table
+
+
+def _caption(summary: Mapping[str, Any]) -> str:
+    run = [
+        words.format("untold" if summary[key]["value"] is None else f"{summary[key]['value']:g}")
+        for key, words in _RUN.items()
+        if key in summary
+    ]
+    law = [f"damping law {summary['damping_law']}"] if "damping_law" in summary else []
+    tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
+    return f"{', '.join(run + law)}.\nExtremes are of steady samples. {', '.join(tools)}."

@@ -1,0 +1,25 @@
+#!/bin/sh
+# Make the virtual environment .venv and install raceway into it; say what is missing where something is.
+# usage: scripts/setup.sh [EXTRAS]      EXTRAS e.g. dev,docs
+set -eu
+extras=${1:-}
+python=${PYTHON:-python3}
+venv=${VENV:-.venv}
+
+missing() { printf 'setup: %s\n' "$1" >&2; exit 2; }
+
+command -v "$python" >/dev/null 2>&1 ||
+  missing "$python not found. Install Python 3.11 or newer (Debian: apt install python3 python3-venv), or name one: make PYTHON=/path/to/python3"
+"$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
+  missing "$("$python" --version 2>&1) is too old: Python 3.11 or newer is needed. Name another: make PYTHON=python3.12"
+"$python" -c 'import venv, ensurepip' 2>/dev/null ||
+  missing "Python's venv module is missing (Debian: apt install python3-venv)"
+if ! command -v cc >/dev/null 2>&1 && ! command -v gcc >/dev/null 2>&1 && ! command -v clang >/dev/null 2>&1; then
+  printf '%s\n' "setup: no C compiler found (Debian: apt install gcc). Going on without: simulations run in a virtual machine, many times slower." >&2
+fi
+
+[ -x "$venv/bin/python" ] || { printf '%s\n' "setup: making $venv"; "$python" -m venv "$venv"; }
+printf '%s\n' "setup: installing raceway${extras:+ with $extras} (first time: some 150 MB of downloads)"
+target=.
+[ -z "$extras" ] || target=".[$extras]"
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check -c requirements.txt -e "$target"

@@ -1,0 +1,392 @@
+"""Linkages for tests, built as records: what `read` would give, without files and units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import sympy as sp
+
+from raceway.derive.linkage import Linkage, derive_linkage
+from raceway.derive.numeric import Evaluator
+from raceway.derive.reactions import Reactions, derive_reactions
+from raceway.derive.scene import (
+    AppliedForce,
+    AppliedTorque,
+    Body,
+    Driver,
+    Joint,
+    Mechanism,
+    NamedPoint,
+    Quantity,
+    Vector,
+)
+
+ANGLE = sp.Symbol("theta", real=True)
+SPEED = sp.Symbol("mechanism.driver.speed", real=True)
+DEGREE = math.pi / 180.0
+
+#: None: zero.  A number: along the body's x axis.  ("xy", x, y).  ("polar", length, angle).
+Place = None | float | tuple[str, float, float]
+
+
+@dataclass
+class Numbers:
+    """Makes quantities and remembers their values."""
+
+    values: dict[str, float] = field(default_factory=dict)
+
+    def quantity(self, path: str, value: float, unit: str) -> Quantity:
+        self.values[path] = value
+        return Quantity(path=path, value=value, unit=unit, description=path, latex="q")
+
+    def vector(self, path: str, place: Place, unit: str) -> Vector:
+        if place is None:
+            return Vector(kind="zero")
+        if isinstance(place, int | float):
+            return Vector(kind="axis", first=self.quantity(path, place, unit))
+        kind, one, two = place
+        first, second = (".x", ".y") if kind == "xy" else (".distance", ".angle")
+        return Vector(
+            kind="cartesian" if kind == "xy" else "polar",
+            first=self.quantity(path + first, one, unit),
+            second=self.quantity(path + second, two, unit if kind == "xy" else "rad"),
+        )
+
+    def points(self, path: str, places: Mapping[str, Place]) -> tuple[NamedPoint, ...]:
+        return tuple(
+            NamedPoint(name=name, position=self.vector(f"{path}.points.{name}", place, "m"))
+            for name, place in places.items()
+        )
+
+
+@dataclass
+class Machine:
+    """A mechanism with its numbers."""
+
+    mechanism: Mechanism
+    values: dict[str, float]
+
+    def linkage(self) -> Linkage:
+        return derive_linkage(self.mechanism, ANGLE, SPEED)
+
+    def reactions(
+        self, linkage: Linkage, gates: Mapping[str, sp.Expr] | None = None, moments: Sequence[str] = ()
+    ) -> Reactions:
+        return derive_reactions(self.mechanism, linkage, gates or {}, frozenset(moments))
+
+    def with_values(self, **changes: float) -> Machine:
+        """Other numbers; `changes` by path with ``__`` for the dot."""
+        new = {name.replace("__", "."): value for name, value in changes.items()}
+        assert set(new) <= set(self.values)
+        return Machine(mechanism=self.mechanism, values={**self.values, **new})
+
+    def with_joint(self, name: str, **changes: Any) -> Machine:
+        joints = tuple(replace(j, **changes) if j.name == name else j for j in self.mechanism.joints)
+        return Machine(mechanism=replace(self.mechanism, joints=joints), values=self.values)
+
+    def with_body(self, name: str, **changes: Any) -> Machine:
+        bodies = tuple(replace(b, **changes) if b.name == name else b for b in self.mechanism.bodies)
+        return Machine(mechanism=replace(self.mechanism, bodies=bodies), values=self.values)
+
+    def numbers(self, angle: Any, **given: Any) -> dict[sp.Symbol, Any]:
+        """Value of every parameter, of the angle, and of other symbols named in `given`."""
+        symbols = {sp.Symbol(name, real=True): value for name, value in self.values.items()}
+        return {**symbols, **{sp.Symbol(n, real=True): v for n, v in given.items()}, ANGLE: angle}
+
+    def speed(self) -> float:
+        return self.values["mechanism.driver.speed"]
+
+
+def evaluate(
+    machine: Machine,
+    results: Sequence[sp.Expr],
+    angle: Any,
+    linkage: Linkage,
+    reactions: Reactions | None = None,
+    **given: Any,
+) -> list[Any]:
+    """Numbers of expressions in the symbols of a linkage and its reactions."""
+    definitions = linkage.definitions + (reactions.definitions if reactions is not None else ())
+    return Evaluator(definitions, results)(machine.numbers(angle, **given))
+
+
+def build(
+    *,
+    frame: Mapping[str, Place],
+    bodies: Mapping[str, Mapping[str, Any]],
+    joints: Mapping[str, Mapping[str, Any]],
+    speed: float,
+    driver: str = "A",
+    gravity: Place = 9.81,
+    forces: Mapping[str, tuple[str, str, Place]] | None = None,
+    torques: Mapping[str, tuple[str, float]] | None = None,
+) -> Machine:
+    numbers = Numbers()
+    root = "mechanism"
+    mechanism = Mechanism(
+        gravity=None if gravity is None else numbers.vector(f"{root}.gravity", gravity, "m/s^2"),
+        driver=Driver(
+            joint=driver,
+            speed=numbers.quantity(f"{root}.driver.speed", speed, "rad/s"),
+            start_angle=numbers.quantity(f"{root}.driver.start_angle", 0.0, "rad"),
+        ),
+        frame_points=numbers.points(f"{root}.frame", frame),
+        bodies=tuple(_body(numbers, name, data) for name, data in bodies.items()),
+        joints=tuple(_joint(numbers, name, data) for name, data in joints.items()),
+        forces=tuple(
+            AppliedForce(
+                name=name,
+                body=body,
+                point=point,
+                force=numbers.vector(f"{root}.forces.{name}.force", force, "N"),
+                windows=(),
+            )
+            for name, (body, point, force) in (forces or {}).items()
+        ),
+        torques=tuple(
+            AppliedTorque(
+                name=name,
+                body=body,
+                torque=numbers.quantity(f"{root}.torques.{name}.torque", torque, "N*m"),
+                windows=(),
+            )
+            for name, (body, torque) in (torques or {}).items()
+        ),
+    )
+    return Machine(mechanism=mechanism, values=numbers.values)
+
+
+def _body(numbers: Numbers, name: str, data: Mapping[str, Any]) -> Body:
+    path = f"mechanism.bodies.{name}"
+    inertia = data.get("inertia")
+    return Body(
+        name=name,
+        mass=numbers.quantity(f"{path}.mass", data["mass"], "kg"),
+        inertia=None if inertia is None else numbers.quantity(f"{path}.inertia", inertia, "kg*m^2"),
+        center_of_mass=numbers.vector(f"{path}.center_of_mass", data.get("center"), "m"),
+        points=numbers.points(path, data["points"]),
+    )
+
+
+def _joint(numbers: Numbers, name: str, data: Mapping[str, Any]) -> Joint:
+    direction = data.get("direction")
+    return Joint(
+        name=name,
+        kind="revolute" if direction is None else "prismatic",
+        bodies=data["bodies"],
+        points=data.get("points", (name, name)),
+        direction=None
+        if direction is None
+        else numbers.quantity(f"mechanism.joints.{name}.direction", direction, "rad"),
+        branch=data.get("branch"),
+    )
+
+
+def crank_slider(crank: float = 6e-3, rod: float = 0.1, branch: str = "ahead") -> Machine:
+    """The punching machine of the paper; physics.md leaves l_o1 = 0, theta_1p = 0, l_o2 = 50 mm."""
+    return build(
+        frame={"A": None, "guide": None},
+        bodies={
+            "crank": {
+                "mass": 0.3567,
+                "inertia": 611.7e-6,
+                "center": ("polar", 0.0, 0.0),
+                "points": {"A": None, "B": crank},
+            },
+            "rod": {"mass": 2.55, "inertia": 7517.545e-6, "center": 0.5 * rod, "points": {"B": None, "C": rod}},
+            "slider": {"mass": 16.7965, "points": {"C": None}},
+        },
+        joints={
+            "A": {"bodies": ("frame", "crank")},
+            "B": {"bodies": ("crank", "rod")},
+            "C": {"bodies": ("rod", "slider"), "branch": branch},
+            "D": {"bodies": ("frame", "slider"), "points": ("guide", "C"), "direction": 270 * DEGREE},
+        },
+        forces={"punch": ("slider", "C", ("xy", 0.0, 8964.8))},
+        speed=500 * 2 * math.pi / 60,
+    )
+
+
+def offset_slider(branch: str = "ahead") -> Machine:
+    """Offset, inclined guide; every centre of mass off its line; slider with inertia, pushed off its pin."""
+    return build(
+        frame={"A": ("xy", 0.01, -0.02), "guide": ("xy", 0.03, 0.012)},
+        bodies={
+            "crank": {
+                "mass": 0.8,
+                "inertia": 1.1e-3,
+                "center": ("polar", 0.017, 0.6),
+                "points": {"A": ("xy", 0.004, 0.003), "B": ("polar", 0.05, 0.2)},
+            },
+            "rod": {
+                "mass": 1.7,
+                "inertia": 9e-3,
+                "center": ("xy", 0.06, 0.02),
+                "points": {"B": ("xy", -0.01, 0.005), "C": ("xy", 0.15, 0.03)},
+            },
+            "slider": {
+                "mass": 3.1,
+                "inertia": 4e-3,
+                "center": ("xy", 0.02, -0.013),
+                "points": {"C": ("xy", 0.005, 0.002), "D": ("xy", -0.01, 0.03), "tool": ("xy", 0.05, 0.01)},
+            },
+        },
+        joints={
+            "A": {"bodies": ("frame", "crank")},
+            "B": {"bodies": ("crank", "rod")},
+            "C": {"bodies": ("rod", "slider"), "branch": branch},
+            "D": {"bodies": ("frame", "slider"), "points": ("guide", "D"), "direction": 20 * DEGREE},
+        },
+        forces={"push": ("slider", "tool", ("xy", -310.0, 45.0))},
+        torques={"friction": ("crank", -0.7)},
+        speed=40.0,
+    )
+
+
+def four_bar(branch: str = "left") -> Machine:
+    """Crank-rocker, centres of mass off the lines."""
+    return build(
+        frame={"A": None, "D": ("xy", 0.2, 0.03)},
+        bodies={
+            "crank": {
+                "mass": 0.5,
+                "inertia": 6e-4,
+                "center": ("xy", 0.02, 0.006),
+                "points": {"A": None, "B": 0.05},
+            },
+            "coupler": {
+                "mass": 1.2,
+                "inertia": 5e-3,
+                "center": ("polar", 0.11, 0.3),
+                "points": {"B": None, "C": 0.19, "tool": ("xy", 0.1, 0.07)},
+            },
+            "rocker": {
+                "mass": 0.9,
+                "inertia": 3e-3,
+                "center": ("xy", 0.06, -0.02),
+                "points": {"D": None, "C": 0.13, "E": ("xy", 0.12, 0.05)},
+            },
+        },
+        joints={
+            "A": {"bodies": ("frame", "crank")},
+            "B": {"bodies": ("crank", "coupler")},
+            "C": {"bodies": ("coupler", "rocker"), "branch": branch},
+            "D": {"bodies": ("rocker", "frame")},
+        },
+        forces={"push": ("coupler", "tool", ("xy", 40.0, -65.0))},
+        torques={"brake": ("rocker", 1.3)},
+        speed=30.0,
+    )
+
+
+def _extended(extra_frame: Mapping[str, Place], bodies: Any, joints: Any, rocker_points: Mapping[str, Place]) -> Machine:
+    """The four-bar with a further dyad."""
+    return build(
+        frame={"A": None, "D": ("xy", 0.2, 0.03), **extra_frame},
+        bodies={
+            "crank": {"mass": 0.5, "inertia": 6e-4, "center": ("xy", 0.02, 0.006), "points": {"A": None, "B": 0.05}},
+            "coupler": {
+                "mass": 1.2,
+                "inertia": 5e-3,
+                "center": ("polar", 0.11, 0.3),
+                "points": {"B": None, "C": 0.19, "tool": ("xy", 0.1, 0.07)},
+            },
+            "rocker": {
+                "mass": 0.9,
+                "inertia": 3e-3,
+                "center": ("xy", 0.06, -0.02),
+                "points": {"D": None, "C": 0.13, **rocker_points},
+            },
+            **bodies,
+        },
+        # The second dyad stands first: the order of assembly is not the order of the file.
+        joints={
+            **joints,
+            "A": {"bodies": ("crank", "frame")},
+            "B": {"bodies": ("crank", "coupler")},
+            "C": {"bodies": ("coupler", "rocker"), "branch": "left"},
+            "D": {"bodies": ("rocker", "frame")},
+        },
+        forces={"push": ("coupler", "tool", ("xy", 40.0, -65.0))},
+        torques={"brake": ("rocker", 1.3)},
+        speed=30.0,
+    )
+
+
+def six_bar_slider(branch: str = "ahead") -> Machine:
+    """Four-bar whose rocker drives a slider on the frame: RRP on RRR."""
+    return _extended(
+        {"guide": ("xy", 0.3, 0.2)},
+        {
+            "link": {"mass": 0.6, "inertia": 2e-3, "center": ("xy", 0.1, 0.01), "points": {"E": None, "F": 0.25}},
+            "ram": {"mass": 2.0, "inertia": 1e-3, "center": ("xy", 0.01, 0.02), "points": {"F": None}},
+        },
+        {
+            "E": {"bodies": ("rocker", "link")},
+            "F": {"bodies": ("ram", "link"), "branch": branch},
+            "G": {"bodies": ("frame", "ram"), "points": ("guide", "F"), "direction": 10 * DEGREE},
+        },
+        {"E": ("xy", 0.12, 0.05)},
+    )
+
+
+def moving_guide(branch: str = "ahead", guide_on_slider: bool = False) -> Machine:
+    """Four-bar whose rocker carries a guide; its slider is hinged to a rod on the frame."""
+    rocker = ("rocker", ("xy", 0.03, 0.04), "E")
+    slider = ("block", ("xy", 0.004, -0.006), "G")
+    first, second = (slider, rocker) if guide_on_slider else (rocker, slider)
+    return _extended(
+        {"H": ("xy", 0.32, 0.02)},
+        {
+            "link": {"mass": 0.6, "inertia": 2e-3, "center": ("xy", 0.1, 0.01), "points": {"H": None, "F": 0.3}},
+            "block": {
+                "mass": 0.4,
+                "inertia": 3e-4,
+                "center": ("xy", 0.005, 0.007),
+                "points": {"F": ("xy", 0.002, 0.001), "G": slider[1]},
+            },
+        },
+        {
+            "F": {"bodies": ("link", "block"), "branch": branch},
+            "G": {"bodies": (first[0], second[0]), "points": (first[2], second[2]), "direction": 35 * DEGREE},
+            "H": {"bodies": ("frame", "link")},
+        },
+        {"E": rocker[1]},
+    )
+
+
+def watt_six_bar(branch: str = "right") -> Machine:
+    """RRR on the coupler and the rocker of a four-bar."""
+    return _extended(
+        {},
+        {
+            "link": {"mass": 0.6, "inertia": 2e-3, "center": ("xy", 0.1, 0.01), "points": {"tool": None, "F": 0.2}},
+            "arm": {"mass": 0.4, "inertia": 1e-3, "center": ("xy", 0.09, 0.007), "points": {"E": None, "F": 0.18}},
+        },
+        {
+            "F": {"bodies": ("link", "arm"), "branch": branch},
+            "E": {"bodies": ("rocker", "arm")},
+            "G": {"bodies": ("coupler", "link"), "points": ("tool", "tool")},
+        },
+        {"E": ("xy", 0.12, 0.05)},
+    )
+
+
+MACHINES = {
+    "crank-slider": crank_slider,
+    "crank-slider behind": lambda: crank_slider(branch="behind"),
+    "offset slider": offset_slider,
+    "offset slider behind": lambda: offset_slider("behind"),
+    "four-bar": four_bar,
+    "four-bar right": lambda: four_bar("right"),
+    "six-bar with slider": six_bar_slider,
+    "six-bar with slider behind": lambda: six_bar_slider("behind"),
+    "guide on a moving body": moving_guide,
+    "guide on a moving body behind": lambda: moving_guide("behind"),
+    "guide on the slider": lambda: moving_guide(guide_on_slider=True),
+    "watt six-bar": watt_six_bar,
+    "watt six-bar left": lambda: watt_six_bar("left"),
+}

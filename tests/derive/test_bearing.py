@@ -1,0 +1,174 @@
+"""The derived bearing equations against the printed ones, and the laws against `physics`: formulas written here by hand."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+import sympy as sp
+
+from raceway.derive.lower import Functions, lower
+from raceway.derive.read import scene_from_text
+from raceway.derive.system import System, derive
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
+VARYING = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
+
+
+def symbol(name: str) -> sp.Symbol:
+    return sp.Symbol(name, real=True)
+
+
+def press(*changes: tuple[str, str]) -> System:
+    text = PRESS
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new)
+    return derive(scene_from_text(text, "punching_press"))
+
+
+@pytest.fixture(scope="module")
+def system() -> System:
+    return press()
+
+
+def test_equations_of_motion_equal_printed_eq_2(system: System) -> None:
+    xi, yi, xo, yo, vxo, vyo = (symbol(n) for n in ("inner.x", "inner.y", "outer.x", "outer.y", "outer.vx", "outer.vy"))
+    sum_x, sum_y = symbol("ball.sum_x"), symbol("ball.sum_y")  # F_x + F_cx, F_y + F_cy
+    share = symbol("bearing.share")
+    kp, cp = symbol("bearing.outer_ring.stiffness"), symbol("bearing.outer_ring.damping")
+    r14x, r14y = system.reactions.joint_force["A"]
+    mo, mei = symbol("bearing.outer_ring.mass"), symbol("bearing.m_ei")
+    printed = sp.Matrix(
+        [
+            share * r14x - sum_x,
+            share * r14y - sum_y,
+            sum_x - cp * vxo - kp * xo,
+            sum_y - cp * vyo - kp * yo,
+        ]
+    )
+    assert (sp.Matrix(system.forcing) - printed).expand() == sp.zeros(4, 1)
+    assert sp.Matrix(system.mass) == sp.diag(mei, mei, mo, mo)
+    assert [s.symbol for s in system.states[:4]] == [xi, yi, xo, yo]
+    default = {p.name: p.default for p in system.parameters}
+    assert default["bearing.share"] == 0.5
+
+
+def test_ball_geometry_equals_printed_eqs_6_and_11(system: System) -> None:
+    xi, yi, xo, yo = (symbol(n) for n in ("inner.x", "inner.y", "outer.x", "outer.y"))
+    vxi, vyi, vxo, vyo = (symbol(n) for n in ("inner.vx", "inner.vy", "outer.vx", "outer.vy"))
+    ball = system.bearing.ball
+    definitions = {d.symbol: d.expression for d in ball.definitions}
+    c, s, omega_c = ball.cos, ball.sin, symbol("bearing.cage_speed")
+    deflection = (xi - xo) * c + (yi - yo) * s - symbol("bearing.clearance") / 2
+    rate = (vxi - vxo) * c - (xi - xo) * s * omega_c + (vyi - vyo) * s + (yi - yo) * c * omega_c
+    assert sp.expand(definitions[ball.deflection] - deflection) == 0
+    assert sp.expand(definitions[ball.deflection_rate] - rate) == 0
+
+
+def test_sums_over_balls_equal_printed_eqs_8_and_9(system: System) -> None:
+    ball = system.bearing.ball
+    definitions = {d.symbol: d.expression for d in ball.definitions}
+    for total, direction in zip(ball.sums, (ball.cos, ball.sin), strict=True):
+        summand = total.expression.subs(ball.force, definitions[ball.force])
+        assert sp.expand(summand - ball.elastic_force * direction - ball.damping_force * direction) == 0
+
+
+def test_cage_turns_by_printed_eq_7(system: System) -> None:
+    constants = {d.symbol.name: d.expression for d in system.constants}
+    names = {d.symbol: d.expression for d in system.constants}
+    rb, big_rb = symbol("bearing.inner_raceway_radius"), symbol("bearing.outer_raceway_radius")
+    printed = (rb / (big_rb + rb)).subs(names)
+    assert sp.simplify(constants["bearing.cage_ratio"] - printed) == 0
+
+
+def test_equivalent_mass_equals_printed_eq_3(system: System) -> None:
+    """With theta_1p = 0: m_i + m (l1 - lo1)/l1 + m_x/2; the other reading halves the crank."""
+    l1 = symbol("mechanism.bodies.crank.points.B")
+    lo1 = symbol("mechanism.bodies.crank.center_of_mass.distance")
+    m1 = symbol("mechanism.bodies.crank.mass")
+    ring, pin = (symbol(f"bearing.inner_ring.equivalent_mass.{n}") for n in ("ring", "crankpin"))
+    straight = {symbol("mechanism.bodies.crank.center_of_mass.angle"): 0}
+    for crank, share in (("whole", 1), ("half", sp.Rational(1, 2))):
+        derived = press(('crank = "whole"', f'crank = "{crank}"'))
+        value = next(d.expression for d in derived.constants if d.symbol.name == "bearing.m_ei")
+        assert sp.simplify(value.subs(straight) - (ring + share * m1 * (l1 - lo1) / l1 + pin / 2)) == 0
+
+
+def test_a_fixed_outer_ring_has_no_coordinates() -> None:
+    derived = derive(scene_from_text(VARYING, "varying_compliance"))
+    assert [s.name for s in derived.states] == ["inner.x", "inner.y", "inner.vx", "inner.vy"]
+    assert derived.mass.shape == (2, 2)
+    assert not any("outer_ring" in p.name for p in derived.parameters)
+
+
+DAMPING = 'law = "one-sided"'
+LAWS = {
+    "one-sided": lambda d, v, k, c: c * max(v, 0.0),
+    "one-sided-gated": lambda d, v, k, c: c * max(v, 0.0) if d > 0 else 0.0,
+    "two-sided-gated": lambda d, v, k, c: c * v if d > 0 else 0.0,
+    "tangent": lambda d, v, k, beta: beta * 1.5 * k * math.sqrt(max(d, 0.0)) * v,
+}
+
+
+def lowered(law: str) -> tuple[System, Functions, np.ndarray, ca.DM]:
+    text = PRESS.replace(DAMPING, f'law = "{law}"')
+    if law == "tangent":
+        text = text.replace('ratio = "0.25e-5 s*mm^0.5"', 'ratio = "0.25e-5 s"')
+    derived = derive(scene_from_text(text, "punching_press"))
+    functions = lower(derived)
+    p = np.array([q.default for q in derived.parameters])
+    return derived, functions, p, functions["constants"](p)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_contact_function_equals_the_law(law: str) -> None:
+    derived, functions, p, c = lowered(law)
+    constants = dict(zip((k.name for k in functions.constants), np.asarray(c).ravel(), strict=True))
+    k_b, coefficient = constants["bearing.k_b"], constants["bearing.c_b"]
+    for delta in (-3e-6, -1e-12, 1e-12, 5e-6):
+        for rate in (-0.02, 0.0, 0.013):
+            elastic, damping = (float(v) for v in functions["contact"](delta, rate, p, c))
+            assert elastic == pytest.approx(k_b * max(delta, 0.0) ** 1.5, rel=1e-14)
+            assert damping == pytest.approx(LAWS[law](delta, rate, k_b, coefficient), rel=1e-14)
+    smoothness = {name: s.value for name, s in derived.smoothness}
+    jump = abs(LAWS[law](1e-30, 1.0, k_b, coefficient) - LAWS[law](-1e-30, 1.0, k_b, coefficient))
+    assert (smoothness["damping"] == "discontinuous") == (jump > 0.1 * coefficient)
+
+
+def test_paper_ratio_in_millimetres_and_in_si() -> None:
+    for ratio, value in (("0.25e-5 s*mm^0.5", 683.4), ("0.25e-5 s*m^0.5", 2.1612e4)):
+        derived = press(('ratio = "0.25e-5 s*mm^0.5"', f'ratio = "{ratio}"'))
+        functions = lower(derived)
+        p = [q.default for q in derived.parameters]
+        c = dict(zip((k.name for k in functions.constants), functions["constants"](p).full().ravel(), strict=True))
+        assert c["bearing.c_b"] == pytest.approx(value, rel=1e-4)
+
+
+def test_ungated_one_sided_balls_are_an_isotropic_dashpot_of_twice_c_b() -> None:
+    """Opposite balls complete each other: with 8 balls that touch nothing, F_c = 2 c_b v, whatever the cage's angle."""
+    derived, functions, p, _ = lowered("one-sided")
+    names = [q.name for q in derived.parameters]
+    p[names.index("bearing.clearance")] = 1e-2
+    p[names.index("mechanism.driver.speed")] = 0.0
+    c = functions["constants"](p)
+    c_b = float(c[[k.name for k in functions.constants].index("bearing.c_b")])
+    mass = float(c[[k.name for k in functions.constants].index("bearing.m_ei")])
+    free = np.zeros(8)
+    moving = np.array([0, 0, 0, 0, 0.3, -0.2, 0.1, 0.4])
+    for phase in (0.0, 0.123, 2.0):
+        u = np.zeros(len(derived.inputs))
+        u[[i.name for i in derived.inputs].index("phase.cage")] = phase
+        change = (functions["rhs"](0, moving, u, p, c) - functions["rhs"](0, free, u, p, c)).full().ravel()
+        assert change[4:6] * mass == pytest.approx(-2 * c_b * np.array([0.2, -0.6]), rel=1e-12)
+
+
+def test_opposite_sums_have_the_number_of_balls_of_the_scene() -> None:
+    for balls in (7, 8):
+        derived = press(("balls = 8", f"balls = {balls}"))
+        outputs = lower(derived)["outputs"]
+        assert outputs.size1_out("ball_force") == balls
