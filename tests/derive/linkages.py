@@ -282,7 +282,9 @@ def four_bar(branch: str = "left") -> Machine:
     )
 
 
-def _extended(extra_frame: Mapping[str, Place], bodies: Any, joints: Any, rocker_points: Mapping[str, Place]) -> Machine:
+def _extended(
+    extra_frame: Mapping[str, Place], bodies: Any, joints: Any, rocker_points: Mapping[str, Place]
+) -> Machine:
     """The four-bar with a further dyad."""
     return build(
         frame={"A": None, "D": ("xy", 0.2, 0.03), **extra_frame},

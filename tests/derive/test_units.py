@@ -21,7 +21,7 @@ from raceway.runtime.errors import RacewayError
 @pytest.mark.parametrize(
     ("text", "unit", "value"),
     [
-        # Sizes by definition: SI prefixes, BIPM SI brochure table 8 (degree, minute), inch 25.4 mm, pound-force 4.4482216152605 N.
+        # Sizes by definition: SI prefixes, inch 25.4 mm, pound-force 4.4482216152605 N.
         ("6 mm", "m", 0.006),
         ("10um", "m", 10e-6),
         ("10 µm", "m", 10e-6),
@@ -43,6 +43,7 @@ from raceway.runtime.errors import RacewayError
         ("683 N*s/m", "N*s/m", 683.0),
         ("683 kg/s", "N*s/m", 683.0),
         ("250 1/s", "Hz", 250.0),
+        ("250/s", "Hz", 250.0),
         ("50 %", "1", 0.5),
         ("0.5", "1", 0.5),
         (0.5, "1", 0.5),
@@ -130,12 +131,14 @@ def test_an_angle_is_no_plain_number(text: str, unit: str, remedy: str) -> None:
         ("6 m^(1/0)", "m", "denominator 0", "m^1.5"),
         ("6 mm)", "m", "no unit can go on", "names"),
         ("6 (mm", "m", "no unit can go on", "names"),
-        ("6 *", "m", "no unit can go on", "names"),
+        ("6 mm*", "m", "no unit can go on", "names"),
         ("6 m\nm", "m", "no place in a unit", "names"),
         ("6 " + "m" * 200, "m", "202 characters", "at most"),
     ],
 )
-def test_a_text_that_is_no_quantity_is_refused_with_a_remedy(text: object, unit: str, problem: str, remedy: str) -> None:
+def test_a_text_that_is_no_quantity_is_refused_with_a_remedy(
+    text: object, unit: str, problem: str, remedy: str
+) -> None:
     with pytest.raises(QuantityError) as caught:
         parse_quantity(text, unit)
     assert problem in caught.value.problem
@@ -172,9 +175,10 @@ def test_nothing_in_a_text_is_run_or_takes_long(text: str) -> None:
 def test_any_text_is_a_finite_number_or_refused(text: str) -> None:
     for unit in ("m", "1", "N/m^1.5"):
         try:
-            assert math.isfinite(parse_quantity(text, unit))
-        except QuantityError as error:
-            assert error.remedy
+            value = parse_quantity(text, unit)
+        except QuantityError:
+            continue
+        assert math.isfinite(value)
 
 
 @given(

@@ -1,6 +1,7 @@
 """A small generated folder made by hand: a damped oscillator pushed by a gate, a harmonic force and a table.
 
-x'' = -stiffness/m x - 2 damping x' + (push gate + amplitude cos(phase) + table) / m,   m = weight / 2 a derived constant.
+x'' = -stiffness/m x - 2 damping x' + (push gate + amplitude cos(phase) + table) / m,
+where m = weight / 2 is a derived constant.
 
 It has all the kinds of inputs, a derived constant, outputs of both shapes and a margin, and a closed-form solution.
 """

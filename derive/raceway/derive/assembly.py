@@ -60,8 +60,8 @@ def assemble(mechanism: Mechanism) -> Assembly:
     Raises
     ------
     LinkageError
-        wrong mobility; a driver that is not a revolute joint on the frame; bodies that no sequence of dyads reaches; a
-        branch that is missing, of the wrong kind, or set where it means nothing.
+        wrong mobility; a driver that is not a revolute joint on the frame; bodies that no sequence of dyads reaches, or
+        that the driver does not move; a branch that is missing, of the wrong kind, or set where it means nothing.
     """
     faults = [*_mobility_faults(mechanism), *_driver_faults(mechanism)]
     if faults:
@@ -75,9 +75,9 @@ def assemble(mechanism: Mechanism) -> Assembly:
     left_over = [b.name for b in mechanism.bodies if b.name not in placed]
     if left_over:
         raise LinkageError([_order_fault(mechanism, placed, left_over)])
-    branch_faults = _branch_faults(mechanism, groups)
-    if branch_faults:
-        raise LinkageError(branch_faults)
+    faults = [*_idle_faults(driven, groups), *_branch_faults(mechanism, groups)]
+    if faults:
+        raise LinkageError(faults)
     return Assembly(driver=driver, driven=driven, groups=tuple(groups))
 
 
@@ -188,6 +188,27 @@ def _order_fault(mechanism: Mechanism, placed: Sequence[str], left_over: Sequenc
         ),
         remedy="check the bodies named by each of these joints",
     )
+
+
+def _idle_faults(driven: str, groups: Sequence[Group]) -> list[Fault]:
+    """Dyads that hang on the frame alone: a truss, which the driver does not reach."""
+    faults, moving = [], [driven]
+    for group in groups:
+        if any(host in moving for host in group.hosts):
+            moving.extend(group.bodies)
+            continue
+        joints = _listed([group.outer[0].name, group.inner.name, group.outer[1].name])
+        faults.append(
+            Fault(
+                key="mechanism.joints",
+                problem=f"the driver does not move {group.bodies[0]} and {group.bodies[1]}: 6 unknowns and 6 equations "
+                f"of the joints {joints} fix them to the frame",
+                given=f"they hang on {group.hosts[0]} and {group.hosts[1]}",
+                allowed="bodies that a chain of joints links to the driven body",
+                remedy=f"hang one of them on {driven} or on a body that it moves",
+            )
+        )
+    return faults
 
 
 def _branch_faults(mechanism: Mechanism, groups: Sequence[Group]) -> list[Fault]:

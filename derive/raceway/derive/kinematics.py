@@ -131,8 +131,9 @@ class Ledger:
     def define(self, name: str, expression: sp.Expr, unit: str, description: str, latex: str) -> sp.Symbol:
         """Give the expression a name and return its symbol."""
         symbol = sp.Symbol(name, real=True)
+        sentence = description[0].upper() + description[1:]
         self._definitions.append(
-            Definition(symbol=symbol, expression=expression, unit=unit, description=description, latex=latex)
+            Definition(symbol=symbol, expression=expression, unit=unit, description=sentence, latex=latex)
         )
         return symbol
 
@@ -146,21 +147,19 @@ class Ledger:
     def name_motion(self, name: str, motion: Motion, words: str, mark: str) -> Motion:
         """Name position, velocity and acceleration of a point: ``name.x``, ``.y``, ``.vx`` ... ``.ay``."""
         return Motion(
-            position=self.name_pair(name, "", motion.position, "m", f"position of {words}", "{}", mark),
-            velocity=self.name_pair(name, "v", motion.velocity, "m/s", f"velocity of {words}", r"\dot{{{}}}", mark),
+            position=self.name_pair(name, "", motion.position, "m", f"position of {words}", f"AXIS_{{{mark}}}"),
+            velocity=self.name_pair(
+                name, "v", motion.velocity, "m/s", f"velocity of {words}", rf"\dot{{AXIS}}_{{{mark}}}"
+            ),
             acceleration=self.name_pair(
-                name, "a", motion.acceleration, "m/s^2", f"acceleration of {words}", r"\ddot{{{}}}", mark
+                name, "a", motion.acceleration, "m/s^2", f"acceleration of {words}", rf"\ddot{{AXIS}}_{{{mark}}}"
             ),
         )
 
-    def name_pair(
-        self, name: str, prefix: str, pair: Pair, unit: str, description: str, accent: str, mark: str
-    ) -> Pair:
-        """Name the components of a vector: ``name.<prefix>x`` and ``name.<prefix>y``."""
+    def name_pair(self, name: str, prefix: str, pair: Pair, unit: str, description: str, latex: str) -> Pair:
+        """Name the components of a vector: ``name.<prefix>x`` and ``name.<prefix>y``; AXIS in `latex` becomes x, y."""
         x, y = (
-            self.name(
-                f"{name}.{prefix}{axis}", value, unit, f"{axis} {description}", f"{accent.format(axis)}_{{{mark}}}"
-            )
+            self.name(f"{name}.{prefix}{axis}", value, unit, f"{axis} {description}", latex.replace("AXIS", axis))
             for axis, value in zip("xy", pair, strict=True)
         )
         return x, y
@@ -198,8 +197,7 @@ def place(
         mass_point.acceleration,
         "m/s^2",
         f"acceleration of the centre of mass of {body}",
-        r"\ddot{{{}}}",
-        f"o,{subscript(body)}",
+        rf"\ddot{{AXIS}}_{{o,{subscript(body)}}}",
     )
     return replace(
         bare,

@@ -13,7 +13,9 @@ from types import MappingProxyType
 import sympy as sp
 
 from raceway.derive.assembly import assemble, point_name
-from raceway.derive.dyads import Dyad, Margin, place_dyad
+from raceway.derive.dyad_rrp import place_rrp
+from raceway.derive.dyad_rrr import place_rrr
+from raceway.derive.dyads import Dyad, Margin
 from raceway.derive.errors import LinkageError
 from raceway.derive.kinematics import Ledger, Motion, Pair, Pose, body_point, frame_pose, place, subscript
 from raceway.derive.scene import FRAME, Joint, Mechanism
@@ -92,7 +94,7 @@ def derive_linkage(mechanism: Mechanism, angle: sp.Expr, speed: sp.Expr) -> Link
     poses[driven.body] = driven
     dyads, margins = [], []
     for group in assembly.groups:
-        placed = place_dyad(ledger, mechanism, group, poses)
+        placed = (place_rrr if group.kind == "RRR" else place_rrp)(ledger, mechanism, group, poses)
         for pose in placed.poses:
             poses[pose.body] = pose
         dyads.append(placed.dyad)

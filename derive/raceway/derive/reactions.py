@@ -226,7 +226,8 @@ class _Balance:
         gravity = self._mechanism.gravity
         weight = ZERO if gravity is None else components(gravity, axis=(0, -1))
         acceleration = self._linkage.poses[body].center_of_mass.acceleration
-        return scale(symbol_of(self._mechanism.body(body).mass), subtract(weight, acceleration))
+        mass = symbol_of(self._mechanism.body(body).mass)
+        return subtract(scale(mass, weight), scale(mass, acceleration))
 
     def _turning_inertia(self, body: str) -> sp.Expr:
         """Moment of inertia about the centre of mass times angular acceleration."""

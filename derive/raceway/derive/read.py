@@ -116,7 +116,7 @@ def _parse(text: str, source: str | None) -> dict[str, Any]:
         # tomllib raises ValueError itself for integers of more than 4300 digits.
         message = str(error) if isinstance(error, tomllib.TOMLDecodeError) else type(error).__name__
         place = re.search(r"\(at line (\d+), column (\d+)\)", message)
-        lines = text.splitlines()
+        lines = text.split("\n")
         line = int(place.group(1)) if place else max(len(lines), 1)
         fault = Fault(
             key="",
@@ -194,7 +194,7 @@ def _refuse_loads(root: Table, because: str) -> None:
 
 def _read_run(table: Table) -> tuple[Run, tuple[str, ...]]:
     with table as run:
-        run.know("cycles", "duration")
+        run.know("cycles", "duration", "transient_cycles", "samples_per_cycle", "method", "rtol", "outputs")
         both = [key for key in ("cycles", "duration") if key in run.data]
         if len(both) != 1 and not run.missing:
             run.fault(

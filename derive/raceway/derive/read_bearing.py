@@ -109,6 +109,8 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None) 
     `driven` is the driven body, None where there is no mechanism or the driver has a fault.
     """
     with table:
+        table.know("joint", "share", "balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle", "contact")
+        table.know("damping", "inner_ring", "outer_ring", "initial")
         joint, share = _read_place(table, mechanism, driven)
         support = _read_outer_ring(table)
         return Bearing(
@@ -150,7 +152,7 @@ def _read_place(table: Table, mechanism: Mechanism | None, driven: str | None) -
         return None, None
     share = table.quantity("share", "1", "Share of the joint's reaction that the bearing carries", "s", example="0.5")
     name = table.text("joint", mechanism.driver.joint or "A")
-    if not name:
+    if not name or not mechanism.joints:
         return name, share
     joint = next((joint for joint in mechanism.joints if joint.name == name), None)
     names = [joint.name for joint in mechanism.joints]

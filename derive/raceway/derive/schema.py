@@ -83,7 +83,7 @@ class Collector:
 
 def suggest(given: object, known: Sequence[str], otherwise: str) -> str:
     """Remedy that names the nearest of `known`."""
-    near = get_close_matches(str(given), known, n=3, cutoff=0.5)
+    near = get_close_matches(str(given)[:MAX_NAME], known, n=3, cutoff=0.5)
     if not near:
         return otherwise
     return "did you mean " + " or ".join(f'"{name}"' for name in near) + "?"
@@ -147,6 +147,7 @@ class Table:
 
     def report_unknown(self) -> None:
         """Note a fault for every key that was not asked for."""
+        absent = [key for key in self._known if key not in self.data]
         for key in self.data:
             if key not in self._known:
                 self.fault(
@@ -154,7 +155,7 @@ class Table:
                     "unknown key",
                     given=key,
                     allowed=listing(self._known),
-                    remedy=suggest(key, self._known, "delete it, or move it to the table it belongs to"),
+                    remedy=suggest(key, absent, "delete it, or move it to the table it belongs to"),
                 )
 
     def fault(self, key: str, problem: str, *, given: str = "", allowed: str = "", remedy: str) -> None:

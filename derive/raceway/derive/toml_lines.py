@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import islice
 
 _HEADER = re.compile(r"\s*(\[\[?)([^\[\]]*?)\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"""\s*((?:"[^"]*"|'[^']*'|[A-Za-z0-9_-]+)(?:\s*\.\s*(?:"[^"]*"|'[^']*'|[A-Za-z0-9_-]+))*)\s*=""")
+#: Keys of a dotted path that are indexed; no key of a scene lies deeper.
+_DEEPEST = 16
 _PART = re.compile(r""""([^"]*)"|'([^']*)'|([A-Za-z0-9_-]+)""")
 
 
@@ -34,7 +37,7 @@ def index_lines(text: str) -> LineIndex:
     elements: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
     state = _State()
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(text.split("\n"), start=1):
         if state.at_statement():
             header, key = _HEADER.match(line), _KEY.match(line)
             if header is not None:
@@ -55,7 +58,8 @@ def index_lines(text: str) -> LineIndex:
 
 
 def _parts(dotted: str) -> tuple[str, ...]:
-    return tuple(next(group for group in match.groups() if group is not None) for match in _PART.finditer(dotted))
+    parts = (next(group for group in match.groups() if group is not None) for match in _PART.finditer(dotted))
+    return tuple(islice(parts, _DEEPEST))
 
 
 def _element(path: tuple[str, ...], elements: dict[tuple[str, ...], int]) -> tuple[str, ...]:

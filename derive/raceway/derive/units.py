@@ -161,19 +161,24 @@ def parse_quantity(given: object, unit: str) -> float:
 def show(given: object, limit: int = 60) -> str:
     """What stands in the file, as people would write it, shortened to `limit` characters."""
     if isinstance(given, str):
-        text = f'"{given}"'
+        text = f'"{given[:limit]}"'
     elif isinstance(given, bool):
         text = "true" if given else "false"
     elif isinstance(given, int) and given.bit_length() > 256:
         text = "an integer of more than 77 digits"
     elif isinstance(given, dict):
-        text = "{ " + ", ".join(f"{key} = {show(value, 20)}" for key, value in list(given.items())[:6]) + " }"
+        text = "{ " + ", ".join(f"{key} = {_show_inner(value)}" for key, value in list(given.items())[:6]) + " }"
     elif isinstance(given, list):
-        text = "[" + ", ".join(show(value, 20) for value in given[:6]) + ("]" if len(given) <= 6 else ", ...]")
+        text = "[" + ", ".join(_show_inner(value) for value in given[:6]) + ("]" if len(given) <= 6 else ", ...]")
     else:
         text = str(given)
     text = "".join(character if character.isprintable() else "?" for character in text)
     return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def _show_inner(given: object) -> str:
+    """What stands inside a list or table; the depth of a file's tables has no bound, that of a message has."""
+    return "..." if isinstance(given, dict | list) else show(given, 20)
 
 
 @lru_cache(maxsize=512)
@@ -212,6 +217,8 @@ class _UnitReader:
     def read(self) -> UnitSize:
         if not self.tokens:
             return UnitSize(exact=Fraction(1), rounded=1.0, base=())
+        if self._peek() == "over":  # "250 /s"
+            self.tokens.insert(0, ("number", "1"))
         size = self._product()
         if self.index != len(self.tokens):
             raise self._misplaced()
@@ -225,7 +232,8 @@ class _UnitReader:
         return self.tokens[self.index - 1][1]
 
     def _misplaced(self) -> _GrammarError:
-        if self._peek() in ("sign", "power") or (self._peek() == "number" and self.index > 0):
+        first = self.index == 0
+        if self._peek() in ("sign", "power", *(("times",) if first else ("number",))):
             return _GrammarError(
                 f"{show(self.tokens[self.index][1])} makes this a computation, which is not done here",
                 "write the result: one number and its unit",

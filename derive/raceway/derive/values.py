@@ -150,7 +150,7 @@ def _unknown_path(path: str, known: Sequence[str]) -> Fault:
             allowed="paths of quantities",
             remedy="change it in the scene file" + ("" if path.startswith("run.") else " and derive the model again"),
         )
-    near = get_close_matches(path, known, n=3, cutoff=0.5)
+    near = get_close_matches(path[:200], known, n=3, cutoff=0.5)
     last = path.rpartition(".")[2]
     near += [name for name in known if name.rpartition(".")[2] == last and name not in near][: 3 - len(near)]
     return Fault(

@@ -9,7 +9,7 @@ import numpy as np
 
 from raceway.runtime import clock
 from raceway.runtime.errors import RequestError
-from raceway.runtime.kernel import Kernel, evaluate_many
+from raceway.runtime.kernel import Kernel
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -33,8 +33,7 @@ def check_assembly(model: Model, numbers: Numbers) -> None:
     turn = clock.period(model.manifest, numbers.values)
     times = turn * np.arange(ANGLES) / ANGLES if math.isfinite(turn) else np.zeros(1)
     fixed = {"u": clock.inputs_at(model.manifest.inputs, numbers.values, 0.0), "p": numbers.p, "c": numbers.c}
-    function = model.function("assembly")
-    (margins,) = evaluate_many(function, len(times), {"t": times}, fixed).values()
+    (margins,) = model.loop("assembly", ("t",))(len(times), {"t": times, **fixed}).values()
     kernel = model.kernel("assembly")
     faults = []
     for row, info in enumerate(mechanism.margins):

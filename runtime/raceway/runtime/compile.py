@@ -100,8 +100,8 @@ def compile_model(folder: str | Path, manifest: Manifest, compiler: str | None =
     found = find_compiler(compiler)
     if found is None:
         warnings.warn(
-            "No C compiler was found ($CC, cc, gcc, clang, ziglang): the model runs in CasADi's virtual machine. Results "
-            "are the same; a simulation takes about five times as long. Install gcc or clang, or "
+            "No C compiler was found ($CC, cc, gcc, clang, ziglang): the model runs in CasADi's virtual machine. "
+            "Results are the same; a simulation takes five to eight times as long. Install gcc or clang, or "
             "`pip install raceway[compiler]` for a compiler from PyPI.",
             NoCompilerWarning,
             stacklevel=3,
@@ -115,7 +115,7 @@ def find_compiler(command: str | None = None) -> Compiler | None:
 
     Parameters
     ----------
-    command : a command with or without arguments, used as it is.  Default: $CC, else the first of cc, gcc, clang, ziglang
+    command : a command, with arguments or without.  Default: $CC, else the first of cc, gcc, clang, ziglang
 
     Raises
     ------
@@ -216,7 +216,7 @@ def _describe(command: tuple[str, ...]) -> Compiler:
 
 
 def _ask(command: tuple[str, ...]) -> subprocess.CompletedProcess[str] | None:
-    """Answer of a short command, None where it cannot run; a compiler that is broken fails, loudly, when it compiles."""
+    """Answer of a short command, None where it cannot run: a broken compiler fails, loudly, when it compiles."""
     try:
         return subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=60.0, check=False)
     except (OSError, subprocess.TimeoutExpired):
@@ -281,7 +281,7 @@ def _processor() -> str:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return platform.processor()
-    facts = {}
+    facts: dict[str, str] = {}
     for line in lines:
         label, _, value = line.partition(":")
         if label.strip() in ("model name", "flags", "Features", "CPU part", "isa"):

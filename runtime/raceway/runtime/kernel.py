@@ -1,15 +1,19 @@
 """Calling generated functions without CasADi's price per call.
 
-A call through Python costs 30 microseconds; through a buffer, on memory given once, a few.  A `Kernel` owns that memory.
+A call through Python costs 30 microseconds; through a buffer, on memory given once, a few.  A `Kernel` owns that
+memory; a `Loop` does the same for many points at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import casadi
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 #: Samples that one compiled loop takes: few enough for the cache, many enough for the price of a call to vanish.
 BLOCK = 256
@@ -31,27 +35,28 @@ class Kernel:
 
     def __init__(self, function: casadi.Function) -> None:
         self.function = function
-        self._buffer, self._evaluate = function.buffer()
-        self._inputs = {}
-        self._outputs = {}
-        self._patterns = {}
+        buffer: Any = function.buffer()
+        self._buffer, self._evaluate = buffer
+        self._inputs: dict[str, Array] = {}
+        self._outputs: dict[str, Array] = {}
+        self._patterns: dict[str, tuple[tuple[int, int], tuple[Array, Array] | None]] = {}
         for k, name in enumerate(function.name_in()):
             memory = np.zeros(function.nnz_in(k))
             if function.size_in(k)[0] * function.size_in(k)[1] != memory.size:
                 raise TypeError(f"{function.name()}: input {name!r} is sparse; a dense one is expected")
             self._inputs[name] = memory
             if memory.size:
-                self._buffer.set_arg(k, memoryview(memory))
+                self._buffer.set_arg(k, memory.data)
         for k, name in enumerate(function.name_out()):
             sparsity = function.sparsity_out(k)
             memory = np.zeros(sparsity.nnz())
             self._outputs[name] = memory
             if memory.size:
-                self._buffer.set_res(k, memoryview(memory))
+                self._buffer.set_res(k, memory.data)
             self._patterns[name] = (sparsity.shape, None if sparsity.is_dense() else _positions(sparsity))
 
-    def __call__(self, values: Mapping[str, Any]) -> np.ndarray:
-        """First output for the inputs in `values` (other keys are ignored); an own copy, shape (rows,) or (rows, columns)."""
+    def __call__(self, values: Mapping[str, Any]) -> Array:
+        """First output for the inputs in `values`; a copy, (rows,) or (rows, columns).  Other keys are ignored."""
         self.run(values)
         return self.output(next(iter(self._outputs)))
 
@@ -70,7 +75,7 @@ class Kernel:
         if self._buffer.ret():
             raise EvaluationError(f"{self.function.name()} reported failure")
 
-    def output(self, name: str) -> np.ndarray:
+    def output(self, name: str) -> Array:
         """Copy of an output of the last evaluation, dense; a single column loses its second dimension."""
         memory = self._outputs[name]
         shape, positions = self._patterns[name]
@@ -82,44 +87,72 @@ class Kernel:
         return dense[:, 0] if shape[1] == 1 else dense
 
 
-def evaluate_many(
-    function: casadi.Function, count: int, varying: Mapping[str, np.ndarray], fixed: Mapping[str, Any]
-) -> dict[str, np.ndarray]:
-    """Evaluate `function` at `count` points in compiled loops of `BLOCK`.
+class Loop:
+    """One generated function at many points, in compiled loops of `BLOCK`, on fixed memory.
 
-    Parameters
+    Attributes
     ----------
-    function : a function of t, x, u, p, c or some of them
-    count : number of points
-    varying : inputs that change, each of shape (count,) or (count, rows)
-    fixed : inputs that do not
-
-    Returns
-    -------
-    dict from output name to array, shape (count, rows)
+    function : the CasADi function of one point
     """
-    names = function.name_in()
-    results: dict[str, list[np.ndarray]] = {name: [] for name in function.name_out()}
-    loop = function.map(function.name() + "_block", "serial", BLOCK, [k for k, n in enumerate(names) if n in fixed], [])
-    for first in range(0, count, BLOCK):
-        size = min(BLOCK, count - first)
-        arguments = []
-        for name in names:
-            if name in varying:
-                part = np.asarray(varying[name], dtype=float)[first : first + size].reshape(size, -1)
-                # the last block is filled up with its last point
-                arguments.append(np.concatenate([part, np.repeat(part[-1:], BLOCK - size, axis=0)]).T)
-            else:
-                arguments.append(np.asarray(fixed[name], dtype=float))
-        for name, value in zip(results, loop.call([casadi.DM(a) for a in arguments]), strict=True):
-            rows = function.size1_out(name)
-            results[name].append(np.asarray(value.full()).reshape(rows, BLOCK).T[:size])
-    return {
-        name: np.concatenate(parts) if parts else np.zeros((0, function.size1_out(name)))
-        for name, parts in results.items()
-    }
+
+    def __init__(self, function: casadi.Function, varying: Collection[str]) -> None:
+        """`varying` names the inputs that change from point to point."""
+        self.function = function
+        names = function.name_in()
+        self._varying = [name for name in names if name in varying]
+        fixed = [k for k, name in enumerate(names) if name not in varying]
+        block = function.map(f"{function.name()}_block", "serial", BLOCK, fixed, [])
+        buffer: Any = block.buffer()
+        self._buffer, self._evaluate = buffer
+        self._inputs: dict[str, Array] = {}
+        self._outputs: dict[str, Array] = {}
+        # columns of CasADi's matrices are points: rows of NumPy's
+        for k, name in enumerate(names):
+            memory = np.zeros((BLOCK if name in varying else 1, function.size1_in(k)))
+            if block.nnz_in(k) != memory.size:
+                raise TypeError(f"{function.name()}: input {name!r} is sparse; a dense one is expected")
+            self._inputs[name] = memory
+            if memory.size:
+                self._buffer.set_arg(k, memory.reshape(-1).data)
+        for k, name in enumerate(function.name_out()):
+            if not function.sparsity_out(k).is_dense():
+                raise TypeError(f"{function.name()}: output {name!r} is sparse; a dense one is expected")
+            memory = np.zeros((BLOCK, function.size1_out(k)))
+            self._outputs[name] = memory
+            if memory.size:
+                self._buffer.set_res(k, memory.reshape(-1).data)
+
+    def __call__(self, count: int, values: Mapping[str, Any]) -> dict[str, Array]:
+        """Outputs at `count` points.
+
+        Parameters
+        ----------
+        count : number of points
+        values : inputs by name; those that vary of shape (count,) or (count, rows), the others of shape (rows,);
+            further keys are ignored
+
+        Returns
+        -------
+        dict from output name to array, shape (count, rows)
+        """
+        results = {name: np.empty((count, memory.shape[1])) for name, memory in self._outputs.items()}
+        for name, memory in self._inputs.items():
+            if name not in self._varying:
+                memory[0] = values[name]
+        for first in range(0, count, BLOCK):
+            size = min(BLOCK, count - first)
+            for name in self._varying:
+                memory = self._inputs[name]
+                memory[:size] = np.asarray(values[name])[first : first + size].reshape(size, -1)
+                memory[size:] = memory[size - 1]  # the last block is filled up with its last point
+            self._evaluate()
+            if self._buffer.ret():
+                raise EvaluationError(f"{self.function.name()} reported failure")
+            for name, memory in self._outputs.items():
+                results[name][first : first + size] = memory[:size]
+        return results
 
 
-def _positions(sparsity: casadi.Sparsity) -> tuple[np.ndarray, np.ndarray]:
+def _positions(sparsity: casadi.Sparsity) -> tuple[Array, Array]:
     rows, columns = sparsity.get_triplet()
     return np.array(rows, dtype=int), np.array(columns, dtype=int)

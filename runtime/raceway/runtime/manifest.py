@@ -62,11 +62,12 @@ class VariableInfo:
 class InputInfo:
     """A quantity the driver holds constant between breakpoints.
 
-    kind ``phase``: the angle ``offset + rate * t_ref`` [rad] at the reference time; `offset` names a parameter, `rate` a
-    parameter or derived constant [rad/s].
-    kind ``gate``: 1 while ``offset + rate * t`` modulo a turn lies in one of `windows` (pairs of parameter names), else 0.
-    kind ``table``: value at the reference time of the piecewise linear table with the knots `times` and `values` (names of
-    parameters); kind ``table_rate``: its slope there.
+    kind ``phase``: the angle ``offset + rate * t_ref`` [rad] at the reference time; `offset` names a parameter, `rate`
+    a parameter or derived constant [rad/s].
+    kind ``gate``: 1 while ``offset + rate * t`` modulo a turn lies in one of `windows` (pairs of parameter names),
+    else 0.
+    kind ``table``: value at the reference time of the piecewise linear table with the knots `times` and `values`
+    (names of parameters); kind ``table_rate``: its slope there.
     """
 
     name: str

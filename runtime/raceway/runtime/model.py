@@ -15,7 +15,7 @@ from raceway.runtime.assembly import check_assembly
 from raceway.runtime.compile import CompiledLibrary, compile_model
 from raceway.runtime.errors import ArtefactError, CompileError, RequestError
 from raceway.runtime.integrators import available_methods, make_integrator
-from raceway.runtime.kernel import Kernel
+from raceway.runtime.kernel import Kernel, Loop
 from raceway.runtime.manifest import Manifest, check_files, read_manifest
 from raceway.runtime.parameters import Parameters, resolve_parameters, unknown_name
 from raceway.runtime.peaks import Peak, refine_peak
@@ -72,6 +72,7 @@ class Model:
         self._folder = folder
         self._functions: dict[str, casadi.Function] = {}
         self._kernels: dict[str, Kernel] = {}
+        self._loops: dict[tuple[str, tuple[str, ...]], Loop] = {}
         self._symbolic: dict[str, casadi.Function] = {}
 
     def __repr__(self) -> str:
@@ -127,6 +128,12 @@ class Model:
         if name not in self._kernels:
             self._kernels[name] = Kernel(self.function(name))
         return self._kernels[name]
+
+    def loop(self, name: str, varying: tuple[str, ...]) -> Loop:
+        """Function by name for many points at once; `varying` names the inputs that change between them."""
+        if (name, varying) not in self._loops:
+            self._loops[name, varying] = Loop(self.function(name), varying)
+        return self._loops[name, varying]
 
     def symbolic(self, name: str) -> casadi.Function:
         """CasADi function by name as an expression graph, which can be differentiated further."""
@@ -300,8 +307,8 @@ class Model:
         Parameters
         ----------
         of : "rhs"
-        wrt : "states", "time", the name of a parameter, or several names.  Derivatives along parameters are total: through
-            the derived constants, the phases and the tables as well.  Gates are flat (they jump at their edges).
+        wrt : "states", "time", the name of a parameter, or several names.  Derivatives along parameters are total:
+            through the derived constants, the phases and the tables as well.  Gates are flat (they jump at edges).
         t : time [s]
         x : state.  Default: the initial one
         parameters : overrides, SI
@@ -382,7 +389,8 @@ class Model:
             function = casadi.external(name, str(self.library.path))
         except RuntimeError as fault:
             raise CompileError(
-                f"{self.library.path}: function {name!r} cannot be loaded. Delete this file, and it is compiled anew.\n{fault}"
+                f"{self.library.path}: function {name!r} cannot be loaded. "
+                f"Delete this file, and it is compiled anew.\n{fault}"
             ) from fault
         _check_signature(function, self.manifest)
         return function

@@ -6,6 +6,7 @@ In: plain numpy arrays in SI.  Out: numbers, arrays and small frozen records in 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,7 +62,8 @@ def kinematic_frequencies(
     """
     if balls < 1 or not 0.0 < ball_diameter < pitch_diameter or not np.isfinite(speed):
         raise RequestError(
-            f"balls {balls!r}, ball_diameter {ball_diameter!r} m, pitch_diameter {pitch_diameter!r} m, speed {speed!r} rad/s; "
+            f"balls {balls!r}, ball_diameter {ball_diameter!r} m, pitch_diameter {pitch_diameter!r} m, "
+            f"speed {speed!r} rad/s; "
             "allowed: balls >= 1, 0 < ball_diameter < pitch_diameter, finite speed"
         )
     shaft = abs(speed) / (2.0 * np.pi)
@@ -98,8 +100,8 @@ def ball_angles(t: ArrayLike, *, balls: int, cage_speed: float, ball_angle: floa
 def turns(t: ArrayLike, cycle_length: float) -> tuple[slice, ...]:
     """Whole turns of a record, the last one ending at the record's end.
 
-    Each slice holds both end samples of its turn, so that neighbours share one; where a turn is not a whole number of steps, its ends
-    are the samples next to it.
+    Each slice holds both end samples of its turn, so that neighbours share one; where a turn is not a whole number of
+    steps, its ends are the samples next to it.
 
     Parameters
     ----------
@@ -115,7 +117,7 @@ def turns(t: ArrayLike, cycle_length: float) -> tuple[slice, ...]:
     count = int(np.floor((time[-1] - time[0]) / cycle_length + _TURN_TOLERANCE))
     ends = time[-1] - cycle_length * np.arange(count, -1, -1)
     index = [int(np.argmin(np.abs(time - end))) for end in ends]
-    return tuple(slice(first, last + 1) for first, last in zip(index[:-1], index[1:], strict=True))
+    return tuple(slice(first, last + 1) for first, last in pairwise(index))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,8 +181,8 @@ def stroboscopic_points(
 ) -> StroboscopicPoints:
     """Stroboscopic (Poincaré) points: the state at the times ``offset + k * cycle_length`` inside the record.
 
-    Between samples the position is the cubic with the given positions and velocities at both ends (Hermite), and the velocity is its
-    derivative; at a sample both are the sample.
+    Between samples the position is the cubic with the given positions and velocities at both ends (Hermite), and the
+    velocity is its derivative; at a sample both are the sample.
 
     Parameters
     ----------
@@ -249,8 +251,9 @@ def orbits(t: ArrayLike, x: ArrayLike, y: ArrayLike, *, cycle_length: float) -> 
 def drive_work(t: ArrayLike, torque: ArrayLike, *, speed: float, cycle_length: float, steps: ArrayLike = ()) -> Array:
     """Work of the drive in each whole turn, the integral of M_d d(theta) [J].
 
-    Trapezoidal rule.  Where the torque steps, it is continued in a straight line from both sides up to the step: second order with
-    loads that act within windows as well.  Of a step not named in `steps`, up to half times the angle of a sampling step is lost.
+    Trapezoidal rule.  Where the torque steps, it is continued in a straight line from both sides up to the step: second
+    order with loads that act within windows as well.  A step not named in `steps` costs up to half of it times the
+    angle of a sampling step.
 
     Parameters
     ----------
@@ -292,7 +295,8 @@ def _like(time: Array, signal: ArrayLike, name: str) -> Array:
     values = np.asarray(signal, dtype=float)
     if values.shape != time.shape:
         raise RequestError(
-            f"{name} has shape {values.shape}, t {time.shape}; allowed: equal; take one column of an output that has one per ball"
+            f"{name} has shape {values.shape}, t {time.shape}; allowed: equal; "
+            "take one column of an output that has one per ball"
         )
     return values
 

@@ -1,7 +1,7 @@
 """The true peak of an output, between the samples.
 
-Ball forces have spikes narrower than a sample interval; samples alone read them low.  Around the largest samples the model
-is integrated once more on a grid 64 times as fine, from the sampled states.
+Ball forces have spikes narrower than a sample interval; samples alone read them low.  Around the largest samples the
+model is integrated once more on a grid 64 times as fine, from the sampled states.
 """
 
 from __future__ import annotations
@@ -72,12 +72,11 @@ def refine_peak(
         raise RequestError(f"A peak needs three samples at least; the solution has {len(solution)}.")
     sign = 1.0 if kind == "max" else -1.0
     samples = sign * solution[name].reshape(len(solution), -1)
-    k, ball = np.unravel_index(int(np.argmax(samples)), samples.shape)
-    best = (float(samples[k, ball]), float(solution.t[k]), int(ball))
+    k, column = divmod(int(np.argmax(samples)), samples.shape[1])
+    best = (float(samples[k, column]), float(solution.t[k]), column)
     sampled = sign * best[0]
     for k in _tops(samples, candidates):
-        found = _closely(model, numbers, solution, name, sign, k)
-        best = max(best, found)
+        best = max(best, _closely(model, numbers, solution, name, sign, k))
     value, time, ball = best
     several = solution[name].ndim == 2
     return Peak(value=sign * value, time=time, ball=ball + 1 if several else None, sampled=sampled)
@@ -113,5 +112,5 @@ def _closely(
             "Is the solution one of this model?"
         ) from end_of_run
     fine = sign * evaluate_outputs(model, numbers, trajectory)[name].reshape(count + 1, -1)
-    row, ball = np.unravel_index(int(np.argmax(fine)), fine.shape)
-    return float(fine[row, ball]), float(times[row]), int(ball)
+    row, column = divmod(int(np.argmax(fine)), fine.shape[1])
+    return float(fine[row, column]), float(times[row]), column

@@ -116,8 +116,8 @@ def amplitude_spectrum(
 
     Notes
     -----
-    Amplitude of line k: ``2 |X_k| / sum(w)``, at half the sampling rate ``|X_k| / sum(w)``; X the discrete Fourier transform
-    of w (signal - mean), the mean being weighted with w so that nothing of it is left at zero frequency.
+    Amplitude of line k: ``2 |X_k| / sum(w)``, at half the sampling rate ``|X_k| / sum(w)``; X the discrete Fourier
+    transform of w (signal - mean), the mean being weighted with w so that nothing of it is left at zero frequency.
     """
     if window not in get_args(Window):
         raise RequestError(f"window is {window!r}; allowed: {', '.join(get_args(Window))}")

@@ -2,8 +2,9 @@
 
 In: a `Model` and its `Solution`.  Out: a dict; every number stands in an object with its ``unit``.
 
-Extremes and means are those of the steady samples, transient cycles dropped.  Extremes are of samples: a spike between two of
-them is missed.  ``rms`` is the plain root mean square; ``std`` that of the deviation from the mean.
+Only steady cycles count, transient ones are dropped.  Extremes of forces and torques are looked for between the samples
+as well; those of motions are of samples.  ``rms`` is the plain root mean square; ``std`` that of the deviation from the
+mean.
 """
 
 from __future__ import annotations
@@ -12,9 +13,10 @@ import platform
 from collections.abc import Mapping
 from importlib.metadata import version
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from rich import box
 from rich.table import Table
 
 from raceway.runtime.clock import breakpoints
@@ -51,7 +53,7 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     ``drive_work``
         work of the drive in a turn, mean over the steady turns: ``{"value": , "unit": "J"}``
     ``peak_ball_force``
-        highest sample of any ball: ``{"elastic": , "total": , "unit": "N"}``
+        highest force of any ball, also between samples: ``{"elastic": , "total": , "unit": "N"}``
     ``inner.x`` and other motions of the rings
         ``{"min": , "max": , "mean": , "rms": , "std": , "unit": }``
     ``k_b`` and other derived constants
@@ -84,23 +86,22 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     if steady.cycle_length is not None:
         summary["cycle_length"] = _value(steady.cycle_length, "s", "cycle_length")
         summary["steady_cycles"] = _value((steady.t[-1] - steady.t[0]) / steady.cycle_length, "1", "steady_cycles")
-    summary |= _forces(steady)
-    summary |= _balls(steady)
+    summary |= _forces(model, steady)
+    summary |= _balls(model, steady)
     summary |= _motions(steady)
     summary |= _constants(steady)
     summary["versions"] = _versions(steady)
     return summary
 
 
-def _forces(sol: Solution) -> dict[str, Any]:
+def _forces(model: Model, sol: Solution) -> dict[str, Any]:
     """Extremes of reactions, load and drive torque; the work of the drive."""
     found: dict[str, Any] = {}
     for info in sol.manifest.outputs:
         if info.name.startswith(("reaction.", "load.")) or info.name == "drive_torque":
-            signal = sol[info.name]
             found[info.name] = {
-                "min": _finite(np.min(signal), info.name),
-                "max": _finite(np.max(signal), info.name),
+                "min": _extreme(model, sol, info.name, "min"),
+                "max": _extreme(model, sol, info.name, "max"),
                 "unit": info.unit,
             }
     mechanism = sol.manifest.mechanism
@@ -118,9 +119,14 @@ def _forces(sol: Solution) -> dict[str, Any]:
     return found
 
 
-def _balls(sol: Solution) -> dict[str, Any]:
+def _extreme(model: Model, sol: Solution, name: str, kind: Literal["min", "max"]) -> float:
+    # samples miss what a load's step and a contact's spike do between them
+    return _finite(model.refine_peak(sol, name, kind=kind).value, name)
+
+
+def _balls(model: Model, sol: Solution) -> dict[str, Any]:
     peaks = {
-        key: _finite(np.max(sol[name]), name)
+        key: _extreme(model, sol, name, "max")
         for key, name in (("elastic", "ball.elastic_force"), ("total", "ball.force"))
         if name in sol.outputs
     }
@@ -179,15 +185,16 @@ def _versions(sol: Solution) -> dict[str, Any]:
     return {"generated_with": dict(sol.manifest.versions), "run_with": running}
 
 
-def _value(value: float, unit: str, name: str) -> dict[str, Any]:
+def _value(value: float | np.floating[Any], unit: str, name: str) -> dict[str, Any]:
     return {"value": _finite(value, name), "unit": unit}
 
 
-def _finite(value: float, name: str) -> float:
+def _finite(value: float | np.floating[Any], name: str) -> float:
     number = float(value)
     if not isfinite(number):
         raise SimulationError(
-            f"{name} holds {number}; allowed: finite values; the run diverged or a parameter is out of range: check the scene"
+            f"{name} holds {number}; allowed: finite values; the run diverged or a parameter is out of range: "
+            "check the scene"
         )
     return number
 
@@ -200,9 +207,10 @@ _RUN = {
     "rtol": "rtol {}",
     "steps": "{} steps",
     "wall_time": "{} s wall time",
+    "cycle_length": "cycle {} s",
     "transient_cycles_dropped": "{} transient cycles dropped",
-    "steady_cycles": "{} steady",
-    "samples": "{} samples",
+    "steady_cycles": "{} steady ones",
+    "samples": "{} steady samples",
 }
 
 
@@ -220,6 +228,8 @@ def render_summary(summary: Mapping[str, Any]) -> Table:
         title_justify="left",
         caption_justify="left",
         header_style="bold",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
     )
     table.add_column("quantity", no_wrap=True)
     for key in columns:
@@ -229,22 +239,22 @@ def render_summary(summary: Mapping[str, Any]) -> Table:
         if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
             continue
         factor, unit = _TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
-        cells = [f"{factor * item[key]:.5g}" if key in item else "" for key in columns]
+        cells = [f"{factor * item[key]:.4g}" if key in item else "" for key in columns]
         if any(cells):
             table.add_row(name, *cells, unit)
         for key, value in item.items():
             if key not in _COLUMNS and key != "unit":
                 # a named part of a quantity, as the peak's elastic one
-                table.add_row(f"{name}.{key}", f"{factor * value:.5g}", "", "", "", unit)
+                table.add_row(f"{name}.{key}", f"{factor * value:.4g}", "", "", "", unit)
     return table
 
 
 def _caption(summary: Mapping[str, Any]) -> str:
     run = [
-        words.format("untold" if summary[key]["value"] is None else f"{summary[key]['value']:g}")
+        words.format(f"{summary[key]['value']:.4g}")
         for key, words in _RUN.items()
-        if key in summary
+        if key in summary and summary[key]["value"] is not None
     ]
     law = [f"damping law {summary['damping_law']}"] if "damping_law" in summary else []
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
-    return f"{', '.join(run + law)}.\nExtremes are of steady samples. {', '.join(tools)}."
+    return f"{', '.join(run + law)}.\n{', '.join(tools)}."

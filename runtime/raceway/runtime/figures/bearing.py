@@ -59,7 +59,13 @@ def draw_bearing(axes: Axes, record: Record, sample: int) -> float:
         bright = float(np.dot(colour[:3], (0.2126, 0.7152, 0.0722))) > 0.45
         axes.text(
             centre[0],
-            centre[1], str(number), ha="center", va="center", fontsize=8.5, color="black" if bright else "white", zorder=4
+            centre[1],
+            str(number),
+            ha="center",
+            va="center",
+            fontsize=8.5,
+            color="black" if bright else "white",
+            zorder=4,
         )
         if load > 0.02 * highest:
             place = (outer_raceway + wall + 0.42 * ball) * direction + outer
@@ -71,7 +77,9 @@ def draw_bearing(axes: Axes, record: Record, sample: int) -> float:
     axes.set_aspect("equal")
     axes.axis("off")
     assert axes.figure is not None  # the axes were made by a figure
-    bar = axes.figure.colorbar(ScalarMappable(scale, _LOAD_COLOURS), ax=axes, shrink=0.6, pad=0.01, aspect=25)
+    bar = axes.figure.colorbar(
+        ScalarMappable(scale, _LOAD_COLOURS), ax=axes, shrink=0.6, pad=0.01, aspect=25, panchor=False
+    )
     bar.set_label("contact load [N]", fontsize=9)
     return factor
 
@@ -98,9 +106,10 @@ def _exaggeration(shown: float, actual: float) -> float:
 
 
 def _draw_load(axes: Axes, record: Record, sample: int, centre: Array, length: float) -> None:
-    if not record.has("load.x", "load.y"):
+    loads = record.ring_load()
+    if loads is None:
         return
-    load = np.array([record.solution["load.x"][sample], record.solution["load.y"][sample]])
+    load = loads[sample]
     size = float(np.hypot(*load))
     if size == 0.0:
         return
@@ -111,16 +120,16 @@ def _draw_load(axes: Axes, record: Record, sample: int, centre: Array, length: f
         xytext=tuple(start),
         arrowprops={"arrowstyle": "-|>", "color": SIGNAL, "linewidth": 3, "mutation_scale": 20},
     )
-    across = np.array([load[1], -load[0]]) / size
-    side = across if across[0] > 0.0 else -across
-    upright = abs(load[1]) >= abs(load[0])
-    place = centre + (0.12 * length * side if upright else 0.25 * length * np.array([0.0, 1.0]))
+    # beside the arrow, as far as the words' half width and half height ask for
+    normal = np.array([load[1], -load[0]]) / size
+    normal = normal if normal[0] > 0.0 else -normal
+    place = centre + (0.38 * abs(normal[0]) + 0.2 * abs(normal[1]) + 0.06) * length * normal
     axes.text(
         place[0],
         place[1],
-        f"load\n{_newton(size)}" if upright else f"load {_newton(size)}",
-        ha="left" if upright else "center",
-        va="center" if upright else "bottom",
+        f"load\n{_newton(size)}",
+        ha="center",
+        va="center",
         fontsize=9,
         color=SIGNAL,
         fontweight="bold",

@@ -76,7 +76,7 @@ def new_figure(height: float) -> Figure:
 def caption(figure: Figure, title: str, text: str) -> None:
     """Title above, caption below, both inside the layout."""
     figure.suptitle(title, x=0.012, ha="left", fontsize=12, fontweight="bold")
-    wrapped = "\n".join(textwrap.wrap(text, 128))
+    wrapped = "\n".join(textwrap.wrap(text, 124, break_on_hyphens=False))
     figure.supxlabel(wrapped, x=0.012, ha="left", fontsize=8, color="#495057")
 
 

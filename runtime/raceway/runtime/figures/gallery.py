@@ -35,8 +35,7 @@ class FigureKind:
 def _load_curve_possible(record: Record) -> bool:
     if record.manifest.mechanism is None or not record.turns:
         return False
-    on_ring = record.manifest.bearing is not None and record.has("load.x", "load.y")
-    return on_ring or bool(loads.reaction_joints(record))
+    return record.ring_load() is not None or bool(loads.reaction_joints(record))
 
 
 def _spectra_possible(record: Record) -> bool:
@@ -94,19 +93,21 @@ def draw(name: str, model: Model, solution: Solution) -> Figure:
     kinds = {kind.name: kind for kind in FIGURES}
     if name not in kinds:
         raise RequestError(f"figure {name!r} does not exist; allowed: {', '.join(kinds)}")
-    record = gather(model, solution)
-    if not kinds[name].possible(record):
+    kind, record = kinds[name], gather(model, solution)
+    if not kind.possible(record):
         raise RequestError(
-            f"figure {name!r} ({kinds[name].description}) cannot be drawn of this run: it lacks the outputs or a whole steady turn; "
-            f"outputs of this run: {', '.join(info.name for info in record.manifest.outputs)}; ask for more in run.outputs of the scene"
+            f"figure {name!r} ({kind.description}) cannot be drawn of this run: it lacks the outputs or a whole steady "
+            f"turn; its outputs are {', '.join(info.name for info in record.manifest.outputs)}; "
+            "ask for more in run.outputs of the scene, or for more cycles"
         )
-    return kinds[name].draw(record)
+    return kind.draw(record)
 
 
 def draw_all(model: Model, solution: Solution, folder: Path) -> list[Path]:
     """Write every figure for which the outputs exist, as PNG, into `folder`.
 
-    Left out are figures whose outputs were not asked for, and, for a steady part shorter than a turn, load curve and spectra.
+    Left out are figures whose outputs were not asked for, and, for a steady part shorter than a turn, load curve and
+    spectra.
 
     Returns
     -------

@@ -35,7 +35,7 @@ def reaction_joints(record: Record) -> tuple[str, ...]:
 def load_curve(record: Record) -> Figure:
     """Joint reactions, load on the inner ring and drive torque over the crank angle of the last turn."""
     joints = reaction_joints(record)
-    with_load = record.manifest.bearing is not None and record.has("load.x", "load.y")
+    ring_load = record.ring_load()
     with_torque = record.has("drive_torque")
     if not joints:
         joints = ("",)  # only the load on the ring was asked for
@@ -56,8 +56,8 @@ def load_curve(record: Record) -> Figure:
                     FIRST,
                     f"force of {second} on {first}",
                 )
-            if with_load and row == 0:
-                _curve(axes, angle, record.solution[f"load.{axis}"][order], SECOND, "load on the inner ring")
+            if ring_load is not None and row == 0:
+                _curve(axes, angle, ring_load[order, column], SECOND, "load on the inner ring")
             axes.set_title(f"{axis} at joint {joint}" if joint else f"{axis}")
             axes.set_ylabel(f"force along {axis} [N]")
             panels.append(axes)
@@ -79,8 +79,7 @@ def load_curve(record: Record) -> Figure:
     for axes in panels[-1:] if with_torque else panels[-2:]:
         axes.set_xlabel("crank angle [°]")
     handles, labels = panels[0].get_legend_handles_labels()
-    if handles:
-        panels[0].legend(handles, labels, loc="best")
+    figure.legend(handles, labels, loc="upper right", ncols=2, bbox_to_anchor=(0.995, 0.995))
     shaded = " Shaded: an applied load acts." if windows else ""
     caption(
         figure,
@@ -91,7 +90,7 @@ def load_curve(record: Record) -> Figure:
 
 
 def _last_turn(record: Record) -> tuple[Array, Array]:
-    """Crank angles of the last turn in increasing order, within a turn [deg], and the samples' indices in that order."""
+    """Crank angles of the last turn, increasing, within a turn [deg], and the samples' indices in that order."""
     turn = record.turns[-1]
     # the last sample of a turn repeats the first one's angle
     index = np.arange(turn.start, turn.stop - 1)
@@ -151,6 +150,7 @@ def ball_loads(record: Record) -> Figure:
     caption(
         figure,
         "Contact load of every ball",
-        f"{words.capitalize()}, {shown}; all strips at one scale, highest sample {top:.4g} N.{shaded} {record.settings()}.",
+        f"{words.capitalize()}, {shown}; all strips at one scale, highest sample {top:.4g} N.{shaded} "
+        f"{record.settings()}.",
     )
     return figure

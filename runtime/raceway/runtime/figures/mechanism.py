@@ -7,9 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
 from raceway.runtime.figures.canvas import GREY, INK, SAND, SIGNAL
-from raceway.runtime.figures.record import Array, Record
-
-FRAME = "frame"
+from raceway.runtime.figures.record import FRAME, Array, Record
 
 #: Positions in which the paths of moving joints are traced.
 _TRACE = 72
@@ -48,9 +46,9 @@ def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
                     tuple(now[first, point]), 0.017 * size, facecolor="white", edgecolor=INK, linewidth=1.5, zorder=6
                 )
             )
-    _draw_names(axes, record, now, size)
-    reach = _draw_reactions(axes, record, now, sample, size)
-    corners = np.vstack([everything, *reach])
+    arrows = _draw_reactions(axes, record, now, sample, size)
+    _draw_names(axes, record, now, _busy(record, used, now, trace) + arrows, size)
+    corners = np.vstack([everything, *((at + way)[None, :] for at, way in arrows)])
     margin = 0.16 * size
     axes.set_xlim(corners[:, 0].min() - margin, corners[:, 0].max() + margin)
     axes.set_ylim(corners[:, 1].min() - margin, corners[:, 1].max() + margin)
@@ -99,7 +97,7 @@ def _draw_ground(axes: Axes, at: Array, size: float) -> None:
     base = at[1] - height
     axes.add_patch(
         Polygon(
-            [at, (at[0] - half, base), (at[0] + half, base)],
+            np.array([at, (at[0] - half, base), (at[0] + half, base)]),
             facecolor="#e9ecef",
             edgecolor=INK,
             linewidth=1.3,
@@ -158,32 +156,33 @@ def _draw_guide(axes: Axes, path: Array, at: Array, direction: Array, size: floa
         _hatched_wall(axes, first + shift, last + shift, side * normal, size)
 
 
-def _draw_names(axes: Axes, record: Record, now: _Points, size: float) -> None:
-    """Names of the joints, those at one place together."""
+def _draw_names(axes: Axes, record: Record, now: _Points, busy: list[tuple[Array, Array]], size: float) -> None:
+    """Names of the joints, those at one place together, where the drawing is empty.
+
+    `busy` : pairs of a place and a direction in which something is drawn from it.
+    """
     mechanism = record.manifest.mechanism
     assert mechanism is not None
     places: list[tuple[Array, list[str]]] = []
     for name, _, _, _, body, point in mechanism.joints:
         at = now[body, point]
-        for place, names in places:
-            if float(np.hypot(*(place - at))) < 0.01 * size:
-                names.append(name)
-                break
+        shared = [names for place, names in places if _close(place, at, size)]
+        if shared:
+            shared[0].append(name)
         else:
             places.append((at, [name]))
-    slides = {(body, point) for _, kind, _, _, body, point in mechanism.joints if kind == "prismatic"}
-    blocks = [now[key] for key in slides if key in now]
-    for number, (place, names) in enumerate(places):
-        others = [other for k, (other, _) in enumerate(places) if k != number]
-        # away from the nearest other joint: a short crank has room for its letters on the outsides only
-        away = place - min(others, key=lambda other: float(np.hypot(*(other - place))), default=place)
-        side = 1.0 if away[0] >= 0.0 else -1.0
-        on_block = any(float(np.hypot(*(block - place))) < 0.01 * size for block in blocks)
+    blocks = [now[item[4], item[5]] for item in mechanism.joints if item[1] == "prismatic"]
+    compass = [np.array([np.cos(angle), np.sin(angle)]) for angle in np.radians(np.arange(0.0, 360.0, 45.0))]
+    for place, names in places:
+        taken = [way / np.hypot(*way) for at, way in busy if _close(at, place, size) and np.hypot(*way) > 0.0]
+        # the direction whose nearest neighbour is farthest; the first of equals
+        free = min(compass, key=lambda way: round(max((float(way @ other) for other in taken), default=0.0), 9))
+        distance = 0.125 if any(_close(block, place, size) for block in blocks) else 0.052
         axes.text(
-            place[0] + side * (0.11 if on_block else 0.035) * size,
-            place[1] + 0.02 * size,
+            place[0] + distance * size * free[0],
+            place[1] + distance * size * free[1],
             ", ".join(names),
-            ha="left" if side > 0.0 else "right",
+            ha="center",
             va="center",
             fontsize=10,
             fontweight="bold",
@@ -192,8 +191,34 @@ def _draw_names(axes: Axes, record: Record, now: _Points, size: float) -> None:
         )
 
 
-def _draw_reactions(axes: Axes, record: Record, now: _Points, sample: int, size: float) -> list[Array]:
-    """Arrows of the forces on the frame at the revolute joints whose reaction was asked for; their ends."""
+def _close(one: Array, other: Array, size: float) -> bool:
+    return float(np.hypot(*(one - other))) < 0.01 * size
+
+
+def _busy(record: Record, used: list[tuple[str, str]], now: _Points, trace: _Points) -> list[tuple[Array, Array]]:
+    """Where links, bases and guides run: pairs of a place and a direction."""
+    mechanism = record.manifest.mechanism
+    assert mechanism is not None
+    busy = [
+        (now[key], now[other] - now[key])
+        for key in used
+        for other in used
+        if key[0] == other[0] != FRAME and key != other
+    ]
+    # a centre of mass is in the way where it lies beside a joint
+    marks = [(now[key], now[key[0], "center_of_mass"] - now[key]) for key in used if (key[0], "center_of_mass") in now]
+    busy += [(at, way) for at, way in marks if float(np.hypot(*way)) < 0.08 * size]
+    for _, kind, first, point, second, block in mechanism.joints:
+        if kind == "prismatic":
+            direction = _guide_direction(record, now, trace, (first, point), (second, block))
+            busy += [(now[second, block], direction), (now[second, block], -direction)]
+        elif FRAME in (first, second):
+            busy.append((now[first, point], np.array([0.0, -1.0])))
+    return busy
+
+
+def _draw_reactions(axes: Axes, record: Record, now: _Points, sample: int, size: float) -> list[tuple[Array, Array]]:
+    """Arrows of the forces on the frame at revolute joints whose reaction is an output; their feet and vectors [m]."""
     mechanism = record.manifest.mechanism
     assert mechanism is not None
     arrows: list[tuple[Array, Array]] = []
@@ -209,7 +234,7 @@ def _draw_reactions(axes: Axes, record: Record, now: _Points, sample: int, size:
         force = sign * np.array([record.solution[f"reaction.{name}.{axis}"][sample] for axis in "xy"])
         arrows.append((now[first, point], force))
     greatest = max((float(np.hypot(*force)) for _, force in arrows), default=0.0)
-    ends: list[Array] = []
+    drawn: list[tuple[Array, Array]] = []
     for at, force in arrows:
         strength = float(np.hypot(*force))
         if strength <= 0.02 * greatest:
@@ -224,7 +249,8 @@ def _draw_reactions(axes: Axes, record: Record, now: _Points, sample: int, size:
         )
         right = force[0] >= 0.0
         axes.text(
-            *(tip + np.array([0.02 * size if right else -0.02 * size, 0.0])),
+            tip[0] + (0.02 if right else -0.02) * size,
+            tip[1],
             f"{strength:.0f} N",
             ha="left" if right else "right",
             va="center",
@@ -233,5 +259,5 @@ def _draw_reactions(axes: Axes, record: Record, now: _Points, sample: int, size:
             fontsize=9.5,
             zorder=8,
         )
-        ends.append(tip[None, :])
-    return ends
+        drawn.append((at, tip - at))
+    return drawn

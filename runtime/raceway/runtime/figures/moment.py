@@ -22,7 +22,7 @@ def can_draw_bearing(record: Record) -> bool:
 def peak_moment(record: Record) -> Figure:
     """Mechanism, bearing, or both side by side.
 
-    The moment is that of the highest sample of the ball force; without a bearing, of the greatest drive torque or joint reaction.
+    The moment is that of the highest sample of the ball force; without a bearing, of the greatest drive torque.
     """
     with_mechanism = record.manifest.mechanism is not None
     with_bearing = can_draw_bearing(record)
@@ -45,7 +45,7 @@ def peak_moment(record: Record) -> Figure:
         )
     if with_bearing:
         words, _ = record.ball_force()
-        text += f"Bearing: balls coloured by {words}; clearance and displacement of the inner ring in the outer one ×{factor:g}"
+        text += f"Bearing: balls coloured by {words}; clearance and displacement between the rings ×{factor:g}"
         if (
             record.manifest.bearing is not None
             and record.manifest.bearing.outer_ring
@@ -54,11 +54,11 @@ def peak_moment(record: Record) -> Figure:
             moved = 1e6 * np.hypot(*ring_centre(record, "outer", sample))
             text += f", the outer ring itself has moved by {moved:.3g} µm"
         text += ". "
-    when = f"t = {record.t[sample] * 1e3:.4g} ms"
+    when = f"At t = {record.t[sample] * 1e3:.4g} ms"
     if with_mechanism:
-        when = f"crank angle {np.degrees(record.crank_angle()[sample]) % 360.0:.1f}°, {when}"
+        when += f", crank angle {np.degrees(record.crank_angle()[sample]) % 360.0:.1f}°"
     subject = "Mechanism and bearing" if with_mechanism and with_bearing else "Bearing" if with_bearing else "Mechanism"
-    caption(figure, f"{subject} at the {reason}", f"{when[0].upper()}{when[1:]}. {text}{record.settings()}.")
+    caption(figure, f"{subject} at the {reason}", f"{when}. {text}{record.settings()}.")
     return figure
 
 
@@ -66,7 +66,7 @@ def _moment(record: Record) -> tuple[int, str]:
     """Sample to draw, and why."""
     if can_draw_bearing(record):
         _, force = record.ball_force()
-        return int(np.argmax(np.max(force, axis=1))), "moment of the highest ball force"
+        return int(np.argmax(np.max(force, axis=1))), "highest sample of the ball force"
     if record.has("drive_torque"):
-        return int(np.argmax(np.abs(record.solution["drive_torque"]))), "moment of the greatest drive torque"
+        return int(np.argmax(np.abs(record.solution["drive_torque"]))), "highest sample of the drive torque"
     return 0, "start of the steady part"

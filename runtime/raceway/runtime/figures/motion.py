@@ -1,4 +1,4 @@
-"""Motion of the inner ring: orbit (Fig. 5 of the paper), spectra (Fig. 6), phase portrait with stroboscopic points (Fig. 7)."""
+"""Motion of the inner ring: orbit (Fig. 5 of the paper), spectra (Fig. 6), phase portrait (Fig. 7)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 from raceway.runtime.figures.canvas import GREY, INK, SAND, SIGNAL, caption, new_figure, styled
 from raceway.runtime.figures.record import Array, Record
 from raceway.runtime.observables import orbits, stroboscopic_points
-from raceway.runtime.spectrum import AmplitudeSpectrum, amplitude_spectrum
+from raceway.runtime.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
 
 #: Points drawn between two samples where velocities are known: a resonance has but ten samples a period.
 _FINER = 8
@@ -46,8 +46,10 @@ def orbit(record: Record) -> Figure:
     x, y = 1e6 * x, 1e6 * y
     axes.plot(x, y, color=INK, linewidth=1.1, label="last turn" if record.turns else "path")
     _highlight_windows(axes, record, t, x, y)
-    axes.plot(x[0], y[0], "o", color="white", markeredgecolor=INK, markersize=8, label="its start", zorder=4)
-    axes.plot(x[-1], y[-1], "s", color=INK, markersize=4, label="its end", zorder=5)
+    axes.plot(
+        x[0], y[0], "o", color="white", markeredgecolor=INK, markersize=8, label="start of the last turn", zorder=4
+    )
+    axes.plot(x[-1], y[-1], "s", color=INK, markersize=4, label="end of the last turn", zorder=5)
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     wide, high = (max(float(np.ptp(record.solution[f"inner.{axis}"])), 1e-15) for axis in "xy")
     equal = max(wide, high) < _SLIVER * min(wide, high)
@@ -80,8 +82,11 @@ def _highlight_windows(axes: Axes, record: Record, t: Array, x: Array, y: Array)
 def spectra(record: Record) -> Figure:
     """Displacement amplitude spectra along x and y, with crank harmonics and ball-pass frequency marked."""
     length = record.cycle_length
+    # a mechanism repeats each turn: its harmonics fall on lines.  Without one a window keeps the leakage low
+    window: Window = "boxcar" if record.manifest.mechanism is not None else "hann"
     lines = {
-        axis: amplitude_spectrum(record.t, record.solution[f"inner.{axis}"] * 1e6, cycle_length=length) for axis in "xy"
+        axis: amplitude_spectrum(record.t, record.solution[f"inner.{axis}"] * 1e6, cycle_length=length, window=window)
+        for axis in "xy"
     }
     marks = record.frequencies()
     figure = new_figure(5.6)
@@ -112,7 +117,7 @@ def spectra(record: Record) -> Figure:
         if spectrum.cycles is None
         else f"{spectrum.cycles} whole turn{'s' if spectrum.cycles != 1 else ''}"
     )
-    text = f"Amplitude, mean removed, {cycles}, no window, lines {spectrum.resolution:.3g} Hz apart."
+    text = f"Amplitude, mean removed, {cycles}, {'no window' if window == 'boxcar' else 'Hann window'}, lines {spectrum.resolution:.3g} Hz apart."
     if marks is not None and marks.shaft > 0.0:
         crank = "crank" if record.manifest.mechanism is not None else "shaft"
         figure.legend(
@@ -141,7 +146,10 @@ def _mark(
 
 
 def _shown_range(spectra: list[AmplitudeSpectrum], *, shaft: float) -> float:
-    """Upper end of the frequency axis [Hz]: up to where lines stay below 1 % of the highest, at least 12 and at most 60 turns' harmonics."""
+    """Upper end of the frequency axis [Hz].
+
+    Above it lines stay below 1 % of the highest; at least 12, at most 60 harmonics of a turn are shown.
+    """
     top = max(float(np.max(s.amplitude)) for s in spectra)
     wanted = max((float(s.frequency[s.amplitude >= 0.01 * top][-1]) for s in spectra if top > 0.0), default=0.0)
     end = min(float(s.frequency[-1]) for s in spectra)
@@ -187,7 +195,8 @@ def phase_portrait(record: Record) -> Figure:
         angle = (
             np.degrees(record.parameter(record.manifest.mechanism.start_angle)) if record.manifest.mechanism else 0.0
         )
-        text = f"{count} stroboscopic point{'' if count == 1 else 's'}, at {'crank' if record.manifest.mechanism else 'shaft'} angle {angle % 360.0:g}°."
+        what = "crank" if record.manifest.mechanism else "shaft"
+        text = f"{count} stroboscopic point{'' if count == 1 else 's'}, at {what} angle {angle % 360.0:g}°."
     axes.axhline(0.0, color=GREY, linewidth=0.6)
     axes.set_xlabel("x of the inner ring's centre [µm]")
     axes.set_ylabel("velocity along x [mm/s]")

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+#: Name of the body that does not move.
+FRAME = "frame"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
@@ -106,10 +109,27 @@ class Record:
         )
 
     def ball_force(self) -> tuple[str, Array]:
-        """Words for, and values of, the ball force to show: total where it was asked for, else elastic, (n, balls) [N]."""
+        """Name and values of the ball force to show: total where asked for, else elastic, (n, balls) [N]."""
+        bearing = self.manifest.bearing
         if self.has("ball.force"):
-            return "elastic and damping force", self.solution["ball.force"]
+            damped = bearing is not None and bearing.damping_law != "none"
+            return "elastic and damping force" if damped else "elastic force", self.solution["ball.force"]
         return "elastic force", self.solution["ball.elastic_force"]
+
+    def ring_load(self) -> Array | None:
+        """Load on the inner ring, (n, 2) [N]: the output, else its share of the reaction; None with neither among the outputs."""
+        if self.has("load.x", "load.y"):
+            return np.column_stack((self.solution["load.x"], self.solution["load.y"]))
+        mechanism, bearing = self.manifest.mechanism, self.manifest.bearing
+        if mechanism is None or bearing is None:
+            return None
+        names = [f"reaction.{bearing.joint}.{axis}" for axis in "xy"]
+        if not self.has(*names):
+            return None
+        first = next(item[2] for item in mechanism.joints if item[0] == bearing.joint)
+        # Eq. (2): the force on the frame presses the ring; the reaction is that of the second body on the first
+        share = self.parameter("bearing.share") * (1.0 if first == FRAME else -1.0)
+        return share * np.column_stack([self.solution[name] for name in names])
 
     def points(self, t: float) -> dict[tuple[str, str], Array]:
         """Coordinates of the mechanism's points at a time: (body, point) -> (2,) [m]."""
@@ -132,7 +152,8 @@ class Record:
         dropped = self.solution.transient_cycles
         parts = [f"{dropped:g} transient cycle{'' if dropped == 1 else 's'} dropped", f"method {statistics.method}"]
         if self.manifest.bearing is not None:
-            parts.append(f"diametral clearance {self.parameter('bearing.clearance') * 1e6:g} µm")
+            # a no-break space keeps number and unit on one line
+            parts.append(f"diametral clearance {self.parameter('bearing.clearance') * 1e6:g}\u00a0µm")
             parts.append(f"damping law {self.manifest.bearing.damping_law}")
         return ", ".join(parts)
 

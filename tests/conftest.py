@@ -1,0 +1,49 @@
+"""Fixtures shared by the suite: scenes of the repository, generated and compiled once per test process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from raceway.derive import generate
+from raceway.derive.read import scene_from_text
+from raceway.runtime import Model, load
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Compiled models of the suite stay out of the user's cache folder."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RACEWAY_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="session")
+def scene_text() -> Callable[..., str]:
+    """Text of a shipped scene with replacements, each of which must apply."""
+
+    def text(name: str, *changes: tuple[str, str]) -> str:
+        out = (ROOT / "scenes" / f"{name}.toml").read_text(encoding="utf-8")
+        for old, new in changes:
+            assert old in out, f"{old!r} is not in {name}"
+            out = out.replace(old, new)
+        return out
+
+    return text
+
+
+@pytest.fixture(scope="session")
+def make_model(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., str]) -> Callable[..., Model]:
+    """Model of a shipped scene with replacements, generated and compiled once."""
+
+    @cache
+    def make(name: str, *changes: tuple[str, str]) -> Model:
+        folder = tmp_path_factory.mktemp(name) / name
+        return load(generate(scene_from_text(scene_text(name, *changes), name), folder))
+
+    return make

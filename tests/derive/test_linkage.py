@@ -1,0 +1,432 @@
+"""Kinematics of linkages: loops close, rates are derivatives, branches are where they say; wrong linkages are refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from linkages import (
+    ANGLE,
+    DEGREE,
+    MACHINES,
+    SPEED,
+    Machine,
+    crank_slider,
+    evaluate,
+    four_bar,
+    moving_guide,
+    offset_slider,
+    six_bar_slider,
+    watt_six_bar,
+)
+
+from raceway.derive.errors import LinkageError, SceneError
+from raceway.derive.kinematics import dot
+from raceway.derive.linkage import Linkage, check_assembly, derive_linkage
+from raceway.derive.numeric import Evaluator
+from raceway.derive.scene import Joint
+
+TURN = np.linspace(0.0, 2 * np.pi, 61)
+STEP = 1e-30  # of complex differentiation: no difference is taken, so no digits are lost
+
+every_machine = pytest.mark.parametrize("name", list(MACHINES))
+
+
+@cache
+def derived(name: str) -> tuple[Machine, Linkage]:
+    machine = MACHINES[name]()
+    return machine, machine.linkage()
+
+
+def joint_points(machine: Machine, linkage: Linkage, joint: Joint) -> list:
+    return [
+        linkage.motion(machine.mechanism, body, point) for body, point in zip(joint.bodies, joint.points, strict=True)
+    ]
+
+
+@every_machine
+def test_both_points_of_every_revolute_joint_coincide(name):
+    machine, linkage = derived(name)
+    gaps = []
+    for joint in machine.mechanism.joints:
+        if joint.kind == "revolute":
+            one, two = joint_points(machine, linkage, joint)
+            gaps += [one.position[i] - two.position[i] for i in (0, 1)]
+            gaps += [(one.velocity[i] - two.velocity[i]) / SPEED for i in (0, 1)]
+            gaps += [(one.acceleration[i] - two.acceleration[i]) / SPEED**2 for i in (0, 1)]
+    for gap in evaluate(machine, gaps, TURN, linkage):
+        assert np.max(np.abs(gap)) < 3e-15
+
+
+@every_machine
+def test_slider_stays_on_its_guide_and_parallel_to_it(name):
+    machine, linkage = derived(name)
+    distances = []
+    for joint in (j for j in machine.mechanism.joints if j.kind == "prismatic"):
+        carrier, slider = (linkage.pose(body) for body in joint.bodies)
+        assert (carrier.cos, carrier.sin, carrier.rate) == (slider.cos, slider.sin, slider.rate)
+        angle = sp.Symbol(joint.direction.path, real=True)
+        across = carrier.rotate((-sp.sin(angle), sp.cos(angle)))
+        one, two = joint_points(machine, linkage, joint)
+        distances.append(dot(across, tuple(b - a for a, b in zip(one.position, two.position, strict=True))))
+    for distance in evaluate(machine, distances, TURN, linkage):
+        assert np.max(np.abs(distance)) < 1e-15
+
+
+@every_machine
+def test_cosine_and_sine_of_every_body_are_of_one_angle(name):
+    machine, linkage = derived(name)
+    for square in evaluate(machine, [p.cos**2 + p.sin**2 for p in linkage.poses.values()], TURN, linkage):
+        assert np.max(np.abs(square - 1.0)) < 2e-14
+
+
+@every_machine
+def test_rates_are_derivatives_of_positions(name):
+    """Complex-step differentiation along the driver's angle."""
+    machine, linkage = derived(name)
+    speed = machine.speed()
+    motions = [m for pose in linkage.poses.values() for m in (pose.origin, pose.center_of_mass)]
+    positions = [c for m in motions for c in m.position]
+    velocities = [c for m in motions for c in m.velocity]
+    accelerations = [c for m in motions for c in m.acceleration]
+    turns = [q for pose in linkage.poses.values() for q in (pose.cos, pose.sin, pose.rate, pose.acceleration)]
+    run = Evaluator(linkage.definitions, [*positions, *velocities, *accelerations, *turns])
+    plain = [np.real(v) for v in run(machine.numbers(TURN))]
+    along = [np.imag(v) / STEP * speed for v in run(machine.numbers(TURN + 1j * STEP))]
+
+    n, size = len(positions), 0.3
+    for k in range(n):
+        assert np.max(np.abs(along[k] - plain[n + k])) < 1e-13 * size * speed
+        assert np.max(np.abs(along[n + k] - plain[2 * n + k])) < 1e-12 * size * speed**2
+    for k in range(3 * n, len(plain), 4):
+        turning = plain[k] * along[k + 1] - plain[k + 1] * along[k]
+        assert np.max(np.abs(turning - plain[k + 2])) < 1e-12 * speed
+        assert np.max(np.abs(along[k + 2] - plain[k + 3])) < 1e-11 * speed**2
+
+
+@every_machine
+def test_body_points_keep_their_distances(name):
+    machine, linkage = derived(name)
+    squares = []
+    for one, two in zip(linkage.points, linkage.points[1:], strict=False):
+        if one.body == two.body:
+            squares.append((one.x - two.x) ** 2 + (one.y - two.y) ** 2)
+    assert len(squares) >= len(machine.mechanism.bodies)
+    for square in evaluate(machine, squares, TURN, linkage):
+        assert np.ptp(square) < 2e-16
+
+
+def test_points_for_drawing_are_those_of_frame_and_bodies_with_centres_of_mass():
+    machine, linkage = derived("offset slider")
+    assert [(p.body, p.point) for p in linkage.points] == [
+        ("frame", "A"),
+        ("frame", "guide"),
+        ("crank", "A"),
+        ("crank", "B"),
+        ("crank", "center_of_mass"),
+        ("rod", "B"),
+        ("rod", "C"),
+        ("rod", "center_of_mass"),
+        ("slider", "C"),
+        ("slider", "D"),
+        ("slider", "tool"),
+        ("slider", "center_of_mass"),
+    ]
+
+
+def test_crank_slider_equals_the_textbook_stroke():
+    """Slider below A on its line: y = l1 sin(theta) − sqrt(l2² − l1² cos²(theta))."""
+    machine, linkage = derived("crank-slider")
+    x, y = evaluate(machine, linkage.motion(machine.mechanism, "slider", "C").position, TURN, linkage)
+    expected = 6e-3 * np.sin(TURN) - np.sqrt(0.1**2 - (6e-3 * np.cos(TURN)) ** 2)
+    assert np.max(np.abs(y - expected)) < 1e-16
+    assert np.max(np.abs(x)) < 1e-16
+
+
+@pytest.mark.parametrize(("branch", "sign"), [("left", 1.0), ("right", -1.0)])
+def test_four_bar_equals_the_law_of_cosines(branch, sign):
+    """The angle at B between the line B–D and the coupler, by arccos; the branch gives its sense."""
+    machine = four_bar(branch)
+    linkage = machine.linkage()
+    pin = 0.05 * np.exp(1j * TURN)
+    line = (0.2 + 0.03j) - pin
+    opening = np.arccos((np.abs(line) ** 2 + 0.19**2 - 0.13**2) / (2 * np.abs(line) * 0.19))
+    expected = pin + 0.19 * np.exp(1j * (np.angle(line) + sign * opening))
+    x, y = evaluate(machine, linkage.motion(machine.mechanism, "coupler", "C").position, TURN, linkage)
+    assert np.max(np.abs(x + 1j * y - expected)) < 1e-15
+
+
+def test_branch_of_rrr_is_the_side_of_the_line_between_the_outer_joints():
+    """Read off the placed points, with the inner joint's bodies in either order."""
+    for branch, side in (("left", 1), ("right", -1)):
+        for bodies in (("coupler", "rocker"), ("rocker", "coupler")):
+            machine = four_bar().with_joint("C", bodies=bodies, branch=branch)
+            linkage = machine.linkage()
+            outer = {"coupler": "B", "rocker": "D"}
+            start = linkage.motion(machine.mechanism, bodies[0], outer[bodies[0]]).position
+            end = linkage.motion(machine.mechanism, bodies[1], outer[bodies[1]]).position
+            inner = linkage.motion(machine.mechanism, "coupler", "C").position
+            x0, y0, x1, y1, x, y = evaluate(machine, [*start, *end, *inner], TURN, linkage)
+            assert np.all(side * ((x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)) > 0)
+
+
+@pytest.mark.parametrize("make", [crank_slider, offset_slider, six_bar_slider, moving_guide])
+def test_branch_of_rrp_is_ahead_or_behind_along_the_guide(make):
+    hinge = {"crank_slider": ("rod", "B", "C"), "offset_slider": ("rod", "B", "C")}
+    body, outer, inner = hinge.get(make.__name__, ("link", "E" if make is six_bar_slider else "H", "F"))
+    for branch, side in (("ahead", 1), ("behind", -1)):
+        machine = make(branch=branch)
+        linkage = machine.linkage()
+        guide = next(j for j in machine.mechanism.joints if j.kind == "prismatic")
+        angle = sp.Symbol(guide.direction.path, real=True)
+        along = linkage.pose(guide.bodies[0]).rotate((sp.cos(angle), sp.sin(angle)))
+        start = linkage.motion(machine.mechanism, body, outer).position
+        end = linkage.motion(machine.mechanism, body, inner).position
+        reach = dot(along, tuple(b - a for a, b in zip(start, end, strict=True)))
+        (values,) = evaluate(machine, [reach], TURN, linkage)
+        assert np.all(side * values > 0)
+
+
+def test_dyads_are_placed_in_the_order_of_dependence_not_of_the_file():
+    _, linkage = derived("six-bar with slider")
+    assert [(d.kind, d.bodies, d.joints) for d in linkage.dyads] == [
+        ("RRR", ("coupler", "rocker"), ("B", "C", "D")),
+        ("RRP", ("link", "ram"), ("E", "F", "G")),
+    ]
+    assert [m.joint for m in linkage.margins] == ["C", "F"]
+    _, linkage = derived("watt six-bar")
+    assert [d.kind for d in linkage.dyads] == ["RRR", "RRR"]
+
+
+@every_machine
+def test_definitions_use_earlier_symbols_only_and_each_name_once(name):
+    machine, linkage = derived(name)
+    known = {sp.Symbol(path, real=True) for path in machine.values} | {ANGLE}
+    for definition in linkage.definitions:
+        assert definition.symbol not in known
+        assert definition.expression.free_symbols <= known
+        known.add(definition.symbol)
+
+
+def test_no_inverse_function_and_one_cosine_of_the_angle():
+    for name in MACHINES:
+        _, linkage = derived(name)
+        expressions = [d.expression for d in linkage.definitions]
+        assert not any(e.has(sp.atan2, sp.atan, sp.acos, sp.asin) for e in expressions)
+        assert sum(e.has(ANGLE) for e in expressions) == 2
+
+
+def test_slider_on_the_frame_does_not_turn():
+    _, linkage = derived("offset slider")
+    pose = linkage.poses["slider"]
+    assert (pose.cos, pose.sin, pose.rate, pose.acceleration) == (1, 0, 0, 0)
+
+
+def test_radicand_of_the_slider_crank_keeps_its_digits_where_the_rod_is_across_the_guide():
+    """L² − e² loses half of them at e = L (1 − 1e-9); (L − e)(L + e) does not."""
+    machine, linkage = derived("crank-slider")
+    definition = next(d for d in linkage.definitions if d.symbol.name == "joint.C.determinant")
+    offset = 0.1 * (1 - 1e-9)
+    length, e = mpmath.mpf(0.1), mpmath.mpf(offset)
+    with mpmath.workdps(50):
+        exact = mpmath.sqrt(length**2 - e**2)
+    (value,) = Evaluator(linkage.definitions, [definition.symbol], given=[sp.Symbol("joint.C.offset", real=True)])(
+        machine.numbers(0.0, **{"joint.C.offset": offset})
+    )
+    assert abs(value / float(exact) - 1) < 1e-15
+
+
+def test_margin_is_the_squared_sine_of_the_transmission_angle():
+    machine, linkage = derived("four-bar")
+    inner, outer = (linkage.motion(machine.mechanism, "coupler", p).position for p in ("C", "B"))
+    far = linkage.motion(machine.mechanism, "rocker", "D").position
+    margin, *rest = evaluate(machine, [linkage.margins[0].expression, *inner, *outer, *far], TURN, linkage)
+    xc, yc, xb, yb, xd, yd = (np.broadcast_to(v, TURN.shape) for v in rest)
+    sine = np.sin(np.angle(((xb - xc) + 1j * (yb - yc)) / ((xd - xc) + 1j * (yd - yc))))
+    assert np.max(np.abs(margin - sine**2)) < 1e-13
+
+
+# --- refusals: numbers --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["crank-slider", "offset slider", "four-bar", "six-bar with slider", "watt six-bar"])
+def test_shipped_linkages_turn_all_the_way(name):
+    machine, linkage = derived(name)
+    check_assembly(linkage, machine.values)
+
+
+def test_locked_four_bar_is_named_with_joint_and_angle():
+    """Coupler and rocker reach 0.20 m; the pin is farther from D than that at 180 deg, where 0.05 + 0.2 m part them."""
+    machine = four_bar().with_values(
+        mechanism__bodies__coupler__points__C=0.1,
+        mechanism__bodies__rocker__points__C=0.1,
+        mechanism__frame__points__D__y=0.0,
+    )
+    with pytest.raises(
+        LinkageError, match=r"cannot be assembled at joint C at a crank angle of 180\.0000 deg"
+    ) as caught:
+        check_assembly(machine.linkage(), machine.values)
+    (fault,) = caught.value.faults
+    assert fault.key == "mechanism.joints.C"
+    assert "B, C, D" in fault.remedy
+
+
+def test_parallelogram_is_refused_at_its_change_point():
+    """All bars collinear at 0 and 180 deg: the linkage does not know which way to go on."""
+    machine = four_bar().with_values(
+        mechanism__bodies__coupler__points__C=0.2,
+        mechanism__bodies__rocker__points__C=0.05,
+        mechanism__frame__points__D__y=0.0,
+    )
+    with pytest.raises(LinkageError, match=r"locks \(dead centre\) at joint C at a crank angle of (0|180)\.0000 deg"):
+        check_assembly(machine.linkage(), machine.values)
+
+
+def test_narrow_gap_between_the_angles_of_the_sweep_is_found():
+    """Crank and rod equally long but for 1e-7: the margin dips at 180.23 deg, off the grid, for 0.05 deg only."""
+    machine = crank_slider(crank=0.1 * (1 + 1e-10), rod=0.1).with_values(
+        mechanism__joints__D__direction=(180.23 + 90.0) * DEGREE
+    )
+    with pytest.raises(LinkageError, match=r"joint C at a crank angle of (0\.23|180\.23)"):
+        check_assembly(machine.linkage(), machine.values)
+
+
+def test_crank_longer_than_rod_is_refused():
+    machine = crank_slider(crank=0.12, rod=0.1)
+    with pytest.raises(LinkageError, match=r"joint C at a crank angle of (0|180)\.0000 deg"):
+        check_assembly(machine.linkage(), machine.values)
+
+
+def test_almost_equal_crank_and_rod_are_accepted():
+    machine = crank_slider(crank=0.095, rod=0.1)
+    check_assembly(machine.linkage(), machine.values)
+
+
+def test_rod_of_zero_length_is_refused():
+    machine = crank_slider(rod=0.0)
+    with pytest.raises(LinkageError, match="joint C"):
+        check_assembly(machine.linkage(), machine.values)
+
+
+def test_dyad_that_fails_behind_another_is_named():
+    machine = six_bar_slider().with_values(mechanism__bodies__link__points__F=0.01)
+    with pytest.raises(LinkageError, match="joint F") as caught:
+        check_assembly(machine.linkage(), machine.values)
+    assert [f.key for f in caught.value.faults] == ["mechanism.joints.F"]
+
+
+# --- refusals: topology -------------------------------------------------------------------------------------------
+
+
+def derive_only(mechanism) -> Linkage:
+    return derive_linkage(mechanism, ANGLE, SPEED)
+
+
+def without_joint(machine: Machine, name: str):
+    mechanism = machine.mechanism
+    return replace(mechanism, joints=tuple(j for j in mechanism.joints if j.name != name))
+
+
+def test_mobility_three_is_refused_with_the_count():
+    with pytest.raises(LinkageError, match=r"mobility 3: 9 unknowns .* and 6 equations") as caught:
+        derive_only(without_joint(four_bar(), "D"))
+    assert "crank, coupler, rocker" in str(caught.value)
+    assert "A, B, C" in str(caught.value)
+
+
+def test_mobility_below_one_is_refused_with_the_count():
+    mechanism = four_bar().mechanism
+    extra = Joint(
+        name="X", kind="revolute", bodies=("frame", "coupler"), points=("A", "tool"), direction=None, branch=None
+    )
+    with pytest.raises(LinkageError, match=r"mobility -1: 9 unknowns .* and 10 equations .*"):
+        derive_only(replace(mechanism, joints=(*mechanism.joints, extra)))
+
+
+def test_mobility_zero_of_a_truss_is_refused():
+    """Two bars and three hinges: a triangle with the frame."""
+    mechanism = crank_slider().mechanism
+    joints = (
+        mechanism.joint("A"),
+        mechanism.joint("B"),
+        Joint(name="C", kind="revolute", bodies=("frame", "rod"), points=("guide", "C"), direction=None, branch=None),
+    )
+    with pytest.raises(LinkageError, match=r"mobility 0: 6 unknowns .* and 6 equations"):
+        derive_only(replace(mechanism, bodies=mechanism.bodies[:2], joints=joints))
+
+
+def test_mobility_two_of_an_open_chain_is_refused():
+    mechanism = crank_slider().mechanism
+    joints = (mechanism.joint("A"), mechanism.joint("B"))
+    with pytest.raises(LinkageError, match=r"mobility 2: 6 unknowns .* and 4 equations"):
+        derive_only(replace(mechanism, bodies=mechanism.bodies[:2], joints=joints))
+
+
+def test_loop_that_the_driver_does_not_reach_is_refused():
+    """The coupler hangs on the frame instead of the crank: a truss beside a crank that turns alone."""
+    machine = four_bar().with_joint("B", bodies=("frame", "coupler"), points=("A", "B"))
+    with pytest.raises(LinkageError, match=r"does not move coupler and rocker: 6 unknowns and 6 equations .* B, C, D"):
+        machine.linkage()
+
+
+def test_group_that_is_no_dyad_is_refused_with_the_count():
+    """Four bodies hinged in a ring of higher class: no two of them can be placed before the others."""
+    machine = watt_six_bar().with_joint("C", bodies=("coupler", "link"), points=("C", "F"), branch=None)
+    with pytest.raises(LinkageError, match=r"no dyad places the bodies .*: 12 unknowns .* and 12 equations") as caught:
+        machine.linkage()
+    assert "coupler, rocker, link, arm" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "joint"), [(crank_slider, "C"), (offset_slider, "C"), (four_bar, "C"), (moving_guide, "F")]
+)
+def test_missing_branch_is_refused(make, joint):
+    with pytest.raises(LinkageError, match="has no branch") as caught:
+        make().with_joint(joint, branch=None).linkage()
+    (fault,) = caught.value.faults
+    assert fault.key == f"mechanism.joints.{joint}.branch"
+    assert fault.allowed in ("left or right", "ahead or behind")
+
+
+@pytest.mark.parametrize(("make", "branch"), [(crank_slider, "left"), (four_bar, "ahead")])
+def test_branch_of_another_dyad_is_refused(make, branch):
+    with pytest.raises(LinkageError, match="branch of another dyad"):
+        make().with_joint("C", branch=branch).linkage()
+
+
+@pytest.mark.parametrize("joint", ["A", "B", "D"])
+def test_branch_where_it_means_nothing_is_refused(joint):
+    with pytest.raises(LinkageError, match=f"means nothing at joint {joint}"):
+        crank_slider().with_joint(joint, branch="left").linkage()
+
+
+def test_prismatic_driver_is_refused():
+    mechanism = crank_slider().mechanism
+    driver = replace(mechanism.driver, joint="D")
+    with pytest.raises(LinkageError, match="prismatic joint cannot be the driver"):
+        derive_only(replace(mechanism, driver=driver))
+
+
+@pytest.mark.parametrize("joint", ["B", "nowhere"])
+def test_driver_away_from_the_frame_is_refused(joint):
+    mechanism = crank_slider().mechanism
+    with pytest.raises(LinkageError, match="driver"):
+        derive_only(replace(mechanism, driver=replace(mechanism.driver, joint=joint)))
+
+
+def test_rod_with_both_joints_on_one_point_is_refused():
+    machine = crank_slider().with_joint("C", points=("B", "C"))
+    with pytest.raises(LinkageError, match="same point of rod"):
+        machine.linkage()
+
+
+def test_all_faults_of_a_topology_are_reported_together():
+    machine = crank_slider().with_joint("A", branch="left").with_joint("C", branch=None)
+    with pytest.raises(SceneError) as caught:
+        machine.linkage()
+    assert [f.key for f in caught.value.faults] == ["mechanism.joints.A.branch", "mechanism.joints.C.branch"]
+    assert "2 faults" in str(caught.value)

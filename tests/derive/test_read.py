@@ -1,0 +1,388 @@
+"""Claims about scene files: what they say is what the record holds, and what is wrong is said, all of it at once."""
+
+from __future__ import annotations
+
+import copy
+import math
+import tomllib
+from dataclasses import FrozenInstanceError, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from raceway.derive.errors import SceneError
+from raceway.derive.read import parse_override, read_scene, scene_from_text, with_values
+from raceway.derive.scene import (
+    EquivalentMass,
+    GivenContact,
+    HarmonicLoad,
+    HertzContact,
+    Quantity,
+    Scene,
+    TableLoad,
+)
+from raceway.derive.units import parse_quantity
+
+SCENES = Path(__file__).parents[2] / "scenes"
+FILES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
+PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
+ROTOR = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
+
+
+def edited(text: str, old: str, new: str) -> str:
+    assert text.count(old) == 1, f"{old!r} occurs {text.count(old)} times"
+    return text.replace(old, new)
+
+
+def values(scene: Scene) -> dict[str, float]:
+    return {quantity.path: quantity.value for quantity in scene.quantities}
+
+
+def quantities_in(record: object) -> list[Quantity]:
+    """All quantities of a record, found without the code under test."""
+    if isinstance(record, Quantity):
+        return [record]
+    if isinstance(record, tuple):
+        return [quantity for item in record for quantity in quantities_in(item)]
+    if is_dataclass(record):
+        return [quantity for field in fields(record) for quantity in quantities_in(getattr(record, field.name))]
+    return []
+
+
+# ----------------------------------------------------------------------------------------------------- what a file says
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_shipped_scene_can_be_read(name: str) -> None:
+    scene = read_scene(SCENES / f"{name}.toml")
+    assert scene.name == name
+    assert scene == read_scene(str(SCENES / f"{name}.toml"))
+    assert scene.title
+    assert all(math.isfinite(quantity.value) for quantity in scene.quantities)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_number_of_a_record_is_listed_once_and_is_the_same_object(name: str) -> None:
+    scene = read_scene(SCENES / f"{name}.toml")
+    found = quantities_in((scene.mechanism, scene.shaft, scene.load, scene.bearing))
+    assert [id(quantity) for quantity in found] == [id(quantity) for quantity in scene.quantities]
+    assert len({quantity.path for quantity in found}) == len(found)
+    assert len({quantity.latex for quantity in found}) == len(found), "two quantities share a symbol"
+    for quantity in found:
+        assert quantity.latex
+        assert quantity.description[0].isupper() or quantity.description[0] in "xy"
+
+
+def test_the_press_holds_the_papers_data_in_si() -> None:
+    """Section 4 of the paper, converted by hand."""
+    scene = read_scene(SCENES / "punching_press.toml")
+    paper = {
+        "mechanism.driver.speed": 500 * 2 * math.pi / 60,
+        "mechanism.bodies.crank.mass": 0.3567,
+        "mechanism.bodies.crank.inertia": 6.117e-4,
+        "mechanism.bodies.crank.points.B": 0.006,
+        "mechanism.bodies.crank.center_of_mass.distance": 0.0,
+        "mechanism.bodies.crank.center_of_mass.angle": 0.0,
+        "mechanism.bodies.rod.mass": 2.55,
+        "mechanism.bodies.rod.inertia": 7.517545e-3,
+        "mechanism.bodies.rod.points.C": 0.1,
+        "mechanism.bodies.rod.center_of_mass": 0.05,
+        "mechanism.bodies.slider.mass": 16.7965,
+        "mechanism.forces.punch.force.x": 0.0,
+        "mechanism.forces.punch.force.y": 8964.8,
+        "mechanism.forces.punch.window.start": math.radians(237),
+        "mechanism.forces.punch.window.end": math.radians(267),
+        "bearing.share": 0.5,
+        "bearing.clearance": 1e-5,
+        "bearing.ball_angle": 0.0,
+        "bearing.damping.ratio": 0.25e-5 * math.sqrt(1e-3),
+        "bearing.outer_ring.mass": 0.555,
+    }
+    held = values(scene)
+    for path, value in paper.items():
+        assert held[path] == pytest.approx(value, rel=1e-15, abs=0.0), path
+    assert scene.bearing is not None
+    assert scene.bearing.balls == 8
+    assert isinstance(scene.bearing.contact, HertzContact)
+    assert isinstance(scene.bearing.inner.mass, EquivalentMass)
+    assert scene.bearing.inner.mass.crank == "whole"
+    assert scene.mechanism is not None
+    joint = scene.mechanism.joint("D")
+    assert (joint.kind, joint.bodies, joint.points) == ("prismatic", ("frame", "slider"), ("guide", "C"))
+
+
+def test_the_two_presses_differ_in_damping_and_in_nothing_else() -> None:
+    one, other = (read_scene(SCENES / f"{name}.toml") for name in ("punching_press", "punching_press_tangent"))
+    first, second = values(one), values(other)
+    first.pop("bearing.damping.ratio")
+    second.pop("bearing.damping.ratio")
+    assert first == second
+    assert (one.mechanism, one.run, one.outputs) == (other.mechanism, other.run, other.outputs)
+
+
+def test_varying_compliance_runs_at_a_ball_pass_frequency_of_20_hz() -> None:
+    """8 balls times the cage ratio (1 - D_w/D_pw)/2 times the shaft's frequency."""
+    held = values(read_scene(SCENES / "varying_compliance.toml"))
+    cage = (1 - held["bearing.ball_diameter"] / held["bearing.pitch_diameter"]) / 2
+    assert 8 * cage * held["shaft.speed"] / (2 * math.pi) == pytest.approx(20.0, rel=1e-11)
+
+
+def test_a_fixed_outer_ring_has_no_quantities() -> None:
+    scene = read_scene(SCENES / "varying_compliance.toml")
+    assert scene.bearing is not None
+    assert scene.bearing.outer is None
+    assert len(scene.bearing.initial.position) == len(scene.bearing.initial.velocity) == 2
+    assert isinstance(scene.bearing.contact, GivenContact)
+    assert not any("outer" in quantity.path for quantity in scene.quantities)
+
+
+@pytest.mark.parametrize("name", ["four_bar", "offset_slider"])
+def test_defaults_stand_for_what_a_file_leaves_out(name: str) -> None:
+    scene = read_scene(SCENES / f"{name}.toml")
+    held = values(scene)
+    assert held["bearing.initial.inner.x"] == held["bearing.initial.outer_velocity.y"] == 0.0
+    assert scene.run.samples_per_cycle == 2000
+    assert scene.run.method == "auto"
+    assert scene.run.rtol == 1e-6
+
+
+def test_the_form_of_a_vector_decides_its_paths() -> None:
+    held = values(read_scene(SCENES / "offset_slider.toml"))
+    assert held["mechanism.frame.points.guide.x"] == 0.004
+    assert held["mechanism.frame.points.guide.y"] == -0.09
+    assert held["mechanism.bodies.crank.center_of_mass.angle"] == pytest.approx(math.radians(150))
+    assert held["mechanism.bodies.rod.points.C"] == 0.095
+    assert held["mechanism.forces.tool.force.magnitude"] == 3500.0
+    assert held["mechanism.forces.tool.force.direction"] == pytest.approx(math.radians(85))
+    assert not any(path.startswith("mechanism.bodies.crank.points.A") for path in held)
+
+
+def test_several_windows_are_counted_from_one() -> None:
+    text = edited(PRESS, 'window = { start = "237 deg", end = "267 deg" }', WINDOWS)
+    held = values(scene_from_text(text, "press"))
+    assert held["mechanism.forces.punch.window.1.end"] == pytest.approx(math.radians(20))
+    assert held["mechanism.forces.punch.window.2.start"] == pytest.approx(math.radians(237))
+
+
+WINDOWS = """window = [
+    { start = "350 deg", end = "20 deg" },   # through zero
+    { start = "237 deg", end = "267 deg" },
+]"""
+
+
+def test_loads_without_a_mechanism() -> None:
+    constant = ROTOR[ROTOR.index('type = "constant"') : ROTOR.index("[bearing]")]
+    harmonic = """type = "harmonic"
+mean = ["196 N", "0 N"]
+amplitude = { magnitude = "20 N", direction = "90 deg" }
+frequency = "50 Hz"
+phase = "0 deg"
+"""
+    scene = scene_from_text(edited(ROTOR, constant, harmonic), "rotor")
+    assert isinstance(scene.load, HarmonicLoad)
+    assert scene.load.frequency.value == 50.0
+    table = """type = "table"
+time = { values = [0, 1.5, 4], unit = "ms" }
+x = ["0 N", "1 kN", "0 N"]
+y = { values = [0, 0.5, 0], unit = "kN" }
+"""
+    scene = scene_from_text(edited(ROTOR, constant, table), "rotor")
+    assert isinstance(scene.load, TableLoad)
+    assert [quantity.value for quantity in scene.load.time] == [0.0, 0.0015, 0.004]
+    assert [quantity.value for quantity in scene.load.x] == [0.0, 1000.0, 0.0]
+    assert [quantity.value for quantity in scene.load.y] == [0.0, 500.0, 0.0]
+    assert scene.load.time[1].path == "load.time.2"
+
+
+def test_clearance_may_be_zero_or_preload() -> None:
+    for clearance in ("0 um", "-3 um"):
+        text = edited(PRESS, 'clearance = "10 um"', f'clearance = "{clearance}"')
+        assert values(scene_from_text(text, "press"))["bearing.clearance"] == parse_quantity(clearance, "m")
+
+
+def test_a_scene_cannot_be_changed_in_place() -> None:
+    scene = read_scene(SCENES / "four_bar.toml")
+    with pytest.raises(FrozenInstanceError):
+        scene.title = "other"  # type: ignore[misc]
+
+
+def test_the_structure_of_a_scene_knows_no_numbers() -> None:
+    """Law 1: changing a number never changes what is compiled; another ball count does."""
+    scene = scene_from_text(PRESS, "press")
+    heavier = scene_from_text(edited(PRESS, '"0.3567 kg"', '"0.4 kg"'), "press")
+    longer = scene_from_text(edited(PRESS, "cycles = 4", "cycles = 5"), "press")
+    fewer = scene_from_text(edited(PRESS, "balls = 8", "balls = 7"), "press")
+    assert scene.structure() == heavier.structure() == longer.structure()
+    assert scene.structure() != fewer.structure()
+    assert scene != heavier
+
+
+# --------------------------------------------------------------------------------------------------------- other values
+
+
+def test_an_override_is_what_the_file_would_have_said() -> None:
+    scene = scene_from_text(PRESS, "press")
+    path, value = parse_override(scene, " bearing.clearance = 20 um ")
+    changed = with_values(scene, {path: value})
+    assert changed == scene_from_text(edited(PRESS, 'clearance = "10 um"', 'clearance = "20 um"'), "press")
+    assert changed.structure() == scene.structure()
+    assert [id(q) for q in quantities_in((changed.mechanism, changed.bearing))] == [id(q) for q in changed.quantities]
+    assert with_values(scene, {}) == scene
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "words"),
+    [
+        ("bearing.clearanc=20 um", "bearing.clearanc", 'did you mean "bearing.clearance"?'),
+        ("clearance=20 um", "clearance", "bearing.clearance"),
+        ("mechanism.bodies.crank.points.C=1 mm", "mechanism.bodies.crank.points.C", "mechanism.bodies.crank.points.B"),
+        ("bearing.clearance=20", "bearing.clearance", "add the unit"),
+        ("bearing.clearance=20 kg", "bearing.clearance", "SI: m"),
+        ("bearing.clearance=", "bearing.clearance", "write a number"),
+        ("bearing.clearance", "bearing.clearance", "PATH=VALUE"),
+        ("bearing.clearance=nan um", "bearing.clearance", "finite"),
+        ("bearing.balls=9", "bearing.balls", "derive the model again"),
+        ("run.cycles=9", "run.cycles", "scene file"),
+        ("=", "", "such as"),
+    ],
+)
+def test_a_wrong_override_is_refused(text: str, key: str, words: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        parse_override(scene_from_text(PRESS, "press"), text)
+    assert caught.value.faults[0].key == key
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "words"),
+    [
+        ("mechanism.bodies.crank.mass", 0.0, "has a mass"),
+        ("bearing.pitch_diameter", 0.001, "check both"),
+        ("bearing.pitch_diameter", 0.02, "do not fit"),
+        ("bearing.contact.poisson_ratio", 0.5, "0.3"),
+        ("mechanism.driver.speed", 0.0, "duration"),
+        ("mechanism.forces.punch.window.end", math.radians(237), "always acts"),
+        ("bearing.clearance", math.nan, "finite"),
+        ("bearing.clearance", math.inf, "finite"),
+        ("bearing.clearence", 1e-5, 'did you mean "bearing.clearance"?'),
+    ],
+)
+def test_other_values_meet_the_checks_of_a_file(path: str, value: float, words: str) -> None:
+    with pytest.raises(SceneError, match="fault") as caught:
+        with_values(scene_from_text(PRESS, "press"), {path: value})
+    assert words in str(caught.value)
+
+
+def test_all_faults_of_other_values_are_raised_together() -> None:
+    bad = {"mechanism.bodies.crank.mass": -1.0, "bearing.ball_diameter": 0.0, "bearing.share": 2.0}
+    with pytest.raises(SceneError) as caught:
+        with_values(scene_from_text(PRESS, "press"), bad)
+    assert [fault.key for fault in caught.value.faults] == [
+        "mechanism.bodies.crank.mass",
+        "bearing.share",
+        "bearing.ball_diameter",
+    ]
+
+
+# ------------------------------------------------------------------------------------------ any file, any mistake in it
+
+
+@given(
+    name=st.sampled_from(FILES),
+    factor=st.floats(min_value=0.999, max_value=1.0),
+    data=st.data(),
+)
+@settings(max_examples=40, deadline=None)
+def test_any_value_comes_back(name: str, factor: float, data: st.DataObject) -> None:
+    scene = read_scene(SCENES / f"{name}.toml")
+    quantity = data.draw(st.sampled_from(scene.quantities))
+    value = quantity.value * factor
+    unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+    path, read = parse_override(scene, f"{quantity.path}={value!r}{unit}")
+    assert read == pytest.approx(value, rel=1e-15)
+    held = values(with_values(scene, {path: read}))
+    assert held == {**values(scene), path: read}
+
+
+def places(table: dict[str, Any], path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+    found: list[tuple[str, ...]] = []
+    for key, value in table.items():
+        found.append((*path, key))
+        if isinstance(value, dict):
+            found += places(value, (*path, key))
+    return found
+
+
+def as_toml(value: object) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{as_toml(str(key))} = {as_toml(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(as_toml(item) for item in value) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        escaped = "".join(f"\\U{ord(character):08x}" if not character.isalnum() else character for character in value)
+        return f'"{escaped}"'
+    return '"none"' if value is None else repr(value)
+
+
+TREES = {name: tomllib.loads((SCENES / f"{name}.toml").read_text(encoding="utf-8")) for name in FILES}
+JUNK = st.recursive(
+    st.one_of(
+        st.none(),
+        st.booleans(),
+        st.integers(),
+        st.floats(),
+        st.text(alphabet=st.characters(exclude_categories=["Cs"]), max_size=8),
+        st.sampled_from(
+            ["6 mm", "0 kg", "-1 kg", "nan m", "500 rpm", "frame", "A", "crank", "fixed", "origin", "1e-6 s"]
+        ),
+    ),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5).filter(str.isalnum), inner, max_size=2)
+    ),
+    max_leaves=5,
+)  # None deletes the key
+
+
+@given(name=st.sampled_from(FILES), data=st.data())
+@settings(max_examples=150, deadline=None)
+def test_a_scene_with_mistakes_is_read_or_refused_but_never_breaks(name: str, data: st.DataObject) -> None:
+    tree = copy.deepcopy(TREES[name])
+    for _ in range(data.draw(st.integers(1, 3))):
+        path = data.draw(st.sampled_from(places(tree)))
+        junk = data.draw(JUNK)
+        table = tree
+        for key in path[:-1]:
+            table = table[key]
+        if junk is None:
+            del table[path[-1]]
+        elif data.draw(st.booleans()):
+            table[path[-1]] = junk
+        else:
+            table[data.draw(st.sampled_from(["mass", "x", "points", "joint", "type"]))] = junk
+        if not tree:
+            break
+    text = "\n".join(f"{as_toml(key)} = {as_toml(value)}" for key, value in tree.items())
+    refused: SceneError | None = None
+    try:
+        scene = scene_from_text(text, "mutant")
+    except SceneError as error:
+        refused = error
+    if refused is None:
+        assert all(math.isfinite(quantity.value) for quantity in scene.quantities)
+    else:
+        assert all(fault.problem and fault.remedy for fault in refused.faults)
+
+
+@given(cut=st.integers(0, len(PRESS)), junk=st.text(alphabet="[]{}\"=.#\n' aA1", max_size=4))
+@settings(max_examples=100, deadline=None)
+def test_a_torn_file_is_read_or_refused_but_never_breaks(cut: int, junk: str) -> None:
+    try:
+        scene = scene_from_text(PRESS[:cut] + junk + PRESS[cut:], "torn")
+    except SceneError:
+        return
+    assert all(math.isfinite(quantity.value) for quantity in scene.quantities)

@@ -1,0 +1,516 @@
+"""Claims about wrong scene files: every fault is found, names its key and line, and says what to do.
+
+Each case is an edit of a shipped scene.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from raceway.derive.errors import SceneError
+from raceway.derive.read import read_scene, scene_from_text
+from raceway.runtime.errors import RacewayError
+
+SCENES = Path(__file__).parents[2] / "scenes"
+PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
+ROTOR = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
+
+
+def edited(text: str, old: str, new: str) -> str:
+    assert text.count(old) == 1, f"{old!r} occurs {text.count(old)} times"
+    return text.replace(old, new)
+
+
+def faults(text: str, name: str = "press") -> SceneError:
+    with pytest.raises(SceneError) as caught:
+        scene_from_text(text, name)
+    for fault in caught.value.faults:
+        assert fault.problem
+        assert fault.remedy
+        assert fault.render() in str(caught.value)
+        assert "Traceback" not in str(caught.value)
+    return caught.value
+
+
+# (id, old text, new text, key, a part of the remedy).  The first four columns are an edit of the press.
+REFUSED = [
+    (
+        "unknown key in a body",
+        'mass = "2.55 kg"',
+        'mas = "2.55 kg"',
+        "mechanism.bodies.rod.mas",
+        'did you mean "mass"?',
+    ),
+    ("missing key", 'mass = "2.55 kg"', "", "mechanism.bodies.rod.mass", 'add mass = "0.36 kg"'),
+    ("unknown key at the top", 'title = "P', 'titel = "P', "titel", 'did you mean "title"?'),
+    ("unknown table", "[bearing.initial]", "[bearing.inital]", "bearing.inital", 'did you mean "initial"?'),
+    ("unknown key in the run", "rtol = 1e-6", "tol = 1e-6", "run.tol", 'did you mean "rtol"?'),
+    (
+        "unknown key in an inline table",
+        'start = "237 deg"',
+        'begin = "1 deg", start = "237 deg"',
+        "mechanism.forces.punch.window.begin",
+        "delete it",
+    ),
+    ("missing unit", 'clearance = "10 um"', "clearance = 10", "bearing.clearance", "10 <unit>"),
+    ("missing unit in text", 'clearance = "10 um"', 'clearance = "10"', "bearing.clearance", 'as in "6 mm"'),
+    ("wrong dimension", 'mass = "2.55 kg"', 'mass = "2.55 mm"', "mechanism.bodies.rod.mass", "SI: kg"),
+    ("speed in hertz", 'speed = "500 rpm"', 'speed = "8 Hz"', "mechanism.driver.speed", "rpm"),
+    ("not a number", 'mass = "2.55 kg"', 'mass = "nan kg"', "mechanism.bodies.rod.mass", "finite"),
+    ("infinite", 'stiffness = "5e7 N/m"', 'stiffness = "inf N/m"', "bearing.outer_ring.stiffness", "finite"),
+    ("TOML nan", "share = 0.5", "share = nan", "bearing.share", "finite"),
+    ("a table where text is due", 'mass = "2.55 kg"', "mass = { a = 1 }", "mechanism.bodies.rod.mass", '"0.36 kg"'),
+    ("text where a table is due", "[bearing.initial]", "[bearing]\ninitial = 3\n[bearing.x]", "", "quotes"),
+    ("negative mass", '"0.3567 kg"', '"-0.3567 kg"', "mechanism.bodies.crank.mass", "has a mass"),
+    ("zero mass", '"0.3567 kg"', '"0 kg"', "mechanism.bodies.crank.mass", "has a mass"),
+    ("zero inertia", '"7517.545 kg*mm^2"', '"0 kg*mm^2"', "mechanism.bodies.rod.inertia", "delete the key"),
+    ("zero length", 'B = "6 mm"', 'B = "0 mm"', "mechanism.bodies.crank.points.B", "positive length"),
+    ("negative length", 'B = "6 mm"', 'B = "-6 mm"', "mechanism.bodies.crank.points.B", "[x, y]"),
+    (
+        "negative distance",
+        'distance = "0 mm"',
+        'distance = "-1 mm"',
+        "mechanism.bodies.crank.center_of_mass.distance",
+        "180 deg",
+    ),
+    ("zero ball", '"7.9375 mm"', '"0 mm"', "bearing.ball_diameter", "positive"),
+    ("negative pitch", '"33.5 mm"', '"-33.5 mm"', "bearing.pitch_diameter", "positive"),
+    ("pitch below ball", '"33.5 mm"', '"7 mm"', "bearing.pitch_diameter", "check both"),
+    ("too many balls", "balls = 8 ", "balls = 14 ", "bearing.balls", "check ball count"),
+    ("too few balls", "balls = 8 ", "balls = 2 ", "bearing.balls", "balls = 8"),
+    ("half a ball", "balls = 8 ", "balls = 8.5 ", "bearing.balls", "balls = 8"),
+    ("balls with a unit", "balls = 8 ", 'balls = "8" ', "bearing.balls", "balls = 8"),
+    ("a truth value of balls", "balls = 8 ", "balls = true ", "bearing.balls", "balls = 8"),
+    ("groove within ball", '"4.1275 mm"', '"3.96 mm"', "bearing.contact.inner_groove_radius", "0.51 to 0.54"),
+    ("groove at ball", '"4.206875 mm"', '"3.96875 mm"', "bearing.contact.outer_groove_radius", "0.51 to 0.54"),
+    ("zero modulus", '"207 GPa"', '"0 GPa"', "bearing.contact.young_modulus", "positive"),
+    ("incompressible", "poisson_ratio = 0.3", "poisson_ratio = 0.5", "bearing.contact.poisson_ratio", "0.3"),
+    ("Poisson below -1", "poisson_ratio = 0.3", "poisson_ratio = -1.0", "bearing.contact.poisson_ratio", "0.3"),
+    ("share above one", "share = 0.5", "share = 1.5", "bearing.share", "0.5 for one of a pair"),
+    ("outer mass zero", '"0.555 kg"', '"0 kg"', "bearing.outer_ring.mass", "fixed"),
+    ("housing pushes", '"5e7 N/m"', '"-5e7 N/m"', "bearing.outer_ring.stiffness", "zero or a positive"),
+    ("housing drives", '"500 N*s/m"', '"-500 N*s/m"', "bearing.outer_ring.damping", "zero or a positive"),
+    ("ring without mass", '"0.032 kg"', '"0 kg"', "bearing.inner_ring.equivalent_mass.ring", "positive"),
+    ("negative pin", '"0.05 kg"', '"-0.05 kg"', "bearing.inner_ring.equivalent_mass.crankpin", "zero or a positive"),
+    ("crank a third", 'crank = "whole"', 'crank = "third"', "bearing.inner_ring.equivalent_mass.crank", '"whole"'),
+    ("unknown body", '["crank", "rod"]', '["crank", "rodd"]', "mechanism.joints.B.bodies", 'did you mean "rod"?'),
+    ("unknown point", '["guide", "C"]', '["guid", "C"]', "mechanism.joints.D.points", 'did you mean "guide"?'),
+    (
+        "point by default",
+        'points = { B = "origin", C = "100 mm" }',
+        'points = { E = "origin", C = "100 mm" }',
+        "mechanism.joints.B.points",
+        "[mechanism.bodies.rod.points]",
+    ),
+    ("joint with itself", '["crank", "rod"]', '["crank", "crank"]', "mechanism.joints.B.bodies", "other body"),
+    ("three bodies", '["crank", "rod"]', '["crank", "rod", "slider"]', "mechanism.joints.B.bodies", "write bodies ="),
+    ("unknown joint type", 'type = "prismatic"', 'type = "prismatc"', "mechanism.joints.D.type", '"prismatic"'),
+    ("guide without direction", 'direction = "270 deg"', "", "mechanism.joints.D.direction", 'direction = "270 deg"'),
+    (
+        "hinge with direction",
+        'branch = "ahead"',
+        'direction = "0 deg"',
+        "mechanism.joints.C.direction",
+        "delete the key",
+    ),
+    (
+        "guide with branch",
+        'direction = "270 deg"',
+        'direction = "270 deg"\nbranch = "left"',
+        "mechanism.joints.D.branch",
+        "revolute",
+    ),
+    ("unknown branch", 'branch = "ahead"', 'branch = "before"', "mechanism.joints.C.branch", "branch"),
+    (
+        "driver unknown",
+        'joint = "A"                             # the',
+        'joint = "Q" # the',
+        "mechanism.driver.joint",
+        "name one",
+    ),
+    (
+        "driver a guide",
+        'joint = "A"                             # the',
+        'joint = "D" # the',
+        "mechanism.driver.joint",
+        "motor",
+    ),
+    (
+        "driver between bodies",
+        'joint = "A"                             # the',
+        'joint = "B" # the',
+        "mechanism.driver.joint",
+        "joint of the frame",
+    ),
+    (
+        "driver turned round",
+        '["frame", "crank"]',
+        '["crank", "frame"]',
+        "mechanism.driver.joint",
+        'bodies = ["frame", "crank"]',
+    ),
+    ("bearing joint unknown", 'joint = "A"\nshare', 'joint = "AA"\nshare', "bearing.joint", 'did you mean "A"?'),
+    ("bearing elsewhere", 'joint = "A"\nshare', 'joint = "B"\nshare', "bearing.joint", 'write joint = "A"'),
+    ("bearing without joint", 'joint = "A"\nshare', "share", "bearing.joint", 'add joint = "A"'),
+    ("bearing without share", "share = 0.5", "", "bearing.share", "add share = 0.5"),
+    ("body name", "[mechanism.bodies.slider]", '[mechanism.bodies."a b"]', "mechanism.bodies.a b", "rename the body"),
+    ("body frame", "[mechanism.bodies.slider]", "[mechanism.bodies.frame]", "mechanism.bodies.frame", "another name"),
+    ("point name", 'C = "100 mm"', '"1C" = "100 mm"', "mechanism.bodies.rod.points.1C", "rename the point"),
+    ("force name", "[mechanism.forces.punch]", "[mechanism.forces.p-1]", "mechanism.forces.p-1", "rename the force"),
+    (
+        "joint name",
+        "[mechanism.joints.B]",
+        f"[mechanism.joints.B{'b' * 64}]",
+        f"mechanism.joints.B{'b' * 64}",
+        "rename",
+    ),
+    ("force on nobody", 'body = "slider"', 'body = "slidr"', "mechanism.forces.punch.body", 'did you mean "slider"?'),
+    ("force on the frame", 'body = "slider"', 'body = "frame"', "mechanism.forces.punch.body", "moving body"),
+    (
+        "force at no point",
+        'point = "C"',
+        'point = "tip"',
+        "mechanism.forces.punch.point",
+        "mechanism.bodies.slider.points",
+    ),
+    (
+        "force of one number",
+        'force = ["0 N", "8964.8 N"]',
+        'force = "8964.8 N"',
+        "mechanism.forces.punch.force",
+        "x and y",
+    ),
+    (
+        "force of three",
+        'force = ["0 N", "8964.8 N"]',
+        'force = ["0 N", "1 N", "2 N"]',
+        "mechanism.forces.punch.force",
+        "x and y",
+    ),
+    ("window without end", ', end = "267 deg"', "", "mechanism.forces.punch.window.end", 'add end = "267 deg"'),
+    ("empty window", 'end = "267 deg"', 'end = "237 deg"', "mechanism.forces.punch.window.end", "always acts"),
+    ("whole turn", 'end = "267 deg"', 'end = "597 deg"', "mechanism.forces.punch.window.end", "always acts"),
+    (
+        "no window",
+        'window = { start = "237 deg", end = "267 deg" }',
+        "window = []",
+        "mechanism.forces.punch.window",
+        "always acts",
+    ),
+    ("unknown law", 'law = "one-sided"\n', 'law = "onesided"\n', "bearing.damping.law", 'did you mean "one-sided"'),
+    ("no coefficient", 'ratio = "0.25e-5 s*mm^0.5"', "", "bearing.damping", "add coefficient"),
+    (
+        "two coefficients",
+        'ratio = "0.25e-5 s*mm^0.5"',
+        'ratio = "0.25e-5 s*mm^0.5"\ncoefficient = "683 N*s/m"',
+        "bearing.damping",
+        "delete one",
+    ),
+    (
+        "the paper's ratio as a time",
+        'ratio = "0.25e-5 s*mm^0.5"',
+        'ratio = "0.25e-5 s"',
+        "bearing.damping.ratio",
+        '"0.25e-5 s*mm^0.5"',
+    ),
+    ("tangent with that ratio", 'law = "one-sided"\n', 'law = "tangent"\n', "bearing.damping.ratio", '"0.25e-5 s"'),
+    (
+        "tangent with a coefficient",
+        'law = "one-sided"\nratio = "0.25e-5 s*mm^0.5"',
+        'law = "tangent"\ncoefficient = "683 N*s/m"',
+        "bearing.damping.coefficient",
+        'ratio = "0.25e-5 s"',
+    ),
+    ("no law with a ratio", 'law = "one-sided"\n', 'law = "none"\n', "bearing.damping.ratio", "delete the key"),
+    ("negative ratio", '"0.25e-5 s*mm^0.5"\n\n', '"-1e-5 s*mm^0.5"\n\n', "bearing.damping.ratio", "zero or a positive"),
+    (
+        "two stiffnesses",
+        'young_modulus = "207 GPa"',
+        'stiffness = "8e9 N/m^1.5"\nyoung_modulus = "207 GPa"',
+        "bearing.contact.stiffness",
+        "delete stiffness",
+    ),
+    ("half a geometry", 'young_modulus = "207 GPa"', "", "bearing.contact.young_modulus", "207 GPa"),
+    (
+        "mass twice",
+        "[bearing.inner_ring.equivalent_mass]",
+        '[bearing.inner_ring]\nmass = "1 kg"\n[bearing.inner_ring.equivalent_mass]',
+        "bearing.inner_ring",
+        "delete one",
+    ),
+    ("fixed with a mass", 'support = "elastic"', 'support = "fixed"', "bearing.outer_ring.mass", 'support = "elastic"'),
+    ("unknown support", 'support = "elastic"', 'support = "rubber"', "bearing.outer_ring.support", '"elastic"'),
+    ("one start coordinate", 'inner = ["0 um", "0 um"]', 'inner = ["0 um"]', "bearing.initial.inner", "write inner"),
+    ("start in degrees", 'inner = ["0 um", "0 um"]', 'inner = ["0 um", "1 deg"]', "bearing.initial.inner.y", "SI: m"),
+    ("cycles and duration", "cycles = 4 ", 'duration = "1 s"\ncycles = 4 ', "run", "delete one"),
+    ("no length of the run", "cycles = 4 ", "", "run", "add cycles"),
+    ("no cycles", "cycles = 4 ", "cycles = 0 ", "run.cycles", "positive"),
+    ("cycles at rest", 'speed = "500 rpm"', 'speed = "0 rpm"', "run.cycles", "duration"),
+    ("all transient", "transient_cycles = 2", "transient_cycles = 4", "run.transient_cycles", "run more cycles"),
+    ("negative transient", "transient_cycles = 2", "transient_cycles = -1", "run.transient_cycles", "write 0"),
+    ("all transient in time", "cycles = 4 ", 'duration = "0.2 s" ', "run.transient_cycles", "run longer"),
+    ("no samples", "samples_per_cycle = 2000", "samples_per_cycle = 15", "run.samples_per_cycle", "2000"),
+    ("too many samples", "samples_per_cycle = 2000", "samples_per_cycle = 1000001", "run.samples_per_cycle", "2000"),
+    ("unknown method", 'method = "auto"', 'method = "leapfrog"', "run.method", 'method = "auto"'),
+    ("loose tolerance", "rtol = 1e-6", "rtol = 0.5", "run.rtol", "1e-6"),
+    ("tight tolerance", "rtol = 1e-6", "rtol = 1e-16", "run.rtol", "1e-6"),
+    ("empty output", '"drive_torque"]', '""]', "run.outputs", "delete the entry"),
+    ("output a number", '"drive_torque"]', "3]", "run.outputs", "delete the entry"),
+    (
+        "outputs a text",
+        'outputs = ["inner.*", "outer.*", "ball.*", "reaction.A.*", "drive_torque"]',
+        'outputs = "inner.*"',
+        "run.outputs",
+        "write outputs = [",
+    ),
+    (
+        "no outputs",
+        'outputs = ["inner.*", "outer.*", "ball.*", "reaction.A.*", "drive_torque"]',
+        "",
+        "run.outputs",
+        "add outputs",
+    ),
+    ("load beside a mechanism", "[run]", '[load]\ntype = "constant"\n[run]', "load", "delete [load]"),
+    ("shaft beside a mechanism", "[run]", '[shaft]\nspeed = "1 rpm"\n[run]', "shaft", "delete [shaft]"),
+    ("title of two lines", 'title = "P', 'title = "a\\nP', "title", "shorten"),
+    ("gravity in g", 'gravity = "9.81 m/s^2"', 'gravity = "9.81"', "mechanism.gravity", "9.81 m/s^2"),
+    (
+        "center of mass",
+        'center_of_mass = "50 mm"',
+        "center_of_mass = true",
+        "mechanism.bodies.rod.center_of_mass",
+        "6 mm",
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "remedy"), [case[1:] for case in REFUSED], ids=[case[0] for case in REFUSED]
+)
+def test_a_wrong_press_is_refused_with_key_and_remedy(old: str, new: str, key: str, remedy: str) -> None:
+    error = faults(edited(PRESS, old, new))
+    hits = [fault for fault in error.faults if fault.key == key]
+    assert hits, f"no fault at {key!r} in\n{error}"
+    assert any(remedy in fault.remedy for fault in hits), str(error)
+    assert remedy in str(error)
+
+
+# The same, as edits of the scene without a mechanism.
+REFUSED_ROTOR = [
+    ("joint without mechanism", "[bearing]\n", '[bearing]\njoint = "A"\n', "bearing.joint", "delete the key"),
+    ("share without mechanism", "[bearing]\n", "[bearing]\nshare = 0.5\n", "bearing.share", "delete the key"),
+    (
+        "bearing without load",
+        '[load]\ntype = "constant"',
+        '[loaded]\ntype = "constant"',
+        "load",
+        "add the table [load]",
+    ),
+    ("bearing without shaft", "[shaft]", "[shafts]", "shaft", "add the table [shaft]"),
+    ("unknown load", 'type = "constant"', 'type = "constnt"', "load.type", 'did you mean "constant"?'),
+    ("harmonic without frequency", 'type = "constant"', 'type = "harmonic"', "load.frequency", "50 Hz"),
+    (
+        "Eq. (3) without crank",
+        'mass = "20 kg"',
+        'equivalent_mass = { ring = "1 kg", crankpin = "0 kg", crank = "half" }',
+        "bearing.inner_ring.equivalent_mass",
+        "0.4 kg",
+    ),
+    ("no mass", 'mass = "20 kg"', "", "bearing.inner_ring", "add mass"),
+    ("no stiffness", 'stiffness = "13.34e9 N/m^1.5"', "", "bearing.contact", "stiffness ="),
+    ("zero stiffness", '"13.34e9 N/m^1.5"', '"0 N/m^1.5"', "bearing.contact.stiffness", "positive"),
+    ("stiffness of a spring", '"13.34e9 N/m^1.5"', '"13.34e9 N/m"', "bearing.contact.stiffness", "N/m^1.5"),
+    ("damping of the ring", '"200 N*s/m"', '"-200 N*s/m"', "bearing.inner_ring.damping", "zero or a positive"),
+    (
+        "start of a fixed ring",
+        "[bearing.initial]",
+        '[bearing.initial]\nouter = ["1 um", "0 um"]',
+        "bearing.initial.outer",
+        "elastic",
+    ),
+    ("cycles at rest", '"393.1540342298 rpm"', '"0 rpm"', "run.cycles", 'duration = "0.5 s"'),
+    (
+        "short table",
+        'type = "constant"',
+        'type = "table"\ntime = ["0 s"]\nx = ["0 N"]\ny = ["0 N"]',
+        "load.time",
+        "add rows",
+    ),
+    (
+        "uneven table",
+        'type = "constant"',
+        'type = "table"\ntime = ["0 s", "1 s"]\nx = ["0 N"]\ny = ["0 N", "0 N"]',
+        "load",
+        "every row",
+    ),
+    (
+        "table out of order",
+        'type = "constant"',
+        'type = "table"\ntime = ["1 s", "1 s"]\nx = ["0 N", "0 N"]\ny = ["0 N", "0 N"]',
+        "load.time.2",
+        "sort",
+    ),
+    (
+        "table of text",
+        'type = "constant"',
+        'type = "table"\ntime = "load.csv"\nx = ["0 N"]\ny = ["0 N"]',
+        "load.time",
+        "one value for each row",
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "remedy"), [case[1:] for case in REFUSED_ROTOR], ids=[case[0] for case in REFUSED_ROTOR]
+)
+def test_a_wrong_rotor_is_refused_with_key_and_remedy(old: str, new: str, key: str, remedy: str) -> None:
+    error = faults(edited(ROTOR, old, new))
+    hits = [fault for fault in error.faults if fault.key == key]
+    assert hits, f"no fault at {key!r} in\n{error}"
+    assert any(remedy in fault.remedy for fault in hits), str(error)
+
+
+def test_single_mistakes_give_single_faults() -> None:
+    """A mistake causes no second fault, but for the pairs below, where two lines contradict each other."""
+    chained = {
+        "joint name",
+        "text where a table is due",
+        "body name",
+        "body frame",
+        "point name",
+        "point by default",
+        "driver turned round",
+        "hinge with direction",
+        "fixed with a mass",
+        "tangent with a coefficient",
+        "unknown key in a body",
+        "unknown key in the run",
+        "unknown support",
+    }
+    for label, old, new, *_ in REFUSED:
+        error = faults(edited(PRESS, old, new))
+        if label not in chained:
+            assert len(error.faults) == 1, f"{label}: {error}"
+
+
+def test_all_faults_of_a_file_are_raised_together() -> None:
+    text = edited(PRESS, '"0.3567 kg"', '"-0.3567 kg"')
+    text = edited(text, 'clearance = "10 um"', "clearance = 10")
+    text = edited(text, 'method = "auto"', 'metod = "auto"')
+    error = faults(text)
+    assert [fault.key for fault in error.faults] == ["mechanism.bodies.crank.mass", "bearing.clearance", "run.metod"]
+    assert "3 faults" in str(error)
+    lines = text.splitlines()
+    for fault, start in zip(error.faults, ["mass", "clearance", "metod"], strict=True):
+        assert fault.line is not None
+        assert lines[fault.line - 1].startswith(start)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "start"),
+    [
+        ('mass = "2.55 kg"', 'mass = "2.55 m"', 'mass = "2.55 m"'),
+        ('mass = "16.7965 kg"', 'mass = "0 kg"', 'mass = "0 kg"'),
+        ('end = "267 deg"', 'end = "267 m"', "window ="),
+        ('speed = "500 rpm"', "", "[mechanism.driver]"),
+        ('law = "one-sided"\n', 'law = "x"\n', 'law = "x"'),
+        ("[bearing.initial]", "[bearing.inital]", "[bearing.inital]"),
+        (
+            '[mechanism.driver]\njoint = "A" ',
+            'driver.start_angle = "1 m"\n[[ignored]]\nx = 1\n[mechanism.driver_]\njoint = "A" ',
+            "driver.start_angle",
+        ),
+        (
+            'outputs = ["inner.*"',
+            'notes = """\n[bearing]\nrtol = 3\n"""\nlist = [\n  ["x"],\n  [ "rtol" ],\n]\noutputs = ["inner.*", 4',
+            'outputs = ["inner.*", 4',
+        ),
+    ],
+)
+def test_a_fault_names_its_line(old: str, new: str, start: str) -> None:
+    text = edited(PRESS, old, new)
+    error = faults(text)
+    named = [text.splitlines()[fault.line - 1] for fault in error.faults if fault.line is not None]
+    assert any(line.startswith(start) for line in named), str(error)
+
+
+def test_arrays_of_tables_are_found_by_their_number() -> None:
+    text = edited(PRESS, 'window = { start = "237 deg", end = "267 deg" }', "")
+    text += """
+[[mechanism.forces.punch.window]]
+start = "0 deg"
+end = "10 deg"
+[[mechanism.forces.punch.window]]
+start = "20 deg"
+end = "30 m"
+"""
+    error = faults(text)
+    (fault,) = error.faults
+    assert fault.key == "mechanism.forces.punch.window.2.end"
+    assert fault.line is not None
+    assert text.splitlines()[fault.line - 1] == 'end = "30 m"'
+
+
+@pytest.mark.parametrize(
+    ("text", "problem", "line"),
+    [
+        ("", "empty", None),
+        ("# nothing\n", "empty", None),
+        ('title = "x"\n', "describes nothing", None),
+        ("a = 1\nb = = 2\n", "not TOML", 2),
+        ('[bearing]\nclearance = "10 um\n', "not TOML", 2),
+        ("[run]\n[run]\n", "not TOML", 2),
+        ("a = " + "[" * 3000, "not TOML", 1),
+        ("a = " + "9" * 5000, "not TOML", 1),
+        ("\x00", "not TOML", 1),
+        ("# one line to TOML: \u2028\x85\nb = = 2\n", "not TOML", 2),
+        ("bearing.clearance" + ".a" * 5000 + " = 1", "is missing", None),
+        ("bearing.clearance" + ".a" * 5000 + " = 1", "a table instead of a length", 1),
+    ],
+)
+def test_a_text_that_is_no_scene_is_refused(text: str, problem: str, line: int | None) -> None:
+    error = faults(text)
+    assert any(problem in fault.problem and fault.line == line for fault in error.faults), str(error)
+
+
+def test_a_scene_describes_a_mechanism_or_a_bearing() -> None:
+    error = faults('[load]\ntype = "constant"\n[run]\ncycles = 4\noutputs = ["x"]\n')
+    assert any("neither a mechanism nor a bearing" in fault.problem for fault in error.faults)
+    assert any(fault.key == "load" and "add [bearing]" in fault.remedy for fault in error.faults)
+
+
+@pytest.mark.parametrize("name", ["1press", "my press", "", "a" * 65, "press-2", "frame", "../x", "préss"])
+def test_a_scene_has_a_name_that_files_and_code_can_bear(name: str) -> None:
+    error = faults(PRESS, name)
+    assert any("rename the scene" in fault.remedy or "another name" in fault.remedy for fault in error.faults)
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    latin = tmp_path / "latin.toml"
+    latin.write_bytes('# ok\ntitle = "Kurbel für"'.encode("latin-1"))
+    for path, word in [
+        (tmp_path / "none.toml", "none.toml"),
+        (tmp_path, tmp_path.name),
+        (latin, "UTF-8"),
+        ("a\0b", "no path"),
+    ]:
+        with pytest.raises(SceneError, match=word) as caught:
+            read_scene(path)
+        assert isinstance(caught.value, RacewayError)
+        assert isinstance(caught.value, ValueError)
+
+
+def test_a_byte_order_mark_and_windows_line_ends_are_no_fault(tmp_path: Path) -> None:
+    path = tmp_path / "punching_press.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + PRESS.replace("\n", "\r\n").encode())
+    assert read_scene(path) == read_scene(SCENES / "punching_press.toml")
+
+
+def test_an_error_names_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "press.toml"
+    path.write_text(edited(PRESS, '"0.3567 kg"', '"-1 kg"'), encoding="utf-8")
+    with pytest.raises(SceneError) as caught:
+        read_scene(path)
+    assert caught.value.source == str(path)
