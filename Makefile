@@ -26,7 +26,6 @@ lint: $(VENV)/.ready-dev
 	$(BIN)/raceway derive --check scenes/punching_press.toml
 
 docs: $(VENV)/.ready-docs
-	$(BIN)/raceway equations scenes/punching_press.toml > docs/theory/equations_punching_press.md
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 

@@ -31,6 +31,7 @@ autodoc_preserve_defaults = True
 napoleon_numpy_docstring = True
 napoleon_google_docstring = False
 napoleon_use_ivar = True  # attributes of records as a list, not as objects that autodoc lists again
+napoleon_use_rtype = False
 
 _SECTION = re.compile(r"^(Parameters|Attributes)$")
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : (.*)$")
@@ -41,6 +42,8 @@ def describe_entries(app: Any, what: str, name: str, obj: Any, options: Any, lin
 
     Types stand in the signatures here, so that the place numpydoc keeps for the type holds the description.
     """
+    if what in ("property", "attribute"):
+        lines.insert(0, "")  # else napoleon takes the first line's words in front of a colon for a type
     inside = False
     rewritten: list[str] = []
     for number, line in enumerate(lines):

@@ -424,7 +424,7 @@ def test_all_faults_of_a_file_are_raised_together() -> None:
         ),
         (
             'outputs = ["inner.*"',
-            'notes = """\n[bearing]\nrtol = 3\n"""\nlist = [\n  ["x"],\n  [ "rtol" ],\n]\noutputs = ["inner.*", 4',
+            'notes = """a " mark\n[bearing]\nrtol = 3\n"""\nlist = [\n  ["x"],\n  ["r"],\n]\noutputs = ["inner.*", 4',
             'outputs = ["inner.*", 4',
         ),
     ],

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from raceway.runtime import clock
@@ -85,8 +86,10 @@ def test_gate_changes_at_every_breakpoint_and_nowhere_else(
     t1 = 2.3 * TURN / speed
     edges = clock.breakpoints((GATE,), values, 0.0, t1)
     bounds = np.concatenate([[0.0], edges, [t1]])
+    # edges nearer than the clock's resolution are one edge: leave out starts and ends that all but meet one
+    assume(np.min(np.diff(bounds)) * speed > 1e4 * clock.ANGLE_RESOLUTION)
     levels = []
-    for left, right in zip(bounds[:-1], bounds[1:], strict=True):
+    for left, right in pairwise(bounds):
         inner = left + (right - left) * np.array([1e-3, 0.37, 0.5, 0.999])
         found = {gate(values, t) for t in inner}
         assert len(found) == 1, (left, right, found)
@@ -95,7 +98,7 @@ def test_gate_changes_at_every_breakpoint_and_nowhere_else(
         if min(abs(angle - math.radians(width)), angle, TURN - angle) > 1e-9:
             assert found == {float(angle < math.radians(width))}
         levels.append(found.pop())
-    assert all(a != b for a, b in zip(levels[:-1], levels[1:], strict=True))
+    assert all(a != b for a, b in pairwise(levels))
 
 
 def test_table_is_linear_between_its_knots_and_constant_outside() -> None:

@@ -15,11 +15,9 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from artefact import write_folder
 
 from raceway.runtime import CacheWarning, CompileError, NoCompilerWarning, RequestError, compile, load
-
-sys.path.insert(0, str(Path(__file__).parent))
-from artefact import write_folder  # noqa: E402
 
 SOURCE = "double twice(double x) { return 2.0 * x; }\n"
 

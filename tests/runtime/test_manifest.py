@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from artefact import manifest as made_manifest
 
 from raceway.runtime import manifest as mf
 from raceway.runtime.errors import ArtefactError
-
-sys.path.insert(0, str(Path(__file__).parent))
-from artefact import manifest as made_manifest  # noqa: E402
 
 
 @pytest.fixture

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from artefact import DEFAULTS, write_folder
 
 from raceway.runtime import IntegrationError, Model, RequestError, Status, compile, load, load_solution
-
-sys.path.insert(0, str(Path(__file__).parent))
-from artefact import DEFAULTS, write_folder  # noqa: E402
+from raceway.runtime.integrators import Frozen, GeneratedIntegrator, Method
 
 METHODS = ("erk", "rosenbrock", "cvodes")
 TURN = 2.0 * math.pi
@@ -36,7 +34,7 @@ def model(folder: Path, cache: Path) -> Model:
 
 
 def exact(times: np.ndarray, parameters: dict[str, float] | None = None) -> np.ndarray:
-    """Closed-form states: free decay about the equilibrium of each constant piece of the gate, plus harmonic response."""
+    """Closed-form states: free decay about the equilibrium of each piece of the gate, plus harmonic response."""
     values = {name: value for name, (_, value) in DEFAULTS.items()} | (parameters or {})
     mass, decay = values["body.weight"] / 2, values["spring.damping"]
     stiffness = values["spring.stiffness"] / mass
@@ -55,7 +53,7 @@ def exact(times: np.ndarray, parameters: dict[str, float] | None = None) -> np.n
         return np.array([rest + fade * (x * c + (v + decay * x) * s), fade * (v * c - (decay * v + stiffness * x) * s)])
 
     low, high = values["push.window.start"], values["push.window.end"] % TURN
-    edges = sorted((edge - start + TURN * k) / speed for edge in (low, high) for k in range(-1, 40))
+    edges = sorted((edge - start + TURN * k) / speed for edge in (low, high) for k in range(-40, 40))
     edges = [edge for edge in edges if edge > 0]
     state, now = np.array([values["initial.x"], values["initial.v"]]) - harmonic(0.0), 0.0
     found = []
@@ -80,8 +78,8 @@ def test_gated_oscillator_follows_its_closed_form(model: Model, method: str) -> 
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_backward_driver_and_harmonic_load_follow_their_closed_form(model: Model, method: str) -> None:
-    changes = {"swing.amplitude": 7.0, "driver.speed": 31.0, "driver.start_angle": 5.0, "body.weight": 5.5}
+def test_backward_driver_and_harmonic_load_follow_the_closed_form(model: Model, method: str) -> None:
+    changes = {"swing.amplitude": 7.0, "driver.speed": -31.0, "driver.start_angle": 5.0, "body.weight": 5.5}
     solution = model.simulate(cycles=4.3, method=method, rtol=1e-11, parameters=changes)
     expected = exact(solution.t, changes)
     error = np.max(np.abs(solution.x - expected), axis=0) / np.max(np.abs(expected), axis=0)
@@ -170,6 +168,27 @@ def test_integration_that_diverges_stops_and_keeps_what_it_has(model: Model) -> 
     assert error.crank_angle == pytest.approx((0.3 + 20.0 * error.time) % TURN)
     assert "crank angle" in str(error)
     assert "t = " in str(error)
+
+
+def test_integrator_that_returns_no_numbers_is_stopped_at_that_piece(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Failing(GeneratedIntegrator):
+        def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
+            block = super().advance(state, start, step, intervals, frozen)
+            return block * np.nan if frozen.u[1] else block
+
+    broken = Method(make=lambda m: Failing(m, "erk"), required=())
+    monkeypatch.setattr("raceway.runtime.integrators.METHODS", {"broken": broken})
+    monkeypatch.setattr("raceway.runtime.simulate.METHODS", {"broken": broken})
+    # the push starts at a quarter turn
+    changes = {"driver.start_angle": 0.0, "push.window.start": TURN / 4, "push.window.end": TURN / 2}
+    with pytest.raises(IntegrationError) as caught:
+        model.simulate(cycles=1, method="broken", parameters=changes, samples_per_cycle=100)
+    assert caught.value.status is Status.NOT_FINITE
+    assert caught.value.crank_angle == pytest.approx(TURN / 4)
+    assert len(caught.value.partial) == 26
+    assert np.isfinite(caught.value.partial["ball.force"]).all()
 
 
 def test_model_without_states_only_evaluates_outputs(tmp_path: Path, cache: Path) -> None:

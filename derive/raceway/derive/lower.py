@@ -15,6 +15,7 @@ import casadi as ca
 import sympy as sp
 
 from raceway.derive.bearing import Ball
+from raceway.derive.kernels import KernelBuilder, Kernels
 from raceway.derive.system import System
 from raceway.derive.terms import TIME
 from raceway.derive.visitor import Visitor
@@ -44,6 +45,7 @@ class Functions:
     constants: tuple[Constant, ...]
     functions: tuple[tuple[ca.Function, str], ...]
     integrators: tuple[tuple[ca.Function, str], ...]
+    kernels: Kernels | None
 
     def __getitem__(self, name: str) -> ca.Function:
         for function, _ in (*self.functions, *self.integrators):
@@ -91,16 +93,16 @@ class _Lowering:
         self.once = Visitor(
             parameters, definitions | {d.symbol: d.expression for d in system.constants}
         )
-        self.visit = Visitor(
+        self._values = (
             {TIME: self.t}
             | {s.symbol: self.x[k] for k, s in enumerate(system.states)}
             | {i.symbol: self.u[k] for k, i in enumerate(system.inputs)}
             | parameters
-            | constants,
-            definitions,
-            constant=frozenset(parameters) | frozenset(constants),
-            hoist=self._hoist,
+            | constants
         )
+        self._definitions = definitions
+        self._fixed = frozenset(parameters) | frozenset(constants)
+        self.visit = Visitor(self._values, definitions, constant=self._fixed, hoist=self._hoist)
 
     def _hoist(self, expression: sp.Basic) -> ca.SX:
         if expression not in self._hoisted:
@@ -138,6 +140,7 @@ class _Lowering:
         for name, outputs in extra.items():
             bodies.append((name, {k: self.visit(e) for k, e in outputs.items()}, "asked for on the side"))
 
+        builder = self._kernel_builder() if system.states else None
         c, once = self._constants()
         arguments = {"t": self.t, "x": self.x, "u": self.u, "p": self.p, "c": c}
         made: list[tuple[ca.Function, str]] = [
@@ -170,7 +173,17 @@ class _Lowering:
         found = [
             Constant(name=f"h{k + 1}", unit="", description=str(e), latex="") for k, e in enumerate(self._hoisted)
         ]
-        return Functions(constants=(*named, *found), functions=tuple(made), integrators=tuple(integrators))
+        return Functions(constants=(*named, *found), functions=tuple(made), integrators=tuple(integrators), kernels=builder.kernels(c) if builder else None)
+
+    def _kernel_builder(self) -> KernelBuilder:
+        return KernelBuilder(
+            self.system,
+            self.visit,
+            values=self._values,
+            definitions=self._definitions,
+            constant=self._fixed,
+            arguments={"t": self.t, "x": self.x, "u": self.u, "p": self.p, "c": ca.SX(0, 1)},
+        )
 
     def _constants(self) -> tuple[ca.SX, ca.SX]:
         """The vector c of symbols, and its value as an expression of p."""

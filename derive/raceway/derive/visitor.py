@@ -76,6 +76,10 @@ class Visitor:
 
     # what an expression depends on
 
+    def is_constant(self, expression: sp.Basic) -> bool:
+        """Whether the expression depends on this visitor's constant symbols only."""
+        return self._fixed(sp.sympify(expression))
+
     def _own(self, expression: sp.Basic) -> bool:
         found = self._is_own.get(expression)
         if found is None:

@@ -144,8 +144,7 @@ class Loop:
             for name in self._varying:
                 memory = self._inputs[name]
                 memory[:size] = np.asarray(values[name])[first : first + size].reshape(size, -1)
-                memory[size:] = memory[size - 1]  # the last block is filled up with its last point
-            self._evaluate()
+            self._evaluate()  # of the last block, also points left over from earlier ones: they are dropped
             if self._buffer.ret():
                 raise EvaluationError(f"{self.function.name()} reported failure")
             for name, memory in self._outputs.items():

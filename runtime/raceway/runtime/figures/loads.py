@@ -47,18 +47,14 @@ def load_curve(record: Record) -> Figure:
     for row, joint in enumerate(joints):
         for column, axis in enumerate("xy"):
             axes = figure.add_subplot(grid[row, column])
+            title = axis
             if joint:
                 first, second = _bodies(record, joint)
-                _curve(
-                    axes,
-                    angle,
-                    record.solution[f"reaction.{joint}.{axis}"][order],
-                    FIRST,
-                    f"force of {second} on {first}",
-                )
+                title = f"{axis} at {joint}: {second} on {first}"
+                _curve(axes, angle, record.solution[f"reaction.{joint}.{axis}"][order], FIRST, "reaction of the joint")
             if ring_load is not None and row == 0:
                 _curve(axes, angle, ring_load[order, column], SECOND, "load on the inner ring")
-            axes.set_title(f"{axis} at joint {joint}" if joint else f"{axis}")
+            axes.set_title(title)
             axes.set_ylabel(f"force along {axis} [N]")
             panels.append(axes)
     if with_torque:
@@ -67,6 +63,7 @@ def load_curve(record: Record) -> Figure:
         axes.set_title("torque of the drive on the driven body")
         axes.set_ylabel("torque [N·m]")
         panels.append(axes)
+    _flatten_noise(panels[: 2 * len(joints)])
     windows = record.gate_windows()
     for axes in panels:
         degree_axis(axes)
@@ -87,6 +84,14 @@ def load_curve(record: Record) -> Figure:
         f"One turn; x and y have their own scales.{shaded} Counter-clockwise torque is positive. {record.settings()}.",
     )
     return figure
+
+
+def _flatten_noise(panels: list[Axes]) -> None:
+    """A component that is zero but for rounding gets an axis on which it looks so."""
+    heights = [max(float(np.max(np.abs(line.get_ydata()))) for line in axes.get_lines()) for axes in panels]
+    for axes, height in zip(panels, heights, strict=True):
+        if height < 1e-9 * max(heights):
+            axes.set_ylim(-0.01 * max(heights), 0.01 * max(heights))
 
 
 def _last_turn(record: Record) -> tuple[Array, Array]:

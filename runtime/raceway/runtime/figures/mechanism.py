@@ -47,7 +47,7 @@ def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
                 )
             )
     arrows = _draw_reactions(axes, record, now, sample, size)
-    _draw_names(axes, record, now, _busy(record, used, now, trace) + arrows, size)
+    _draw_names(axes, record, now, _busy(record, used, now, trace, size) + arrows, size)
     corners = np.vstack([everything, *((at + way)[None, :] for at, way in arrows)])
     margin = 0.16 * size
     axes.set_xlim(corners[:, 0].min() - margin, corners[:, 0].max() + margin)
@@ -177,7 +177,7 @@ def _draw_names(axes: Axes, record: Record, now: _Points, busy: list[tuple[Array
         taken = [way / np.hypot(*way) for at, way in busy if _close(at, place, size) and np.hypot(*way) > 0.0]
         # the direction whose nearest neighbour is farthest; the first of equals
         free = min(compass, key=lambda way: round(max((float(way @ other) for other in taken), default=0.0), 9))
-        distance = 0.125 if any(_close(block, place, size) for block in blocks) else 0.052
+        distance = 0.15 if any(_close(block, place, size) for block in blocks) else 0.052
         axes.text(
             place[0] + distance * size * free[0],
             place[1] + distance * size * free[1],
@@ -195,7 +195,9 @@ def _close(one: Array, other: Array, size: float) -> bool:
     return float(np.hypot(*(one - other))) < 0.01 * size
 
 
-def _busy(record: Record, used: list[tuple[str, str]], now: _Points, trace: _Points) -> list[tuple[Array, Array]]:
+def _busy(
+    record: Record, used: list[tuple[str, str]], now: _Points, trace: _Points, size: float
+) -> list[tuple[Array, Array]]:
     """Where links, bases and guides run: pairs of a place and a direction."""
     mechanism = record.manifest.mechanism
     assert mechanism is not None

@@ -117,7 +117,8 @@ def spectra(record: Record) -> Figure:
         if spectrum.cycles is None
         else f"{spectrum.cycles} whole turn{'s' if spectrum.cycles != 1 else ''}"
     )
-    text = f"Amplitude, mean removed, {cycles}, {'no window' if window == 'boxcar' else 'Hann window'}, lines {spectrum.resolution:.3g} Hz apart."
+    weighting = "no window" if window == "boxcar" else "Hann window"
+    text = f"Amplitude, mean removed, {cycles}, {weighting}, lines {spectrum.resolution:.3g} Hz apart."
     if marks is not None and marks.shaft > 0.0:
         crank = "crank" if record.manifest.mechanism is not None else "shaft"
         figure.legend(

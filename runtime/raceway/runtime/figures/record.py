@@ -117,7 +117,7 @@ class Record:
         return "elastic force", self.solution["ball.elastic_force"]
 
     def ring_load(self) -> Array | None:
-        """Load on the inner ring, (n, 2) [N]: the output, else its share of the reaction; None with neither among the outputs."""
+        """Load on the inner ring, (n, 2) [N]: the output, else its share of the reaction; None without both."""
         if self.has("load.x", "load.y"):
             return np.column_stack((self.solution["load.x"], self.solution["load.y"]))
         mechanism, bearing = self.manifest.mechanism, self.manifest.bearing
@@ -150,7 +150,9 @@ class Record:
         """What a caption says of the run: transient cycles dropped, method, clearance, damping law."""
         statistics = self.solution.statistics
         dropped = self.solution.transient_cycles
-        parts = [f"{dropped:g} transient cycle{'' if dropped == 1 else 's'} dropped", f"method {statistics.method}"]
+        parts = [f"{dropped:g} transient cycle{'' if dropped == 1 else 's'} dropped"]
+        if self.solution.states:  # a linkage alone needs no integration
+            parts.append(f"method {statistics.method}")
         if self.manifest.bearing is not None:
             # a no-break space keeps number and unit on one line
             parts.append(f"diametral clearance {self.parameter('bearing.clearance') * 1e6:g}\u00a0µm")

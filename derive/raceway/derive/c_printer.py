@@ -1,0 +1,114 @@
+"""C99 text of small CasADi functions, to be inlined.
+
+In: an SX function.  Out: a ``static inline`` function whose body is straight-line code over local scalars.  CasADi's own
+code generator passes everything through pointer tables, which no compiler turns into SIMD lanes; this text it does.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+_UNARY = {
+    ca.OP_NEG: "-{0}",
+    ca.OP_NOT: "!{0}",
+    ca.OP_SQ: "{0} * {0}",
+    ca.OP_TWICE: "2.0 * {0}",
+    ca.OP_INV: "1.0 / {0}",
+    ca.OP_ASSIGN: "{0}",
+    ca.OP_SQRT: "sqrt({0})",
+    ca.OP_SIN: "sin({0})",
+    ca.OP_COS: "cos({0})",
+    ca.OP_TAN: "tan({0})",
+    ca.OP_ATAN: "atan({0})",
+    ca.OP_ASIN: "asin({0})",
+    ca.OP_ACOS: "acos({0})",
+    ca.OP_EXP: "exp({0})",
+    ca.OP_LOG: "log({0})",
+    ca.OP_TANH: "tanh({0})",
+    ca.OP_FABS: "fabs({0})",
+    ca.OP_SIGN: "(double)(({0} > 0.0) - ({0} < 0.0))",
+}
+_BINARY = {
+    ca.OP_ADD: "{0} + {1}",
+    ca.OP_SUB: "{0} - {1}",
+    ca.OP_MUL: "{0} * {1}",
+    ca.OP_DIV: "{0} / {1}",
+    ca.OP_POW: "pow({0}, {1})",
+    ca.OP_CONSTPOW: "pow({0}, {1})",
+    ca.OP_ATAN2: "atan2({0}, {1})",
+    ca.OP_FMIN: "fmin({0}, {1})",
+    ca.OP_FMAX: "fmax({0}, {1})",
+    ca.OP_LT: "(double)({0} < {1})",
+    ca.OP_LE: "(double)({0} <= {1})",
+    ca.OP_EQ: "(double)({0} == {1})",
+    ca.OP_NE: "(double)({0} != {1})",
+    ca.OP_AND: "(double)({0} != 0.0 && {1} != 0.0)",
+    ca.OP_OR: "(double)({0} != 0.0 || {1} != 0.0)",
+    # a selection, not a product: what is not selected may be NaN
+    ca.OP_IF_ELSE_ZERO: "({0} != 0.0 ? {1} : 0.0)",
+}
+
+
+def print_function(function: ca.Function, *, prefix: str, description: str, scalars: frozenset[str] = frozenset()) -> str:
+    """C99 text of an SX function.
+
+    Every argument is ``const double *restrict``, every result ``double *restrict``, both dense and column-major; arguments named in
+    `scalars` are passed by value.
+
+    Raises
+    ------
+    TypeError
+        An operation has no C text here, or a result is sparse.
+    """
+    arguments = [
+        f"double {function.name_in(k)}" if function.name_in(k) in scalars else f"const double *restrict {function.name_in(k)}"
+        for k in range(function.n_in())
+    ]
+    results = [f"double *restrict {function.name_out(k)}" for k in range(function.n_out())]
+    for k in range(function.n_out()):
+        if not function.sparsity_out(k).is_dense():
+            raise TypeError(f"{function.name()}: the result {function.name_out(k)} is sparse; make it dense first")
+    lines = [f"/* {description} */", f"static inline void {prefix}{function.name()}({', '.join(arguments + results)})", "{"]
+    lines += _unused(function)
+    declared: set[int] = set()
+    for k in range(function.n_instructions()):
+        operation, out, take = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+        if operation == ca.OP_OUTPUT:
+            lines.append(f"    {function.name_out(out[0])}[{out[1]}] = w{take[0]};")
+            continue
+        if operation == ca.OP_INPUT:
+            name = function.name_in(take[0])
+            text = name if name in scalars else f"{name}[{take[1]}]"
+        elif operation == ca.OP_CONST:
+            text = _literal(function.instruction_constant(k))
+        elif operation in _UNARY:
+            text = _UNARY[operation].format(f"w{take[0]}")
+        elif operation in _BINARY:
+            text = _BINARY[operation].format(f"w{take[0]}", f"w{take[1]}")
+        else:
+            raise TypeError(f"{function.name()}: operation {operation} has no C text")
+        lines.append(f"    {'' if out[0] in declared else 'double '}w{out[0]} = {text};")
+        declared.add(out[0])
+    lines.append("}")
+    return "\n".join(lines)
+
+
+def print_array(name: str, values: list[float]) -> str:
+    """``static const double`` array; never of length zero, which C does not know."""
+    body = ", ".join(_literal(v) for v in values) or "0.0"
+    return f"static const double {name}[{max(len(values), 1)}] = {{{body}}};"
+
+
+def _literal(value: float) -> str:
+    text = repr(float(value))
+    return text if any(mark in text for mark in ".en") else text + ".0"
+
+
+def _unused(function: ca.Function) -> list[str]:
+    """Silence warnings on arguments a model does not need."""
+    used = {
+        function.instruction_input(k)[0]
+        for k in range(function.n_instructions())
+        if function.instruction_id(k) == ca.OP_INPUT
+    }
+    return [f"    (void){function.name_in(k)};" for k in range(function.n_in()) if k not in used]

@@ -1,0 +1,315 @@
+/* The loop around the methods: segments, step sizes, dense output, choice of method, status.  See stepper.h. */
+#include "stepper.h"
+
+#include <float.h>
+#include <string.h>
+
+#include "explicit.h"
+#include "rosenbrock.h"
+
+typedef struct {
+    const raceway_options *options;
+    raceway_result *result;
+    rw_numbers numbers;
+    double weight[RW_NX]; /* 1 / tolerance */
+    double *x;
+    double next[RW_NX];
+    double step;           /* proposal for the next step; 0 where it has to be estimated */
+    double last_error;     /* of the last accepted step, for the PI controller */
+    int method;
+    long outputs;
+    const double *output_times;
+    double *output_states;
+    /* work of the methods */
+    rw_rosenbrock linear;
+    rw_matrix matrix;
+    rw_explicit plain;
+    double dense[RW_DENSE_ROWS][RW_NX];
+} rw_run;
+
+enum { STIFF_STEPS = 12 }; /* steps at the stability limit before an explicit method gives up */
+
+static int is_explicit(int method) { return method == RACEWAY_DP54 || method == RACEWAY_DOP853; }
+
+static int is_finite(const double *x)
+{
+    for (int k = 0; k < RW_NX; k++)
+        if (!(fabs(x[k]) <= DBL_MAX)) return 0;
+    return 1;
+}
+
+static double error_exponent(int method)
+{
+    switch (method) {
+    case RACEWAY_RODAS4: return rw_rodas4.error_exponent;
+    case RACEWAY_RODAS5P: return rw_rodas5p.error_exponent;
+    case RACEWAY_DP54: return rw_dp54.error_exponent;
+    default: return rw_dop853.error_exponent;
+    }
+}
+
+/* Initial step (Hairer, Norsett & Wanner I, section II.4): from the size of the first and a guess of the second derivative. */
+static double estimate_step(rw_run *run, double t, double longest)
+{
+    double dx[RW_NX], moved[RW_NX], change[RW_NX];
+    rw_explicit_rate(&run->numbers, t, run->x, dx);
+    const double slope = rw_norm(dx, run->weight), size = rw_norm(run->x, run->weight);
+    double h = size > 1e-5 && slope > 1e-5 ? 0.01 * size / slope : 1e-6 * longest;
+    /* from rest the size says nothing: the step of a tolerance's motion does */
+    if (slope > 0.0 && h < 1.0 / slope) h = 1.0 / slope;
+    if (h > longest) h = longest;
+    for (int k = 0; k < RW_NX; k++) moved[k] = run->x[k] + h * dx[k];
+    rw_explicit_rate(&run->numbers, t + h, moved, change);
+    for (int k = 0; k < RW_NX; k++) change[k] = (change[k] - dx[k]) / h;
+    const double curvature = rw_norm(change, run->weight), larger = curvature > slope ? curvature : slope;
+    const double second = larger > 1e-15 ? pow(0.01 / larger, 1.0 / error_exponent(run->method)) : h * 1e-3;
+    run->result->evaluations += 2;
+    h = 100.0 * h < second ? 100.0 * h : second;
+    return h < longest ? h : longest;
+}
+
+/* The family for the coming segment: linearly implicit where damping is faster than the oscillation it damps, for then an explicit
+   method's step is held down by stability and not by accuracy. */
+static int choose_method(rw_run *run, double t)
+{
+    rw_rosenbrock *work = &run->linear;
+    rw_rosenbrock_start(work, &run->numbers, t, run->x, 1);
+    run->result->evaluations++;
+    double decay = 0.0, squared = 0.0;
+    for (int i = 0; i < RW_NQ; i++) {
+        double a = 0.0, b = 0.0;
+        for (int j = 0; j < RW_NQ; j++) {
+            a += fabs(work->A[i * RW_NQ + j]);
+            b += fabs(work->B[i * RW_NQ + j]);
+        }
+        decay = b > decay ? b : decay;
+        squared = a > squared ? a : squared;
+    }
+    return decay * decay > 2.0 * squared ? RACEWAY_RODAS5P : RACEWAY_DP54;
+}
+
+/* Outputs up to the end of the accepted step from (t, x) to (t + h, next); t counts from the segment's start. */
+static void write_outputs(rw_run *run, double start, double t, double h)
+{
+    raceway_result *result = run->result;
+    if (result->written >= run->outputs) return;
+    const double end = start + (t + h);
+    if (run->output_times[result->written] > end) return;
+    int prepared = 0;
+    while (result->written < run->outputs && run->output_times[result->written] <= end) {
+        const double theta = ((run->output_times[result->written] - start) - t) / h;
+        double at[RW_NX], *y = run->output_states ? run->output_states + result->written * RW_NX : at;
+        if (theta >= 1.0) {
+            memcpy(y, run->next, sizeof run->next);
+        } else {
+            if (!prepared) {
+                if (run->method == RACEWAY_DP54) rw_explicit_dense(&rw_dp54, &run->plain, &run->numbers, t, run->x, h, run->next, run->dense);
+                else if (run->method == RACEWAY_DOP853) rw_explicit_dense(&rw_dop853, &run->plain, &run->numbers, t, run->x, h, run->next, run->dense);
+                else if (run->method == RACEWAY_RODAS4) rw_rosenbrock_dense(&rw_rodas4, &run->linear, run->dense);
+                else rw_rosenbrock_dense(&rw_rodas5p, &run->linear, run->dense);
+                prepared = 1;
+            }
+            const double(*dense)[RW_NX] = (const double(*)[RW_NX])run->dense;
+            const double place = theta > 0.0 ? theta : 0.0;
+            if (run->method == RACEWAY_DP54) rw_explicit_at(&rw_dp54, dense, run->x, run->next, place, y);
+            else if (run->method == RACEWAY_DOP853) rw_explicit_at(&rw_dop853, dense, run->x, run->next, place, y);
+            else if (run->method == RACEWAY_RODAS4) rw_rosenbrock_at(&rw_rodas4, dense, run->x, run->next, place, y);
+            else rw_rosenbrock_at(&rw_rodas5p, dense, run->x, run->next, place, y);
+        }
+        result->written++;
+    }
+}
+
+/* Try one step; returns its scaled error. */
+static double try_step(rw_run *run, double t, double h)
+{
+    raceway_result *result = run->result;
+    switch (run->method) {
+    case RACEWAY_DP54:
+        result->evaluations += rw_dp54.stages;
+        return rw_explicit_step(&rw_dp54, RW_DP54_STAGES, &run->plain, &run->numbers, t, run->x, h, run->weight, run->next);
+    case RACEWAY_DOP853:
+        result->evaluations += rw_dop853.stages;
+        return rw_explicit_step(&rw_dop853, RW_DOP853_STAGES, &run->plain, &run->numbers, t, run->x, h, run->weight, run->next);
+    case RACEWAY_RODAS4: {
+        result->evaluations += rw_rodas4.stages - 1;
+        const double error = rw_rosenbrock_step(&rw_rodas4, RW_RODAS4_STAGES, &run->linear, &run->matrix, &run->numbers, t, run->x, h,
+                                                run->weight, run->next);
+        result->factorizations++;
+        result->pivoted += run->matrix.pivoted;
+        return error;
+    }
+    default: {
+        result->evaluations += rw_rodas5p.stages - 1;
+        const double error = rw_rosenbrock_step(&rw_rodas5p, RW_RODAS5P_STAGES, &run->linear, &run->matrix, &run->numbers, t, run->x, h,
+                                                run->weight, run->next);
+        result->factorizations++;
+        result->pivoted += run->matrix.pivoted;
+        return error;
+    }
+    }
+}
+
+/* The state whose scaled value is worst, or the first that is none. */
+static int worst_state(const rw_run *run)
+{
+    int worst = 0;
+    double largest = -1.0;
+    for (int k = 0; k < RW_NX; k++) {
+        if (!(fabs(run->next[k]) <= DBL_MAX)) return k;
+        const double change = fabs(run->next[k] - run->x[k]) * run->weight[k];
+        if (change > largest) {
+            largest = change;
+            worst = k;
+        }
+    }
+    return worst;
+}
+
+static void first_slope(rw_run *run, double t)
+{
+    rw_explicit_rate(&run->numbers, t, run->x, run->plain.k[0]);
+    run->result->evaluations++;
+}
+
+static void linearize(rw_run *run, double t, int fresh)
+{
+    rw_rosenbrock_start(&run->linear, &run->numbers, t, run->x, fresh);
+    run->result->evaluations++;
+}
+
+/* Integrate one segment from `start` to `end`; its clock starts at zero. */
+static int run_segment(rw_run *run, double start, double end, int restart, int changeable)
+{
+    raceway_result *result = run->result;
+    const raceway_options *options = run->options;
+    const double length = end - start;
+    double t = 0.0;
+    if (!(length > 0.0)) return RACEWAY_DONE;
+    if (restart || run->step == 0.0) {
+        if (changeable) {
+            const int chosen = choose_method(run, t);
+            result->switches += run->method != chosen && run->method != RACEWAY_AUTO;
+            run->method = chosen;
+        }
+        const double estimate = options->first_step > 0.0 && run->step == 0.0 ? options->first_step : estimate_step(run, t, length);
+        run->step = estimate;
+        run->last_error = 1e-4;
+    }
+    int stiff = 0, rejected_last = 0;
+    if (is_explicit(run->method)) first_slope(run, t);
+    else linearize(run, t, 1);
+    while (t < length) {
+        double h = run->step < options->largest_step ? run->step : options->largest_step;
+        const double left = length - t;
+        int last = 0;
+        if (h * 1.0001 >= left) {
+            h = left;
+            last = 1;
+        } else if (2.0 * h > left) {
+            h = 0.5 * left; /* two even steps rather than a full and a tiny one */
+        }
+        if (result->steps + result->rejected >= options->max_steps) {
+            result->step = h;
+            return RACEWAY_TOO_MANY_STEPS;
+        }
+        const double error = try_step(run, t, h);
+        const double q = error_exponent(run->method);
+        if (error >= 0.0 && error <= 1.0 && is_finite(run->next)) {
+            /* PI controller (Hairer & Wanner II, section IV.2) */
+            const double floor_error = error > 1e-10 ? error : 1e-10;
+            double factor = 0.9 * pow(floor_error, -0.7 / q) * pow(run->last_error, 0.4 / q);
+            factor = factor > 6.0 ? 6.0 : factor < 0.2 ? 0.2 : factor;
+            if (rejected_last && factor > 1.0) factor = 1.0;
+            run->last_error = floor_error > 1e-4 ? floor_error : 1e-4;
+            result->steps++;
+            write_outputs(run, start, t, h);
+            if (changeable && is_explicit(run->method)) {
+                const double limit = run->method == RACEWAY_DP54 ? 3.25 : 6.1;
+                const double reach = rw_explicit_stiffness(&run->plain, run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES, h,
+                                                           run->next, run->weight);
+                stiff = reach > limit ? stiff + 1 : 0;
+            }
+            memcpy(run->x, run->next, sizeof run->next);
+            t = last ? length : t + h;
+            if (!last || factor < 1.0) run->step = h * factor;
+            rejected_last = 0;
+            if (stiff >= STIFF_STEPS) {
+                run->method = RACEWAY_RODAS5P;
+                result->switches++;
+                stiff = 0;
+                linearize(run, t, 1);
+            } else if (is_explicit(run->method)) {
+                const int stages = run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES;
+                memcpy(run->plain.k[0], run->plain.k[stages], sizeof run->plain.k[0]);
+            } else if (t < length) {
+                linearize(run, t, 0);
+            }
+        } else {
+            const int finite = error >= 0.0 && error <= DBL_MAX;
+            double factor = finite ? 0.9 * pow(error, -1.0 / q) : 0.1;
+            if (factor < 0.1) factor = 0.1;
+            if (factor > 0.9) factor = 0.9;
+            result->rejected++;
+            rejected_last = 1;
+            run->step = h * factor;
+            if (run->step < options->smallest_step || start + t + run->step == start + t) {
+                result->step = run->step;
+                result->state = worst_state(run);
+                result->time = start + t;
+                return finite ? RACEWAY_STEP_TOO_SMALL : RACEWAY_NOT_FINITE;
+            }
+        }
+        result->time = start + t;
+    }
+    result->time = end;
+    return RACEWAY_DONE;
+}
+
+int raceway_run(const raceway_options *options, const double *p, const double *c, double *x, long segments, const double *times,
+                const double *inputs, const unsigned char *restarts, long outputs, const double *output_times, double *output_states,
+                raceway_result *result)
+{
+    rw_run run;
+    memset(result, 0, sizeof *result);
+    result->state = -1;
+    result->time = segments > 0 ? times[0] : 0.0;
+    run.options = options;
+    run.result = result;
+    run.x = x;
+    run.step = 0.0;
+    run.last_error = 1e-4;
+    run.method = options->method;
+    run.outputs = outputs;
+    run.output_times = output_times;
+    run.output_states = output_states;
+    run.numbers.p = p;
+    run.numbers.c = c;
+    const int changeable = options->method == RACEWAY_AUTO;
+    if (options->method < RACEWAY_AUTO || options->method > RACEWAY_DOP853) return result->status = RACEWAY_BAD_ARGUMENT;
+    for (int k = 0; k < RW_NX; k++) run.weight[k] = 1.0 / options->tolerance[k];
+    for (long i = 1; i <= segments; i++)
+        if (!(times[i] >= times[i - 1])) return result->status = RACEWAY_BAD_ARGUMENT;
+    if (!is_finite(x)) return result->status = RACEWAY_NOT_FINITE;
+    while (result->written < outputs && output_times[result->written] <= result->time) {
+        if (output_states) memcpy(output_states + result->written * RW_NX, x, RW_NX * sizeof *x);
+        result->written++;
+    }
+    for (long i = 0; i < segments; i++) {
+        result->segment = i;
+        run.numbers.u = inputs + i * RW_NU;
+        result->status = run_segment(&run, times[i], times[i + 1], restarts[i], changeable);
+        if (result->status != RACEWAY_DONE) break;
+    }
+    result->method = run.method;
+    return result->status;
+}
+
+void raceway_sizes(int *sizes)
+{
+    sizes[0] = RW_NX;
+    sizes[1] = RW_NU;
+    sizes[2] = RW_NP;
+    sizes[3] = RW_NC;
+    sizes[4] = RW_NB;
+}

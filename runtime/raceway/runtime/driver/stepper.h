@@ -1,0 +1,75 @@
+/* The stepper's interface: one call integrates a run over any number of segments.
+
+   A segment is a stretch of time within which the inputs u are constant; its clock starts at zero.  The driver lands on every
+   segment's end exactly, so that a load that switches there never hides inside a step.
+
+   No static state, no allocation: callable from many threads at once. */
+#ifndef RACEWAY_STEPPER_H
+#define RACEWAY_STEPPER_H
+
+#ifdef _WIN32
+#define RACEWAY_EXPORT __declspec(dllexport)
+#else
+#define RACEWAY_EXPORT __attribute__((visibility("default")))
+#endif
+
+enum raceway_method {
+    RACEWAY_AUTO = 0,
+    RACEWAY_RODAS4 = 1,
+    RACEWAY_RODAS5P = 2,
+    RACEWAY_DP54 = 3,
+    RACEWAY_DOP853 = 4
+};
+
+enum raceway_status {
+    RACEWAY_DONE = 0,
+    RACEWAY_TOO_MANY_STEPS = 1, /* max_steps reached */
+    RACEWAY_STEP_TOO_SMALL = 2, /* the error test fails at the smallest step */
+    RACEWAY_NOT_FINITE = 3,     /* the state or its rate is not a number even for the smallest step */
+    RACEWAY_BAD_ARGUMENT = 4    /* method unknown, times out of order */
+};
+
+typedef struct {
+    int method;              /* enum raceway_method */
+    long max_steps;          /* accepted and rejected */
+    double first_step;       /* [s]; 0: estimated */
+    double smallest_step;    /* [s] */
+    double largest_step;     /* [s] */
+    const double *tolerance; /* error allowed in a step for each state */
+} raceway_options;
+
+typedef struct {
+    int status;          /* enum raceway_status */
+    int method;          /* the method of the last segment */
+    int state;           /* state whose error or value ended the run, -1 if none */
+    long segment;        /* segment in which the run ended */
+    long written;        /* output times reached */
+    long steps;          /* accepted */
+    long rejected;
+    long evaluations;    /* of the right-hand side */
+    long factorizations; /* of the iteration matrix */
+    long pivoted;        /* of these, with pivoting */
+    long switches;       /* changes of method */
+    double time;         /* reached [s] */
+    double step;         /* last step size tried [s] */
+} raceway_result;
+
+/* Integrate from x to the last segment's end.
+
+   x            states; on return those reached
+   segments     number of segments
+   times        their ends, [segments + 1] values, increasing [s]
+   inputs       u of each, row after row
+   restarts     1 where the load jumps at the segment's start: the step size is estimated anew there
+   outputs      number of output times
+   output_times increasing, within the run [s]
+   output_states row after row, or NULL
+   Returns result->status. */
+RACEWAY_EXPORT int raceway_run(const raceway_options *options, const double *p, const double *c, double *x, long segments,
+                               const double *times, const double *inputs, const unsigned char *restarts, long outputs,
+                               const double *output_times, double *output_states, raceway_result *result);
+
+/* Sizes the library was compiled for: states, inputs, parameters, constants, balls. */
+RACEWAY_EXPORT void raceway_sizes(int *sizes);
+
+#endif

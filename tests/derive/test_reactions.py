@@ -1,0 +1,426 @@
+"""Newton–Euler of linkages: the derived equations are the printed Eq. (1); their closed form agrees with LAPACK."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy as sp
+from linkages import (
+    DEGREE,
+    MACHINES,
+    Machine,
+    crank_slider,
+    evaluate,
+    four_bar,
+    moving_guide,
+    offset_slider,
+    six_bar_slider,
+    watt_six_bar,
+)
+
+from raceway.derive.errors import LinkageError
+from raceway.derive.linkage import Linkage
+from raceway.derive.numeric import Evaluator
+from raceway.derive.reactions import Reactions
+
+STATES = 200
+
+
+@cache
+def derived(name: str, moments: tuple[str, ...] = ()) -> tuple[Machine, Linkage, Reactions]:
+    machine = MACHINES[name]()
+    linkage = machine.linkage()
+    return machine, linkage, machine.reactions(linkage, moments=moments)
+
+
+# --- Eq. (1) ------------------------------------------------------------------------------------------------------
+
+# The printed frame: x right, y down, angles from +x towards +y.  Symbols as printed.
+L1, L2, LO1, LO2, T1, T1P, T2 = sp.symbols("l1 l2 lo1 lo2 theta1 theta1p theta2", real=True)
+M1, M2, M3, J1, J2, G, F = sp.symbols("m1 m2 m3 J1 J2 g F", real=True)
+AX1, AY1, AX2, AY2, A, E1, E2 = sp.symbols("ax1 ay1 ax2 ay2 a epsilon1 epsilon2", real=True)
+
+#: Sign of each derived row (crank, rod, slider: x, y, moment) as printed.
+ROW_SIGNS = (-1, 1, 1, -1, 1, 1, -1, 1)
+#: Sign of each derived column as printed: the printed R34 is the force of the frame on the slider.
+COLUMN_SIGNS = (1, 1, 1, 1, -1, 1, 1, 1)
+
+
+def printed_equation() -> tuple[sp.Matrix, sp.Matrix]:
+    """Eq. (1) as it stands in the paper."""
+    a1 = L1 * sp.sin(T1) - LO1 * sp.sin(T1 + T1P)
+    a2 = L1 * sp.cos(T1) - LO1 * sp.cos(T1 + T1P)
+    a3, a4 = LO1 * sp.sin(T1 + T1P), LO1 * sp.cos(T1 + T1P)
+    a5, a6 = LO2 * sp.sin(T2), LO2 * sp.cos(T2)
+    a7, a8 = (L2 - LO2) * sp.sin(T2), (L2 - LO2) * sp.cos(T2)
+    matrix = sp.Matrix(
+        [
+            [-1, 0, 0, 0, 0, 1, 0, 0],
+            [0, 1, 0, 0, 0, 0, -1, 0],
+            [a1, a2, 0, 0, 0, a3, a4, 1],
+            [1, 0, -1, 0, 0, 0, 0, 0],
+            [0, -1, 0, 1, 0, 0, 0, 0],
+            [a5, a6, a7, a8, 0, 0, 0, 0],
+            [0, 0, 1, 0, -1, 0, 0, 0],
+            [0, 0, 0, -1, 0, 0, 0, 0],
+        ]
+    )
+    right_side = sp.Matrix(
+        [
+            -M1 * AX1,
+            M1 * G - M1 * AY1,
+            -J1 * E1,
+            -M2 * AX2,
+            M2 * G - M2 * AY2,
+            -J2 * E2,
+            0,
+            M3 * G - F - M3 * A,
+        ]
+    )
+    return matrix, right_side
+
+
+def in_printed_symbols(expression: sp.Expr) -> sp.Expr:
+    """The project's symbols (y up, counter-clockwise) in the printed ones (y down, clockwise)."""
+    names = {
+        "body.crank.cos": sp.cos(T1),
+        "body.crank.sin": -sp.sin(T1),
+        "body.rod.cos": sp.cos(T2),
+        "body.rod.sin": -sp.sin(T2),
+        "body.crank.angular_acceleration": -E1,
+        "body.rod.angular_acceleration": -E2,
+        "body.crank.center_of_mass.ax": AX1,
+        "body.crank.center_of_mass.ay": -AY1,
+        "body.rod.center_of_mass.ax": AX2,
+        "body.rod.center_of_mass.ay": -AY2,
+        # The guide points down, so its coordinate counts as the printed y.
+        "joint.C.ax": A * sp.cos(3 * sp.pi / 2),
+        "joint.C.ay": A * sp.sin(3 * sp.pi / 2),
+        "joint.D.direction.x": sp.cos(3 * sp.pi / 2),
+        "joint.D.direction.y": sp.sin(3 * sp.pi / 2),
+        "mechanism.bodies.crank.points.B": L1,
+        "mechanism.bodies.rod.points.C": L2,
+        "mechanism.bodies.crank.center_of_mass.distance": LO1,
+        "mechanism.bodies.crank.center_of_mass.angle": -T1P,
+        "mechanism.bodies.rod.center_of_mass": LO2,
+        "mechanism.bodies.crank.mass": M1,
+        "mechanism.bodies.rod.mass": M2,
+        "mechanism.bodies.slider.mass": M3,
+        "mechanism.bodies.crank.inertia": J1,
+        "mechanism.bodies.rod.inertia": J2,
+        "mechanism.gravity": G,
+        "mechanism.forces.punch.force.x": sp.S.Zero,
+        "mechanism.forces.punch.force.y": F,
+    }
+    unknown = {s.name for s in expression.free_symbols} - set(names)
+    assert not unknown
+    return expression.subs({sp.Symbol(name, real=True): value for name, value in names.items()})
+
+
+def test_derived_matrix_equals_printed_eq_1():
+    _, linkage, reactions = derived("crank-slider")
+    assert [u.name for u in reactions.unknowns] == [
+        *("reaction.B.x", "reaction.B.y", "reaction.C.x", "reaction.C.y"),  # R12x R12y R23x R23y
+        *("reaction.D.normal", "reaction.A.x", "reaction.A.y", "drive_torque"),  # R34x R14x R14y Md
+    ]
+    slider = {d.symbol.name: d.expression for d in linkage.definitions}
+    along = sp.Symbol("joint.D.acceleration", real=True)
+    assert slider["joint.C.ax"] == along * sp.Symbol("joint.D.direction.x", real=True)
+    assert slider["joint.C.ay"] == along * sp.Symbol("joint.D.direction.y", real=True)
+    matrix, right_side = printed_equation()
+    assert reactions.matrix.shape == (8, 8)
+    for i in range(8):
+        for j in range(8):
+            entry = ROW_SIGNS[i] * COLUMN_SIGNS[j] * in_printed_symbols(reactions.matrix[i, j])
+            assert sp.simplify(sp.expand_trig(entry - matrix[i, j])) == 0, (i, j)
+        assert sp.expand(ROW_SIGNS[i] * in_printed_symbols(reactions.right_side[i]) - right_side[i]) == 0, i
+
+
+def solve_printed(angle: float, speed: float, v: dict[str, float]) -> np.ndarray:
+    """Eq. (1) as printed, with kinematics by hand in the printed frame; unknowns in the printed order."""
+    l1, l2, lo1, t1p, lo2 = v["l1"], v["l2"], v["lo1"], v["t1p"], v["lo2"]
+    t, w = -angle, -speed
+    cos2 = -l1 * np.cos(t) / l2
+    sin2 = np.sqrt(1 - cos2**2)
+    w2 = -l1 * np.sin(t) * w / (l2 * sin2)
+    e2 = -(l1 * np.cos(t) * w**2 + l2 * cos2 * w2**2) / (l2 * sin2)
+    bx, by = -l1 * np.cos(t) * w**2, -l1 * np.sin(t) * w**2
+    x1, y1 = -lo1 * np.cos(t + t1p) * w**2, -lo1 * np.sin(t + t1p) * w**2
+    x2, y2 = bx - lo2 * (sin2 * e2 + cos2 * w2**2), by + lo2 * (cos2 * e2 - sin2 * w2**2)
+    a = by + l2 * (cos2 * e2 - sin2 * w2**2)
+    numbers = {
+        L1: l1,
+        L2: l2,
+        LO1: lo1,
+        LO2: lo2,
+        T1: t,
+        T1P: t1p,
+        T2: np.arctan2(sin2, cos2),
+        M1: v["m1"],
+        M2: v["m2"],
+        M3: v["m3"],
+        J1: 1.0,
+        J2: v["J2"],
+        G: v["g"],
+        F: v["F"],
+        AX1: x1,
+        AY1: y1,
+        AX2: x2,
+        AY2: y2,
+        A: a,
+        E1: 0.0,
+        E2: e2,
+    }
+    return np.linalg.solve(*_printed_numbers([float(numbers[s]) for s in _PRINTED_SYMBOLS]))
+
+
+_PRINTED_SYMBOLS = (L1, L2, LO1, LO2, T1, T1P, T2, M1, M2, M3, J1, J2, G, F, AX1, AY1, AX2, AY2, A, E1, E2)
+
+
+@cache
+def _printed_function():
+    return sp.lambdify(_PRINTED_SYMBOLS, printed_equation(), modules="numpy")
+
+
+def _printed_numbers(values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    matrix, right_side = _printed_function()(*values)
+    return np.array(matrix, dtype=float), np.array(right_side, dtype=float).ravel()
+
+
+def test_project_frame_gives_the_forces_of_printed_eq_1():
+    """Random masses, lengths, offsets, angles and speeds; forces agree up to the declared signs."""
+    machine, linkage, reactions = derived("crank-slider")
+    run = Evaluator(linkage.definitions + reactions.definitions, reactions.unknowns)
+    random = np.random.default_rng(1)
+    for _ in range(STATES):
+        v = {
+            "l1": random.uniform(0.005, 0.05),
+            "l2": random.uniform(0.06, 0.2),
+            "lo1": random.uniform(0, 0.03),
+            "t1p": random.uniform(-3, 3),
+            "lo2": random.uniform(0, 0.1),
+            "m1": random.uniform(0.1, 2),
+            "m2": random.uniform(0.1, 5),
+            "m3": random.uniform(1, 20),
+            "J2": random.uniform(1e-3, 1e-2),
+            "g": 9.81,
+            "F": random.uniform(-9000, 9000),
+        }
+        angle, speed = random.uniform(0, 2 * np.pi), random.uniform(5, 100)
+        b = "mechanism__bodies__"
+        changed = machine.with_values(
+            **{
+                f"{b}crank__points__B": v["l1"],
+                f"{b}rod__points__C": v["l2"],
+                f"{b}crank__center_of_mass__distance": v["lo1"],
+                f"{b}crank__center_of_mass__angle": -v["t1p"],
+                f"{b}rod__center_of_mass": v["lo2"],
+                f"{b}crank__mass": v["m1"],
+                f"{b}rod__mass": v["m2"],
+                f"{b}slider__mass": v["m3"],
+                f"{b}rod__inertia": v["J2"],
+                "mechanism__forces__punch__force__y": v["F"],
+                "mechanism__driver__speed": speed,
+            }
+        )
+        ours = np.array(run(changed.numbers(angle)), dtype=float) * COLUMN_SIGNS
+        printed = solve_printed(angle, speed, v)
+        assert np.linalg.norm(ours - printed) < 1e-12 * np.linalg.norm(printed)
+
+
+def loads_at(degrees: float) -> np.ndarray:
+    machine, linkage, reactions = derived("crank-slider")
+    results = [*reactions.joint_force["A"], reactions.drive_torque]
+    return np.array(evaluate(machine, results, degrees * DEGREE, linkage, reactions), dtype=float)
+
+
+def test_loads_of_the_punching_machine_at_240_deg():
+    """Force of the crank on the frame and drive torque, against Eq. (1) as printed and the reference of the project.
+
+    The reference values (-267.6, 8487.1) N and 26.90 N*m carry all their digits at 239.95 deg; at 240 deg Eq. (1) as
+    printed, solved by `solve_printed`, gives (-267.174, 8486.976) N and 26.8597 N*m, 0.16 % away.
+    """
+    v = {"l1": 6e-3, "l2": 0.1, "lo1": 0.0, "t1p": 0.0, "lo2": 0.05, "m1": 0.3567, "m2": 2.55, "m3": 16.7965}
+    v |= {"J2": 7517.545e-6, "g": 9.81, "F": 8964.8}
+    printed = solve_printed(240 * DEGREE, 500 * 2 * np.pi / 60, v)[5:]
+    assert loads_at(240.0) == pytest.approx(printed, rel=1e-12)
+    reference = np.array([-267.6, 8487.1, 26.90])
+    assert loads_at(240.0) == pytest.approx(reference, rel=2e-3)
+    assert np.all(np.abs(loads_at(239.95) - reference) <= [0.05, 0.05, 0.005])
+
+
+# --- the solution -------------------------------------------------------------------------------------------------
+
+
+def worst_difference_from_lapack(machine: Machine, moments: Sequence[str] = (), seed: int = 2) -> float:
+    """Largest norm-wise relative difference of the closed form from LAPACK's solution at random states."""
+    linkage = machine.linkage()
+    reactions = machine.reactions(linkage, moments=moments)
+    n = len(reactions.unknowns)
+    assert reactions.matrix.shape == (n, n)
+    random = np.random.default_rng(seed)
+    angle, speed = random.uniform(0, 2 * np.pi, STATES), random.uniform(1, 100, STATES)
+    results = [*reactions.matrix, *reactions.right_side, *reactions.unknowns]
+    numbers = {**machine.numbers(angle), linkage.speed: speed}
+    rows = Evaluator(linkage.definitions + reactions.definitions, results)(numbers)
+    values = np.array([np.broadcast_to(row, STATES) for row in rows], dtype=float).T
+    worst = 0.0
+    for row in values:
+        solved = np.linalg.solve(row[: n * n].reshape(n, n), row[n * n : n * n + n])
+        worst = max(worst, float(np.linalg.norm(row[-n:] - solved) / np.linalg.norm(solved)))
+    return worst
+
+
+CASES = {
+    "crank-slider": (crank_slider, ()),
+    "crank-slider with guide moment": (lambda: with_slider_inertia(crank_slider()), ("D",)),
+    "crank-slider, l1/l2 = 0.95": (lambda: crank_slider(crank=0.095, rod=0.1), ()),
+    "crank-slider, crank of 50 um": (lambda: crank_slider(crank=50e-6, rod=0.1), ()),
+    "offset slider": (offset_slider, ("D",)),
+    "offset slider without guide moment": (offset_slider, ()),
+    "four-bar": (four_bar, ()),
+    "four-bar right": (lambda: four_bar("right"), ()),
+    "six-bar with slider": (six_bar_slider, ("G",)),
+    "guide on a moving body": (moving_guide, ()),
+    "guide on the slider": (lambda: moving_guide(guide_on_slider=True), ()),
+    "watt six-bar": (watt_six_bar, ()),
+}
+
+
+def with_slider_inertia(machine: Machine) -> Machine:
+    """Give the slider the rod's moment of inertia: any number will do for a body that does not turn."""
+    return machine.with_body("slider", inertia=machine.mechanism.body("rod").inertia)
+
+
+@pytest.mark.parametrize("case", list(CASES))
+def test_closed_form_equals_lapack(case):
+    make, moments = CASES[case]
+    assert worst_difference_from_lapack(make(), moments) < 1e-12
+
+
+def test_reversed_bodies_of_a_joint_reverse_its_reaction():
+    one, linkage, reactions = derived("four-bar")
+    two = one.with_joint("B", bodies=("coupler", "crank"))
+    linkage2 = two.linkage()
+    reactions2 = two.reactions(linkage2)
+    first = evaluate(one, [*reactions.joint_force["B"], *reactions.joint_force["A"]], 1.1, linkage, reactions)
+    second = evaluate(two, [*reactions2.joint_force["B"], *reactions2.joint_force["A"]], 1.1, linkage2, reactions2)
+    assert np.array(second) == pytest.approx([-first[0], -first[1], first[2], first[3]], rel=1e-12)
+
+
+def test_force_of_a_guide_is_normal_to_it():
+    machine, linkage, reactions = derived("offset slider", ("D",))
+    x, y, normal = evaluate(
+        machine,
+        [*reactions.joint_force["D"], sp.Symbol("reaction.D.normal", real=True)],
+        np.linspace(0, 6, 7),
+        linkage,
+        reactions,
+    )
+    assert np.max(np.abs(x * np.cos(20 * DEGREE) + y * np.sin(20 * DEGREE))) < 1e-12 * np.max(np.abs(normal))
+    assert np.hypot(x, y) == pytest.approx(np.abs(normal), rel=1e-14)
+
+
+def test_guide_moment_balances_the_pushed_slider_at_rest():
+    """Speed zero, no gravity: statics of the slider by hand, moments about its pin C."""
+    machine, linkage, reactions = derived("offset slider", ("D",))
+    still = machine.with_values(mechanism__driver__speed=0.0, mechanism__gravity=0.0)
+    results = [*reactions.joint_force["D"], reactions.joint_moment["D"]]
+    points = [linkage.motion(machine.mechanism, "slider", p).position for p in ("C", "D", "tool")]
+    fx, fy, moment, xc, yc, xd, yd, xt, yt = evaluate(
+        still, [*results, *(c for p in points for c in p)], 0.7, linkage, reactions
+    )
+    push = (xt - xc) * 45.0 - (yt - yc) * -310.0
+    guide = (xd - xc) * -fy - (yd - yc) * -fx - moment
+    assert push + guide == pytest.approx(0.0, abs=1e-12)
+    assert abs(moment) > 1.0
+
+
+def test_forces_on_the_frame_and_the_loads_change_the_momentum():
+    """Whole linkage: sum of m a = loads + weight − forces of the linkage on the frame."""
+    for name, frame_joints in (("four-bar", (("A", 1), ("D", -1))), ("offset slider", (("A", 1), ("D", 1)))):
+        machine, linkage, reactions = derived(name)
+        random = np.random.default_rng(3).uniform(0, 2 * np.pi, 20)
+        for axis, gravity in ((0, 0.0), (1, -9.81)):
+            mass = {b.name: machine.values[b.mass.path] for b in machine.mechanism.bodies}
+            momentum = sum(m * linkage.poses[b].center_of_mass.acceleration[axis] for b, m in mass.items())
+            on_frame = sum(sign * reactions.joint_force[j][axis] for j, sign in frame_joints)
+            load = {"four-bar": (40.0, -65.0), "offset slider": (-310.0, 45.0)}[name][axis]
+            left, right = evaluate(machine, [momentum, on_frame], random, linkage, reactions)
+            expected = sum(mass.values()) * gravity + load - right
+            assert left == pytest.approx(expected, rel=1e-11, abs=1e-11 * np.max(np.abs(right)))
+
+
+def test_gate_switches_its_load_and_no_other():
+    machine = four_bar()
+    linkage = machine.linkage()
+    gate = sp.Symbol("gate.push", real=True)
+    gated = machine.reactions(linkage, gates={"push": gate})
+    free = machine.reactions(linkage)
+    run = Evaluator(linkage.definitions + gated.definitions, gated.unknowns)
+    always = np.array(evaluate(machine, free.unknowns, 0.4, linkage, free))
+    on = np.array(run(machine.numbers(0.4, **{"gate.push": 1.0})))
+    off = np.array(run(machine.numbers(0.4, **{"gate.push": 0.0})))
+    unloaded = machine.with_values(mechanism__forces__push__force__x=0.0, mechanism__forces__push__force__y=0.0)
+    without = np.array(evaluate(unloaded, free.unknowns, 0.4, linkage, free))
+    assert on == pytest.approx(always, rel=1e-14)
+    assert off == pytest.approx(without, rel=1e-13)
+    assert np.linalg.norm(on - off) > 10.0
+
+
+# --- structure ----------------------------------------------------------------------------------------------------
+
+
+def test_guide_moment_costs_a_row_only_where_it_is_asked_for():
+    _, _, without = derived("offset slider")
+    _, _, asked = derived("offset slider", ("D",))
+    assert (without.matrix.shape, asked.matrix.shape) == ((8, 8), (9, 9))
+    assert "D" not in without.joint_moment
+    assert asked.joint_moment["D"].name == "reaction.D.moment"
+    assert ("slider", "moment") not in without.rows
+    assert ("slider", "moment") in asked.rows
+
+
+def test_moving_guide_always_has_its_moment():
+    machine = moving_guide()
+    reactions = machine.reactions(machine.linkage())
+    assert "G" in reactions.joint_moment
+    assert reactions.matrix.shape == (15, 15)
+
+
+@pytest.mark.parametrize("name", list(MACHINES))
+def test_every_unknown_is_defined_once_from_earlier_symbols(name):
+    machine, linkage, reactions = derived(name)
+    known = {sp.Symbol(path, real=True) for path in machine.values} | {linkage.angle}
+    known |= {d.symbol for d in linkage.definitions}
+    for definition in reactions.definitions:
+        assert definition.symbol not in known
+        assert definition.expression.free_symbols <= known
+        known.add(definition.symbol)
+    assert set(reactions.unknowns) <= known
+    assert list(reactions.joint_force) == [j.name for j in machine.mechanism.joints]
+
+
+# --- refusals -----------------------------------------------------------------------------------------------------
+
+
+def test_guide_moment_of_a_slider_without_inertia_is_refused():
+    machine = crank_slider()
+    with pytest.raises(LinkageError, match="slider") as caught:
+        machine.reactions(machine.linkage(), moments=("D",))
+    assert [f.key for f in caught.value.faults] == ["mechanism.bodies.slider.inertia"]
+
+
+def test_rod_without_inertia_is_refused():
+    machine = four_bar().with_body("rocker", inertia=None)
+    with pytest.raises(LinkageError, match=r"moment balance of rocker"):
+        machine.reactions(machine.linkage())
+
+
+def test_moment_of_a_revolute_joint_is_refused():
+    machine = offset_slider()
+    with pytest.raises(LinkageError, match="guide moment of joint B"):
+        machine.reactions(machine.linkage(), moments=("B",))

@@ -1,0 +1,231 @@
+"""What the figures show, against the run they are drawn of; nothing cut, labels with units, same bytes each time."""
+
+from __future__ import annotations
+
+import re
+import struct
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from matplotlib.text import Text
+
+from raceway.runtime import Model, Solution
+from raceway.runtime.errors import RequestError
+from raceway.runtime.figures import FIGURES, draw, draw_all
+from raceway.runtime.figures.canvas import INK, PALE, SAND, SIGNAL
+from raceway.runtime.figures.record import gather
+
+Run = tuple[Model, Solution]
+NAMES = [kind.name for kind in FIGURES]
+
+
+@pytest.fixture(scope="module")
+def press(make_model: Callable[..., Model]) -> Run:
+    model = make_model("punching_press")
+    return model, model.simulate(cycles=4)
+
+
+@pytest.fixture(scope="module")
+def shaft(make_model: Callable[..., Model]) -> Run:
+    model = make_model("varying_compliance")
+    return model, model.simulate(cycles=4, transient=2)
+
+
+@pytest.fixture(scope="module")
+def linkage_alone(make_model: Callable[..., Model], scene_text: Callable[..., str]) -> Run:
+    text = scene_text("punching_press")
+    bearing = text[text.index("[bearing]\n") : text.index("[run]\n")]
+    outputs = re.search(r"outputs = \[.*?\]", text, re.DOTALL)
+    assert outputs is not None
+    model = make_model(
+        "punching_press", (bearing, ""), (outputs[0], 'outputs = ["reaction.*.x", "reaction.*.y", "drive_torque"]')
+    )
+    return model, model.simulate(cycles=2, transient=1)
+
+
+def texts(figure: Figure) -> str:
+    return " ".join(item.get_text() for item in figure.findobj(Text)).replace("\n", " ").replace("\u00a0", " ")
+
+
+def test_figures_are_the_same_bytes_whatever_the_user_s_settings(press: Run, tmp_path: Path) -> None:
+    first = draw_all(*press, tmp_path / "a")
+    assert [path.name for path in first] == [f"{name}.png" for name in NAMES]
+    with matplotlib.rc_context({"font.size": 30.0, "axes.grid": False, "lines.linewidth": 9.0, "savefig.dpi": 37.0}):
+        before = dict(matplotlib.rcParams)
+        second = draw_all(*press, tmp_path / "b")
+        assert dict(matplotlib.rcParams) == before
+    for one, other in zip(first, second, strict=True):
+        data = one.read_bytes()
+        assert data == other.read_bytes()
+        assert struct.unpack(">I", data[16:20]) == (1200,)  # width in the PNG header
+        assert b"Software" not in data
+        assert b"tIME" not in data
+
+
+def test_a_scene_without_mechanism_gets_the_bearing_s_figures(shaft: Run, tmp_path: Path) -> None:
+    assert [path.stem for path in draw_all(*shaft, tmp_path)] == NAMES[1:]
+
+
+def test_a_scene_without_bearing_gets_reactions_and_mechanism(linkage_alone: Run, tmp_path: Path) -> None:
+    assert [path.stem for path in draw_all(*linkage_alone, tmp_path)] == ["load_curve", "peak_moment"]
+    figure = draw("load_curve", *linkage_alone)
+    assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == [
+        "x at A: crank on frame",
+        "y at A: crank on frame",
+    ]
+    assert len(figure.axes) == 2 * 4 + 1
+    # the guide is vertical and free of friction: rounding must not be blown up to a force
+    noise = next(axes for axes in figure.axes if axes.get_title(loc="left").startswith("y at D"))
+    assert noise.get_ylim()[1] > 50.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("scene", ["press", "shaft", "linkage_alone"])
+def test_nothing_is_cut_and_axes_have_units(name: str, scene: str, request: pytest.FixtureRequest) -> None:
+    run: Run = request.getfixturevalue(scene)
+    record = gather(*run)
+    kind = next(kind for kind in FIGURES if kind.name == name)
+    if not kind.possible(record):
+        with pytest.raises(RequestError, match="cannot be drawn"):
+            draw(name, *run)
+        return
+    figure = kind.draw(record)
+    FigureCanvasAgg(figure).draw()
+    drawn, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+    assert drawn.x0 >= -0.01
+    assert drawn.y0 >= -0.01
+    assert drawn.x1 <= width + 0.01
+    assert drawn.y1 <= height + 0.01
+    labels = [label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel()) if label]
+    labels += [figure.get_supylabel()] if figure.get_supylabel() else []
+    assert all(re.search(r"\[.+\]$", label) for label in labels), labels
+    assert labels or name == "peak_moment"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_caption_says_how_the_run_was_made(press: Run, name: str) -> None:
+    text = texts(draw(name, *press))
+    for words in ("2 transient cycles dropped", f"method {press[1].statistics.method}", "clearance 10 µm", "one-sided"):
+        assert words in text
+
+
+def test_load_curve_shows_reaction_and_half_of_it_over_one_turn(press: Run) -> None:
+    figure = draw("load_curve", *press)
+    solution = press[1].steady()
+    for axes, axis in zip(figure.axes, "xy", strict=False):
+        reaction, load = (line.get_xydata() for line in axes.get_lines()[:2])
+        assert (np.min(reaction[:, 0]), np.max(reaction[:, 0])) == pytest.approx((0.0, 360.0), abs=0.2)
+        assert np.max(reaction[:, 1]) == solution[f"reaction.A.{axis}"].max()
+        assert load[:, 1] == pytest.approx(0.5 * reaction[:, 1])
+        # the punch acts between 237 and 267 degrees: everywhere else the reaction is that of inertia and weight
+        outside = (reaction[:, 0] < 236.9) | (reaction[:, 0] > 267.1)
+        if axis == "y":
+            assert (
+                np.max(np.abs(reaction[outside, 1]))
+                < 600.0
+                < 8000.0
+                < np.min(reaction[(reaction[:, 0] > 237.2) & (reaction[:, 0] < 266.8), 1])
+            )
+
+
+def test_spectrum_lines_equal_fourier_integrals_of_the_run(press: Run) -> None:
+    figure = draw("spectra", *press)
+    solution = press[1].steady()
+    time = solution.t[:-1]
+    for axes, axis in zip(figure.axes, "xy", strict=False):
+        dots = next(line for line in axes.get_lines() if line.get_marker() == "o").get_xydata()
+        signal = 1e6 * solution[f"inner.{axis}"][:-1]
+        for frequency, amplitude in dots[:8]:
+            integral = 2.0 * np.mean(signal * np.exp(-2j * np.pi * frequency * time))
+            assert amplitude == pytest.approx(abs(integral), rel=1e-6)
+    text = texts(figure)
+    assert "8.333 Hz" in text
+    assert "25.44 Hz" in text
+    # 3.0522 - 3 ball passes a turn: two turns cannot tell them apart, and the caption says so
+    assert "within one line; telling them apart takes 20 turns" in text
+
+
+def test_phase_portrait_marks_the_state_at_each_turn(press: Run) -> None:
+    figure = draw("phase_portrait", *press)
+    points = next(line for line in figure.axes[0].get_lines() if line.get_marker() == "o").get_xydata()
+    solution = press[1].steady()
+    expected = np.column_stack((1e6 * solution["inner.x"], 1e3 * solution["inner.vx"]))[::2000]
+    assert points == pytest.approx(expected, abs=1e-6)
+
+
+def test_every_ball_has_its_strip(press: Run) -> None:
+    figure = draw("ball_loads", *press)
+    solution = press[1].steady()
+    assert len(figure.axes) == 8
+    for number, axes in enumerate(figure.axes):
+        curve = axes.get_lines()[0].get_xydata()
+        assert curve[:, 1] == pytest.approx(solution["ball.force"][:, number])
+        assert (curve[0, 0], curve[-1, 0]) == pytest.approx((0.0, 720.0), abs=1e-6)
+
+
+def test_orbit_passes_through_the_samples(press: Run) -> None:
+    figure = draw("orbit", *press)
+    last = next(line for line in figure.axes[0].get_lines() if line.get_label() == "last turn").get_xydata()
+    solution = press[1].steady()
+    assert last[::8] == pytest.approx(1e6 * np.column_stack((solution["inner.x"], solution["inner.y"]))[-2001:])
+
+
+def test_drawn_mechanism_keeps_its_lengths(press: Run) -> None:
+    record = gather(*press)
+    for time in (0.0, 0.031, 0.3194):
+        points = record.points(time)
+        angle = 2.0 * np.pi * time / 0.12
+        assert points["crank", "B"] == pytest.approx(6e-3 * np.array([np.cos(angle), np.sin(angle)]))
+        assert np.hypot(*(points["rod", "C"] - points["rod", "B"])) == pytest.approx(100e-3)
+        assert points["slider", "C"] == pytest.approx(points["rod", "C"])
+        assert points["slider", "C"][0] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_drawn_bearing_shows_the_moment_of_the_highest_ball_force(press: Run) -> None:
+    figure = draw("peak_moment", *press)
+    solution = press[1].steady()
+    force = solution["ball.force"]
+    sample, loaded = np.unravel_index(int(np.argmax(force)), force.shape)
+    text = texts(figure)
+    assert f"{force[sample, loaded]:.0f} N" in text
+    assert f"crank angle {solution.t[sample] / 0.12 % 1.0 * 360.0:.1f}°" in text
+    # the balls, darkest first: the most loaded one; all lie between the raceways of a 6204
+    balls = [patch for patch in figure.axes[1].patches if isinstance(patch, Circle) and patch.radius == 7.9375e-3 / 2]
+    assert len(balls) == 8
+    dark = [luminance(patch.get_facecolor()[:3]) for patch in balls]
+    assert int(np.argmin(dark)) == loaded
+    angles = 2.0 * np.pi * (np.arange(8) / 8.0 + 0.38152985 * solution.t[sample] / 0.12)
+    for patch, angle in zip(balls, angles, strict=True):
+        assert np.hypot(*patch.center) == pytest.approx(33.5e-3 / 2, rel=0.06)
+        assert patch.center / np.hypot(*patch.center) == pytest.approx([np.cos(angle), np.sin(angle)], abs=1e-6)
+
+
+def luminance(colour: tuple[float, float, float]) -> float:
+    """CIE lightness L* of an sRGB colour (IEC 61966-2-1, CIE 15)."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
+    y = float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+    return 116.0 * y ** (1.0 / 3.0) - 16.0 if y > 0.008856 else 903.3 * y
+
+
+def test_palette_keeps_its_order_in_greyscale() -> None:
+    steps = np.diff([luminance(to_rgb(colour)) for colour in (INK, SIGNAL, SAND, PALE)])
+    assert np.min(steps) > 12.0
+
+
+def test_figures_leave_pyplot_alone() -> None:
+    code = "import sys, raceway.runtime.figures; sys.exit('matplotlib.pyplot' in sys.modules or 'sympy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_unknown_figure_is_refused_with_the_names_there_are(press: Run) -> None:
+    with pytest.raises(RequestError, match="load_curve, orbit, spectra"):
+        draw("waterfall", *press)

@@ -1,0 +1,108 @@
+"""The summary of a run: units everywhere, reference values of the press, honest extremes."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from raceway.runtime import Model, Solution
+from raceway.runtime.errors import SimulationError
+from raceway.runtime.summary import render_summary, summarize
+
+
+@pytest.fixture(scope="module")
+def press(make_model: Callable[..., Model]) -> tuple[Model, Solution]:
+    model = make_model("punching_press")
+    return model, model.simulate(cycles=4)
+
+
+@pytest.fixture(scope="module")
+def summary(press: tuple[Model, Solution]) -> dict[str, Any]:
+    return summarize(*press)
+
+
+def numbers(node: Any, path: tuple[str, ...] = (), unit: str = "") -> Iterator[tuple[tuple[str, ...], float, str]]:
+    """Every number of a summary with the unit of the object it stands in."""
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield from numbers(value, (*path, key), node.get("unit", ""))
+    elif isinstance(node, int | float) and not isinstance(node, bool):
+        yield path, float(node), unit
+
+
+def test_every_number_has_a_unit_and_survives_json(summary: dict[str, Any]) -> None:
+    assert json.loads(json.dumps(summary, allow_nan=False)) == summary
+    found = list(numbers(summary))
+    assert len(found) > 60
+    assert [path for path, _, unit in found if not unit] == []
+
+
+def test_reactions_torque_and_work_are_those_of_the_paper_s_data(summary: dict[str, Any]) -> None:
+    # found with an independent solver: |R14y| max 8497 N, |R14x| max 291 N, 9.0784 J a turn
+    assert summary["reaction.A.y"]["max"] == pytest.approx(8497.0, abs=0.6)
+    assert summary["reaction.A.x"]["min"] == pytest.approx(-291.0, abs=0.6)
+    assert summary["drive_work"]["value"] == pytest.approx(9.0784, abs=1e-4)
+    assert summary["drive_torque"]["min"] < 0.0 < summary["drive_torque"]["max"]
+
+
+def test_stiffness_and_frequencies_are_the_reference_values(summary: dict[str, Any]) -> None:
+    assert summary["k_b"] == {"value": pytest.approx(8.64473e9, rel=1e-6), "unit": "N/m^1.5"}
+    assert summary["frequencies"]["cage"] * 0.12 == pytest.approx(0.381530, abs=1e-6)
+    assert summary["frequencies"]["ball_pass_outer"] * 0.12 == pytest.approx(3.052239, abs=1e-6)
+
+
+def test_motions_are_those_of_the_steady_samples(press: tuple[Model, Solution], summary: dict[str, Any]) -> None:
+    _, solution = press
+    kept = solution["inner.y"][solution.t >= 0.24 * (1.0 - 1e-12)]
+    found = summary["inner.y"]
+    assert (found["min"], found["max"]) == (kept.min(), kept.max())
+    # 4000 equal steps: sums over the samples differ from integrals by the end points only
+    assert found["rms"] == pytest.approx(np.sqrt(np.mean(kept**2)), rel=2e-3)
+    assert found["std"] == pytest.approx(np.std(kept), rel=2e-3)
+    assert found["rms"] ** 2 == pytest.approx(found["std"] ** 2 + found["mean"] ** 2)
+    assert summary["transient_cycles_dropped"]["value"] == 2.0
+    assert summary["steady_cycles"]["value"] == pytest.approx(2.0)
+
+
+def test_peaks_between_samples_are_found(press: tuple[Model, Solution], summary: dict[str, Any]) -> None:
+    _, solution = press
+    sampled = solution.steady()["ball.force"].max()
+    fine = press[0].simulate(cycles=4, samples_per_cycle=40000).steady()["ball.force"].max()
+    assert summary["peak_ball_force"]["total"] > sampled
+    assert summary["peak_ball_force"]["total"] == pytest.approx(fine, rel=2e-3)
+    assert summary["peak_ball_force"]["elastic"] <= summary["peak_ball_force"]["total"]
+
+
+def test_a_scene_without_mechanism_has_no_reaction(make_model: Callable[..., Model]) -> None:
+    model = make_model("varying_compliance")
+    found = summarize(model, model.simulate(cycles=2, transient=1))
+    assert not [key for key in found if key.startswith(("reaction", "drive"))]
+    assert found["frequencies"]["ball_pass_outer"] == pytest.approx(20.0, rel=1e-4)
+    assert "outer.x" not in found
+
+
+def test_values_that_are_not_finite_are_refused(press: tuple[Model, Solution]) -> None:
+    model, solution = press
+    broken = np.array(solution["inner.y"])
+    broken[-5] = np.nan
+    with pytest.raises(SimulationError, match=r"inner\.y holds nan"):
+        summarize(model, replace(solution, outputs={**solution.outputs, "inner.y": broken}))
+
+
+def test_table_fits_a_terminal_and_shows_micrometres(summary: dict[str, Any]) -> None:
+    out = io.StringIO()
+    Console(file=out, width=80).print(render_summary(summary))
+    text = out.getvalue()
+    assert "…" not in text
+    row = next(line for line in text.splitlines() if line.split()[:1] == ["inner.y"])
+    assert float(row.split()[2]) == pytest.approx(1e6 * summary["inner.y"]["max"], rel=1e-3)
+    assert row.split()[-1] == "µm"
+    assert "2 transient cycles" in text
+    assert "one-sided" in text
