@@ -250,7 +250,7 @@ int erk_1_work_bytes(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *sz_iw, 
 #define erk_1_SZ_ARG 12
 #define erk_1_SZ_RES 11
 #define erk_1_SZ_IW 0
-#define erk_1_SZ_W 369
+#define erk_1_SZ_W 373
 int erk_64(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem);
 int erk_64_checkout(void);
 void erk_64_release(int mem);
@@ -268,7 +268,7 @@ int erk_64_work_bytes(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *sz_iw,
 #define erk_64_SZ_ARG 12
 #define erk_64_SZ_RES 11
 #define erk_64_SZ_IW 0
-#define erk_64_SZ_W 369
+#define erk_64_SZ_W 373
 int rosenbrock_1(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem);
 int rosenbrock_1_checkout(void);
 void rosenbrock_1_release(int mem);
@@ -286,7 +286,7 @@ int rosenbrock_1_work_bytes(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *
 #define rosenbrock_1_SZ_ARG 12
 #define rosenbrock_1_SZ_RES 16
 #define rosenbrock_1_SZ_IW 0
-#define rosenbrock_1_SZ_W 611
+#define rosenbrock_1_SZ_W 615
 int rosenbrock_64(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem);
 int rosenbrock_64_checkout(void);
 void rosenbrock_64_release(int mem);
@@ -304,7 +304,7 @@ int rosenbrock_64_work_bytes(casadi_int *sz_arg, casadi_int* sz_res, casadi_int 
 #define rosenbrock_64_SZ_ARG 12
 #define rosenbrock_64_SZ_RES 16
 #define rosenbrock_64_SZ_IW 0
-#define rosenbrock_64_SZ_W 611
+#define rosenbrock_64_SZ_W 615
 void model_casadi_version(int* major, int* minor, int* patch);
 int model_casadi_int_size(void);
 int model_casadi_real_size(void);

@@ -102,7 +102,8 @@ def test_derivative_passes_through_the_iteration(ratio: float) -> None:
     implicit = float(sp.diff(hertz.ellipticity(RATIO), RATIO).subs(RATIO, sp.Float(ratio, 40)).evalf(20))
     step = sp.Float(ratio, 40) * sp.Float("1e-12", 40)
     difference = (
-        hertz.ellipticity(sp.Float(ratio, 40) + step).evalf(40) - hertz.ellipticity(sp.Float(ratio, 40) - step).evalf(40)
+        hertz.ellipticity(sp.Float(ratio, 40) + step).evalf(40)
+        - hertz.ellipticity(sp.Float(ratio, 40) - step).evalf(40)
     ) / (2 * step)
     assert automatic == pytest.approx(float(difference), rel=1e-10)
     assert implicit == pytest.approx(float(difference), rel=1e-12)

@@ -20,7 +20,9 @@ from raceway.runtime import Model
 SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
 
 
-def by_sympy(system: System, t: float, x: np.ndarray, u: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, dict[str, sp.Expr]]:
+def by_sympy(
+    system: System, t: float, x: np.ndarray, u: np.ndarray, p: np.ndarray
+) -> tuple[np.ndarray, dict[str, sp.Expr]]:
     """Right-hand side straight from the definitions, in 40 digits: substitution, elliptic integrals by mpmath, no CasADi."""
     digits = 40
 
@@ -81,7 +83,9 @@ def test_sympy_virtual_machine_and_compiled_c_agree(
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_jacobians_agree_with_differences(name: str, make_model: Callable[..., Model], scene_text: Callable[..., str]) -> None:
+def test_jacobians_agree_with_differences(
+    name: str, make_model: Callable[..., Model], scene_text: Callable[..., str]
+) -> None:
     """Central differences at states kicked away from symmetry; tangent damping is left out at its kink."""
     system = derive(scene_from_text(scene_text(name), name))
     functions = lower(system)
@@ -105,7 +109,9 @@ def test_jacobians_agree_with_differences(name: str, make_model: Callable[..., M
         h = 1e-6 * max(abs(p[k]), 1e-7)
         step = np.eye(len(p))[k] * h
         difference = (value(t, x, p + step) - value(t, x, p - step)) / (2 * h)
-        assert np.abs(total[:, k] - difference).max() <= 3e-5 * max(np.abs(difference).max(), 1e-3 / h), system.parameters[k]
+        assert np.abs(total[:, k] - difference).max() <= 3e-5 * max(np.abs(difference).max(), 1e-3 / h), (
+            system.parameters[k]
+        )
 
 
 def test_elliptic_integrals_stay_out_of_the_step(scene_text: Callable[..., str]) -> None:

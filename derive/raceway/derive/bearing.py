@@ -96,11 +96,27 @@ def _stiffness_constants(bearing: Bearing) -> list[Definition]:
         kappa, factor = _real(f"bearing.{ring}_ellipticity"), _real(f"bearing.k_{letter}")
         ratio_of, sum_of = hertz.curvature_ratio(ball_diameter, sign * raceway, symbol_of(groove))
         out += [
-            _constant(raceway, (pitch_diameter - sign * ball_diameter) / 2, "m", f"Radius of the {ring} raceway from the bearing axis, Eq. (7)", "r_b" if ring == "inner" else "R_b"),
-            _constant(ratio, ratio_of, "1", f"Ratio of the principal curvature sums at the {ring} contact", rf"(A/B)_{letter}"),
+            _constant(
+                raceway,
+                (pitch_diameter - sign * ball_diameter) / 2,
+                "m",
+                f"Radius of the {ring} raceway from the bearing axis, Eq. (7)",
+                "r_b" if ring == "inner" else "R_b",
+            ),
+            _constant(
+                ratio, ratio_of, "1", f"Ratio of the principal curvature sums at the {ring} contact", rf"(A/B)_{letter}"
+            ),
             _constant(curvature, sum_of, "1/m", f"Curvature sum at the {ring} contact", rf"\Sigma\rho_{letter}"),
-            _constant(kappa, hertz.ellipticity(ratio), "1", f"Ellipticity a/b of the {ring} contact", rf"\kappa_{letter}"),
-            _constant(factor, hertz.contact_stiffness(kappa=kappa, curvature_sum=curvature, compliance=_compliance(contact)), "N/m^1.5", f"Stiffness factor of the {ring} contact", f"k_{letter}"),
+            _constant(
+                kappa, hertz.ellipticity(ratio), "1", f"Ellipticity a/b of the {ring} contact", rf"\kappa_{letter}"
+            ),
+            _constant(
+                factor,
+                hertz.contact_stiffness(kappa=kappa, curvature_sum=curvature, compliance=_compliance(contact)),
+                "N/m^1.5",
+                f"Stiffness factor of the {ring} contact",
+                f"k_{letter}",
+            ),
         ]
         factors.append(factor)
     out.append(_constant(STIFFNESS, hertz.series_stiffness(*factors), "N/m^1.5", total, "k_b"))
@@ -148,7 +164,13 @@ def derive_bearing(
     ball_diameter, pitch_diameter = symbol_of(bearing.ball_diameter), symbol_of(bearing.pitch_diameter)
     constants = [
         *_stiffness_constants(bearing),
-        _constant(CAGE_RATIO, (1 - ball_diameter / pitch_diameter) / 2, "1", "Speed of the cage over speed of the inner ring, r_b/(R_b + r_b), Eq. (7)", r"\omega_c/\omega"),
+        _constant(
+            CAGE_RATIO,
+            (1 - ball_diameter / pitch_diameter) / 2,
+            "1",
+            "Speed of the cage over speed of the inner ring, r_b/(R_b + r_b), Eq. (7)",
+            r"\omega_c/\omega",
+        ),
         _constant(CAGE_SPEED, CAGE_RATIO * shaft_speed, "rad/s", "Speed of the cage", r"\omega_c"),
         _constant(INNER_MASS, inner_mass, "kg", "Mass moved by the inner ring, Eq. (3) or given", "m_{ei}"),
     ]
@@ -198,7 +220,10 @@ def _ball(bearing: Bearing, coordinates: tuple[Coordinate, ...], cage_phase: sp.
     motion = {c.position: sp.Function(c.name)(TIME) for c in coordinates}
     angle = sp.Function("theta")(TIME)
     # Eq. (6); a fixed outer ring has no coordinates
-    x, y = (sum((s * c.position for c, s in zip(coordinates[axis::2], (1, -1), strict=False)), start=sp.S.Zero) for axis in (0, 1))
+    x, y = (
+        sum((s * c.position for c, s in zip(coordinates[axis::2], (1, -1), strict=False)), start=sp.S.Zero)
+        for axis in (0, 1)
+    )
     geometry = x * sp.cos(angle) + y * sp.sin(angle) - symbol_of(bearing.clearance) / 2
     # Eq. (11): the time derivative, the cage turning
     rate = sp.diff(geometry.subs(motion), TIME)
@@ -212,20 +237,46 @@ def _ball(bearing: Bearing, coordinates: tuple[Coordinate, ...], cage_phase: sp.
     delta, delta_rate = _real("ball.deflection"), _real("ball.deflection_rate")
     elastic, damping, force = _real("ball.elastic_force"), _real("ball.damping_force"), _real("ball.force")
     definitions = [
-        Definition(symbol=delta, expression=geometry, unit="m", description="Deflection of ball j, Eq. (6)", latex=r"\delta_j"),
-        Definition(symbol=elastic, expression=laws.elastic_force(delta, STIFFNESS), unit="N", description="Elastic force of ball j, Eq. (4)", latex="F_{rj}"),
+        Definition(
+            symbol=delta, expression=geometry, unit="m", description="Deflection of ball j, Eq. (6)", latex=r"\delta_j"
+        ),
+        Definition(
+            symbol=elastic,
+            expression=laws.elastic_force(delta, STIFFNESS),
+            unit="N",
+            description="Elastic force of ball j, Eq. (4)",
+            latex="F_{rj}",
+        ),
     ]
     total: sp.Expr = elastic
     law = bearing.damping.law
     if law != "none":
         definitions += [
-            Definition(symbol=delta_rate, expression=rate, unit="m/s", description="Rate of deflection of ball j, Eq. (11)", latex=r"\dot\delta_j"),
-            Definition(symbol=damping, expression=laws.DAMPING[law].force(delta, delta_rate, STIFFNESS, DAMPING_COEFFICIENT), unit="N", description=f"Damping force of ball j, law {law}", latex="F_{cj}"),
+            Definition(
+                symbol=delta_rate,
+                expression=rate,
+                unit="m/s",
+                description="Rate of deflection of ball j, Eq. (11)",
+                latex=r"\dot\delta_j",
+            ),
+            Definition(
+                symbol=damping,
+                expression=laws.DAMPING[law].force(delta, delta_rate, STIFFNESS, DAMPING_COEFFICIENT),
+                unit="N",
+                description=f"Damping force of ball j, law {law}",
+                latex="F_{cj}",
+            ),
         ]
         total = elastic + damping
     definitions.append(Definition(symbol=force, expression=total, unit="N", description="Force of ball j", latex="F_j"))
     sums = tuple(
-        Definition(symbol=_real(f"ball.sum_{axis}"), expression=force * direction_symbol, unit="N", description=f"Sum of the ball forces along {axis}, Eqs. (8) and (9)", latex=rf"(F_{axis} + F_{{c,{axis}}})")
+        Definition(
+            symbol=_real(f"ball.sum_{axis}"),
+            expression=force * direction_symbol,
+            unit="N",
+            description=f"Sum of the ball forces along {axis}, Eqs. (8) and (9)",
+            latex=rf"(F_{axis} + F_{{c,{axis}}})",
+        )
         for axis, direction_symbol in (("x", COS), ("y", SIN))
     )
     ball = Ball(

@@ -49,7 +49,9 @@ _BINARY = {
 }
 
 
-def print_function(function: ca.Function, *, prefix: str, description: str, scalars: frozenset[str] = frozenset()) -> str:
+def print_function(
+    function: ca.Function, *, prefix: str, description: str, scalars: frozenset[str] = frozenset()
+) -> str:
     """C99 text of an SX function.
 
     Every argument is ``const double *restrict``, every result ``double *restrict``, both dense and column-major; arguments named in
@@ -61,14 +63,20 @@ def print_function(function: ca.Function, *, prefix: str, description: str, scal
         An operation has no C text here, or a result is sparse.
     """
     arguments = [
-        f"double {function.name_in(k)}" if function.name_in(k) in scalars else f"const double *restrict {function.name_in(k)}"
+        f"double {function.name_in(k)}"
+        if function.name_in(k) in scalars
+        else f"const double *restrict {function.name_in(k)}"
         for k in range(function.n_in())
     ]
     results = [f"double *restrict {function.name_out(k)}" for k in range(function.n_out())]
     for k in range(function.n_out()):
         if not function.sparsity_out(k).is_dense():
             raise TypeError(f"{function.name()}: the result {function.name_out(k)} is sparse; make it dense first")
-    lines = [f"/* {description} */", f"static inline void {prefix}{function.name()}({', '.join(arguments + results)})", "{"]
+    lines = [
+        f"/* {description} */",
+        f"static inline void {prefix}{function.name()}({', '.join(arguments + results)})",
+        "{",
+    ]
     lines += _unused(function)
     declared: set[int] = set()
     for k in range(function.n_instructions()):

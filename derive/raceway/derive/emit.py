@@ -31,6 +31,7 @@ from raceway.derive.read import read_scene
 from raceway.derive.scene import Scene
 from raceway.derive.system import System, derive
 from raceway.runtime import manifest as mf
+from raceway.runtime.errors import ArtefactError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +135,7 @@ def _fresh(folder: Path, scene: Scene) -> mf.Manifest | None:
     try:
         present = mf.read_manifest(folder)
         mf.check_files(folder, present)
-    except mf.ArtefactError:
+    except ArtefactError:
         return None
     return present if present.signature == signature(scene) else None
 
@@ -150,8 +151,9 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene) -> None:
     )
     if updated == present:
         return
-    if scene.mechanism is not None:
-        check_assembly(derive(scene).linkage, values)
+    linkage = derive(scene).linkage if scene.mechanism is not None else None
+    if linkage is not None:
+        check_assembly(linkage, values)
     mf.write(folder, updated)
 
 

@@ -16,7 +16,8 @@ import mpmath
 import sympy as sp
 
 
-class ellipticity(sp.Function):
+class ellipticity(sp.Function):  # type: ignore[misc]  # SymPy has no types
+    # the name prints as in formulas
     """Ratio kappa = a/b >= 1 of the semi-axes of the contact ellipse, given ``ratio = A/B`` in (0, 1).
 
     A and B are the sums of the curvatures of both bodies in the two principal planes, A the smaller (for a ball in a groove:
@@ -72,15 +73,17 @@ def curvature_ratio(ball_diameter: sp.Expr, raceway_radius: sp.Expr, groove_radi
     return across / along, across + along
 
 
-def contact_stiffness(
-    *, kappa: sp.Expr, curvature_sum: sp.Expr, compliance: sp.Expr
-) -> sp.Expr:
+def contact_stiffness(*, kappa: sp.Expr, curvature_sum: sp.Expr, compliance: sp.Expr) -> sp.Expr:
     """Load-deflection factor of one contact, k = Q / delta^1.5 [N/m^1.5].
 
     `compliance` is (1 - nu1^2)/E1 + (1 - nu2^2)/E2 [1/Pa]; from Harris & Kotzalas 2006, Eq. 6.39,
     delta = delta* (3 Q compliance / (2 (A + B)))^(2/3) (A + B)/2.
     """
-    return sp.Rational(4, 3) * sp.sqrt(2) / (compliance * sp.sqrt(curvature_sum) * deflection_factor(kappa) ** sp.Rational(3, 2))
+    return (
+        sp.Rational(4, 3)
+        * sp.sqrt(2)
+        / (compliance * sp.sqrt(curvature_sum) * deflection_factor(kappa) ** sp.Rational(3, 2))
+    )
 
 
 def series_stiffness(inner: sp.Expr, outer: sp.Expr) -> sp.Expr:

@@ -100,7 +100,13 @@ class KernelBuilder:
             {ball.deflection: delta, ball.deflection_rate: rate},
             {k: v for k, v in definitions.items() if k not in (ball.deflection, ball.deflection_rate)},
         )
-        force = sp.sympify(definitions[ball.force]).xreplace({k: v for k, v in definitions.items() if k != ball.force and k not in (ball.deflection, ball.deflection_rate)})
+        force = sp.sympify(definitions[ball.force]).xreplace(
+            {
+                k: v
+                for k, v in definitions.items()
+                if k != ball.force and k not in (ball.deflection, ball.deflection_rate)
+            }
+        )
         slopes = [law(sp.diff(force, s)) for s in (ball.deflection, ball.deflection_rate)]
 
         sums = ca.SX.sym("S", 2)
@@ -128,17 +134,37 @@ class KernelBuilder:
         state = {k: self._arguments[k] for k in "upc"}
         tail = {**state, "w": w}
         return [
-            ("stage", {"t": t, **state}, {"w": stage}, "Once per stage time: cage direction, loads, all else without the state"),
-            ("stage_rate", {"t": t, **state}, {"w": stage, "wt": ca.jacobian(stage, t)}, "Stage variables and their time derivatives"),
+            (
+                "stage",
+                {"t": t, **state},
+                {"w": stage},
+                "Once per stage time: cage direction, loads, all else without the state",
+            ),
+            (
+                "stage_rate",
+                {"t": t, **state},
+                {"w": stage, "wt": ca.jacobian(stage, t)},
+                "Stage variables and their time derivatives",
+            ),
             ("relative", {"x": x, **tail}, {"r": relative}, "delta = r0 + r1 cos + r2 sin, rate = r3 cos + r4 sin"),
-            ("law", {"delta": delta, "rate": rate, "p": state["p"], "c": state["c"]}, {"F": law(ball.force)}, "Force of one ball [N]"),
+            (
+                "law",
+                {"delta": delta, "rate": rate, "p": state["p"], "c": state["c"]},
+                {"F": law(ball.force)},
+                "Force of one ball [N]",
+            ),
             (
                 "law_slopes",
                 {"delta": delta, "rate": rate, "p": state["p"], "c": state["c"]},
                 {"F": law(ball.force), "Fd": slopes[0], "Fv": slopes[1]},
                 "Force of one ball [N] and its slopes",
             ),
-            ("acceleration", {"x": x, "S": sums, **tail}, {"a": acceleration}, "Accelerations from the sums over the balls"),
+            (
+                "acceleration",
+                {"x": x, "S": sums, **tail},
+                {"a": acceleration},
+                "Accelerations from the sums over the balls",
+            ),
             (
                 "acceleration_jacobian",
                 {"x": x, "S": sums, "G": g, **tail},
@@ -174,6 +200,4 @@ class KernelBuilder:
             function = ca.Function(name, [*inputs.values()], ca.cse(results), [*inputs], [*gives])
             functions.append(Kernel(function=function, description=words))
         assert self._system.bearing is not None
-        return Kernels(
-            stage_size=len(self._stage), balls=self._system.bearing.ball.count, functions=tuple(functions)
-        )
+        return Kernels(stage_size=len(self._stage), balls=self._system.bearing.ball.count, functions=tuple(functions))

@@ -90,9 +90,7 @@ class _Lowering:
         constants = dict(zip((d.symbol for d in system.constants), self._named, strict=True))
         definitions = {d.symbol: d.expression for d in system.definitions}
         # evaluates constants: parameters are free, constants are definitions, nothing is hoisted
-        self.once = Visitor(
-            parameters, definitions | {d.symbol: d.expression for d in system.constants}
-        )
+        self.once = Visitor(parameters, definitions | {d.symbol: d.expression for d in system.constants})
         self._values = (
             {TIME: self.t}
             | {s.symbol: self.x[k] for k, s in enumerate(system.states)}
@@ -157,7 +155,12 @@ class _Lowering:
             made.append((ca.Function(name, [*takes.values()], [*results.values()], [*takes], [*results]), words))
             if name == "rhs":
                 rhs = results["xdot"]
-                for k, words in (("x", "states"), ("t", "time"), ("p", "parameters, constants held"), ("c", "constants")):
+                for k, words in (
+                    ("x", "states"),
+                    ("t", "time"),
+                    ("p", "parameters, constants held"),
+                    ("c", "constants"),
+                ):
                     jacobian = ca.Function(
                         f"rhs_jac_{k}",
                         [*arguments.values()],
@@ -168,12 +171,16 @@ class _Lowering:
                     made.append((jacobian, f"derivative of rhs by the {words}"))
         integrators = self._integrators(bodies[0][1]["xdot"], arguments) if system.states else []
         named = [
-            Constant(name=d.symbol.name, unit=d.unit, description=d.description, latex=d.latex) for d in system.constants
+            Constant(name=d.symbol.name, unit=d.unit, description=d.description, latex=d.latex)
+            for d in system.constants
         ]
-        found = [
-            Constant(name=f"h{k + 1}", unit="", description=str(e), latex="") for k, e in enumerate(self._hoisted)
-        ]
-        return Functions(constants=(*named, *found), functions=tuple(made), integrators=tuple(integrators), kernels=builder.kernels(c) if builder else None)
+        found = [Constant(name=f"h{k + 1}", unit="", description=str(e), latex="") for k, e in enumerate(self._hoisted)]
+        return Functions(
+            constants=(*named, *found),
+            functions=tuple(made),
+            integrators=tuple(integrators),
+            kernels=builder.kernels(c) if builder else None,
+        )
 
     def _kernel_builder(self) -> KernelBuilder:
         return KernelBuilder(
@@ -188,7 +195,9 @@ class _Lowering:
     def _constants(self) -> tuple[ca.SX, ca.SX]:
         """The vector c of symbols, and its value as an expression of p."""
         symbols = ca.vertcat(*self._named, *self._hoisted.values())
-        values = ca.vertcat(*(self.once(d.symbol) for d in self.system.constants), *(self.once(e) for e in self._hoisted))
+        values = ca.vertcat(
+            *(self.once(d.symbol) for d in self.system.constants), *(self.once(e) for e in self._hoisted)
+        )
         return ca.SX(symbols), ca.SX(values)
 
     def _balls(self, ball: Ball) -> list[Visitor]:
@@ -200,7 +209,9 @@ class _Lowering:
         for j in range(ball.count):
             spacing = sp.Rational(2 * j, ball.count) * sp.pi
             c, s = float(sp.cos(spacing)), float(sp.sin(spacing))
-            out.append(self.visit.child({ball.cos: c * cosine - s * sine, ball.sin: s * cosine + c * sine}, definitions))
+            out.append(
+                self.visit.child({ball.cos: c * cosine - s * sine, ball.sin: s * cosine + c * sine}, definitions)
+            )
         return out
 
     def _sums(self, balls: list[Visitor]) -> dict[sp.Symbol, ca.SX]:

@@ -20,6 +20,8 @@ from raceway.derive.linkage import Linkage, derive_linkage
 from raceway.derive.reactions import Reactions, derive_reactions
 from raceway.derive.scene import (
     FRAME,
+    AppliedForce,
+    AppliedTorque,
     Bearing,
     ConstantLoad,
     EquivalentMass,
@@ -218,7 +220,8 @@ def _driver_inputs(mechanism: Mechanism) -> list[Input]:
             rate=driver.speed.path,
         )
     ]
-    for load in (*mechanism.forces, *mechanism.torques):
+    loads: tuple[AppliedForce | AppliedTorque, ...] = (*mechanism.forces, *mechanism.torques)
+    for load in loads:
         if load.windows:
             out.append(
                 Input(
@@ -350,13 +353,15 @@ def _inner_mass(bearing: Bearing, mechanism: Mechanism | None) -> sp.Expr:
     ]
     if len(far) != 1:
         raise SceneError(
-            [Fault(
-                key="bearing.inner_ring.equivalent_mass",
-                problem=f"Eq. (3) needs one far joint of the body {crank.name!r}",
-                given=f"{len(far)} further joints",
-                allowed="a crank with exactly two joints",
-                remedy='give the mass itself: [bearing.inner_ring] mass = "0.4 kg"',
-            )]
+            [
+                Fault(
+                    key="bearing.inner_ring.equivalent_mass",
+                    problem=f"Eq. (3) needs one far joint of the body {crank.name!r}",
+                    given=f"{len(far)} further joints",
+                    allowed="a crank with exactly two joints",
+                    remedy='give the mass itself: [bearing.inner_ring] mass = "0.4 kg"',
+                )
+            ]
         )
     return equivalent_mass(mass, crank, crank.point(joint.points[side]), crank.point(far[0]))
 
@@ -460,7 +465,12 @@ def _available(
             )
         )
         out.append(
-            Output(name="drive_angle", expression=DRIVER_ANGLE, unit="rad", description="Angle of the driven body, within the turn")
+            Output(
+                name="drive_angle",
+                expression=DRIVER_ANGLE,
+                unit="rad",
+                description="Angle of the driven body, within the turn",
+            )
         )
         for body in scene.mechanism.bodies:
             pose = linkage.poses[body.name]

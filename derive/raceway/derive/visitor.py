@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import reduce
 from operator import mul
+from typing import Any
 
 import casadi as ca
 import sympy as sp
@@ -162,7 +163,7 @@ class Visitor:
         return function(*(self(a) for a in expression.args))
 
     def _sum(self, expression: sp.Basic) -> ca.SX:
-        total: ca.SX | None = None
+        total: Any = None
         negative: list[sp.Basic] = []
         for term in expression.args:
             if term.could_extract_minus_sign():
@@ -180,7 +181,12 @@ class Visitor:
         for factor in expression.args:
             if factor is sp.S.NegativeOne:
                 sign = -sign
-            elif isinstance(factor, sp.Pow) and factor.exp.is_Rational and factor.exp.is_negative and not self._fixed(factor):
+            elif (
+                isinstance(factor, sp.Pow)
+                and factor.exp.is_Rational
+                and factor.exp.is_negative
+                and not self._fixed(factor)
+            ):
                 below.append(self(sp.Pow(factor.base, -factor.exp)))
             elif factor.is_Rational and not factor.is_Integer:
                 above.append(ca.SX(float(factor)))
@@ -226,7 +232,11 @@ class Visitor:
 
 def _is_trivial(expression: sp.Basic) -> bool:
     """Whether computing the expression costs nothing worth storing: a number, a symbol, or their product by a number."""
-    if expression.is_Number or isinstance(expression, sp.Symbol) or isinstance(expression, sp.logic.boolalg.BooleanAtom):
+    if (
+        expression.is_Number
+        or isinstance(expression, sp.Symbol)
+        or isinstance(expression, sp.logic.boolalg.BooleanAtom)
+    ):
         return True
     return (
         isinstance(expression, sp.Mul)

@@ -215,5 +215,3 @@ def _write_results(model: Model, solution: Solution, folder: Path, *, figures: b
 def main() -> None:
     """Entry point of the ``raceway`` command."""
     app()
-
-

@@ -1,0 +1,427 @@
+"""Tableaus: the figures have the order they claim, by algebra and by experiment, and a wrong digit is refused."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from decimal import Decimal, localcontext
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from reference_steps import ReferenceStep, Vector, explicit_step, floats, rosenbrock_step
+from scipy.integrate import DOP853 as ScipyDop853
+from scipy.integrate import RK45
+
+from raceway.derive.explicit_tableaus import DOP853, DORMAND_PRINCE_54, ErrorEstimate, ExplicitTableau
+from raceway.derive.order_conditions import PRECISION, Tree, rooted_trees
+from raceway.derive.rosenbrock_tableaus import RODAS4, RODAS5P, RosenbrockTableau
+from raceway.derive.tableaus import Row, TableauError, nested_powers
+
+Tableau = ExplicitTableau | RosenbrockTableau
+EXPLICIT = (DORMAND_PRINCE_54, DOP853)
+ROSENBROCK = (RODAS4, RODAS5P)
+
+
+def named(*tableaus: Tableau) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("tableau", tableaus, ids=lambda tableau: tableau.name)
+
+
+# Trees
+
+
+def symmetry(trees: tuple[Tree, ...], tree: Tree) -> int:
+    """Number of ways in which a tree maps onto itself."""
+    product = 1
+    for place, times in Counter(tree.branches).items():
+        product *= math.factorial(times) * symmetry(trees, trees[place]) ** times
+    return product
+
+
+def test_numbers_of_rooted_trees_are_those_of_cayley():
+    counts = Counter(tree.order for tree in rooted_trees(8))
+    assert [counts[order] for order in range(1, 9)] == [1, 1, 2, 4, 9, 20, 48, 115]
+
+
+def test_monotonic_labellings_of_all_trees_add_up():
+    # A tree with n vertices has n! / (density symmetry) monotonic labellings; all trees together have (n - 1)!.
+    trees = rooted_trees(8)
+    for order in range(1, 9):
+        labellings = [
+            Fraction(math.factorial(order), tree.density * symmetry(trees, tree))
+            for tree in trees
+            if tree.order == order
+        ]
+        assert all(number.denominator == 1 for number in labellings)
+        assert sum(labellings) == math.factorial(order - 1)
+
+
+def test_trees_of_index_one_systems_contain_those_of_ordinary_equations():
+    both = rooted_trees(5, algebraic=True)
+    assert [tree for tree in both if not (set("{}") & set(tree.notation))] != []
+    assert {tree.notation for tree in rooted_trees(5)} == {
+        tree.notation for tree in both if not (set("{}") & set(tree.notation))
+    }
+    # The lowest condition of the algebraic component: sum b_i omega_ij alpha_j**2 = 1.
+    lowest = next(tree for tree in both if tree.algebraic)
+    assert (lowest.notation, lowest.order, lowest.density) == ("{•,•}", 2, 1)
+
+
+# Figures against other prints
+
+
+def test_dormand_prince_figures_equal_scipys():
+    size = DORMAND_PRINCE_54.stages
+    assert np.array_equal(floats(DORMAND_PRINCE_54.matrix, size)[:, :5], RK45.A)
+    assert np.array_equal(floats((DORMAND_PRINCE_54.weights, DORMAND_PRINCE_54.nodes), size), [RK45.B, RK45.C])
+    (estimate,) = DORMAND_PRINCE_54.error_estimates
+    assert np.allclose(floats((estimate.weights,), 7)[0], -RK45.E, rtol=1e-15, atol=0)
+    # SciPy's interpolant is Shampine's in powers of theta, printed apart from the nested form used here.
+    assert np.allclose(floats(DORMAND_PRINCE_54.dense_weights(), 7).T, RK45.P, rtol=1e-14, atol=1e-15)
+
+
+def test_dop853_step_error_and_dense_output_equal_scipys():
+    start, time, step = solution_at(0.3), 0.3, 0.4
+    solver = ScipyDop853(slope, time, start, 5.0, first_step=step, rtol=1.0, atol=1.0)
+    solver.step()
+    ours = explicit_step(DOP853, slope, time, start, step)
+    assert np.allclose(ours.end, solver.y, rtol=1e-15, atol=1e-15)
+    theirs = solver.dense_output()
+    for theta in np.linspace(0, 1, 7):
+        assert np.allclose(ours.dense(theta), theirs(time + theta * step), rtol=1e-14, atol=0)
+
+    scale = np.array([1e-3, 2e-3])
+    norms = [np.mean((error / scale) ** 2) for error in ours.errors]
+    shares = [float(estimate.share) for estimate in DOP853.error_estimates]
+    combined = norms[0] / math.sqrt(sum(share * norm for share, norm in zip(shares, norms, strict=True)))
+    assert combined == pytest.approx(solver._estimate_error_norm(solver.K, step, scale), rel=1e-12)
+
+
+def test_rodas4_has_the_free_parameters_printed_for_it():
+    # Hairer & Wanner print beta_2', beta_3', beta_4', the row sums of beta_ij without the diagonal, beside the figures.
+    form = RODAS4.classical()
+    sums = [sum(form.alpha[row]) + sum(form.gamma[row][:row]) for row in range(4)]
+    assert np.allclose([float(number) for number in sums], [0, 0.0317, 0.0635, 0.3438], rtol=0, atol=1e-14)
+
+
+# Claims that do not hold are refused
+
+
+def changed_rows(rows: tuple[Row, ...], change: Fraction) -> Iterator[tuple[Row, ...]]:
+    for place, row in enumerate(rows):
+        for column, number in enumerate(row):
+            yield (*rows[:place], (*row[:column], number + change, *row[column + 1 :]), *rows[place + 1 :])
+
+
+def changes(tableau: Tableau, change: Fraction) -> Iterator[tuple[str, object]]:
+    """Every field of figures with one figure changed."""
+    for field in fields(tableau):
+        value = getattr(tableau, field.name)
+        if field.name == "gamma":
+            yield field.name, value + change
+        elif field.name == "error_estimates":
+            for place, estimate in enumerate(value):
+                for (row,) in changed_rows((estimate.weights,), change):
+                    yield field.name, (*value[:place], replace(estimate, weights=row), *value[place + 1 :])
+        elif isinstance(value, tuple) and field.name != "algebraic_orders":
+            if value and isinstance(value[0], Fraction):
+                yield from ((field.name, row) for (row,) in changed_rows((value,), change))
+            else:
+                yield from ((field.name, rows) for rows in changed_rows(value, change))
+
+
+FIGURES = {
+    "Dormand–Prince 5(4)": 15 + 6 + 6 + 7 + 7,
+    "DOP853": 66 + 12 + 12 + 2 * 13 + (13 + 14 + 15) + 3 + 4 * 16,
+    "Rodas4": 1 + 2 * 15 + 4 * 6 + 2 * 6,
+    "Rodas5P": 1 + 2 * 28 + 4 * 8 + 3 * 8,
+}
+
+
+def free_figures(tableau: Tableau) -> Row:
+    """Weights in the dense output of the last stage, whose u is an error estimate and so smaller than any condition."""
+    return tuple(row[-1] for row in tableau.dense_rows) if isinstance(tableau, RosenbrockTableau) else ()
+
+
+@named(*EXPLICIT, *ROSENBROCK)
+def test_any_changed_figure_is_refused(tableau):
+    change = 1000 * tableau.rounding
+    refused = 0
+    for name, value in changes(tableau, change):
+        if name == "dense_rows" and free_figures(tableau) not in ((), tuple(row[-1] for row in value)):
+            assert replace(tableau, dense_rows=value).dense_rows == value
+            continue
+        with pytest.raises(TableauError, match=r"claims? do(es)? not hold"):
+            replace(tableau, **{name: value})
+        refused += 1
+    assert refused == FIGURES[tableau.name] - len(free_figures(tableau))
+
+
+def test_figures_that_no_condition_fixes_are_the_printed_ones():
+    assert free_figures(RODAS4) == (0, 0)
+    printed = ("-0.17202221070155493", "-6.710236069923372", "4.883087185713722")
+    assert free_figures(RODAS5P) == tuple(Fraction(number) for number in printed)
+
+
+@named(*EXPLICIT, *ROSENBROCK)
+@pytest.mark.parametrize("claim", ["order", "dense_order"])
+def test_one_order_more_is_refused(tableau, claim):
+    with pytest.raises(TableauError, match="is left over"):
+        replace(tableau, **{claim: getattr(tableau, claim) + 1})
+
+
+@named(*ROSENBROCK)
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_one_order_more_in_the_algebraic_component_is_refused(tableau, place):
+    orders = list(tableau.algebraic_orders)
+    orders[place] += 1
+    with pytest.raises(TableauError, match=r"tree \{|algebraic_orders"):
+        replace(tableau, algebraic_orders=tuple(orders))
+
+
+@pytest.mark.parametrize("off", [-1, 1])
+def test_embedded_order_is_exact(off):
+    for tableau in ROSENBROCK:
+        with pytest.raises(TableauError, match="error estimate"):
+            replace(tableau, embedded_order=tableau.embedded_order + off)
+    for tableau in EXPLICIT:
+        for place, estimate in enumerate(tableau.error_estimates):
+            estimates = list(tableau.error_estimates)
+            estimates[place] = ErrorEstimate(weights=estimate.weights, order=estimate.order + off, share=estimate.share)
+            with pytest.raises(TableauError, match=f"error estimate of order {estimate.order + off}"):
+                replace(tableau, error_estimates=tuple(estimates))
+
+
+def test_missing_figure_is_named():
+    with pytest.raises(TableauError, match=r"weights: rows of \[5\] figures, needed \[6\]"):
+        replace(DORMAND_PRINCE_54, weights=DORMAND_PRINCE_54.weights[:-1])
+    with pytest.raises(TableauError, match=r"coupling: rows of"):
+        replace(RODAS4, coupling=RODAS4.coupling[:-1])
+
+
+# Order by experiment: u = exp(sin phi), v = cos phi with phi = t + t**2 / 4 solve a nonlinear system that depends on time.
+
+
+def solution_at(time: float) -> Vector:
+    phase = time + time**2 / 4
+    return np.array([math.exp(math.sin(phase)), math.cos(phase)])
+
+
+def slope(time: float, state: Vector) -> Vector:
+    u, v = state
+    return (1 + time / 2) * np.array([u * v, -math.log(u)])
+
+
+def jacobian(time: float, state: Vector) -> Vector:
+    u, v = state
+    return (1 + time / 2) * np.array([[v, u], [-1 / u, 0]])
+
+
+def time_derivative(time: float, state: Vector) -> Vector:
+    u, v = state
+    return np.array([u * v, -math.log(u)]) / 2
+
+
+def step_of(tableau: Tableau, time: float, step: float) -> ReferenceStep:
+    start = solution_at(time)
+    if isinstance(tableau, ExplicitTableau):
+        return explicit_step(tableau, slope, time, start, step)
+    return rosenbrock_step(tableau, slope, jacobian(time, start), time_derivative(time, start), time, start, step)
+
+
+def errors_of(result: ReferenceStep, time: float, step: float) -> list[Vector]:
+    """Errors of solution, embedded solutions and dense output."""
+    end = solution(time + step)
+    thetas = np.linspace(0.1, 0.9, 9)
+    dense = np.array([result.dense(theta) - solution(time + theta * step) for theta in thetas])
+    return [result.end - end, *(result.end - error - end for error in result.errors), dense]
+
+
+def slopes_of(steps: list[float], errors: list[list[float]]) -> list[float]:
+    """Order of each column, fitted to the four smallest steps whose error is not rounding."""
+    found = []
+    for column in np.array(errors).T:
+        usable = np.flatnonzero(column > 5e-14)[-4:]
+        found.append(float(np.polyfit(np.log(np.array(steps)[usable]), np.log(column[usable]), 1)[0]))
+    return found
+
+
+@named(*EXPLICIT, *ROSENBROCK)
+def test_one_step_converges_with_the_claimed_orders(tableau):
+    steps = [0.4 * 2 ** (-k / 2) for k in range(13)]
+    starts = np.linspace(0, 3, 13)
+    errors = []
+    for step in steps:
+        of_starts = [errors_of(step_of(tableau, time, step), time, step) for time in starts]
+        errors.append([float(np.linalg.norm(kind)) for kind in map(np.array, zip(*of_starts, strict=True))])
+    if isinstance(tableau, ExplicitTableau):
+        embedded = [estimate.order for estimate in tableau.error_estimates]
+    else:
+        embedded = [tableau.embedded_order]
+    claimed = [order + 1 for order in (tableau.order, *embedded, tableau.dense_order)]
+    assert slopes_of(steps, errors) == pytest.approx(claimed, abs=0.3)
+
+
+@named(*EXPLICIT, *ROSENBROCK)
+def test_combined_error_shrinks_with_the_exponent_for_the_controller(tableau):
+    shares = [1.0]
+    if isinstance(tableau, ExplicitTableau):
+        shares = [float(estimate.share) for estimate in tableau.error_estimates]
+
+    def combined(step: float) -> float:
+        norms = [np.mean(error**2) for error in step_of(tableau, 0.5, step).errors]
+        return float(norms[0] / math.sqrt(sum(share * norm for share, norm in zip(shares, norms, strict=True))))
+
+    order = math.log2(combined(0.04) / combined(0.02))
+    assert order == pytest.approx(tableau.error_exponent, abs=0.3)
+
+
+@named(*EXPLICIT)
+def test_explicit_dense_output_joins_with_continuous_slope(tableau):
+    weights = floats(tableau.dense_weights(), tableau.all_stages)
+    degrees = np.arange(1, len(weights) + 1)
+    assert np.allclose(weights.sum(axis=0)[: tableau.stages], floats((tableau.weights,), tableau.stages)[0], atol=1e-12)
+    assert np.allclose(weights[0], np.eye(tableau.all_stages)[0], atol=1e-12)
+    assert np.allclose(degrees @ weights, np.eye(tableau.all_stages)[tableau.stages], atol=1e-11)
+
+
+@named(*ROSENBROCK)
+def test_rosenbrock_dense_output_meets_both_ends(tableau):
+    weights = floats(tableau.dense_weights(), tableau.stages)
+    assert np.allclose(weights.sum(axis=0), floats((tableau.weights,), tableau.stages)[0], rtol=0, atol=1e-13)
+    start = np.array([0.7])
+    result = rosenbrock_step(tableau, lambda t, y: -(y**2), -2 * start[None], np.zeros(1), 0.0, start, 0.3)
+    assert result.dense(1.0) == pytest.approx(result.end, abs=1e-15)
+    assert result.dense(0.0) == pytest.approx(start, abs=1e-15)
+
+
+def test_nested_powers_of_a_polynomial_worked_by_hand():
+    # theta (1 + (1 - theta) (2 + theta 3)) = 3 theta + theta**2 - 3 theta**3
+    terms = ((Fraction(1),), (Fraction(2),), (Fraction(3),))
+    assert nested_powers(terms, [False, True]) == ((Fraction(3),), (Fraction(1),), (Fraction(-3),))
+
+
+# Stiffness
+
+
+def classical_arrays(tableau: RosenbrockTableau) -> tuple[Vector, Vector, Vector, Vector]:
+    form = tableau.classical()
+    alpha, gamma = (np.array(matrix, dtype=float) for matrix in (form.alpha, form.gamma))
+    return alpha, gamma, np.array(form.weights, dtype=float), np.array(form.error_weights, dtype=float)
+
+
+def stability(tableau: RosenbrockTableau, z: complex) -> complex:
+    alpha, gamma, weights, _ = classical_arrays(tableau)
+    ones = np.ones(tableau.stages)
+    return complex(1 + z * weights @ np.linalg.solve(np.eye(tableau.stages) - z * (alpha + gamma), ones))
+
+
+@named(*ROSENBROCK)
+def test_rosenbrock_methods_are_l_stable(tableau):
+    assert max(abs(stability(tableau, 1j * y)) for y in np.logspace(-2, 6, 400)) <= 1 + 1e-13
+    assert abs(stability(tableau, -1e9)) < 1e-7
+    assert stability(tableau, -0.01) == pytest.approx(math.exp(-0.01), abs=1e-11)
+
+
+@named(*ROSENBROCK)
+def test_one_long_step_of_a_stiff_equation_ends_at_rest(tableau):
+    rate = -1e10
+    result = rosenbrock_step(tableau, lambda t, y: rate * y, np.array([[rate]]), np.zeros(1), 0.0, np.array([1.0]), 1.0)
+    assert abs(result.end[0]) < 1e-8
+    assert abs(result.end[0] - result.errors[0][0]) < 1e-8  # the embedded solution as well
+
+
+@named(*ROSENBROCK)
+def test_classical_and_transformed_form_take_the_same_step(tableau):
+    alpha, gamma, weights, error_weights = classical_arrays(tableau)
+    time, step = 0.4, 0.2
+    start = solution_at(time)
+    matrix = np.eye(2) - step * gamma[0, 0] * jacobian(time, start)
+    slopes = np.zeros((tableau.stages, 2))
+    for stage in range(tableau.stages):
+        at = time + alpha[stage].sum() * step
+        rhs = slope(at, start + step * alpha[stage] @ slopes)
+        rhs = rhs + step * jacobian(time, start) @ (gamma[stage, :stage] @ slopes[:stage])
+        rhs = rhs + step * gamma[stage].sum() * time_derivative(time, start)
+        slopes[stage] = np.linalg.solve(matrix, rhs)
+    transformed = step_of(tableau, time, step)
+    assert np.allclose(start + step * weights @ slopes, transformed.end, rtol=1e-13, atol=0)
+    assert np.allclose(step * error_weights @ slopes, transformed.errors[0], rtol=1e-7, atol=1e-15)
+    powers = np.array(tableau.classical().dense_weights, dtype=float)
+    at_middle = start + step * (0.5 ** np.arange(1, len(powers) + 1)) @ powers @ slopes
+    assert np.allclose(at_middle, transformed.dense(0.5), rtol=1e-13, atol=0)
+
+
+@named(*ROSENBROCK)
+def test_index_one_system_converges_with_the_claimed_orders(tableau):
+    # u' = (1 + t / 2) u v and 0 = 1 - v**2 - log(u)**2 have the same solution as above while v > 0.
+    def constrained(time: float, state: Vector) -> Vector:
+        u, v = state
+        return np.array([(1 + time / 2) * u * v, 1 - v**2 - math.log(u) ** 2])
+
+    mass = np.diag([1.0, 0.0])
+    steps = [0.2 * 2 ** (-k / 2) for k in range(13)]
+    errors = []
+    for step in steps:
+        of_starts = []
+        for time in np.linspace(0.2, 0.6, 5):
+            u, v = start = solution_at(time)
+            rate = 1 + time / 2
+            matrix = np.array([[rate * v, rate * u], [-2 * math.log(u) / u, -2 * v]])
+            derivative = np.array([u * v / 2, 0.0])
+            result = rosenbrock_step(tableau, constrained, matrix, derivative, time, start, step, mass)
+            of_starts.append(errors_of(result, time, step))
+        kinds = [np.array(kind) for kind in zip(*of_starts, strict=True)]
+        errors.append([float(np.linalg.norm(kind[..., part])) for part in (0, 1) for kind in kinds])
+    found = slopes_of(steps, errors)
+    differential = (tableau.order, tableau.embedded_order, tableau.dense_order)
+    claimed = [order + 1 for order in (*differential, *tableau.algebraic_orders)]
+    assert all(order > claim - 0.3 for order, claim in zip(found, claimed, strict=True)), (found, claimed)
+
+
+# Stability polynomials
+
+
+@named(*EXPLICIT)
+def test_stability_polynomial_is_the_exponential_series_through_the_order(tableau):
+    coefficients = tableau.stability_polynomial()
+    assert len(coefficients) == tableau.stages + 1
+    for power in range(tableau.order + 1):
+        assert abs(coefficients[power] - Fraction(1, math.factorial(power))) <= tableau.rounding
+    assert coefficients[tableau.order + 1] != Fraction(1, math.factorial(tableau.order + 1))
+
+
+def test_stability_polynomial_of_dormand_prince_ends_with_one_six_hundredth():
+    # Hairer & Wanner II, section IV.2, eq. (2.13): R(z) = 1 + z + ... + z**5 / 120 + z**6 / 600.
+    assert DORMAND_PRINCE_54.stability_polynomial()[6] == Fraction(1, 600)
+
+
+# Layout that the generated step relies on
+
+
+def test_end_slope_enters_the_error_of_dormand_prince_only():
+    assert DORMAND_PRINCE_54.error_uses_end_slope
+    assert not DOP853.error_uses_end_slope
+    assert [tableau.all_stages - tableau.stages for tableau in EXPLICIT] == [1, 4]
+
+
+@named(*ROSENBROCK)
+def test_arguments_of_the_last_stages_continue_one_another(tableau):
+    first = {"Rodas4": 4, "Rodas5P": 5}[tableau.name]
+    rows = (*tableau.matrix[first:], tableau.weights)
+    for before, after in pairwise(rows):
+        assert after == (*before, Fraction(1))
+    assert all(node == 1 for node in tableau.nodes[first:])
+    assert all(weight == 0 for weight in tableau.time_weights[first:])
+
+
+def test_classical_form_is_exact_decimal_and_stiffly_accurate():
+    for tableau in ROSENBROCK:
+        form = tableau.classical()
+        with localcontext() as context:
+            context.prec = PRECISION
+            last = [a + g for a, g in zip(form.alpha[-1], form.gamma[-1], strict=True)]
+            assert max(abs(x - b) for x, b in zip(last, form.weights, strict=True)) < Decimal("1e-45")
