@@ -3,6 +3,8 @@
 In: a scene file.  Out: ``generated/<scene>/`` with
 
 model.c, model.h   every function and the integrators as C99
+kernels.h          the model cut into inline functions for the project's own stepper
+methods.h          the stepper's methods
 model.casadi       the same functions serialised, for machines without a compiler
 EQUATIONS.md       the derivation for people
 manifest.json      the contract with the runtime, written last
@@ -24,6 +26,7 @@ from pathlib import Path
 
 import casadi as ca
 
+from raceway.derive.emit_stepper import kernels_header, methods_header
 from raceway.derive.equations import equations
 from raceway.derive.linkage import check_assembly
 from raceway.derive.lower import Functions, lower, operations
@@ -159,6 +162,10 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene) -> None:
 
 def _write(folder: Path, system: System, functions: Functions) -> None:
     _write_c(folder, functions)
+    if functions.kernels is not None:
+        header = kernels_header(system, functions, functions.kernels)
+        (folder / "kernels.h").write_text(header, encoding="utf-8", newline="\n")
+        (folder / "methods.h").write_text(methods_header(), encoding="utf-8", newline="\n")
     pack = ca.FileSerializer(str(folder / "model.casadi"))
     pack.pack(len(functions.functions))
     for function, _ in functions.functions:

@@ -87,8 +87,8 @@ class RosenbrockTableau:
     time_weights : d_i, the row sums of gamma_ij, shape (s,)
     weights : m_i, shape (s,)
     error_weights : e_i, shape (s,)
-    dense_rows : h_mi of H1, H2, ..., each of shape (s,).  The figures of the last stage are free as far as the order goes:
-        its u is the error estimate, of the order of what the dense output leaves out
+    dense_rows : h_mi of H1, H2, ..., each of shape (s,).  The figures of the last stage are free as far as the order
+        goes: its u is the error estimate, no larger than what the dense output leaves out
     rounding : residual in a condition that the rounding of the printed figures explains; more raises
     source : where the figures are printed
 

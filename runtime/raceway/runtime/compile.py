@@ -22,7 +22,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -107,7 +107,8 @@ def compile_model(folder: str | Path, manifest: Manifest, compiler: str | None =
             stacklevel=3,
         )
         return None
-    return compile_sources((Path(folder) / SOURCE,), found, label=manifest.scene)
+    # absolute: the compiler runs in the cache folder
+    return compile_sources((Path(folder).absolute() / SOURCE,), found, label=manifest.scene)
 
 
 def find_compiler(command: str | None = None) -> Compiler | None:
@@ -147,21 +148,33 @@ def find_compiler(command: str | None = None) -> Compiler | None:
     return None
 
 
-def compile_sources(sources: Sequence[Path], compiler: Compiler, *, label: str = "model") -> CompiledLibrary:
+def compile_sources(
+    sources: Sequence[Path],
+    compiler: Compiler,
+    *,
+    label: str = "model",
+    headers: Sequence[Path] = (),
+    include: Sequence[Path] = (),
+    flags: tuple[str, ...] = (),
+) -> CompiledLibrary:
     """Compile C sources together into one shared library, or find it in the cache.
 
     Parameters
     ----------
-    sources : C files; their order and content enter the key, their place does not
+    sources : C files, absolute; their order and content enter the key, their place does not
     compiler : see `find_compiler`
     label : start of the library's file name
+    headers : what the sources include, which enters the key as well
+    include : absolute folders in which headers are found
+    flags : further flags, behind the compiler's own
 
     Raises
     ------
     CompileError
         The compiler failed, took too long, or a source cannot be read; with command and output.
     """
-    key = library_key(sources, compiler)
+    compiler = replace(compiler, flags=(*compiler.flags, *flags))
+    key = library_key((*sources, *headers), compiler)
     name = f"{_file_name(label)}-{key[:32]}{_suffix()}"
     ready = _cache_folder() / name
     if ready.exists():
@@ -172,7 +185,9 @@ def compile_sources(sources: Sequence[Path], compiler: Compiler, *, label: str =
     os.close(descriptor)
     started = time.perf_counter()
     try:
-        _run((*compiler.command, *compiler.flags, *(str(path) for path in sources), "-o", temporary, "-lm"), folder)
+        places = (f"-I{path}" for path in include)
+        names = (str(path) for path in sources)
+        _run((*compiler.command, *compiler.flags, *places, *names, "-o", temporary, "-lm"), folder)
         os.chmod(temporary, 0o755)
         os.replace(temporary, target)
     except BaseException:

@@ -12,7 +12,7 @@ import numpy as np
 
 from raceway.runtime import clock
 from raceway.runtime.assembly import check_assembly
-from raceway.runtime.compile import CompiledLibrary, compile_model
+from raceway.runtime.compile import CompiledLibrary, compile_model, find_compiler
 from raceway.runtime.errors import ArtefactError, CompileError, RequestError
 from raceway.runtime.integrators import available_methods, make_integrator
 from raceway.runtime.kernel import Kernel, Loop
@@ -20,6 +20,8 @@ from raceway.runtime.manifest import Manifest, check_files, read_manifest
 from raceway.runtime.parameters import Parameters, resolve_parameters, unknown_name
 from raceway.runtime.peaks import Peak, refine_peak
 from raceway.runtime.simulate import Numbers, Request, simulate
+from raceway.runtime.stepper import HEADERS, Stepper, compile_stepper
+from raceway.runtime.stepper import METHODS as STEPPERS
 
 if TYPE_CHECKING:
     from raceway.runtime.solution import Solution
@@ -52,7 +54,9 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     manifest = read_manifest(folder)
     if verify:
         check_files(folder, manifest)
-    return Model(Path(folder), manifest, compile_model(folder, manifest, compiler))
+    # absolute: the compiler runs in the cache folder, and functions may be read after the process has moved elsewhere
+    place = Path(folder).absolute()
+    return Model(place, manifest, compile_model(place, manifest, compiler), compiler=compiler)
 
 
 class Model:
@@ -66,7 +70,9 @@ class Model:
     library : the compiled library, None when CasADi's virtual machine runs the functions
     """
 
-    def __init__(self, folder: Path, manifest: Manifest, library: CompiledLibrary | None) -> None:
+    def __init__(
+        self, folder: Path, manifest: Manifest, library: CompiledLibrary | None, *, compiler: str | None = None
+    ) -> None:
         self.manifest = manifest
         self.library = library
         self._folder = folder
@@ -74,6 +80,8 @@ class Model:
         self._kernels: dict[str, Kernel] = {}
         self._loops: dict[tuple[str, tuple[str, ...]], Loop] = {}
         self._symbolic: dict[str, casadi.Function] = {}
+        self._compiler = compiler
+        self._stepper: Stepper | None = None
 
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "in CasADi's virtual machine"
@@ -105,7 +113,33 @@ class Model:
     @property
     def methods(self) -> tuple[str, ...]:
         """Integration methods of this model, besides ``auto``."""
-        return available_methods(self)
+        return (*(STEPPERS if self.has_stepper else ()), *available_methods(self))
+
+    @property
+    def has_stepper(self) -> bool:
+        """Whether the folder brings the kernels of the project's own stepper, and a compiler made code of the rest."""
+        return self.compiled and all((self._folder / name).is_file() for name in HEADERS)
+
+    @property
+    def stepper(self) -> Stepper:
+        """The project's own stepper, compiled when first asked for.
+
+        Raises
+        ------
+        RequestError
+            There is no compiler, or the folder brings no kernels.
+        CompileError
+            The compiler failed.
+        """
+        if self._stepper is None:
+            compiler = find_compiler(self._compiler) if self.has_stepper else None
+            if compiler is None:
+                raise RequestError(
+                    "method stepper: it needs a C compiler and the kernels in the generated folder. Install gcc or "
+                    "clang, write the folder again, or take another method."
+                )
+            self._stepper = Stepper(compile_stepper(self._folder, self.manifest, compiler), self.manifest)
+        return self._stepper
 
     def has(self, name: str) -> bool:
         """Whether the model has a function of that name."""
@@ -254,7 +288,8 @@ class Model:
         ----------
         cycles, duration : turns of driver or shaft, or time [s]; one of them
         parameters : overrides of parameters, SI
-        method : ``auto`` or one of `methods`.  ``auto`` takes ``rosenbrock`` for a stiff model, else ``erk``
+        method : ``auto`` or one of `methods`.  ``auto`` takes ``stepper`` where there is a compiler, else
+            ``rosenbrock`` for a stiff model and ``erk`` for others
         rtol : error allowed per step, relative to the magnitudes of the states (`raceway.runtime.scales`)
         samples_per_cycle : samples in a turn; in the whole run where nothing turns
         initial : state at the start, shape (states,)

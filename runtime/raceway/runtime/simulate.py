@@ -26,6 +26,8 @@ from raceway.runtime.parameters import Parameters, unknown_name
 from raceway.runtime.scales import Scales, find_scales
 from raceway.runtime.solution import Solution, Statistics
 from raceway.runtime.status import IntegrationError, Status
+from raceway.runtime.stepper import METHODS as STEPPERS
+from raceway.runtime.stepper import End, Family, Outcome, Segments
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -34,6 +36,9 @@ if TYPE_CHECKING:
 #: four degrees of freedom and eight balls at rtol 1e-6: both take equal time at a ratio of 2, ``erk`` twice as long at
 #: 7, because its steps are bounded by 3.3 / decay while each of ``rosenbrock`` costs three of its steps.
 STIFF_RATIO = 3.0
+
+#: Segments that one call of the stepper takes: progress is shown, and an interrupt heard, between calls.
+SEGMENTS_A_CALL = 600
 
 #: Smallest and largest relative tolerance [1].
 TOLERANCES = (1e-13, 1e-1)
@@ -122,22 +127,34 @@ def simulate(model: Model, numbers: Numbers, request: Request) -> Solution:
         raise RequestError(f"rtol: a number from {TOLERANCES[0]:g} to {TOLERANCES[1]:g} is expected, not {rtol!r}.")
     initial = _initial(model, numbers, request.initial)
 
+    integrator: Integrator | None = None
+    outcomes: list[Outcome] = []
     if len(initial):
         scales = model_scales(model, numbers, initial, duration, turn)
         magnitude = scales.magnitude
         method, reason = choose_method(model, request.method or run.method, scales)
-        integrator: Integrator | None = METHODS[method].make(model)
+        if method not in STEPPERS:
+            integrator = METHODS[method].make(model)
     else:
-        magnitude, integrator = np.zeros(0), None
+        magnitude = np.zeros(0)
         method, reason = "none", "the model has no states: its outputs follow from time alone"
 
     times = duration * (np.arange(count + 1) / count)
     trajectory = start_trajectory(times, initial, len(model.manifest.inputs))
     failure = None
+    tolerance = rtol * magnitude
     try:
-        integrate(model, numbers, integrator, rtol * magnitude, trajectory, turn, request.progress)
+        if method in STEPPERS:
+            step_through(model, numbers, STEPPERS[method], tolerance, trajectory, turn, outcomes, request.progress)
+        else:
+            integrate(model, numbers, integrator, tolerance, trajectory, turn, request.progress)
     except Interrupted as end:
         failure = end
+    steps, rejected = (integrator.steps, integrator.rejected) if integrator else (0, 0)
+    if outcomes:
+        steps, rejected = sum(o.steps for o in outcomes), sum(o.rejected for o in outcomes)
+        families = ", ".join(dict.fromkeys(o.family.name.lower() for o in outcomes))
+        reason = f"{reason}; {families} at the end" if method == "stepper" else reason
 
     outputs = evaluate_outputs(model, numbers, trajectory)
     done = trajectory.finished
@@ -155,8 +172,8 @@ def simulate(model: Model, numbers: Numbers, request: Request) -> Solution:
             reason=reason,
             rtol=rtol,
             magnitudes=tuple(float(value) for value in magnitude),
-            steps=integrator.steps if integrator else 0,
-            rejected=integrator.rejected if integrator else 0,
+            steps=steps,
+            rejected=rejected,
             segments=trajectory.segments,
             calls=trajectory.calls,
             wall_time=clocks.perf_counter() - started,
@@ -215,6 +232,77 @@ def integrate(
         first = stop
         if progress is not None:
             progress((right - begin) / (end - begin))
+
+
+def step_through(
+    model: Model,
+    numbers: Numbers,
+    family: Family,
+    tolerance: np.ndarray,
+    trajectory: Trajectory,
+    turn: float,
+    outcomes: list[Outcome],
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Fill the samples of `trajectory` by the project's own stepper, many segments a call; notes each call's outcome."""
+    times = trajectory.t
+    begin, end = float(times[0]), float(times[-1])
+    near = 1e-9 * (times[1] - times[0])
+    edges = segment_edges(model, numbers, begin, end, turn)
+    inputs = model.manifest.inputs
+    gates = [k for k, info in enumerate(inputs) if info.kind != "phase"]
+    stepper = model.stepper
+    state = trajectory.x[0].copy()
+    before: np.ndarray | None = None
+    for first in range(0, len(edges) - 1, SEGMENTS_A_CALL):
+        part = edges[first : first + SEGMENTS_A_CALL + 1]
+        u = np.array(
+            [clock.inputs_at(inputs, numbers.values, a, 0.5 * (a + b)) for a, b in pairwise(part)]
+        ).reshape(len(part) - 1, len(inputs))
+        stops = np.searchsorted(times, part - near)
+        stops[-1] = len(times) if part[-1] >= end else stops[-1]
+        if first == 0:
+            stops[0] = 0
+        lengths = np.diff(stops)
+        begun = slice(stops[0], stops[-1])
+        trajectory.reference[begun] = np.repeat(part[:-1], lengths)
+        trajectory.u[begun] = np.repeat(u, lengths, axis=0)
+        switched = np.array([before is None or not np.array_equal(before, u[0, gates])])
+        restarts = np.concatenate([switched, np.any(np.diff(u[:, gates], axis=0) != 0.0, axis=1)])
+        before = u[-1, gates]
+        segments = Segments(times=part, inputs=np.ascontiguousarray(u), restarts=restarts)
+        states = np.empty((stops[-1] - stops[0], len(state)))
+        # a sample that rounding puts beside an edge lies on it
+        wanted = np.clip(times[begun], part[0], part[-1])
+        outcome = stepper.run(
+            family=family,
+            tolerance=tolerance,
+            p=numbers.p,
+            c=numbers.c,
+            x=state,
+            segments=segments,
+            output_times=wanted,
+            output_states=states,
+        )
+        outcomes.append(outcome)
+        trajectory.x[stops[0] : stops[0] + outcome.written] = states[: outcome.written]
+        trajectory.segments += len(part) - 1
+        trajectory.calls += 1
+        trajectory.finished = int(stops[0]) + outcome.written
+        if outcome.end is not End.DONE:
+            name = model.states[outcome.state] if outcome.state >= 0 else ""
+            detail = f"Step size {outcome.step:.3g} s" + (f", worst state {name}." if name else ".")
+            raise Interrupted(_STATUS[outcome.end], outcome.time, detail)
+        if progress is not None:
+            progress((float(part[-1]) - begin) / (end - begin))
+
+
+_STATUS = {
+    End.TOO_MANY_STEPS: Status.TOO_MANY_STEPS,
+    End.STEP_TOO_SMALL: Status.STEP_TOO_SMALL,
+    End.NOT_FINITE: Status.NOT_FINITE,
+    End.BAD_ARGUMENT: Status.INTEGRATOR_FAILED,
+}
 
 
 def _segment(
@@ -324,6 +412,10 @@ def choose_method(model: Model, asked: str, scales: Scales) -> tuple[str, str]:
         No such method, or the model was generated without it.
     """
     available = available_methods(model)
+    if asked == "auto" and model.has_stepper:
+        return "stepper", "the fastest method that a compiler allows"
+    if asked in STEPPERS and model.has_stepper:
+        return asked, "asked for"
     if asked == "auto":
         ratio = f"fastest decay {scales.decay:.3g} 1/s, fastest natural frequency {scales.frequency:.3g} rad/s"
         name, why = ("rosenbrock", "stiff") if scales.stiffness > STIFF_RATIO else ("erk", "not stiff")
@@ -333,7 +425,7 @@ def choose_method(model: Model, asked: str, scales: Scales) -> tuple[str, str]:
             return available[-1], f"{why}: {ratio}; the model was generated without {name}"
         raise RequestError("The model has no right-hand side to integrate. Generate it again with `raceway derive`.")
     if asked not in available:
-        raise RequestError(unknown_name("method", asked, ("auto", *available)))
+        raise RequestError(unknown_name("method", asked, ("auto", *model.methods)))
     return asked, "asked for"
 
 

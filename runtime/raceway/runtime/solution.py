@@ -32,7 +32,7 @@ class Statistics:
     ----------
     method : the integrator that ran, and `reason` why
     rtol : relative tolerance, and `magnitudes` of the states it refers to
-    steps, rejected : accepted and rejected steps; None where the integrator does not tell (compiled ones do not)
+    steps, rejected : accepted and rejected steps; None where the integrator does not tell (CasADi's in C do not)
     segments : intervals between breakpoints, integrated one by one
     calls : calls of the integrator
     wall_time : time the simulation took [s]
@@ -95,6 +95,9 @@ class Solution:
             return self.x[:, names.index(name)]
         hint = unknown_name("output or state", name, dict.fromkeys((*self.outputs, *names)))
         raise RequestError(f"{hint} The scene's run.outputs says which outputs are computed.")
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.outputs or name in self.states
 
     def __len__(self) -> int:
         return len(self.t)

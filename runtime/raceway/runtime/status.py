@@ -19,6 +19,15 @@ class Status(Enum):
         "The motion stopped being finite. The model diverges from this state or a parameter is out of its range: "
         "check initial state, damping and units, or start nearer to rest."
     )
+    STEP_TOO_SMALL = (
+        "The step size fell to the resolution of time without meeting the tolerance: the force jumps there (a "
+        "discontinuous law switching back and forth) or the motion grows without bound. Take a continuous damping law, "
+        "a looser rtol, or check initial state and parameters."
+    )
+    TOO_MANY_STEPS = (
+        "The run took more steps than allowed. Take a shorter run or a looser rtol, and check damping and stiffness: "
+        "an explicit method crawls on a stiff model."
+    )
     INTEGRATOR_FAILED = (
         "The integrator could not go on: the tolerance asks for steps too small or too many. "
         'Try method="rosenbrock" for a stiff model, a looser rtol, or check initial state and parameters.'

@@ -1,0 +1,259 @@
+"""The project's own stepper: generated kernels and the C driver, compiled together and called through ctypes.
+
+In: numbers and segments of a run.  Out: states at the requested times, and what the run cost.  One call integrates any number
+of segments; the interpreter is free meanwhile, and calls from several threads do not share anything.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+
+import numpy as np
+
+from raceway.runtime.compile import CompiledLibrary, Compiler, compile_sources
+from raceway.runtime.errors import ArtefactError
+from raceway.runtime.manifest import Manifest
+
+#: C sources of the driver, and the generated headers it includes.
+DRIVER = Path(__file__).parent / "driver"
+HEADERS = ("kernels.h", "methods.h")
+
+#: IEEE arithmetic throughout; what is given up is errno and traps, and what is gained are vectors of square roots.
+FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd")
+
+#: Most steps of a run, accepted and rejected.
+MAX_STEPS = 1_000_000_000
+
+
+class Family(IntEnum):
+    """Methods of the driver; the numbers are those of stepper.h."""
+
+    AUTO = 0
+    RODAS4 = 1
+    RODAS5P = 2
+    DP54 = 3
+    DOP853 = 4
+
+
+#: Names users give, and the driver's methods.  Plain ``stepper`` lets the driver choose.
+METHODS: Mapping[str, Family] = {
+    "stepper": Family.AUTO,
+    "stepper-rodas4": Family.RODAS4,
+    "stepper-rodas5p": Family.RODAS5P,
+    "stepper-dp54": Family.DP54,
+    "stepper-dop853": Family.DOP853,
+}
+
+
+class End(IntEnum):
+    """How a run of the driver ended; the numbers are those of stepper.h."""
+
+    DONE = 0
+    TOO_MANY_STEPS = 1
+    STEP_TOO_SMALL = 2
+    NOT_FINITE = 3
+    BAD_ARGUMENT = 4
+
+
+class _Options(ctypes.Structure):
+    _fields_ = (
+        ("method", ctypes.c_int),
+        ("max_steps", ctypes.c_long),
+        ("first_step", ctypes.c_double),
+        ("smallest_step", ctypes.c_double),
+        ("largest_step", ctypes.c_double),
+        ("tolerance", ctypes.POINTER(ctypes.c_double)),
+    )
+
+
+class _Result(ctypes.Structure):
+    _fields_ = (
+        ("status", ctypes.c_int),
+        ("method", ctypes.c_int),
+        ("state", ctypes.c_int),
+        ("segment", ctypes.c_long),
+        ("written", ctypes.c_long),
+        ("steps", ctypes.c_long),
+        ("rejected", ctypes.c_long),
+        ("evaluations", ctypes.c_long),
+        ("factorizations", ctypes.c_long),
+        ("pivoted", ctypes.c_long),
+        ("switches", ctypes.c_long),
+        ("time", ctypes.c_double),
+        ("step", ctypes.c_double),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segments:
+    """The run as the driver sees it.
+
+    Attributes
+    ----------
+    times : ends of the segments, shape (segments + 1,), increasing [s]
+    inputs : inputs of each segment at its start, shape (segments, inputs)
+    restarts : where the load jumps at a segment's start, shape (segments,)
+    """
+
+    times: np.ndarray
+    inputs: np.ndarray
+    restarts: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What a run of the driver tells.
+
+    Attributes
+    ----------
+    end : how it ended
+    family : method of the last segment
+    state : index of the state that ended it, -1 if none
+    written : output times reached
+    steps, rejected, evaluations, factorizations, pivoted, switches : counts
+    time : reached [s]
+    step : last step size tried [s]
+    """
+
+    end: End
+    family: Family
+    state: int
+    written: int
+    steps: int
+    rejected: int
+    evaluations: int
+    factorizations: int
+    pivoted: int
+    switches: int
+    time: float
+    step: float
+
+
+def compile_stepper(folder: Path, manifest: Manifest, compiler: Compiler) -> CompiledLibrary:
+    """Library of driver and kernels of a generated folder.
+
+    Raises
+    ------
+    CompileError
+        The compiler failed.
+    """
+    sources = sorted(DRIVER.glob("*.c"))
+    headers = [*sorted(DRIVER.glob("*.h")), *(folder.absolute() / name for name in HEADERS)]
+    return compile_sources(
+        sources,
+        compiler,
+        label=f"{manifest.scene}-stepper",
+        headers=headers,
+        include=(folder.absolute(), DRIVER),
+        flags=FLAGS,
+    )
+
+
+class Stepper:
+    """The compiled driver of one model.
+
+    Raises
+    ------
+    ArtefactError
+        The library's sizes are not those of the manifest.
+    """
+
+    def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
+        self.library = library
+        code = ctypes.CDLL(str(library.path))
+        sizes = (ctypes.c_int * 5)()
+        code.raceway_sizes(sizes)
+        inputs = max(len(manifest.inputs), 1)
+        expected = [len(manifest.states), inputs, len(manifest.parameters), len(manifest.constants)]
+        if list(sizes)[:4] != expected:
+            raise ArtefactError(
+                f"{library.path}: compiled for {list(sizes)[:4]} states, inputs, parameters and constants, the "
+                f"manifest has {expected}. Write the folder again."
+            )
+        self._inputs = inputs
+        self._run = code.raceway_run
+        self._run.restype = ctypes.c_int
+        real, long = ctypes.POINTER(ctypes.c_double), ctypes.c_long
+        self._run.argtypes = (
+            *(ctypes.POINTER(_Options), real, real, real, long, real, real, ctypes.POINTER(ctypes.c_ubyte)),
+            *(long, real, real, ctypes.POINTER(_Result)),
+        )
+
+    def run(
+        self,
+        *,
+        family: Family,
+        tolerance: np.ndarray,
+        p: np.ndarray,
+        c: np.ndarray,
+        x: np.ndarray,
+        segments: Segments,
+        output_times: np.ndarray,
+        output_states: np.ndarray | None,
+        max_steps: int = MAX_STEPS,
+        first_step: float = 0.0,
+        smallest_step: float = 0.0,
+        largest_step: float = np.inf,
+    ) -> Outcome:
+        """Integrate over all segments.
+
+        Parameters
+        ----------
+        tolerance : error allowed in a step, shape (states,)
+        p, c : parameters and derived constants
+        x : state at the start, shape (states,); on return that at the end
+        output_times : increasing, shape (n,) [s]
+        output_states : C-contiguous, shape (n, states), or None
+        """
+        inputs = segments.inputs if segments.inputs.shape[1] else np.zeros((len(segments.inputs), self._inputs))
+        arrays = {
+            "tolerance": tolerance,
+            "p": p,
+            "c": c,
+            "x": x,
+            "times": segments.times,
+            "inputs": inputs,
+            "output_times": output_times,
+        }
+        pointers = {name: _pointer(name, array) for name, array in arrays.items()}
+        restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
+        options = _Options(family, max_steps, first_step, smallest_step, largest_step, pointers["tolerance"])
+        result = _Result()
+        self._run(
+            ctypes.byref(options),
+            pointers["p"],
+            pointers["c"],
+            pointers["x"],
+            len(restarts),
+            pointers["times"],
+            pointers["inputs"],
+            restarts.ctypes.data_as(ctypes.POINTER(ctypes.c_ubyte)),
+            len(output_times),
+            pointers["output_times"],
+            None if output_states is None else _pointer("output_states", output_states),
+            ctypes.byref(result),
+        )
+        return Outcome(
+            end=End(result.status),
+            family=Family(result.method),
+            state=result.state,
+            written=result.written,
+            steps=result.steps,
+            rejected=result.rejected,
+            evaluations=result.evaluations,
+            factorizations=result.factorizations,
+            pivoted=result.pivoted,
+            switches=result.switches,
+            time=result.time,
+            step=result.step,
+        )
+
+
+def _pointer(name: str, array: np.ndarray) -> ctypes._Pointer[ctypes.c_double]:
+    if array.dtype != np.float64 or not array.flags.c_contiguous:
+        raise TypeError(f"{name}: a C-contiguous array of float64 is expected, not {array.dtype}, {array.flags}")
+    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
