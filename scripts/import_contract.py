@@ -58,7 +58,8 @@ def loaded() -> list[str]:
     )
     code = (
         f"import importlib, sys\nfor m in {modules!r}: importlib.import_module(m)\n"
-        f"print('\\n'.join(m for m in sorted(sys.modules) if m.split('.')[0] in ('sympy', 'pint') or m.startswith('raceway.derive')))"
+        "bad = [m for m in sorted(sys.modules) if m.split('.')[0] in ('sympy', 'pint')"
+        " or m.startswith('raceway.derive')]\nprint('\\n'.join(bad))"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return [f"loading the runtime brings {name}" for name in result.stdout.split()]

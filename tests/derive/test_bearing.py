@@ -1,4 +1,5 @@
-"""The derived bearing equations against the printed ones, and the laws against `physics`: formulas written here by hand."""
+"""The derived bearing equations against the printed ones, and the laws against `physics`: formulas written here by
+hand."""
 
 from __future__ import annotations
 

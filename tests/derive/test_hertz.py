@@ -95,7 +95,7 @@ def test_generated_elliptic_integrals_agree_with_mpmath(kappa: float) -> None:
 
 @pytest.mark.parametrize("ratio", [1e-3, 0.029348, 0.07, 0.5])
 def test_derivative_passes_through_the_iteration(ratio: float) -> None:
-    """Algorithmic derivative of the unrolled iteration, the implicit derivative, and a difference in 40 digits agree."""
+    """Derivative of the unrolled iteration, implicit derivative, and a difference in 40 digits agree."""
     function = lowered(hertz.ellipticity(RATIO))
     x = ca.SX.sym("x")
     automatic = float(ca.Function("d", [x], [ca.jacobian(function(x), x)])(ratio))

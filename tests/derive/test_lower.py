@@ -23,7 +23,7 @@ SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar
 def by_sympy(
     system: System, t: float, x: np.ndarray, u: np.ndarray, p: np.ndarray
 ) -> tuple[np.ndarray, dict[str, sp.Expr]]:
-    """Right-hand side straight from the definitions, in 40 digits: substitution, elliptic integrals by mpmath, no CasADi."""
+    """Right-hand side from the definitions in 40 digits: substitution, elliptic integrals by mpmath, no CasADi."""
     digits = 40
 
     def number(value: float) -> sp.Float:

@@ -20,7 +20,7 @@ poisson_ratio = 0.3"""
 
 
 def equilibrium(model: Model, *, force: float, clearance: float, ball_angle: float) -> tuple[float, float]:
-    """Displacement [m] of the inner ring along the load, and the largest ball force [N], by Newton's method on the generated functions."""
+    """Displacement [m] of the inner ring along the load and largest ball force [N], by Newton's method."""
     parameters = {
         "load.force.x": force,
         "load.force.y": 0.0,
@@ -91,7 +91,8 @@ def test_many_balls_give_the_radial_load_integral(
 ) -> None:
     """J_r = F/(Z Q_max) of Harris' table for the load zone parameter epsilon, from 200 balls at a given displacement.
 
-    epsilon = (1 - P_d/(2 delta_r))/2 with the ring's displacement delta_r: preload (P_d < 0) gives epsilon above one half.
+    epsilon = (1 - P_d/(2 delta_r))/2 with the ring's displacement delta_r: preload (P_d < 0) gives epsilon above
+    one half.
     """
     text = scene_text(
         "varying_compliance",

@@ -2,8 +2,10 @@
 
 In: the scene's bearing, the cage's angle and the load on the inner ring as expressions.  Out: a `BearingModel`.
 
-One generic ball at the angle theta_j stands for all: delta_j is geometry (Eq. 6), its rate is its time derivative (Eq. 11), and the
-force F_j of the ball does the virtual work -F_j * d(delta_j) on the rings.  Lagrange's equations with the rings' kinetic energy and the
+One generic ball at the angle theta_j stands for all: delta_j is geometry (Eq. 6), its rate is its time derivative
+(Eq. 11), and the
+force F_j of the ball does the virtual work -F_j * d(delta_j) on the rings.  Lagrange's equations with the rings'
+kinetic energy and the
 housing's potential energy and dissipation give Eq. (2); the sums over the balls in them are Eqs. (8) and (9).
 """
 
@@ -41,7 +43,8 @@ class Coordinate:
 class Ball:
     """The generic ball j at the angle ``cage_angle + 2 pi (j - 1) / count``.
 
-    `definitions` use `cos` and `sin` of that angle; each of `sums` is (symbol, summand, description, latex): symbol := sum of summand over j.
+    `definitions` use `cos` and `sin` of that angle; each of `sums` is (symbol, summand, description, latex): symbol
+    := sum of summand over j.
     """
 
     count: int
@@ -133,8 +136,8 @@ def _compliance(contact: HertzContact) -> sp.Expr:
 def equivalent_mass(given: EquivalentMass, crank: Body, joint_point: Vector, far_point: Vector) -> sp.Expr:
     """Eq. (3) [kg]: ring, half the crankpin, and the crank's mass by the lever rule.
 
-    l_1 - l_o1 is measured along the crank from its centre of mass to the far joint: for theta_1p = 0, where the rule holds, this is the
-    printed one.
+    l_1 - l_o1 is measured along the crank from its centre of mass to the far joint: for theta_1p = 0, where the
+    rule holds, this is the printed one.
     """
     near, far, center = components(joint_point), components(far_point), components(crank.center_of_mass)
     arm = (far[0] - near[0], far[1] - near[1])

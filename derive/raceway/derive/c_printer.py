@@ -1,6 +1,7 @@
 """C99 text of small CasADi functions, to be inlined.
 
-In: an SX function.  Out: a ``static inline`` function whose body is straight-line code over local scalars.  CasADi's own
+In: an SX function.  Out: a ``static inline`` function whose body is straight-line code over local scalars.
+CasADi's own
 code generator passes everything through pointer tables, which no compiler turns into SIMD lanes; this text it does.
 """
 
@@ -54,8 +55,8 @@ def print_function(
 ) -> str:
     """C99 text of an SX function.
 
-    Every argument is ``const double *restrict``, every result ``double *restrict``, both dense and column-major; arguments named in
-    `scalars` are passed by value.
+    Every argument is ``const double *restrict``, every result ``double *restrict``, both dense and column-major;
+    arguments named in `scalars` are passed by value.
 
     Raises
     ------

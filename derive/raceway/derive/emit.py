@@ -9,8 +9,10 @@ model.casadi       the same functions serialised, for machines without a compile
 EQUATIONS.md       the derivation for people
 manifest.json      the contract with the runtime, written last
 
-The same scene gives the same bytes on every run.  `Manifest.signature` covers the scene's structure, the deriving sources and the
-versions of CasADi and SymPy: numbers are not in it, so a changed number rewrites the manifest's defaults and nothing else.
+The same scene gives the same bytes on every run.  `Manifest.signature` covers the scene's structure, the deriving
+sources and the
+versions of CasADi and SymPy: numbers are not in it, so a changed number rewrites the manifest's defaults and
+nothing else.
 """
 
 from __future__ import annotations
@@ -134,7 +136,8 @@ def _files(folder: Path) -> set[str]:
 
 
 def _fresh(folder: Path, scene: Scene) -> mf.Manifest | None:
-    """The folder's manifest where signature and file digests agree with the scene, else None: then it is derived anew."""
+    """The folder's manifest where signature and file digests agree with the scene, else None: then it is derived
+    anew."""
     try:
         present = mf.read_manifest(folder)
         mf.check_files(folder, present)

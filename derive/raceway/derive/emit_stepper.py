@@ -1,6 +1,7 @@
 """From kernels and tableaus to the C headers the driver includes.
 
-In: `Kernels` of a model, and the methods' tableaus.  Out: text of ``kernels.h`` (the model) and ``methods.h`` (the methods).
+In: `Kernels` of a model, and the methods' tableaus.  Out: text of ``kernels.h`` (the model) and ``methods.h`` (the
+methods).
 """
 
 from __future__ import annotations

@@ -71,7 +71,8 @@ def equations(system: System) -> str:
             "## Joint reactions and drive torque, Eq. (1)",
             "Newton and Euler for every moving body about its centre of mass.",
             _equation(
-                rf"{tex(system.reactions.matrix)}\,{tex(sp.Matrix(system.reactions.unknowns))} = {tex(system.reactions.right_side)}"
+                rf"{tex(system.reactions.matrix)}\,{tex(sp.Matrix(system.reactions.unknowns))}"
+                f" = {tex(system.reactions.right_side)}"
             ),
             "Solved by structure, dyad by dyad:",
             *_definitions(tex, system.reactions.definitions),

@@ -1,9 +1,12 @@
 """Hertz point contact between ball and raceway: the load-deflection factor from geometry.
 
-In: radii and elastic constants as SymPy expressions.  Out: k in Q = k * delta^1.5, exact (elliptic integrals), as an expression.
+In: radii and elastic constants as SymPy expressions.  Out: k in Q = k * delta^1.5, exact (elliptic integrals), as
+an expression.
 
-The ellipticity kappa = a/b solves one transcendental equation (Harris & Kotzalas, Essential Concepts of Bearing Technology,
-5th ed., 2006, Eqs. 6.26, 6.40; Brewe & Hamrock 1977, doi:10.1115/1.3453245).  It enters as the SymPy function `ellipticity`, which evaluates by
+The ellipticity kappa = a/b solves one transcendental equation (Harris & Kotzalas, Essential Concepts of Bearing
+Technology,
+5th ed., 2006, Eqs. 6.26, 6.40; Brewe & Hamrock 1977, doi:10.1115/1.3453245).  It enters as the SymPy function
+`ellipticity`, which evaluates by
 mpmath's root finder, and which `lower.py` turns into an unrolled Newton iteration on arithmetic-geometric means: two
 routes to one number, and derivatives pass through the second.
 """
@@ -20,12 +23,13 @@ class ellipticity(sp.Function):  # type: ignore[misc]  # SymPy has no types
     # the name prints as in formulas
     """Ratio kappa = a/b >= 1 of the semi-axes of the contact ellipse, given ``ratio = A/B`` in (0, 1).
 
-    A and B are the sums of the curvatures of both bodies in the two principal planes, A the smaller (for a ball in a groove:
-    the plane across the groove).  kappa solves, with K and E of parameter m = 1 - 1/kappa^2,
+    A and B are the sums of the curvatures of both bodies in the two principal planes, A the smaller (for a ball in
+    a groove: the plane across the groove).  kappa solves, with K and E of parameter m = 1 - 1/kappa^2,
 
         (K - E) / ((kappa^2 - 1) E) = A / (A + B)
 
-    which is Harris' equation for F(rho) = (B - A)/(A + B), subtracted from one and halved: no cancellation for close conformity.
+    which is Harris' equation for F(rho) = (B - A)/(A + B), subtracted from one and halved: no cancellation for
+    close conformity.
     """
 
     nargs = (1,)
@@ -65,7 +69,8 @@ def deflection_factor(kappa: sp.Expr) -> sp.Expr:
 def curvature_ratio(ball_diameter: sp.Expr, raceway_radius: sp.Expr, groove_radius: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
     """Ratio A/B of the principal curvature sums, and the curvature sum A + B [1/m].
 
-    `raceway_radius` is that of the groove's bottom in the plane of rolling, positive where it is convex towards the ball (inner
+    `raceway_radius` is that of the groove's bottom in the plane of rolling, positive where it is convex towards the
+    ball (inner
     ring) and negative where concave (outer ring); `groove_radius` that of the groove's cross section, positive.
     """
     across = 2 / ball_diameter - 1 / groove_radius

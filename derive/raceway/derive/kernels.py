@@ -8,7 +8,8 @@ relative       (x, u, p, c, w) -> r         delta = r0 + r1 cos + r2 sin, delta_
 law            (delta, rate, p, c) -> F     force of one ball
 law_slopes     (delta, rate, p, c) -> F, Fd, Fv      and its slopes by deflection and rate
 acceleration   (x, S, u, p, c, w) -> a      from the sums S = (sum F cos, sum F sin) over the balls
-acceleration_jacobian  (x, S, G, u, p, c, w) -> A, B     da/dq, da/dv (row-major); G: sums of slopes times cos², cos sin, sin²
+acceleration_jacobian  (x, S, G, u, p, c, w) -> A, B     da/dq, da/dv (row-major); G: sums of slopes times cos², cos
+sin, sin²
 acceleration_rate      (x, S, G, r, u, p, c, w, wt) -> at    partial time derivative at fixed state
 
 The balls enter by one law: the driver loops over them, and the compiler makes SIMD lanes of the loop.  Text and compile

@@ -23,8 +23,8 @@ from raceway.derive.terms import Smoothness
 class DampingForce:
     """A damping law.
 
-    `force(delta, delta_rate, k_b, coefficient)` is the expression [N]; `coefficient` is c_b [N*s/m], for ``tangent`` the time
-    constant beta [s].
+    `force(delta, delta_rate, k_b, coefficient)` is the expression [N]; `coefficient` is c_b [N*s/m], for
+    ``tangent`` the time constant beta [s].
     """
 
     smoothness: Smoothness

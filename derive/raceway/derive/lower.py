@@ -1,8 +1,10 @@
 """From mathematics to functions: a `System` lowered to named CasADi functions.
 
-In: a `System`.  Out: `Functions`, each with named inputs out of ``t, x, u, p, c`` (see `raceway.runtime.manifest`) and named outputs.
+In: a `System`.  Out: `Functions`, each with named inputs out of ``t, x, u, p, c`` (see `raceway.runtime.manifest`)
+and named outputs.
 
-Whatever depends on parameters only goes into ``constants(p) -> c``, evaluated once a run: the named constants of the system first, then
+Whatever depends on parameters only goes into ``constants(p) -> c``, evaluated once a run: the named constants of
+the system first, then
 the subexpressions the visitor found.  Derivatives are CasADi's.
 """
 
@@ -27,7 +29,8 @@ INTEGRATORS = ("erk", "rosenbrock")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constant:
-    """Entry of the vector c: a named constant of the system, or a subexpression of parameters (name ``h1``, ``h2`` ...)."""
+    """Entry of the vector c: a named constant of the system, or a subexpression of parameters (name ``h1``, ``h2``
+    ...)."""
 
     name: str
     unit: str

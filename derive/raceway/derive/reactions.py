@@ -142,17 +142,18 @@ class _Balance:
         self._solved: list[_Contact] = []
 
     def _refuse(self, moments: frozenset[str]) -> None:
+        at_rest = {g.slider for g in self._guides.values() if g.fixed}
         faults = [
             Fault(
                 key=f"mechanism.bodies.{body.name}.inertia",
                 problem=f"the moment balance of {body.name} is needed, and the body has no moment of inertia",
                 given="nothing",
                 allowed="a moment of inertia about the centre of mass; it may be left out for a slider on a fixed "
-                "guide whose guide moment is not among the outputs",
+                "guide, which does not turn",
                 remedy=f'give mechanism.bodies.{body.name}.inertia, as in inertia = "611.7 kg*mm^2"',
             )
             for body in self._mechanism.bodies
-            if body.inertia is None and body.name not in self._without_moment
+            if body.inertia is None and body.name not in at_rest
         ]
         faults += [
             Fault(

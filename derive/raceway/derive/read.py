@@ -26,7 +26,17 @@ from raceway.derive.values import parse_override, quantities_of, value_faults, w
 
 __all__ = ["METHODS", "parse_override", "read_scene", "scene_from_text", "with_values"]
 
-METHODS = ("auto", "stepper", "rosenbrock", "erk", "cvodes")
+METHODS = (
+    "auto",
+    "stepper",
+    "stepper-rodas4",
+    "stepper-rodas5p",
+    "stepper-dp54",
+    "stepper-dop853",
+    "rosenbrock",
+    "erk",
+    "cvodes",
+)
 #: Largest file that is read [bytes]; the largest sensible one is a table of loads.
 MAX_FILE_SIZE = 8_000_000
 _TABLES = ("mechanism", "shaft", "load", "bearing", "run")

@@ -288,7 +288,8 @@ class InitialState:
 class Bearing:
     """A deep groove ball bearing.
 
-    `joint` names the revolute joint whose reaction loads it (None without mechanism), `share` the part of the reaction it
+    `joint` names the revolute joint whose reaction loads it (None without mechanism), `share` the part of the
+    reaction it
     takes.  `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
     `outer` is None for a fixed outer ring.
     """
@@ -323,8 +324,8 @@ class Run:
 class Scene:
     """A checked scene.
 
-    `outputs` are the patterns of the file (``"inner.*"``); `derive` resolves them.  `quantities` lists every number in the
-    order of the file's schema: the model's parameters.
+    `outputs` are the patterns of the file (``"inner.*"``); `derive` resolves them.  `quantities` lists every number
+    in the order of the file's schema: the model's parameters.
     """
 
     name: str

@@ -1,6 +1,7 @@
 """The words all derivations share: symbols of parameters, named definitions, smoothness.
 
-A derivation is an ordered tuple of `Definition`: symbol := expression, each using parameters, inputs, states and earlier
+A derivation is an ordered tuple of `Definition`: symbol := expression, each using parameters, inputs, states and
+earlier
 symbols only.  Expressions stay as small as on paper, and the visitor of `lower.py` shares them.
 """
 

@@ -2,7 +2,8 @@
 
 In: SymPy expressions over known symbols.  Out: CasADi SX expressions that share every common node.
 
-What depends on parameters only is not computed in the step: the visitor hands each largest such subexpression to its `hoist`
+What depends on parameters only is not computed in the step: the visitor hands each largest such subexpression to
+its `hoist`
 callback, which answers with a symbol of the derived constants.
 """
 
@@ -11,14 +12,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import reduce
 from operator import mul
-from typing import Any
 
 import casadi as ca
 import sympy as sp
 
 from raceway.derive.hertz import ellipticity
 
-#: Arithmetic-geometric means from k' = 0.01 (kappa = 100) settle to rounding in six steps; one more for closer conformity.
+#: Arithmetic-geometric means from k' = 0.01 (kappa = 100) settle to rounding in six steps; one more for closer
+#: conformity.
 AGM_STEPS = 7
 #: Newton steps on the logarithm of kappa; the start (1977 fit of Brewe and Hamrock) is 3 % off, each step squares that.
 ELLIPTICITY_STEPS = 4
@@ -163,7 +164,7 @@ class Visitor:
         return function(*(self(a) for a in expression.args))
 
     def _sum(self, expression: sp.Basic) -> ca.SX:
-        total: Any = None
+        total: ca.SX | None = None
         negative: list[sp.Basic] = []
         for term in expression.args:
             if term.could_extract_minus_sign():
@@ -172,6 +173,7 @@ class Visitor:
                 total = self(term) if total is None else total + self(term)
         for term in negative:
             total = -self(term) if total is None else total - self(term)
+        assert total is not None  # a sum has terms
         return total
 
     def _product(self, expression: sp.Basic) -> ca.SX:
@@ -231,12 +233,8 @@ class Visitor:
 
 
 def _is_trivial(expression: sp.Basic) -> bool:
-    """Whether computing the expression costs nothing worth storing: a number, a symbol, or their product by a number."""
-    if (
-        expression.is_Number
-        or isinstance(expression, sp.Symbol)
-        or isinstance(expression, sp.logic.boolalg.BooleanAtom)
-    ):
+    """Whether computing the expression costs nothing worth storing: a number, a symbol, or a symbol's negative."""
+    if expression.is_Number or isinstance(expression, sp.Symbol | sp.logic.boolalg.BooleanAtom):
         return True
     return (
         isinstance(expression, sp.Mul)
@@ -247,7 +245,7 @@ def _is_trivial(expression: sp.Basic) -> bool:
 
 
 def _agm_sum(complementary: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """K and (K - E)/K for the complementary modulus k' (Abramowitz & Stegun 17.6): all terms positive, no cancellation."""
+    """K and (K - E)/K for the complementary modulus k' (Abramowitz & Stegun 17.6), without cancellation."""
     a, b = ca.SX(1.0), complementary
     weight = 0.5
     total = weight * (1 - complementary * complementary)

@@ -1,6 +1,7 @@
 """The command line: ``raceway run | derive | equations``.
 
-The one module that knows both halves; it imports `raceway.derive` where a command needs it.  Messages and progress go to
+The one module that knows both halves; it imports `raceway.derive` where a command needs it.  Messages and progress
+go to
 stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 the request was wrong.
 """
 
@@ -40,7 +41,8 @@ SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TO
 
 @contextmanager
 def _reported() -> Iterator[None]:
-    """Turn the errors raised on purpose into a message and an exit code; everything else is a defect and shows itself."""
+    """Turn the errors raised on purpose into a message and an exit code; everything else is a defect and shows
+    itself."""
     try:
         yield
     except RacewayError as error:

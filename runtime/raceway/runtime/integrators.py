@@ -13,8 +13,12 @@ A further method is a class with `pieces` and `advance`, and a line in `METHODS`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from types import FrameType
 from typing import Any, Protocol
 
 import casadi
@@ -199,7 +203,33 @@ def available_methods(model: ModelFunctions) -> tuple[str, ...]:
 
 def _call(function: casadi.Function, values: Mapping[str, Any]) -> np.ndarray:
     try:
-        return np.asarray(function(**values)["xf"].full())
+        with _interrupts_kept():
+            return np.asarray(function(**values)["xf"].full())
     except RuntimeError as fault:
         lines = [line.strip() for line in str(fault).splitlines() if line.strip()]
         raise EvaluationError(f"{function.name()}: {lines[-1] if lines else 'failed'}") from fault
+
+
+@contextmanager
+def _interrupts_kept() -> Iterator[None]:
+    """Let Ctrl-C be Ctrl-C: CasADi's integrators report it as a right-hand side that failed."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    noted = False
+
+    def note(number: int, frame: FrameType | None) -> None:
+        nonlocal noted
+        noted = True
+        before(number, frame)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    except RuntimeError:
+        if noted:
+            raise KeyboardInterrupt from None
+        raise
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -13,8 +13,8 @@ import numpy as np
 
 from raceway.runtime import clock
 from raceway.runtime.errors import RequestError
-from raceway.runtime.integrators import GRID, METHODS
-from raceway.runtime.simulate import Interrupted, Numbers, evaluate_outputs, integrate, start_trajectory
+from raceway.runtime.integrators import GRID
+from raceway.runtime.simulate import Cost, Interrupted, Numbers, evaluate_outputs, fill, start_trajectory
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -101,11 +101,10 @@ def _closely(
     times = begin + (end - begin) * (np.arange(count + 1) / count)
     trajectory = start_trajectory(times, solution.x[low], len(model.manifest.inputs))
     statistics = solution.statistics
-    integrator = METHODS[statistics.method].make(model) if solution.x.shape[1] else None
-    scale = statistics.rtol * np.array(statistics.magnitudes)
+    tolerance = statistics.rtol * np.array(statistics.magnitudes)
     turn = clock.period(model.manifest, numbers.values)
     try:
-        integrate(model, numbers, integrator, scale, trajectory, turn)
+        fill(model, numbers, statistics.method, tolerance, trajectory, turn, Cost())
     except Interrupted as end_of_run:
         raise RequestError(
             f"The peak of {name!r} near t = {begin:g} s cannot be refined: {end_of_run.status.value} "

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import time as clocks
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -27,7 +27,7 @@ from raceway.runtime.scales import Scales, find_scales
 from raceway.runtime.solution import Solution, Statistics
 from raceway.runtime.status import IntegrationError, Status
 from raceway.runtime.stepper import METHODS as STEPPERS
-from raceway.runtime.stepper import End, Family, Outcome, Segments
+from raceway.runtime.stepper import End, Family, Segments
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -127,14 +127,10 @@ def simulate(model: Model, numbers: Numbers, request: Request) -> Solution:
         raise RequestError(f"rtol: a number from {TOLERANCES[0]:g} to {TOLERANCES[1]:g} is expected, not {rtol!r}.")
     initial = _initial(model, numbers, request.initial)
 
-    integrator: Integrator | None = None
-    outcomes: list[Outcome] = []
     if len(initial):
         scales = model_scales(model, numbers, initial, duration, turn)
         magnitude = scales.magnitude
         method, reason = choose_method(model, request.method or run.method, scales)
-        if method not in STEPPERS:
-            integrator = METHODS[method].make(model)
     else:
         magnitude = np.zeros(0)
         method, reason = "none", "the model has no states: its outputs follow from time alone"
@@ -142,19 +138,13 @@ def simulate(model: Model, numbers: Numbers, request: Request) -> Solution:
     times = duration * (np.arange(count + 1) / count)
     trajectory = start_trajectory(times, initial, len(model.manifest.inputs))
     failure = None
-    tolerance = rtol * magnitude
+    cost = Cost()
     try:
-        if method in STEPPERS:
-            step_through(model, numbers, STEPPERS[method], tolerance, trajectory, turn, outcomes, request.progress)
-        else:
-            integrate(model, numbers, integrator, tolerance, trajectory, turn, request.progress)
+        fill(model, numbers, method, rtol * magnitude, trajectory, turn, cost, request.progress)
     except Interrupted as end:
         failure = end
-    steps, rejected = (integrator.steps, integrator.rejected) if integrator else (0, 0)
-    if outcomes:
-        steps, rejected = sum(o.steps for o in outcomes), sum(o.rejected for o in outcomes)
-        families = ", ".join(dict.fromkeys(o.family.name.lower() for o in outcomes))
-        reason = f"{reason}; {families} at the end" if method == "stepper" else reason
+    if cost.families:
+        reason = f"{reason}; {', '.join(dict.fromkeys(cost.families))} at the end"
 
     outputs = evaluate_outputs(model, numbers, trajectory)
     done = trajectory.finished
@@ -172,8 +162,8 @@ def simulate(model: Model, numbers: Numbers, request: Request) -> Solution:
             reason=reason,
             rtol=rtol,
             magnitudes=tuple(float(value) for value in magnitude),
-            steps=steps,
-            rejected=rejected,
+            steps=cost.steps,
+            rejected=cost.rejected,
             segments=trajectory.segments,
             calls=trajectory.calls,
             wall_time=clocks.perf_counter() - started,
@@ -191,6 +181,43 @@ def simulate(model: Model, numbers: Numbers, request: Request) -> Solution:
             partial=solution,
         )
     return solution
+
+
+@dataclass(slots=True, kw_only=True)
+class Cost:
+    """What an integration took: steps where the method tells, and the families the stepper ended with."""
+
+    steps: int | None = 0
+    rejected: int | None = 0
+    families: list[str] = field(default_factory=list)
+
+
+def fill(
+    model: Model,
+    numbers: Numbers,
+    method: str,
+    tolerance: np.ndarray,
+    trajectory: Trajectory,
+    turn: float,
+    cost: Cost,
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Fill the samples of `trajectory` by a method of that name ("none" for a model without states); notes the cost.
+
+    Raises
+    ------
+    Interrupted
+        The method could not reach the end.
+    """
+    if method in STEPPERS:
+        step_through(model, numbers, STEPPERS[method], tolerance, trajectory, turn, cost, progress)
+        return
+    integrator = METHODS[method].make(model) if method != "none" else None
+    try:
+        integrate(model, numbers, integrator, tolerance, trajectory, turn, progress)
+    finally:
+        if integrator is not None:
+            cost.steps, cost.rejected = integrator.steps, integrator.rejected
 
 
 def start_trajectory(times: np.ndarray, initial: np.ndarray, inputs: int) -> Trajectory:
@@ -241,10 +268,10 @@ def step_through(
     tolerance: np.ndarray,
     trajectory: Trajectory,
     turn: float,
-    outcomes: list[Outcome],
+    cost: Cost,
     progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Fill the samples of `trajectory` by the project's own stepper, many segments a call; notes each call's outcome."""
+    """Fill the samples of `trajectory` by the project's own stepper, many segments a call."""
     times = trajectory.t
     begin, end = float(times[0]), float(times[-1])
     near = 1e-9 * (times[1] - times[0])
@@ -256,9 +283,9 @@ def step_through(
     before: np.ndarray | None = None
     for first in range(0, len(edges) - 1, SEGMENTS_A_CALL):
         part = edges[first : first + SEGMENTS_A_CALL + 1]
-        u = np.array(
-            [clock.inputs_at(inputs, numbers.values, a, 0.5 * (a + b)) for a, b in pairwise(part)]
-        ).reshape(len(part) - 1, len(inputs))
+        u = np.array([clock.inputs_at(inputs, numbers.values, a, 0.5 * (a + b)) for a, b in pairwise(part)]).reshape(
+            len(part) - 1, len(inputs)
+        )
         stops = np.searchsorted(times, part - near)
         stops[-1] = len(times) if part[-1] >= end else stops[-1]
         if first == 0:
@@ -284,7 +311,10 @@ def step_through(
             output_times=wanted,
             output_states=states,
         )
-        outcomes.append(outcome)
+        cost.steps = (cost.steps or 0) + outcome.steps
+        cost.rejected = (cost.rejected or 0) + outcome.rejected
+        if family is Family.AUTO:
+            cost.families.append(outcome.family.name.lower())
         trajectory.x[stops[0] : stops[0] + outcome.written] = states[: outcome.written]
         trajectory.segments += len(part) - 1
         trajectory.calls += 1

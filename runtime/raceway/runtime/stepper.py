@@ -1,6 +1,7 @@
 """The project's own stepper: generated kernels and the C driver, compiled together and called through ctypes.
 
-In: numbers and segments of a run.  Out: states at the requested times, and what the run cost.  One call integrates any number
+In: numbers and segments of a run.  Out: states at the requested times, and what the run cost.  One call integrates
+any number
 of segments; the interpreter is free meanwhile, and calls from several threads do not share anything.
 """
 
