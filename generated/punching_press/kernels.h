@@ -5,7 +5,9 @@
 
 #include <math.h>
 
-enum { RW_NQ = 4, RW_NX = 8, RW_NU = 3, RW_NP = 41, RW_NC = 39, RW_NW = 4, RW_NB = 8 };
+#include "trig.h"
+
+enum { RW_NQ = 4, RW_NX = 8, RW_NU = 3, RW_NP = 41, RW_NC = 39, RW_NW = 4, RW_NB = 8, RW_LANES = 8 };
 
 static const double rw_cos[8] = {1.0, 0.7071067811865476, 0.0, -0.7071067811865476, -1.0, -0.7071067811865476, 0.0, 0.7071067811865476};
 
@@ -19,21 +21,21 @@ static inline void rw_stage(double t, const double *restrict u, const double *re
     double w2 = t;
     w1 = w1 * w2;
     w0 = w0 + w1;
-    w1 = cos(w0);
+    w1 = rw_cos1(w0);
     w[0] = w1;
-    w0 = sin(w0);
+    w0 = rw_sin1(w0);
     w[1] = w0;
     w0 = p[18];
     w1 = u[0];
     double w3 = p[1];
     w3 = w3 * w2;
     w1 = w1 + w3;
-    w3 = cos(w1);
+    w3 = rw_cos1(w1);
     w2 = p[7];
     double w4 = w3 * w2;
     double w5 = c[17];
     w4 = w4 * w5;
-    w1 = sin(w1);
+    w1 = rw_sin1(w1);
     w2 = w1 * w2;
     double w6 = c[18];
     w2 = w2 * w6;
@@ -167,21 +169,21 @@ static inline void rw_stage_rate(double t, const double *restrict u, const doubl
     double w2 = t;
     double w3 = w1 * w2;
     w0 = w0 + w3;
-    w3 = cos(w0);
+    w3 = rw_cos1(w0);
     w[0] = w3;
-    w0 = sin(w0);
+    w0 = rw_sin1(w0);
     w[1] = w0;
     double w4 = p[18];
     double w5 = u[0];
     double w6 = p[1];
     w2 = w6 * w2;
     w5 = w5 + w2;
-    w2 = cos(w5);
+    w2 = rw_cos1(w5);
     double w7 = p[7];
     double w8 = w2 * w7;
     double w9 = c[17];
     w8 = w8 * w9;
-    w5 = sin(w5);
+    w5 = rw_sin1(w5);
     double w10 = w5 * w7;
     double w11 = c[18];
     w10 = w10 * w11;
@@ -723,6 +725,157 @@ static inline void rw_acceleration_rate(const double *restrict x, const double *
     w1 = w1 * w2;
     w1 = w1 * w10;
     at[3] = w1;
+}
+
+/* Once per stage time: cage direction, loads, all else without the state, for RW_LANES times at once. */
+static inline void rw_stage_lanes(const double *restrict t, const double *restrict u, const double *restrict p, const double *restrict c, double *restrict w)
+{
+#pragma omp simd
+    for (int lane = 0; lane < RW_LANES; lane++) {
+        double w0 = u[2];
+        double w1 = c[12];
+        double w2 = t[0 * RW_LANES + lane];
+        w1 = w1 * w2;
+        w0 = w0 + w1;
+        w1 = rw_cos1(w0);
+        w[0 * RW_LANES + lane] = w1;
+        w0 = rw_sin1(w0);
+        w[1 * RW_LANES + lane] = w0;
+        w0 = p[18];
+        w1 = u[0];
+        double w3 = p[1];
+        w3 = w3 * w2;
+        w1 = w1 + w3;
+        w3 = rw_cos1(w1);
+        w2 = p[7];
+        double w4 = w3 * w2;
+        double w5 = c[17];
+        w4 = w4 * w5;
+        w1 = rw_sin1(w1);
+        w2 = w1 * w2;
+        double w6 = c[18];
+        w2 = w2 * w6;
+        w4 = w4 - w2;
+        w2 = p[11];
+        double w7 = w4 + w2;
+        w2 = w2 - w4;
+        w7 = w7 * w2;
+        w7 = sqrt(w7);
+        w2 = w7 * w6;
+        double w8 = w4 * w5;
+        w2 = w2 - w8;
+        w8 = u[1];
+        double w9 = p[14];
+        w9 = w8 * w9;
+        double w10 = c[23];
+        w10 = w10 * w1;
+        w10 = w10 * w5;
+        double w11 = c[22];
+        w11 = w11 * w3;
+        w11 = w11 * w6;
+        w10 = w10 - w11;
+        w10 = w10 / w7;
+        w10 = w10 * w10;
+        w11 = w2 * w10;
+        double w12 = c[20];
+        double w13 = w12 * w1;
+        double w14 = c[21];
+        double w15 = w14 * w3;
+        w13 = w13 + w15;
+        w11 = w11 + w13;
+        w15 = w2 * w11;
+        double w16 = w7 * w5;
+        w4 = w4 * w6;
+        w16 = w16 + w4;
+        w4 = w16 * w10;
+        w12 = w12 * w3;
+        w14 = w14 * w1;
+        w12 = w12 - w14;
+        w4 = w4 - w12;
+        w14 = w16 * w4;
+        w15 = w15 + w14;
+        w15 = w15 / w7;
+        w14 = w15 * w6;
+        double w17 = p[12];
+        w14 = w14 * w17;
+        w9 = w9 + w14;
+        w9 = w6 * w9;
+        w14 = p[15];
+        w8 = w8 * w14;
+        w15 = w15 * w5;
+        w15 = w15 * w17;
+        w8 = w8 + w15;
+        w15 = c[26];
+        w8 = w8 - w15;
+        w8 = w5 * w8;
+        w9 = w9 + w8;
+        w8 = w2 * w9;
+        w15 = c[19];
+        w2 = w2 * w15;
+        w17 = p[10];
+        w14 = w2 * w17;
+        w4 = w4 * w6;
+        w11 = w11 * w5;
+        w4 = w4 - w11;
+        w4 = w4 / w7;
+        w2 = w4 * w2;
+        w2 = w2 * w17;
+        w12 = w12 + w2;
+        w15 = w16 * w15;
+        w2 = w15 * w17;
+        w2 = w2 * w10;
+        w12 = w12 - w2;
+        w2 = p[8];
+        w12 = w12 * w2;
+        w11 = c[24];
+        double w18 = w12 + w11;
+        w18 = w14 * w18;
+        double w19 = c[25];
+        double w20 = w4 * w15;
+        w20 = w20 * w17;
+        w13 = w13 + w20;
+        w14 = w14 * w10;
+        w13 = w13 + w14;
+        w19 = w19 * w13;
+        w19 = w19 * w15;
+        w18 = w18 + w19;
+        w19 = p[9];
+        w4 = w4 * w19;
+        w18 = w18 + w4;
+        w5 = w18 * w5;
+        w8 = w8 - w5;
+        w8 = w8 / w7;
+        w13 = w13 * w2;
+        w8 = w8 + w13;
+        w13 = c[29];
+        w2 = c[28];
+        w5 = w2 * w3;
+        w4 = c[27];
+        w19 = w4 * w1;
+        w5 = w5 - w19;
+        w5 = w13 * w5;
+        w19 = p[3];
+        w5 = w5 * w19;
+        w8 = w8 + w5;
+        w8 = w0 * w8;
+        w[2 * RW_LANES + lane] = w8;
+        w16 = w16 * w9;
+        w18 = w18 * w6;
+        w16 = w16 + w18;
+        w16 = w16 / w7;
+        w16 = w16 - w12;
+        w16 = w16 - w11;
+        w4 = w4 * w3;
+        w2 = w2 * w1;
+        w4 = w4 + w2;
+        w13 = w13 * w4;
+        w13 = w13 * w19;
+        w16 = w16 + w13;
+        w13 = c[30];
+        w16 = w16 - w13;
+        w0 = w0 * w16;
+        w[3 * RW_LANES + lane] = w0;
+    }
 }
 
 #endif

@@ -6,7 +6,7 @@
 enum { RW_METHOD_STAGES = 16, RW_DENSE_ROWS = 6, RW_RODAS4_STAGES = 6, RW_RODAS5P_STAGES = 8, RW_DP54_STAGES = 6, RW_DOP853_STAGES = 12 };
 
 typedef struct {
-    int stages, dense_rows;
+    int stages, inner, dense_rows; /* inner: stages between start and end */
     double error_exponent, gamma;
     double nodes[RW_METHOD_STAGES], time_weights[RW_METHOD_STAGES];
     double a[RW_METHOD_STAGES][RW_METHOD_STAGES], coupling[RW_METHOD_STAGES][RW_METHOD_STAGES];
@@ -26,6 +26,7 @@ typedef struct {
 /* Rodas4: Hairer & Wanner, Solving Ordinary Differential Equations II, 1996, section VI.4, code RODAS */
 static const rw_rosenbrock_method rw_rodas4 = {
     .stages = 6,
+    .inner = 3,
     .dense_rows = 2,
     .error_exponent = 4.0,
     .gamma = 0.25,
@@ -40,6 +41,7 @@ static const rw_rosenbrock_method rw_rodas4 = {
 /* Rodas5P: Steinebach, BIT Numerical Mathematics 63 (2023) 27, doi:10.1007/s10543-023-00967-x */
 static const rw_rosenbrock_method rw_rodas5p = {
     .stages = 8,
+    .inner = 4,
     .dense_rows = 3,
     .error_exponent = 5.0,
     .gamma = 0.21193756319429014,

@@ -80,6 +80,29 @@ def test_peaks_between_samples_are_found(press: tuple[Model, Solution], summary:
     assert summary["peak_ball_force"]["elastic"] <= summary["peak_ball_force"]["total"]
 
 
+def test_peaks_tell_when_which_ball_and_what_the_samples_alone_show(
+    press: tuple[Model, Solution], summary: dict[str, Any]
+) -> None:
+    model, solution = press
+    # 40 times as many samples at a ten thousandth of the tolerance: time and ball are read off, not searched for
+    fine = model.simulate(cycles=4, samples_per_cycle=80000, rtol=1e-10).steady()
+    found = summary["peak_ball_force"]
+    for key, name in (("elastic", "ball.elastic_force"), ("total", "ball.force")):
+        k, ball = np.unravel_index(np.argmax(fine[name]), fine[name].shape)
+        assert found["ball"][key] == ball + 1
+        assert found["time"][key] == pytest.approx(fine.t[k], abs=5e-6)
+        assert found["sampled"][key] == solution.steady()[name].max()
+        assert found[key] >= found["sampled"][key]
+        assert found[key] == pytest.approx(fine[name].max(), rel=1e-4)
+
+
+def test_steps_are_told_or_null(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press")
+    told = {method: model.simulate(cycles=1, method=method, transient=0) for method in ("erk", "cvodes")}
+    assert summarize(model, told["cvodes"])["steps"]["value"] == told["cvodes"].statistics.steps > 1000
+    assert summarize(model, told["erk"])["steps"] == {"value": None, "unit": "1"}
+
+
 def test_a_scene_without_mechanism_has_no_reaction(make_model: Callable[..., Model]) -> None:
     model = make_model("varying_compliance")
     found = summarize(model, model.simulate(cycles=2, transient=1))

@@ -17,8 +17,8 @@ _UNARY = {
     ca.OP_INV: "1.0 / {0}",
     ca.OP_ASSIGN: "{0}",
     ca.OP_SQRT: "sqrt({0})",
-    ca.OP_SIN: "sin({0})",
-    ca.OP_COS: "cos({0})",
+    ca.OP_SIN: "rw_sin1({0})",
+    ca.OP_COS: "rw_cos1({0})",
     ca.OP_TAN: "tan({0})",
     ca.OP_ATAN: "atan({0})",
     ca.OP_ASIN: "asin({0})",
@@ -51,43 +51,53 @@ _BINARY = {
 
 
 def print_function(
-    function: ca.Function, *, prefix: str, description: str, scalars: frozenset[str] = frozenset()
+    function: ca.Function,
+    *,
+    prefix: str,
+    description: str,
+    scalars: frozenset[str] = frozenset(),
+    lanes: str = "",
+    varying: frozenset[str] = frozenset(),
 ) -> str:
     """C99 text of an SX function.
 
-    Every argument is ``const double *restrict``, every result ``double *restrict``, both dense and column-major;
-    arguments named in `scalars` are passed by value.
+    Every argument is ``const double *restrict``, every result ``double *restrict``, both dense and column-major; arguments named
+    in `scalars` are passed by value.
+
+    Parameters
+    ----------
+    lanes : C constant; where given, the function is evaluated for so many points in one loop that compilers turn into SIMD
+        lanes.  Results, and arguments named in `varying`, then hold that many values for each entry, next to each other
+    varying : arguments that differ from lane to lane
 
     Raises
     ------
     TypeError
         An operation has no C text here, or a result is sparse.
     """
-    arguments = [
-        f"double {function.name_in(k)}"
-        if function.name_in(k) in scalars
-        else f"const double *restrict {function.name_in(k)}"
-        for k in range(function.n_in())
-    ]
+    by_value = scalars - varying if lanes else scalars
+    arguments = [_argument(function.name_in(k), by_value) for k in range(function.n_in())]
     results = [f"double *restrict {function.name_out(k)}" for k in range(function.n_out())]
     for k in range(function.n_out()):
         if not function.sparsity_out(k).is_dense():
             raise TypeError(f"{function.name()}: the result {function.name_out(k)} is sparse; make it dense first")
-    lines = [
-        f"/* {description} */",
-        f"static inline void {prefix}{function.name()}({', '.join(arguments + results)})",
-        "{",
-    ]
+    name = f"{prefix}{function.name()}{'_lanes' if lanes else ''}"
+    lines = [f"/* {description} */", f"static inline void {name}({', '.join(arguments + results)})", "{"]
     lines += _unused(function)
+    if lanes:
+        lines += ["#pragma omp simd", f"    for (int lane = 0; lane < {lanes}; lane++) {{"]
+    indent = "        " if lanes else "    "
     declared: set[int] = set()
     for k in range(function.n_instructions()):
         operation, out, take = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if operation == ca.OP_OUTPUT:
-            lines.append(f"    {function.name_out(out[0])}[{out[1]}] = w{take[0]};")
+            place = f"{out[1]} * {lanes} + lane" if lanes else str(out[1])
+            lines.append(f"{indent}{function.name_out(out[0])}[{place}] = w{take[0]};")
             continue
         if operation == ca.OP_INPUT:
             name = function.name_in(take[0])
-            text = name if name in scalars else f"{name}[{take[1]}]"
+            place = f"{take[1]} * {lanes} + lane" if lanes and name in varying else str(take[1])
+            text = name if name in by_value else f"{name}[{place}]"
         elif operation == ca.OP_CONST:
             text = _literal(function.instruction_constant(k))
         elif operation in _UNARY:
@@ -96,10 +106,14 @@ def print_function(
             text = _BINARY[operation].format(f"w{take[0]}", f"w{take[1]}")
         else:
             raise TypeError(f"{function.name()}: operation {operation} has no C text")
-        lines.append(f"    {'' if out[0] in declared else 'double '}w{out[0]} = {text};")
+        lines.append(f"{indent}{'' if out[0] in declared else 'double '}w{out[0]} = {text};")
         declared.add(out[0])
-    lines.append("}")
+    lines += ["    }", "}"] if lanes else ["}"]
     return "\n".join(lines)
+
+
+def _argument(name: str, by_value: frozenset[str]) -> str:
+    return f"double {name}" if name in by_value else f"const double *restrict {name}"
 
 
 def print_array(name: str, values: list[float]) -> str:

@@ -1,18 +1,21 @@
 """The command line: ``raceway run | derive | equations``.
 
-The one module that knows both halves; it imports `raceway.derive` where a command needs it.  Messages and progress
-go to
-stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 the request was wrong.
+The one module that knows both halves; it imports `raceway.derive` where a command needs it.  Messages and progress go
+to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 the request was wrong, 130 interrupted.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
+import math
 import os
+import sys
 import tempfile
+import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,10 +24,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from raceway.runtime.errors import RacewayError
+from raceway.runtime.errors import RacewayError, RequestError
 
 if TYPE_CHECKING:
     from raceway.derive import Scene
+    from raceway.derive.errors import Fault
     from raceway.runtime.model import Model
     from raceway.runtime.solution import Solution
 
@@ -32,37 +36,61 @@ app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    help="Planar mechanisms and the ball bearings they load: equations, generated code, simulation.",
+    help="Planar mechanisms and the ball bearings they load: from a scene file to derived equations, generated C, a "
+    "simulation and figures. Start with: raceway run scenes/punching_press.toml",
+    epilog="Results go to stdout, messages and progress to stderr. Exit codes: 0 done, 1 the computation failed, 2 the "
+    "request was wrong.",
 )
 _err = Console(stderr=True)
 
-SceneFile = Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TOML).", show_default=False)]
+SceneFile = Annotated[
+    Path,
+    typer.Argument(help="Scene file (TOML). The folder scenes/ has some to copy.", show_default=False),
+]
+
+#: Names of the stages as they are announced.
+_STAGES = {
+    "read": "reading the scene",
+    "derive": "deriving equations",
+    "lower": "building functions",
+    "emit": "generating C",
+    "check": "deriving to compare",
+    "compile": "compiling",
+    "simulate": "simulating",
+    "draw": "drawing figures",
+    "write": "writing results",
+}
 
 
-@contextmanager
+@contextlib.contextmanager
 def _reported() -> Iterator[None]:
-    """Turn the errors raised on purpose into a message and an exit code; everything else is a defect and shows
-    itself."""
+    """Turn errors raised on purpose into a message and an exit code; everything else is a defect and shows itself."""
     try:
         yield
     except RacewayError as error:
-        _err.print(f"[bold red]error[/]: {escape(str(error))}", soft_wrap=True, highlight=False)
+        _complain(str(error))
         raise typer.Exit(2 if isinstance(error, ValueError) else 1) from None
+    except BrokenPipeError:  # the reader has seen enough, as in `raceway equations SCENE | head`
+        raise
     except OSError as error:
-        where = f" {error.filename!r}" if error.filename else ""
-        _err.print(
-            f"[bold red]error[/]: cannot read or write{where}: {error.strerror}. Check the path, its permissions and the free space.",
-            soft_wrap=True,
-            highlight=False,
-        )
+        where = f" {os.fspath(error.filename)!r}" if error.filename else ""
+        why = error.strerror or str(error)
+        _complain(f"cannot read or write{where}: {why}. Check the path, its permissions and the free space.")
         raise typer.Exit(2) from None
+    except KeyboardInterrupt:
+        _complain("interrupted. Whatever files are there are whole.")
+        raise typer.Exit(130) from None
 
 
-def _warn(message: Warning | str, *_: Any) -> None:
+def _complain(message: str) -> None:
+    _err.print(f"[bold red]error[/]: {escape(message)}", soft_wrap=True, highlight=False)
+
+
+def _warn(message: Warning | str, *_: Any, **__: Any) -> None:
     _err.print(f"[bold yellow]warning[/]: {escape(str(message))}", soft_wrap=True, highlight=False)
 
 
-@contextmanager
+@contextlib.contextmanager
 def _warnings_shown() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.showwarning = _warn
@@ -70,17 +98,20 @@ def _warnings_shown() -> Iterator[None]:
 
 
 class _Stages:
-    """Progress on stderr: a line for each finished stage, a bar for the running simulation."""
+    """Progress on stderr: on a terminal bars that move, elsewhere one line when a stage begins."""
 
     def __init__(self) -> None:
+        # rich's own answer is yes under FORCE_COLOR, also for a file
+        self._moving = sys.stderr.isatty() and _err.is_interactive
         self._progress = Progress(
             SpinnerColumn(),
-            TextColumn("{task.description:<12}"),
+            TextColumn("{task.description:<20}"),
             BarColumn(bar_width=30),
             TimeElapsedColumn(),
             console=_err,
-            transient=False,
+            disable=not self._moving,
         )
+        self._begin = time.perf_counter()
         self._task: Any = None
 
     def __enter__(self) -> _Stages:
@@ -90,6 +121,8 @@ class _Stages:
     def __exit__(self, *error: Any) -> None:
         if error[0] is None:
             self._finish()
+        elif self._task is not None:
+            self._progress.stop_task(self._task)
         self._progress.__exit__(*error)
 
     def _finish(self) -> None:
@@ -98,37 +131,79 @@ class _Stages:
 
     def __call__(self, name: str) -> None:
         self._finish()
-        self._task = self._progress.add_task(name, total=None)
+        words = _STAGES.get(name, name)
+        if self._moving:
+            self._task = self._progress.add_task(words, total=None)
+        else:
+            _err.print(f"{time.perf_counter() - self._begin:7.1f} s  {words}", highlight=False, soft_wrap=True)
 
     def fraction(self, done: float) -> None:
-        self._progress.update(self._task, total=1.0, completed=done)
+        if self._moving:
+            self._progress.update(self._task, total=1.0, completed=done)
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"raceway {version('raceway')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Options of `raceway` itself; the commands have their own."""
 
 
 @app.command()
 def run(
     scene: SceneFile,
-    cycles: Annotated[float | None, typer.Option(help="Turns of the driver or shaft.")] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help='Parameter: bearing.clearance="20 um".')
+    cycles: Annotated[float | None, typer.Option(metavar="N", help="Turns of driver or shaft to simulate.")] = None,
+    transient: Annotated[
+        float | None, typer.Option(metavar="N", help="Turns at the start that summary and figures leave out.")
     ] = None,
-    rtol: Annotated[float | None, typer.Option(help="Relative tolerance of the integrator.")] = None,
-    method: Annotated[str | None, typer.Option(help="auto, erk, rosenbrock or cvodes.")] = None,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Results; default results/<scene>.")] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="PATH=VALUE",
+            help='Another value for a number of the scene: --set bearing.clearance="20 um". May be repeated.',
+        ),
+    ] = None,
+    rtol: Annotated[float | None, typer.Option(metavar="R", help="Relative tolerance of the integrator.")] = None,
+    method: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Integrator: auto, stepper, erk, rosenbrock or cvodes.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of the results; results/<scene> if not given.")
+    ] = None,
     json_: Annotated[bool, typer.Option("--json", help="Print the summary as JSON on stdout, nothing else.")] = False,
-    figures: Annotated[bool, typer.Option(help="Draw the figures.")] = True,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
 ) -> None:
-    """Simulate a scene: derive and compile what is stale, run, write solution, summary and figures."""
+    """Simulate a scene; write solution, summary and figures.
+
+    Derives and compiles what is stale in generated/<scene>. What is not given here is as the scene's run table says.
+    """
     with _reported(), _warnings_shown(), _Stages() as stages:
         stages("read")
-        read, overrides = _read(scene, set_ or [])
-        model = _model(read, stages)
+        read, asked, overrides = _read(scene, set_ or [])
+        _check_request(asked, cycles, transient, rtol, method)
+        folder = out if out is not None else Path("results") / read.name
+        _check_folder(folder)
+        with _faults_of(scene):
+            model = _model(read, stages, method or read.run.method)
         stages("simulate")
         solution = model.simulate(
-            cycles=cycles, parameters=overrides, method=method, rtol=rtol, progress=stages.fraction
+            cycles=cycles,
+            transient=transient,
+            parameters=overrides,
+            method=method,
+            rtol=rtol,
+            progress=stages.fraction,
         )
-        stages("write")
-        folder = out if out is not None else Path("results") / read.name
-        summary = _write_results(model, solution, folder, figures=figures)
+        summary, files = _write_results(model, solution, folder, stages, figures=figures)
     from raceway.runtime.summary import render_summary
 
     if json_:
@@ -136,29 +211,37 @@ def run(
     else:
         console = Console()
         console.print(render_summary(summary))
-        console.print(f"results in {folder}", highlight=False)
+        console.print(f"results in {folder}: {', '.join(files)}", highlight=False, soft_wrap=True, markup=False)
 
 
 @app.command()
 def derive(
     scene: SceneFile,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder; default generated/<scene>.")] = None,
-    check: Annotated[bool, typer.Option("--check", help="Write nothing; exit 1 where the folder is stale.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder to write; generated/<scene> if not given.")
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Write nothing; exit 1 where the folder differs from what is derived today.")
+    ] = False,
 ) -> None:
-    """Derive a scene and write its generated folder."""
+    """Derive the equations of a scene and generate its C, functions, manifest and EQUATIONS.md."""
     from raceway import derive as deriving
 
-    with _reported(), _Stages() as stages:
+    with _reported(), _warnings_shown(), _Stages() as stages, _faults_of(scene):
         if check:
             stages("check")
             result = deriving.check(scene, out)
-            if result.stale:
-                names = ", ".join(result.stale)
-                raise typer.Exit(_fail(f"{result.folder} is stale: {names}. Run: raceway derive {scene}"))
-            message = f"{result.folder} is up to date"
         else:
-            message = str(deriving.generate(scene, out, progress=stages))
-    typer.echo(message)
+            folder = deriving.generate(scene, out, progress=stages)
+    if not check:
+        typer.echo(str(folder))
+    elif result.stale:
+        state = f"is stale: {', '.join(result.stale)}" if result.folder.is_dir() else "does not exist"
+        command = f"raceway derive {scene}" + (f" --out {out}" if out is not None else "")
+        _complain(f"{result.folder} {state}. Run: {command}")
+        raise typer.Exit(1)
+    else:
+        typer.echo(f"{result.folder} is up to date")
 
 
 @app.command()
@@ -166,52 +249,181 @@ def equations(scene: SceneFile) -> None:
     """Print the derived equations of a scene as Markdown with LaTeX."""
     from raceway import derive as deriving
 
-    with _reported():
-        typer.echo(deriving.equations(deriving.derive(deriving.read_scene(scene))), nl=False)
+    with _reported(), _faults_of(scene):
+        text = deriving.equations(deriving.derive(deriving.read_scene(scene)))
+    typer.echo(text, nl=False)
 
 
-def _fail(message: str) -> int:
-    _err.print(f"[bold red]error[/]: {escape(message)}", soft_wrap=True, highlight=False)
-    return 1
+@contextlib.contextmanager
+def _faults_of(source: Path | str) -> Iterator[None]:
+    """Say whose faults they are, where a later stage than reading finds them."""
+    from raceway.derive import SceneError
+
+    try:
+        yield
+    except SceneError as error:
+        if error.source is not None:
+            raise
+        raise SceneError(error.faults, source=source) from None
 
 
-def _read(path: Path, settings: list[str]) -> tuple[Scene, dict[str, float]]:
-    """The scene, and the overrides in SI; overrides are checked as if they stood in the file."""
-    from raceway.derive import read_scene
+def _read(path: Path, settings: list[str]) -> tuple[Scene, Scene, dict[str, float]]:
+    """The scene as the file has it, the scene as asked for, and the overrides in SI; checked as if in the file."""
+    from raceway.derive import SceneError, read_scene
+    from raceway.derive.linkage import check_assembly, derive_linkage
     from raceway.derive.read import parse_override, with_values
+    from raceway.derive.system import DRIVER_ANGLE
+    from raceway.derive.terms import symbol_of
 
     read = read_scene(path)
-    overrides = dict(parse_override(read, text) for text in settings)
-    with_values(read, overrides)
-    return read, overrides
+    faults: list[Fault] = []
+    overrides: dict[str, float] = {}
+    for text in settings:
+        try:
+            name, value = parse_override(read, text)
+        except SceneError as error:
+            faults += error.faults
+        else:
+            overrides[name] = value
+    if faults:
+        raise SceneError(faults, source="--set")
+    if not overrides:
+        return read, read, {}
+    with _faults_of("--set"):
+        asked = with_values(read, overrides)
+        if asked.mechanism is not None:
+            # here, so that nothing is written for a linkage that locks
+            linkage = derive_linkage(asked.mechanism, DRIVER_ANGLE, symbol_of(asked.mechanism.driver.speed))
+            check_assembly(linkage, {quantity.path: quantity.value for quantity in asked.quantities})
+    return read, asked, overrides
 
 
-def _model(scene: Scene, stages: _Stages) -> Model:
+def _check_request(
+    scene: Scene, cycles: float | None, transient: float | None, rtol: float | None, method: str | None
+) -> None:
+    """Refuse options that no model can follow, before anything is derived or written."""
+    from raceway.runtime.integrators import METHODS
+    from raceway.runtime.parameters import unknown_name
+    from raceway.runtime.simulate import TOLERANCES
+    from raceway.runtime.stepper import METHODS as STEPPERS
+
+    faults = []
+    if method is not None and method not in ("auto", *STEPPERS, *METHODS):
+        faults.append(f"--method: {unknown_name('method', method, ('auto', *STEPPERS, *METHODS))}")
+    if rtol is not None and not TOLERANCES[0] <= rtol <= TOLERANCES[1]:
+        faults.append(
+            f"--rtol: {rtol:g} lies outside its bounds. Allowed: {TOLERANCES[0]:g} to {TOLERANCES[1]:g}. "
+            "Take 1e-6 where nothing speaks for another value."
+        )
+    if cycles is not None and not 0.0 < cycles < math.inf:
+        faults.append(f"--cycles: {cycles:g} turns cannot be simulated. Allowed: a number above 0, as in --cycles 4.")
+    if transient is not None and not 0.0 <= transient < math.inf:
+        faults.append(f"--transient: {transient:g} turns cannot be left out. Allowed: a number from 0 on.")
+    if faults:
+        raise RequestError("\n".join(faults))
+    shaft = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
+    speed = abs(shaft.value) if shaft is not None else 0.0
+    if cycles is not None and speed == 0.0:
+        raise RequestError(
+            f"--cycles: {cycles:g} turns were asked for, but nothing turns in this scene. Give it a speed, or write "
+            "duration in its [run] and leave --cycles away."
+        )
+    turns = cycles if cycles is not None else scene.run.cycles
+    if turns is None:
+        turns = (scene.run.duration or 0.0) * speed / math.tau
+    dropped = scene.run.transient_cycles if transient is None else transient
+    if dropped > 0.0 and turns <= dropped:
+        raise RequestError(
+            f"The run of {turns:g} turns lies within its {dropped:g} transient turns: nothing is left to report. "
+            f"Allowed: fewer transient turns than turns. Simulate more (--cycles {dropped + 2:g}) or drop fewer "
+            "(--transient 0)."
+        )
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder of results that cannot be made or written, before the simulation instead of behind it."""
+    place = folder.absolute()
+    while not os.path.lexists(place):
+        place = place.parent
+    why = None
+    if not place.is_dir():
+        why = f"{place} is no folder"
+    elif not os.access(place, os.W_OK | os.X_OK):
+        why = f"{place} may not be written"
+    if why is not None:
+        raise RequestError(
+            f"The folder of the results, {folder}, cannot be written: {why}. Allowed: a folder that you may write, or "
+            "one that can be made. Give another: --out DIR."
+        )
+
+
+def _model(scene: Scene, stages: _Stages, method: str) -> Model:
     from raceway.derive import generate
     from raceway.runtime.model import load
+    from raceway.runtime.stepper import METHODS as STEPPERS
 
     folder = generate(scene, progress=stages)
     stages("compile")
-    return load(folder)
+    model = load(folder)
+    if model.has_stepper and method in ("auto", *STEPPERS):
+        _ = model.stepper  # compiled here, where it is announced
+    return model
 
 
-def _write_results(model: Model, solution: Solution, folder: Path, *, figures: bool) -> dict[str, Any]:
-    """Write into a folder beside the target and move file by file: what is there is whole."""
+def _write_results(
+    model: Model, solution: Solution, folder: Path, stages: _Stages, *, figures: bool
+) -> tuple[dict[str, Any], list[str]]:
+    """Write into a folder beside the target and move file by file: what is there is whole.
+
+    Returns
+    -------
+    The summary, and the names of the files.
+    """
     from raceway.runtime.summary import summarize
 
-    folder.mkdir(parents=True, exist_ok=True)
+    stages("write")
     summary = summarize(model, solution)
-    with tempfile.TemporaryDirectory(prefix=".writing-", dir=folder) as name:
-        made = Path(name)
-        solution.save(made / "solution.nc")
-        (made / "summary.json").write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        if figures:
-            from raceway.runtime.figures import draw_all
+    made = _make_folder(folder)
+    try:
+        with tempfile.TemporaryDirectory(prefix=".writing-", dir=folder) as name:
+            beside = Path(name)
+            solution.save(beside / "solution.nc")
+            if figures:
+                from raceway.runtime.figures import draw_all
 
-            draw_all(model, solution, made)
-        for path in sorted(made.iterdir()):
-            os.replace(path, folder / path.name)
-    return summary
+                stages("draw")
+                draw_all(model, solution, beside)
+            (beside / "summary.json").write_text(
+                json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8"
+            )
+            names = sorted(path.name for path in beside.iterdir())
+            _drop_figures(folder, names)
+            for file in names:
+                os.replace(beside / file, folder / file)
+    except BaseException:
+        for path in made:
+            with contextlib.suppress(OSError):  # not empty: files were moved already
+                path.rmdir()
+        raise
+    return summary, names
+
+
+def _make_folder(folder: Path) -> list[Path]:
+    """Make a folder and its parents; those that were not there, innermost first."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def _drop_figures(folder: Path, kept: list[str]) -> None:
+    """Delete figures of an earlier run that this one does not replace: they would pass for its own."""
+    if not any(folder.glob("*.png")):
+        return
+    from raceway.runtime.figures import FIGURES
+
+    for kind in FIGURES:
+        if f"{kind.name}.png" not in kept:
+            (folder / f"{kind.name}.png").unlink(missing_ok=True)
 
 
 def main() -> None:

@@ -53,7 +53,9 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     ``drive_work``
         work of the drive in a turn, mean over the steady turns: ``{"value": , "unit": "J"}``
     ``peak_ball_force``
-        highest force of any ball, also between samples: ``{"elastic": , "total": , "unit": "N"}``
+        highest force of any ball, also between samples: ``{"elastic": , "total": , "unit": "N"}``; beside them, with
+        the same two keys and a unit each, ``time`` and ``ball`` of the peak (balls are counted from 1), and
+        ``sampled``, what the samples alone show
     ``inner.x`` and other motions of the rings
         ``{"min": , "max": , "mean": , "rms": , "std": , "unit": }``
     ``k_b`` and other derived constants
@@ -77,7 +79,7 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
         "method": statistic.method,
         "compiled": statistic.compiled,
         "rtol": _value(statistic.rtol, "1", "rtol"),
-        # compiled integrators do not tell their steps: null
+        # null where the integrator does not tell: erk and rosenbrock in compiled code
         "steps": {"value": statistic.steps, "unit": "1"},
         "wall_time": _value(statistic.wall_time, "s", "wall_time"),
         "transient_cycles_dropped": _value(sol.transient_cycles, "1", "transient cycles"),
@@ -126,11 +128,18 @@ def _extreme(model: Model, sol: Solution, name: str, kind: Literal["min", "max"]
 
 def _balls(model: Model, sol: Solution) -> dict[str, Any]:
     peaks = {
-        key: _extreme(model, sol, name, "max")
+        key: model.refine_peak(sol, name)
         for key, name in (("elastic", "ball.elastic_force"), ("total", "ball.force"))
         if name in sol.outputs
     }
-    return {"peak_ball_force": {**peaks, "unit": "N"}} if peaks else {}
+    if not peaks:
+        return {}
+    found: dict[str, Any] = {key: _finite(peak.value, "ball.force") for key, peak in peaks.items()}
+    found["unit"] = "N"
+    found["time"] = {**{key: peak.time for key, peak in peaks.items()}, "unit": "s"}
+    found["ball"] = {**{key: peak.ball for key, peak in peaks.items()}, "unit": "1"}
+    found["sampled"] = {**{key: peak.sampled for key, peak in peaks.items()}, "unit": "N"}
+    return {"peak_ball_force": found}
 
 
 def _motions(sol: Solution) -> dict[str, Any]:
@@ -243,8 +252,8 @@ def render_summary(summary: Mapping[str, Any]) -> Table:
         if any(cells):
             table.add_row(name, *cells, unit)
         for key, value in item.items():
-            if key not in _COLUMNS and key != "unit":
-                # a named part of a quantity, as the peak's elastic one
+            if key not in _COLUMNS and key != "unit" and not isinstance(value, Mapping):
+                # a named part of a quantity, as the peak's elastic one; what is said of it is in the file
                 table.add_row(f"{name}.{key}", f"{factor * value:.4g}", "", "", "", unit)
     return table
 

@@ -35,21 +35,15 @@ static inline __attribute__((always_inline)) double rw_explicit_step(const rw_ex
                                                                       const double *restrict x, double h,
                                                                       const double *restrict weight, double *restrict next)
 {
-    double end_w[RW_NW];
-    int have_end = 0;
+    /* all times of the step at once; the last stage and the end slope are both at its end */
+    double w[RW_METHOD_STAGES][RW_NW];
+    rw_stages(n, t, h, method->nodes + 1, stages - 1, w);
     for (int i = 1; i < stages; i++) {
         rw_combine(method->a[i], i, (const double(*)[RW_NX])work->k, h, x, work->y);
-        if (method->nodes[i] == 1.0) {
-            if (!have_end) rw_stage(t + h, n->u, n->p, n->c, end_w);
-            have_end = 1;
-            rw_rate(n, end_w, work->y, work->k[i]);
-        } else {
-            rw_explicit_rate(n, t + method->nodes[i] * h, work->y, work->k[i]);
-        }
+        rw_rate(n, w[i - 1], work->y, work->k[i]);
     }
     rw_combine(method->weights, stages, (const double(*)[RW_NX])work->k, h, x, next);
-    if (!have_end) rw_stage(t + h, n->u, n->p, n->c, end_w);
-    rw_rate(n, end_w, next, work->k[stages]);
+    rw_rate(n, w[stages - 2], next, work->k[stages]);
     double first = 0.0, below = 0.0;
     for (int m = 0; m < method->estimates; m++) {
         double error[RW_NX];

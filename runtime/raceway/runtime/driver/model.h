@@ -16,6 +16,20 @@ typedef struct {
     const double *c;
 } rw_numbers;
 
+/* Stage variables at the times t + nodes[i] h, i = 0 ... count - 1, into the rows of w. */
+static inline __attribute__((always_inline)) void rw_stages(const rw_numbers *n, double t, double h, const double *restrict nodes,
+                                                             const int count, double w[][RW_NW])
+{
+    for (int first = 0; first < count; first += RW_LANES) {
+        double time[RW_LANES], lanes[RW_NW * RW_LANES];
+        const int filled = count - first < RW_LANES ? count - first : RW_LANES;
+        for (int i = 0; i < RW_LANES; i++) time[i] = t + nodes[first + (i < filled ? i : filled - 1)] * h;
+        rw_stage_lanes(time, n->u, n->p, n->c, lanes);
+        for (int i = 0; i < filled; i++)
+            for (int k = 0; k < RW_NW; k++) w[first + i][k] = lanes[k * RW_LANES + i];
+    }
+}
+
 /* Sums over the balls of F cos, F sin.  One ball a lane. */
 static inline void rw_sums(const rw_numbers *n, const double *restrict w, const double *restrict r, double *restrict S)
 {

@@ -9,71 +9,53 @@
 #include "model.h"
 
 typedef struct {
-    double lu[RW_NQ * RW_NQ];
-    int row[RW_NQ]; /* order of the rows; used where pivoted */
+    double solve[RW_NX][RW_NQ]; /* column j: what R[j] adds to kv, [W^-1 A/s | W^-1] */
     int pivoted;
 } rw_matrix;
 
-/* LU of W.  Without pivoting where every row is dominated by its diagonal: elimination then cannot lose digits
-   (Golub & Van Loan, Matrix Computations, theorem 3.4.3 for the transpose); with partial pivoting otherwise.  Returns 0 where W is singular. */
+/* Gauss-Jordan elimination on the rows of [W | A/s | I]: with eight right-hand sides a step, products with the inverse cost less than
+   substitutions, and its rows fill SIMD lanes.  Without pivoting where every row of W is dominated by its diagonal, as it is for steps
+   that resolve the motion; with partial pivoting otherwise.  Returns 0 where W is singular. */
 static inline int rw_factorize(rw_matrix *restrict m, const double *restrict A, const double *restrict B, double s)
 {
-    double *restrict lu = m->lu;
+    double rows[RW_NQ][3 * RW_NQ];
     const double inverse = 1.0 / s;
     int dominant = 1;
     for (int i = 0; i < RW_NQ; i++) {
         double rest = 0.0;
         for (int j = 0; j < RW_NQ; j++) {
-            const double entry = (i == j ? s : 0.0) - B[i * RW_NQ + j] - A[i * RW_NQ + j] * inverse;
-            lu[i * RW_NQ + j] = entry;
-            if (i != j) rest += fabs(entry);
+            const double scaled = A[i * RW_NQ + j] * inverse;
+            const double entry = (i == j ? s : 0.0) - B[i * RW_NQ + j] - scaled;
+            rows[i][j] = entry;
+            rows[i][RW_NQ + j] = scaled;
+            rows[i][2 * RW_NQ + j] = i == j ? 1.0 : 0.0;
+            rest += i != j ? fabs(entry) : 0.0;
         }
-        if (!(fabs(lu[i * RW_NQ + i]) >= rest)) dominant = 0;
-        m->row[i] = i;
+        if (!(fabs(rows[i][i]) >= rest)) dominant = 0;
     }
     m->pivoted = !dominant;
     for (int k = 0; k < RW_NQ; k++) {
         if (!dominant) {
             int best = k;
             for (int i = k + 1; i < RW_NQ; i++)
-                if (fabs(lu[i * RW_NQ + k]) > fabs(lu[best * RW_NQ + k])) best = i;
-            if (best != k) {
-                for (int j = 0; j < RW_NQ; j++) {
-                    const double swap = lu[k * RW_NQ + j];
-                    lu[k * RW_NQ + j] = lu[best * RW_NQ + j];
-                    lu[best * RW_NQ + j] = swap;
-                }
-                const int swap = m->row[k];
-                m->row[k] = m->row[best];
-                m->row[best] = swap;
+                if (fabs(rows[i][k]) > fabs(rows[best][k])) best = i;
+            for (int j = 0; j < 3 * RW_NQ; j++) {
+                const double swap = rows[k][j];
+                rows[k][j] = rows[best][j];
+                rows[best][j] = swap;
             }
         }
-        if (lu[k * RW_NQ + k] == 0.0) return 0;
-        const double pivot = 1.0 / lu[k * RW_NQ + k];
-        lu[k * RW_NQ + k] = pivot;
-        for (int i = k + 1; i < RW_NQ; i++) {
-            const double factor = lu[i * RW_NQ + k] * pivot;
-            lu[i * RW_NQ + k] = factor;
-            for (int j = k + 1; j < RW_NQ; j++) lu[i * RW_NQ + j] -= factor * lu[k * RW_NQ + j];
+        if (rows[k][k] == 0.0) return 0;
+        const double pivot = 1.0 / rows[k][k];
+        for (int j = 0; j < 3 * RW_NQ; j++) rows[k][j] *= pivot;
+        for (int i = 0; i < RW_NQ; i++) {
+            const double factor = i == k ? 0.0 : rows[i][k];
+            for (int j = 0; j < 3 * RW_NQ; j++) rows[i][j] -= factor * rows[k][j];
         }
     }
+    for (int j = 0; j < RW_NX; j++)
+        for (int i = 0; i < RW_NQ; i++) m->solve[j][i] = rows[i][RW_NQ + j];
     return 1;
-}
-
-static inline void rw_solve(const rw_matrix *restrict m, double *restrict b)
-{
-    const double *restrict lu = m->lu;
-    if (m->pivoted) {
-        double moved[RW_NQ];
-        for (int i = 0; i < RW_NQ; i++) moved[i] = b[m->row[i]];
-        for (int i = 0; i < RW_NQ; i++) b[i] = moved[i];
-    }
-    for (int i = 1; i < RW_NQ; i++)
-        for (int j = 0; j < i; j++) b[i] -= lu[i * RW_NQ + j] * b[j];
-    for (int i = RW_NQ - 1; i >= 0; i--) {
-        for (int j = i + 1; j < RW_NQ; j++) b[i] -= lu[i * RW_NQ + j] * b[j];
-        b[i] *= lu[i * RW_NQ + i];
-    }
 }
 
 /* What a step starts from and keeps when it is rejected. */
@@ -105,7 +87,10 @@ static inline __attribute__((always_inline)) double rw_rosenbrock_step(const rw_
 {
     const double s = 1.0 / (h * method->gamma), inverse_s = h * method->gamma, inverse_h = 1.0 / h;
     if (!rw_factorize(matrix, work->A, work->B, s)) return -1.0;
-    int have_end = 0;
+    /* the times inside the step at once; its end, which serves several stages and the next step, with the time derivative */
+    double w[RW_METHOD_STAGES][RW_NW];
+    rw_stages(n, t, h, method->nodes + 1, method->inner, w);
+    rw_stage_rate(t + h, n->u, n->p, n->c, work->end_w, work->end_wt);
     for (int i = 0; i < stages; i++) {
         double y[RW_NX], dx[RW_NX], R[RW_NX], *restrict u = work->u[i];
         for (int k = 0; k < RW_NX; k++) y[k] = x[k];
@@ -119,25 +104,16 @@ static inline __attribute__((always_inline)) double rw_rosenbrock_step(const rw_
         }
         if (i == 0) {
             for (int k = 0; k < RW_NX; k++) dx[k] = work->dx[k];
-        } else if (method->nodes[i] == 1.0) {
-            /* the end of the step serves several stages, and the start of the next step */
-            if (!have_end) rw_stage_rate(t + h, n->u, n->p, n->c, work->end_w, work->end_wt);
-            have_end = 1;
-            rw_rate(n, work->end_w, y, dx);
         } else {
-            double w[RW_NW];
-            rw_stage(t + method->nodes[i] * h, n->u, n->p, n->c, w);
-            rw_rate(n, w, y, dx);
+            rw_rate(n, i <= method->inner ? w[i - 1] : work->end_w, y, dx);
         }
         for (int k = 0; k < RW_NX; k++) R[k] = R[k] * inverse_h + dx[k];
         const double d = h * method->time_weights[i];
+        for (int k = 0; k < RW_NQ; k++) R[RW_NQ + k] += d * work->at[k];
         double kv[RW_NQ];
-        for (int k = 0; k < RW_NQ; k++) {
-            double rest = R[RW_NQ + k] + d * work->at[k];
-            for (int j = 0; j < RW_NQ; j++) rest += work->A[k * RW_NQ + j] * (R[j] * inverse_s);
-            kv[k] = rest;
-        }
-        rw_solve(matrix, kv);
+        for (int k = 0; k < RW_NQ; k++) kv[k] = 0.0;
+        for (int j = 0; j < RW_NX; j++)
+            for (int k = 0; k < RW_NQ; k++) kv[k] += matrix->solve[j][k] * R[j];
         for (int k = 0; k < RW_NQ; k++) {
             u[RW_NQ + k] = kv[k];
             u[k] = (R[k] + kv[k]) * inverse_s;

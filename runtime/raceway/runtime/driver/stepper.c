@@ -15,7 +15,7 @@ typedef struct {
     double *x;
     double next[RW_NX];
     double step;           /* proposal for the next step; 0 where it has to be estimated */
-    double last_error;     /* of the last accepted step, for the PI controller */
+    double last_error;     /* logarithm of that of the last accepted step, for the PI controller */
     int method;
     long outputs;
     const double *output_times;
@@ -26,6 +26,9 @@ typedef struct {
     rw_explicit plain;
     double dense[RW_DENSE_ROWS][RW_NX];
 } rw_run;
+
+/* Logarithm of 1e-4: smaller errors of the step before do not tell the controller more. */
+static const double LOG_SMALL_ERROR = -9.210340371976182;
 
 enum { STIFF_STEPS = 12 }; /* steps at the stability limit before an explicit method gives up */
 
@@ -88,12 +91,12 @@ static int choose_method(rw_run *run, double t)
     return decay * decay > 2.0 * squared ? RACEWAY_RODAS5P : RACEWAY_DP54;
 }
 
-/* Outputs up to the end of the accepted step from (t, x) to (t + h, next); t counts from the segment's start. */
-static void write_outputs(rw_run *run, double start, double t, double h)
+/* Outputs up to `end`, that of the accepted step from (t, x) to (t + h, next); t counts from the segment's start.  The caller gives the
+   end, for start + (t + h) may fall short of the segment's by rounding, and its output would then be lost. */
+static void write_outputs(rw_run *run, double start, double t, double h, double end)
 {
     raceway_result *result = run->result;
     if (result->written >= run->outputs) return;
-    const double end = start + (t + h);
     if (run->output_times[result->written] > end) return;
     int prepared = 0;
     while (result->written < run->outputs && run->output_times[result->written] <= end) {
@@ -194,7 +197,7 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
         }
         const double estimate = options->first_step > 0.0 && run->step == 0.0 ? options->first_step : estimate_step(run, t, length);
         run->step = estimate;
-        run->last_error = 1e-4;
+        run->last_error = LOG_SMALL_ERROR;
     }
     int stiff = 0, rejected_last = 0;
     if (is_explicit(run->method)) first_slope(run, t);
@@ -217,13 +220,13 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
         const double q = error_exponent(run->method);
         if (error >= 0.0 && error <= 1.0 && is_finite(run->next)) {
             /* PI controller (Hairer & Wanner II, section IV.2) */
-            const double floor_error = error > 1e-10 ? error : 1e-10;
-            double factor = 0.9 * pow(floor_error, -0.7 / q) * pow(run->last_error, 0.4 / q);
+            const double log_error = log(error > 1e-10 ? error : 1e-10);
+            double factor = 0.9 * exp((0.4 * run->last_error - 0.7 * log_error) / q);
             factor = factor > 6.0 ? 6.0 : factor < 0.2 ? 0.2 : factor;
             if (rejected_last && factor > 1.0) factor = 1.0;
-            run->last_error = floor_error > 1e-4 ? floor_error : 1e-4;
+            run->last_error = log_error > LOG_SMALL_ERROR ? log_error : LOG_SMALL_ERROR;
             result->steps++;
-            write_outputs(run, start, t, h);
+            write_outputs(run, start, t, h, last ? end : start + (t + h));
             if (changeable && is_explicit(run->method)) {
                 const double limit = run->method == RACEWAY_DP54 ? 3.25 : 6.1;
                 const double reach = rw_explicit_stiffness(&run->plain, run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES, h,
@@ -278,7 +281,7 @@ int raceway_run(const raceway_options *options, const double *p, const double *c
     run.result = result;
     run.x = x;
     run.step = 0.0;
-    run.last_error = 1e-4;
+    run.last_error = LOG_SMALL_ERROR;
     run.method = options->method;
     run.outputs = outputs;
     run.output_times = output_times;

@@ -1,0 +1,43 @@
+/* Sine and cosine without branches and tables, so that the compiler can put several arguments into SIMD lanes.
+
+   Reduction by multiples of pi/2 in three parts of 33 bits (Cody & Waite, Software Manual for the Elementary Functions, 1980): exact
+   products for |x| < 1e6, which the driver guarantees by taking phases anew in every segment.  Then the minimax polynomials of
+   fdlibm on [-pi/4, pi/4].  Error below 1 ulp of the larger of sine and cosine. */
+#ifndef RACEWAY_TRIG_H
+#define RACEWAY_TRIG_H
+
+#include <math.h>
+
+static inline void rw_sincos(double x, double *restrict sine, double *restrict cosine)
+{
+    const double n = rint(x * 6.36619772367581382433e-01);
+    const double r = ((x - n * 1.57079632673412561417e+00) - n * 6.07710050630396597660e-11) - n * 2.02226624879595063154e-21;
+    const double z = r * r;
+    const double s = r + r * z * (-1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 + z * (-1.98412698298579493134e-04
+                     + z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
+    const double half = 0.5 * z, rest = 1.0 - half;
+    const double c = rest + (((1.0 - rest) - half) + z * z * (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03
+                     + z * (2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 + z * (2.08757232129817482790e-09
+                     + z * -1.13596475577881948265e-11))))));
+    const double quadrant = n - 4.0 * floor(0.25 * n);
+    const int odd = quadrant == 1.0 || quadrant == 3.0;
+    const double a = odd ? c : s, b = odd ? s : c;
+    *sine = quadrant >= 2.0 ? -a : a;
+    *cosine = quadrant == 1.0 || quadrant == 2.0 ? -b : b;
+}
+
+static inline double rw_sin1(double x)
+{
+    double sine, cosine;
+    rw_sincos(x, &sine, &cosine);
+    return sine;
+}
+
+static inline double rw_cos1(double x)
+{
+    double sine, cosine;
+    rw_sincos(x, &sine, &cosine);
+    return cosine;
+}
+
+#endif
