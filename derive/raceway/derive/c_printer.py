@@ -61,12 +61,13 @@ def print_function(
 ) -> str:
     """C99 text of an SX function.
 
-    Every argument is ``const double *restrict``, every result ``double *restrict``, both dense and column-major; arguments named
-    in `scalars` are passed by value.
+    Every argument is ``const double *restrict``, every result ``double *restrict``, both dense and column-major;
+    arguments named in `scalars` are passed by value.
 
     Parameters
     ----------
-    lanes : C constant; where given, the function is evaluated for so many points in one loop that compilers turn into SIMD
+    lanes : C constant; where given, the function is evaluated for so many points in one loop that compilers turn
+        into SIMD
         lanes.  Results, and arguments named in `varying`, then hold that many values for each entry, next to each other
     varying : arguments that differ from lane to lane
 

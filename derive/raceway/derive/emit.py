@@ -4,6 +4,8 @@ In: a scene file.  Out: ``generated/<scene>/`` with
 
 model.c, model.h   every function and the integrators as C99
 kernels.h          the model cut into inline functions for the project's own stepper
+tangents.h         derivatives of these along several directions at once, for sensitivities
+ensemble_kernels.h the kernels for several members of an ensemble at once, and what reductions need
 methods.h          the stepper's methods
 model.casadi       the same functions serialised, for machines without a compiler
 EQUATIONS.md       the derivation for people
@@ -28,7 +30,8 @@ from pathlib import Path
 
 import casadi as ca
 
-from raceway.derive.emit_stepper import kernels_header, methods_header
+from raceway.derive.emit_ensemble import ensemble_header
+from raceway.derive.emit_stepper import kernels_header, methods_header, tangents_header
 from raceway.derive.equations import equations
 from raceway.derive.linkage import check_assembly
 from raceway.derive.lower import Functions, lower, operations
@@ -169,6 +172,10 @@ def _write(folder: Path, system: System, functions: Functions) -> None:
         header = kernels_header(system, functions, functions.kernels)
         (folder / "kernels.h").write_text(header, encoding="utf-8", newline="\n")
         (folder / "methods.h").write_text(methods_header(), encoding="utf-8", newline="\n")
+        lanes = ensemble_header(functions, functions.kernels)
+        (folder / "ensemble_kernels.h").write_text(lanes, encoding="utf-8", newline="\n")
+        tangents = tangents_header(functions.kernels)
+        (folder / "tangents.h").write_text(tangents, encoding="utf-8", newline="\n")
     pack = ca.FileSerializer(str(folder / "model.casadi"))
     pack.pack(len(functions.functions))
     for function, _ in functions.functions:

@@ -74,6 +74,25 @@ def kernels_header(system: System, functions: Functions, kernels: Kernels) -> st
     return "\n\n".join(parts) + "\n"
 
 
+def tangents_header(kernels: Kernels) -> str:
+    """Text of tangents.h: the kernels' derivatives along RW_LANES directions at once."""
+    parts = [_NOTE, "#ifndef RACEWAY_TANGENTS_H\n#define RACEWAY_TANGENTS_H", '#include "kernels.h"']
+    for kernel in kernels.tangents:
+        names = kernel.function.name_in()
+        parts.append(
+            print_function(
+                kernel.function,
+                prefix="rw_",
+                description=f"{kernel.description} along RW_LANES directions.",
+                scalars=frozenset({"t", "delta", "rate"}),
+                lanes="RW_LANES",
+                varying=frozenset(n for n in names if n.endswith("_d")),
+            )
+        )
+    parts.append("#endif")
+    return "\n\n".join(parts) + "\n"
+
+
 def methods_header() -> str:
     """Text of methods.h: the tableaus as constant structures, unused entries zero."""
     stages = max(
@@ -87,8 +106,8 @@ def methods_header() -> str:
         _NOTE,
         "#ifndef RACEWAY_METHODS_H\n#define RACEWAY_METHODS_H",
         f"enum {{ RW_METHOD_STAGES = {stages}, RW_DENSE_ROWS = {rows}, {sizes} }};",
-        "typedef struct {\n    int stages, inner, dense_rows; /* inner: stages between start and end */\n    double error_exponent, gamma;\n"
-        "    double nodes[RW_METHOD_STAGES], time_weights[RW_METHOD_STAGES];\n"
+        "typedef struct {\n    int stages, inner, dense_rows; /* inner: stages between start and end */\n    double
+        error_exponent, gamma;\n" "    double nodes[RW_METHOD_STAGES], time_weights[RW_METHOD_STAGES];\n"
         "    double a[RW_METHOD_STAGES][RW_METHOD_STAGES], coupling[RW_METHOD_STAGES][RW_METHOD_STAGES];\n"
         "    double weights[RW_METHOD_STAGES], error_weights[RW_METHOD_STAGES];\n"
         "    double dense[RW_DENSE_ROWS][RW_METHOD_STAGES];\n} rw_rosenbrock_method;",

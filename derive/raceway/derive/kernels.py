@@ -42,11 +42,15 @@ class Kernel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kernels:
-    """Kernels of a model; `stage_size` entries of w, the first two of which are cosine and sine of the cage's angle."""
+    """Kernels of a model; `stage_size` entries of w, the first two of which are cosine and sine of the cage's angle.
+
+    `tangents` are directional derivatives of the functions, for sensitivities.
+    """
 
     stage_size: int
     balls: int
     functions: tuple[Kernel, ...]
+    tangents: tuple[Kernel, ...]
 
 
 class KernelBuilder:
@@ -201,4 +205,50 @@ class KernelBuilder:
             function = ca.Function(name, [*inputs.values()], ca.cse(results), [*inputs], [*gives])
             functions.append(Kernel(function=function, description=words))
         assert self._system.bearing is not None
-        return Kernels(stage_size=len(self._stage), balls=self._system.bearing.ball.count, functions=tuple(functions))
+        tangents = tuple(
+            _tangent(k, name, along, results)
+            for name, kernel, along, results in _TANGENTS
+            for k in functions
+            if k.function.name() == kernel
+        )
+        return Kernels(
+            stage_size=len(self._stage),
+            balls=self._system.bearing.ball.count,
+            functions=tuple(functions),
+            tangents=tangents,
+        )
+
+
+#: Directional derivatives for sensitivities: name, kernel, the arguments that move, and the results that are wanted.
+_TANGENTS: tuple[tuple[str, str, tuple[str, ...], tuple[str, ...]], ...] = (
+    ("stage_tangent", "stage", ("u", "p", "c"), ("w",)),
+    ("stage_rate_tangent", "stage_rate", ("u", "p", "c"), ("w", "wt")),
+    ("relative_tangent", "relative", ("x", "u", "p", "c", "w"), ("r",)),
+    # the slopes of the law are known where this is called: only its own parameters are left
+    ("law_partial", "law", ("p", "c"), ("F",)),
+    ("law_slopes_tangent", "law_slopes", ("delta", "rate", "p", "c"), ("Fd", "Fv")),
+    ("acceleration_tangent", "acceleration", ("x", "S", "u", "p", "c", "w"), ("a",)),
+    ("acceleration_jacobian_tangent", "acceleration_jacobian", ("x", "S", "G", "u", "p", "c", "w"), ("A", "B")),
+    (
+        "acceleration_rate_tangent",
+        "acceleration_rate",
+        ("x", "S", "G", "r", "u", "p", "c", "w", "wt"),
+        ("at",),
+    ),
+)
+
+
+def _tangent(kernel: Kernel, name: str, along: tuple[str, ...], results: tuple[str, ...]) -> Kernel:
+    """Derivative of a kernel's results along a direction of some of its arguments, named ``x_d`` for ``x``."""
+    function = kernel.function
+    symbols = {
+        function.name_in(k): ca.SX.sym(function.name_in(k), function.size1_in(k)) for k in range(function.n_in())
+    }
+    values = dict(zip(function.name_out(), function.call([*symbols.values()], True, False), strict=True))
+    directions = {f"{k}_d": ca.SX.sym(f"{k}_d", symbols[k].numel()) for k in along}
+    point, direction = ca.vertcat(*(symbols[k] for k in along)), ca.vertcat(*directions.values())
+    moved = {f"{k}_d": ca.densify(ca.jtimes(ca.vec(values[k]), point, direction)) for k in results}
+    made = ca.Function(
+        name, [*symbols.values(), *directions.values()], ca.cse([*moved.values()]), [*symbols, *directions], [*moved]
+    )
+    return Kernel(function=made, description=f"Directional derivative of {function.name()}")

@@ -119,6 +119,39 @@ def input_derivatives(inputs: Sequence[InputInfo], values: Values, t: float) -> 
     return entries
 
 
+def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float) -> list[tuple[str, float]]:
+    """Derivative of the time of the breakpoint at `t`: (name of parameter or constant, derivative [s/unit]).
+
+    Raises
+    ------
+    RequestError
+        Several loads switch at that time, each of which could move on its own.
+    """
+    found: dict[tuple[tuple[str, float], ...], None] = {}
+    for item in inputs:
+        if item.kind == "gate" and values[item.rate] != 0.0:
+            rate = values[item.rate]
+            angle = values[item.offset] + rate * t
+            for names, (start, width) in zip(item.windows, _windows(item, values), strict=True):
+                if not 0.0 < width < TURN:
+                    continue
+                for name, edge in zip(names, (start, start + width), strict=True):
+                    past = (angle - edge + math.pi) % TURN - math.pi
+                    if abs(past) < 1e3 * ANGLE_RESOLUTION * max(1.0, abs(angle)):
+                        found[((name, 1.0 / rate), (item.offset, -1.0 / rate), (item.rate, -t / rate))] = None
+        elif item.kind == "table":
+            times = _knots(item, values)[0]
+            near = np.flatnonzero(np.abs(times - t) <= TIME_RESOLUTION * max(abs(t), float(np.max(np.abs(times)))))
+            for k in near:
+                found[((item.times[int(k)], 1.0),)] = None
+    if len(found) > 1:
+        raise RequestError(
+            f"At t = {t:.9g} s several loads switch at once ({', '.join(entry[0][0] for entry in found)}): the motion has "
+            "no derivative along a parameter that moves only one of them. Move their edges apart."
+        )
+    return [pair for entry in found for pair in entry]
+
+
 def _input(item: InputInfo, values: Values, t: float, inside: float) -> float:
     if item.kind == "phase":
         return (values[item.offset] + values[item.rate] * t) % TURN

@@ -19,6 +19,7 @@ from raceway.runtime.kernel import Kernel, Loop
 from raceway.runtime.manifest import Manifest, check_files, read_manifest
 from raceway.runtime.parameters import Parameters, resolve_parameters, unknown_name
 from raceway.runtime.peaks import Peak, refine_peak
+from raceway.runtime.sensitivity import Sensitivities, sensitivities
 from raceway.runtime.simulate import Numbers, Request, simulate
 from raceway.runtime.stepper import HEADERS, Stepper, compile_stepper
 from raceway.runtime.stepper import METHODS as STEPPERS
@@ -82,6 +83,7 @@ class Model:
         self._symbolic: dict[str, casadi.Function] = {}
         self._compiler = compiler
         self._stepper: Stepper | None = None
+        self._differentiating: Stepper | None = None
 
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "in CasADi's virtual machine"
@@ -132,14 +134,25 @@ class Model:
             The compiler failed.
         """
         if self._stepper is None:
-            compiler = find_compiler(self._compiler) if self.has_stepper else None
-            if compiler is None:
-                raise RequestError(
-                    "method stepper: it needs a C compiler and the kernels in the generated folder. Install gcc or "
-                    "clang, write the folder again, or take another method."
-                )
-            self._stepper = Stepper(compile_stepper(self._folder, self.manifest, compiler), self.manifest)
+            self._stepper = self._make_stepper(sensitivities=False)
         return self._stepper
+
+    @property
+    def differentiating_stepper(self) -> Stepper:
+        """The stepper with the derivatives of its steps, compiled when first asked for; errors as for `stepper`."""
+        if self._differentiating is None:
+            self._differentiating = self._make_stepper(sensitivities=True)
+        return self._differentiating
+
+    def _make_stepper(self, *, sensitivities: bool) -> Stepper:
+        compiler = find_compiler(self._compiler) if self.has_stepper else None
+        if compiler is None:
+            raise RequestError(
+                "method stepper: it needs a C compiler and the kernels in the generated folder. Install gcc or "
+                "clang, write the folder again, or take another method."
+            )
+        library = compile_stepper(self._folder, self.manifest, compiler, sensitivities=sensitivities)
+        return Stepper(library, self.manifest)
 
     def has(self, name: str) -> bool:
         """Whether the model has a function of that name."""
@@ -316,6 +329,44 @@ class Model:
             progress=progress,
         )
         return simulate(self, numbers, request)
+
+    def sensitivities(
+        self,
+        wrt: str | Sequence[str],
+        cycles: float | None = None,
+        *,
+        duration: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        method: str | None = None,
+        rtol: float | None = None,
+        samples_per_cycle: int | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Sensitivities:
+        """Simulate from t = 0 with the derivatives of the states by parameters, exact for the discrete solution.
+
+        Parameters
+        ----------
+        wrt : names of parameters; any number in one pass
+        others : as for `simulate`
+
+        Raises
+        ------
+        RequestError
+            A wrong request, an unknown parameter, or a damping law whose force jumps.
+        IntegrationError
+            The computation failed.
+        """
+        numbers = self.numbers(parameters)
+        check_assembly(self, numbers)
+        request = Request(
+            cycles=cycles,
+            duration=duration,
+            method=method,
+            rtol=rtol,
+            samples_per_cycle=samples_per_cycle,
+            progress=progress,
+        )
+        return sensitivities(self, numbers, request, [wrt] if isinstance(wrt, str) else list(wrt))
 
     def refine_peak(
         self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max", candidates: int = 6

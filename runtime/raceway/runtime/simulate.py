@@ -31,6 +31,7 @@ from raceway.runtime.stepper import End, Family, Segments
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
+    from raceway.runtime.sensitivity import Directions
 
 #: `auto` takes ``rosenbrock`` above this ratio of fastest decay to fastest natural frequency.  Measured on a press with
 #: four degrees of freedom and eight balls at rtol 1e-6: both take equal time at a ratio of 2, ``erk`` twice as long at
@@ -103,8 +104,10 @@ class Interrupted(Exception):
         self.status, self.time, self.detail = status, time, detail
 
 
-def simulate(model: Model, numbers: Numbers, request: Request) -> Solution:
-    """Run a model.
+def simulate(
+    model: Model, numbers: Numbers, request: Request, prepare: Callable[[int], Directions] | None = None
+) -> Solution:
+    """Run a model; with derivatives along the directions that `prepare` makes for a number of samples.
 
     Raises
     ------
@@ -140,7 +143,8 @@ def simulate(model: Model, numbers: Numbers, request: Request) -> Solution:
     failure = None
     cost = Cost()
     try:
-        fill(model, numbers, method, rtol * magnitude, trajectory, turn, cost, request.progress)
+        directions = prepare(len(times)) if prepare is not None else None
+        fill(model, numbers, method, rtol * magnitude, trajectory, turn, cost, request.progress, directions)
     except Interrupted as end:
         failure = end
     if cost.families:
@@ -201,6 +205,7 @@ def fill(
     turn: float,
     cost: Cost,
     progress: Callable[[float], None] | None = None,
+    directions: Directions | None = None,
 ) -> None:
     """Fill the samples of `trajectory` by a method of that name ("none" for a model without states); notes the cost.
 
@@ -210,7 +215,7 @@ def fill(
         The method could not reach the end.
     """
     if method in STEPPERS:
-        step_through(model, numbers, STEPPERS[method], tolerance, trajectory, turn, cost, progress)
+        step_through(model, numbers, STEPPERS[method], tolerance, trajectory, turn, cost, progress, directions)
         return
     integrator = METHODS[method].make(model) if method != "none" else None
     try:
@@ -270,6 +275,7 @@ def step_through(
     turn: float,
     cost: Cost,
     progress: Callable[[float], None] | None = None,
+    directions: Directions | None = None,
 ) -> None:
     """Fill the samples of `trajectory` by the project's own stepper, many segments a call."""
     times = trajectory.t
@@ -278,7 +284,7 @@ def step_through(
     edges = segment_edges(model, numbers, begin, end, turn)
     inputs = model.manifest.inputs
     gates = [k for k, info in enumerate(inputs) if info.kind != "phase"]
-    stepper = model.stepper
+    stepper = model.stepper if directions is None else model.differentiating_stepper
     state = trajectory.x[0].copy()
     before: np.ndarray | None = None
     for first in range(0, len(edges) - 1, SEGMENTS_A_CALL):
@@ -310,6 +316,7 @@ def step_through(
             segments=segments,
             output_times=wanted,
             output_states=states,
+            tangents=directions.tangents(segments, int(stops[0]), len(states)) if directions is not None else None,
         )
         cost.steps = (cost.steps or 0) + outcome.steps
         cost.rejected = (cost.rejected or 0) + outcome.rejected

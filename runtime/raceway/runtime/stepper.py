@@ -8,10 +8,11 @@ of segments; the interpreter is free meanwhile, and calls from several threads d
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from raceway.runtime.manifest import Manifest
 
 #: C sources of the driver, and the generated headers it includes.
 DRIVER = Path(__file__).parent / "driver"
-HEADERS = ("kernels.h", "methods.h")
+HEADERS = ("kernels.h", "methods.h", "tangents.h")
 
 #: IEEE arithmetic throughout; what is given up is errno and traps, and what is gained are vectors of square roots.
 FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd")
@@ -68,6 +69,20 @@ class _Options(ctypes.Structure):
         ("smallest_step", ctypes.c_double),
         ("largest_step", ctypes.c_double),
         ("tolerance", ctypes.POINTER(ctypes.c_double)),
+        ("reduction", ctypes.POINTER(ctypes.c_double)),
+    )
+
+
+class _Tangents(ctypes.Structure):
+    _fields_ = (
+        ("blocks", ctypes.c_long),
+        ("p", ctypes.POINTER(ctypes.c_double)),
+        ("c", ctypes.POINTER(ctypes.c_double)),
+        ("u", ctypes.POINTER(ctypes.c_double)),
+        ("shift", ctypes.POINTER(ctypes.c_double)),
+        ("x", ctypes.POINTER(ctypes.c_double)),
+        ("outputs", ctypes.POINTER(ctypes.c_double)),
+        ("work", ctypes.c_void_p),
     )
 
 
@@ -134,15 +149,39 @@ class Outcome:
     step: float
 
 
-def compile_stepper(folder: Path, manifest: Manifest, compiler: Compiler) -> CompiledLibrary:
-    """Library of driver and kernels of a generated folder.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tangents:
+    """Directions along which a run is differentiated, in blocks of `Stepper.lanes`.
+
+    Attributes
+    ----------
+    p, c : derivatives of parameters and constants along the directions, shapes (blocks, parameters, lanes),
+        (blocks, constants, lanes)
+    u : of the inputs at each segment's start, shape (segments, blocks, inputs, lanes)
+    shift : of the time at which each segment starts, shape (segments, blocks, lanes) [s]
+    x : of the states at the start, on return at the end, shape (blocks, states, lanes)
+    outputs : filled with those at the output times, shape (outputs, blocks, states, lanes)
+    """
+
+    p: np.ndarray
+    c: np.ndarray
+    u: np.ndarray
+    shift: np.ndarray
+    x: np.ndarray
+    outputs: np.ndarray
+
+
+def compile_stepper(
+    folder: Path, manifest: Manifest, compiler: Compiler, *, sensitivities: bool = False
+) -> CompiledLibrary:
+    """Library of driver and kernels of a generated folder; with the derivatives of its steps where asked for.
 
     Raises
     ------
     CompileError
         The compiler failed.
     """
-    sources = sorted(DRIVER.glob("*.c"))
+    sources = (DRIVER / "stepper.c",)
     headers = [*sorted(DRIVER.glob("*.h")), *(folder.absolute() / name for name in HEADERS)]
     return compile_sources(
         sources,
@@ -150,7 +189,7 @@ def compile_stepper(folder: Path, manifest: Manifest, compiler: Compiler) -> Com
         label=f"{manifest.scene}-stepper",
         headers=headers,
         include=(folder.absolute(), DRIVER),
-        flags=FLAGS,
+        flags=(*FLAGS, "-DRACEWAY_SENSITIVITIES") if sensitivities else FLAGS,
     )
 
 
@@ -166,7 +205,7 @@ class Stepper:
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
         self.library = library
         code = ctypes.CDLL(str(library.path))
-        sizes = (ctypes.c_int * 5)()
+        sizes = (ctypes.c_int * 6)()
         code.raceway_sizes(sizes)
         inputs = max(len(manifest.inputs), 1)
         expected = [len(manifest.states), inputs, len(manifest.parameters), len(manifest.constants)]
@@ -176,6 +215,9 @@ class Stepper:
                 f"manifest has {expected}. Write the folder again."
             )
         self._inputs = inputs
+        #: directions that the driver differentiates along at once
+        self.lanes = int(sizes[5])
+        self._code = code
         self._run = code.raceway_run
         self._run.restype = ctypes.c_int
         real, long = ctypes.POINTER(ctypes.c_double), ctypes.c_long
@@ -195,6 +237,7 @@ class Stepper:
         segments: Segments,
         output_times: np.ndarray,
         output_states: np.ndarray | None,
+        tangents: Tangents | None = None,
         max_steps: int = MAX_STEPS,
         first_step: float = 0.0,
         smallest_step: float = 0.0,
@@ -209,6 +252,7 @@ class Stepper:
         x : state at the start, shape (states,); on return that at the end
         output_times : increasing, shape (n,) [s]
         output_states : C-contiguous, shape (n, states), or None
+        tangents : directions to differentiate along; the library must have been compiled with sensitivities
         """
         inputs = segments.inputs if segments.inputs.shape[1] else np.zeros((len(segments.inputs), self._inputs))
         arrays = {
@@ -224,7 +268,8 @@ class Stepper:
         restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
         options = _Options(family, max_steps, first_step, smallest_step, largest_step, pointers["tolerance"])
         result = _Result()
-        self._run(
+        call = self._run if tangents is None else self._differentiated(tangents)
+        call(
             ctypes.byref(options),
             pointers["p"],
             pointers["c"],
@@ -252,6 +297,29 @@ class Stepper:
             time=result.time,
             step=result.step,
         )
+
+    def _differentiated(self, tangents: Tangents) -> Callable[..., int]:
+        """The driver's call with derivatives, the directions bound."""
+        fields = ("p", "c", "u", "shift", "x", "outputs")
+        pointers = {name: _pointer(name, getattr(tangents, name)) for name in fields}
+        blocks = len(tangents.x)
+        self._code.raceway_tangent_work.restype = ctypes.c_long
+        work = np.empty(self._code.raceway_tangent_work(ctypes.c_long(blocks)) // 8 + 8)
+        bound = _Tangents(blocks=blocks, work=work.ctypes.data, **pointers)
+        run = self._code.raceway_run_tangents
+        run.restype = ctypes.c_int
+
+        def call(*arguments: object) -> int:
+            *given, result = arguments
+            options, p, c, x, segments, times, inputs, restarts, outputs, output_times, output_states = given
+            done: int = run(
+                *(options, p, c, x, ctypes.c_long(cast("int", segments)), times, inputs, restarts),
+                *(ctypes.c_long(cast("int", outputs)), output_times, output_states, ctypes.byref(bound), result),
+            )
+            assert work.size  # the driver's memory lives until here
+            return done
+
+        return call
 
 
 def _pointer(name: str, array: np.ndarray) -> ctypes._Pointer[ctypes.c_double]:

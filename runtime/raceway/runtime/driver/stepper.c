@@ -4,8 +4,15 @@
 #include <float.h>
 #include <string.h>
 
+#include "control.h"
 #include "explicit.h"
 #include "rosenbrock.h"
+#ifdef RACEWAY_SENSITIVITIES
+#include "sensitivity.h"
+#endif
+#ifdef RACEWAY_REDUCTIONS
+#include "reductions.h"
+#endif
 
 typedef struct {
     const raceway_options *options;
@@ -25,12 +32,16 @@ typedef struct {
     rw_matrix matrix;
     rw_explicit plain;
     double dense[RW_DENSE_ROWS][RW_NX];
+#ifdef RACEWAY_SENSITIVITIES
+    const raceway_tangents *tangents; /* or NULL */
+    rw_tangent_block *blocks;
+    double rate_before[RW_NX]; /* at the end of the segment before */
+#endif
+#ifdef RACEWAY_REDUCTIONS
+    double *reduction; /* or NULL where nothing is reduced in the present segment */
+    double sampled[RW_POINTS][RW_CHANNELS];
+#endif
 } rw_run;
-
-/* Logarithm of 1e-4: smaller errors of the step before do not tell the controller more. */
-static const double LOG_SMALL_ERROR = -9.210340371976182;
-
-enum { STIFF_STEPS = 12 }; /* steps at the stability limit before an explicit method gives up */
 
 static int is_explicit(int method) { return method == RACEWAY_DP54 || method == RACEWAY_DOP853; }
 
@@ -51,45 +62,104 @@ static double error_exponent(int method)
     }
 }
 
-/* Initial step (Hairer, Norsett & Wanner I, section II.4): from the size of the first and a guess of the second derivative. */
 static double estimate_step(rw_run *run, double t, double longest)
 {
-    double dx[RW_NX], moved[RW_NX], change[RW_NX];
-    rw_explicit_rate(&run->numbers, t, run->x, dx);
-    const double slope = rw_norm(dx, run->weight), size = rw_norm(run->x, run->weight);
-    double h = size > 1e-5 && slope > 1e-5 ? 0.01 * size / slope : 1e-6 * longest;
-    /* from rest the size says nothing: the step of a tolerance's motion does */
-    if (slope > 0.0 && h < 1.0 / slope) h = 1.0 / slope;
-    if (h > longest) h = longest;
-    for (int k = 0; k < RW_NX; k++) moved[k] = run->x[k] + h * dx[k];
-    rw_explicit_rate(&run->numbers, t + h, moved, change);
-    for (int k = 0; k < RW_NX; k++) change[k] = (change[k] - dx[k]) / h;
-    const double curvature = rw_norm(change, run->weight), larger = curvature > slope ? curvature : slope;
-    const double second = larger > 1e-15 ? pow(0.01 / larger, 1.0 / error_exponent(run->method)) : h * 1e-3;
     run->result->evaluations += 2;
-    h = 100.0 * h < second ? 100.0 * h : second;
-    return h < longest ? h : longest;
+    return rw_first_step(&run->numbers, t, run->x, longest, run->weight, error_exponent(run->method));
 }
 
-/* The family for the coming segment: linearly implicit where damping is faster than the oscillation it damps, for then an explicit
-   method's step is held down by stability and not by accuracy. */
+/* The family for the coming segment. */
 static int choose_method(rw_run *run, double t)
 {
-    rw_rosenbrock *work = &run->linear;
-    rw_rosenbrock_start(work, &run->numbers, t, run->x, 1);
+    rw_rosenbrock_start(&run->linear, &run->numbers, t, run->x, 1);
     run->result->evaluations++;
-    double decay = 0.0, squared = 0.0;
-    for (int i = 0; i < RW_NQ; i++) {
-        double a = 0.0, b = 0.0;
-        for (int j = 0; j < RW_NQ; j++) {
-            a += fabs(work->A[i * RW_NQ + j]);
-            b += fabs(work->B[i * RW_NQ + j]);
-        }
-        decay = b > decay ? b : decay;
-        squared = a > squared ? a : squared;
-    }
-    return decay * decay > 2.0 * squared ? RACEWAY_RODAS5P : RACEWAY_DP54;
+    return rw_is_stiff(run->linear.A, run->linear.B) ? RACEWAY_RODAS5P : RACEWAY_DP54;
 }
+
+#ifdef RACEWAY_SENSITIVITIES
+static void tangent_start(rw_run *run, double t)
+{
+    if (run->tangents && is_explicit(run->method))
+        rw_explicit_tangent_start(run->tangents, run->blocks, &run->numbers, run->result->segment, t, run->x);
+}
+
+static void tangent_step(rw_run *run, double t, double h)
+{
+    const raceway_tangents *tangents = run->tangents;
+    const long segment = run->result->segment;
+    if (!tangents) return;
+    switch (run->method) {
+    case RACEWAY_DP54:
+        rw_explicit_tangent_step(&rw_dp54, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h, run->next);
+        break;
+    case RACEWAY_DOP853:
+        rw_explicit_tangent_step(&rw_dop853, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h, run->next);
+        break;
+    case RACEWAY_RODAS4:
+        rw_rosenbrock_tangent_step(&rw_rodas4, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers, segment, t, run->x, h);
+        break;
+    default:
+        rw_rosenbrock_tangent_step(&rw_rodas5p, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers, segment, t, run->x, h);
+    }
+}
+
+/* Take over the derivatives of an accepted step. */
+static void tangent_accept(rw_run *run)
+{
+    if (!run->tangents) return;
+    const int end = run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES;
+    for (long b = 0; b < run->tangents->blocks; b++) {
+        memcpy(rw_tangent_state(run->tangents, b), run->blocks[b].next, sizeof run->blocks[b].next);
+        if (is_explicit(run->method)) memcpy(run->blocks[b].k[0], run->blocks[b].k[end], sizeof run->blocks[b].k[0]);
+    }
+}
+
+static void tangent_output(rw_run *run, double t, double h, double theta, int prepared)
+{
+    const raceway_tangents *tangents = run->tangents;
+    if (!tangents || !tangents->outputs) return;
+    double *out = tangents->outputs + run->result->written * tangents->blocks * (RW_NX * RW_LANES);
+    if (theta >= 1.0) {
+        for (long b = 0; b < tangents->blocks; b++)
+            memcpy(out + b * (RW_NX * RW_LANES), run->blocks[b].next, sizeof run->blocks[b].next);
+        return;
+    }
+    const long segment = run->result->segment;
+    if (!prepared) {
+        if (run->method == RACEWAY_DP54)
+            rw_explicit_tangent_dense(&rw_dp54, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h);
+        else if (run->method == RACEWAY_DOP853)
+            rw_explicit_tangent_dense(&rw_dop853, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h);
+        else
+            rw_rosenbrock_tangent_dense(run->method == RACEWAY_RODAS4 ? &rw_rodas4 : &rw_rodas5p, tangents, run->blocks);
+    }
+    if (run->method == RACEWAY_DP54) rw_explicit_tangent_at(&rw_dp54, tangents, run->blocks, theta, out);
+    else if (run->method == RACEWAY_DOP853) rw_explicit_tangent_at(&rw_dop853, tangents, run->blocks, theta, out);
+    else rw_rosenbrock_tangent_at(run->method == RACEWAY_RODAS4 ? &rw_rodas4 : &rw_rodas5p, tangents, run->blocks, theta, out);
+}
+
+/* Where a load switches at a time that moves with a parameter, the derivative at fixed time jumps. */
+static void tangent_jump(rw_run *run)
+{
+    const raceway_tangents *tangents = run->tangents;
+    const long segment = run->result->segment;
+    if (!tangents || segment == 0) return;
+    double behind[RW_NX];
+    rw_explicit_rate(&run->numbers, 0.0, run->x, behind);
+    for (long b = 0; b < tangents->blocks; b++) {
+        const double *shift = tangents->shift + (segment * tangents->blocks + b) * RW_LANES;
+        double *xd = rw_tangent_state(tangents, b);
+        for (int k = 0; k < RW_NX; k++)
+            for (int l = 0; l < RW_LANES; l++) xd[k * RW_LANES + l] += (run->rate_before[k] - behind[k]) * shift[l];
+    }
+}
+#else
+#define tangent_start(run, t) ((void)0)
+#define tangent_step(run, t, h) ((void)0)
+#define tangent_accept(run) ((void)0)
+#define tangent_output(run, t, h, theta, prepared) ((void)(prepared))
+#define tangent_jump(run) ((void)0)
+#endif
 
 /* Outputs up to `end`, that of the accepted step from (t, x) to (t + h, next); t counts from the segment's start.  The caller gives the
    end, for start + (t + h) may fall short of the segment's by rounding, and its output would then be lost. */
@@ -98,7 +168,7 @@ static void write_outputs(rw_run *run, double start, double t, double h, double 
     raceway_result *result = run->result;
     if (result->written >= run->outputs) return;
     if (run->output_times[result->written] > end) return;
-    int prepared = 0;
+    int prepared = 0, tangents_prepared = 0;
     while (result->written < run->outputs && run->output_times[result->written] <= end) {
         const double theta = ((run->output_times[result->written] - start) - t) / h;
         double at[RW_NX], *y = run->output_states ? run->output_states + result->written * RW_NX : at;
@@ -119,9 +189,66 @@ static void write_outputs(rw_run *run, double start, double t, double h, double 
             else if (run->method == RACEWAY_RODAS4) rw_rosenbrock_at(&rw_rodas4, dense, run->x, run->next, place, y);
             else rw_rosenbrock_at(&rw_rodas5p, dense, run->x, run->next, place, y);
         }
+        /* behind the state: the derivatives use its slopes */
+        tangent_output(run, t, h, theta > 0.0 ? theta : 0.0, tangents_prepared);
+        tangents_prepared = tangents_prepared || theta < 1.0;
         result->written++;
     }
 }
+
+#ifdef RACEWAY_REDUCTIONS
+/* An accepted step, for the reductions: its dense output is ready. */
+typedef struct {
+    const rw_run *run;
+    double t, h;
+} rw_step_taken;
+
+static void state_at(const rw_run *run, double theta, double *y)
+{
+    const double(*dense)[RW_NX] = (const double(*)[RW_NX])run->dense;
+    if (run->method == RACEWAY_DP54) rw_explicit_at(&rw_dp54, dense, run->x, run->next, theta, y);
+    else if (run->method == RACEWAY_DOP853) rw_explicit_at(&rw_dop853, dense, run->x, run->next, theta, y);
+    else if (run->method == RACEWAY_RODAS4) rw_rosenbrock_at(&rw_rodas4, dense, run->x, run->next, theta, y);
+    else rw_rosenbrock_at(&rw_rodas5p, dense, run->x, run->next, theta, y);
+}
+
+static double channel_at(const void *source, int channel, double theta, int *ball)
+{
+    const rw_step_taken *step = source;
+    double y[RW_NX];
+    state_at(step->run, theta, y);
+    return rw_channel(&step->run->numbers, step->t + theta * step->h, y, channel, ball);
+}
+
+static void reduce_start(rw_run *run, double start)
+{
+    run->reduction = run->options->reduction;
+    if (run->reduction == NULL || start < run->reduction[RW_FROM]) run->reduction = NULL;
+    else rw_channels(&run->numbers, 0.0, run->x, run->reduction[RW_BALLS] != 0.0, run->sampled[0]);
+}
+
+static void reduce_step(rw_run *run, double start, double t, double h)
+{
+    if (run->reduction == NULL) return;
+    if (run->method == RACEWAY_DP54) rw_explicit_dense(&rw_dp54, &run->plain, &run->numbers, t, run->x, h, run->next, run->dense);
+    else if (run->method == RACEWAY_DOP853) rw_explicit_dense(&rw_dop853, &run->plain, &run->numbers, t, run->x, h, run->next, run->dense);
+    else if (run->method == RACEWAY_RODAS4) rw_rosenbrock_dense(&rw_rodas4, &run->linear, run->dense);
+    else rw_rosenbrock_dense(&rw_rodas5p, &run->linear, run->dense);
+    for (int i = 1; i < RW_POINTS; i++) {
+        const double theta = (double)i / (RW_POINTS - 1);
+        double y[RW_NX];
+        if (i < RW_POINTS - 1) state_at(run, theta, y);
+        else memcpy(y, run->next, sizeof y);
+        rw_channels(&run->numbers, t + theta * h, y, run->reduction[RW_BALLS] != 0.0, run->sampled[i]);
+    }
+    const rw_step_taken step = {run, t, h};
+    rw_reduce(run->reduction, (const double(*)[RW_CHANNELS])run->sampled, start + t, h, channel_at, &step);
+    memcpy(run->sampled[0], run->sampled[RW_POINTS - 1], sizeof run->sampled[0]);
+}
+#else
+#define reduce_start(run, start) ((void)0)
+#define reduce_step(run, start, t, h) ((void)0)
+#endif
 
 /* Try one step; returns its scaled error. */
 static double try_step(rw_run *run, double t, double h)
@@ -197,11 +324,14 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
         }
         const double estimate = options->first_step > 0.0 && run->step == 0.0 ? options->first_step : estimate_step(run, t, length);
         run->step = estimate;
-        run->last_error = LOG_SMALL_ERROR;
+        run->last_error = RW_LOG_SMALL_ERROR;
     }
     int stiff = 0, rejected_last = 0;
+    reduce_start(run, start);
+    tangent_jump(run);
     if (is_explicit(run->method)) first_slope(run, t);
     else linearize(run, t, 1);
+    tangent_start(run, t);
     while (t < length) {
         double h = run->step < options->largest_step ? run->step : options->largest_step;
         const double left = length - t;
@@ -224,20 +354,23 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
             double factor = 0.9 * exp((0.4 * run->last_error - 0.7 * log_error) / q);
             factor = factor > 6.0 ? 6.0 : factor < 0.2 ? 0.2 : factor;
             if (rejected_last && factor > 1.0) factor = 1.0;
-            run->last_error = log_error > LOG_SMALL_ERROR ? log_error : LOG_SMALL_ERROR;
+            run->last_error = log_error > RW_LOG_SMALL_ERROR ? log_error : RW_LOG_SMALL_ERROR;
             result->steps++;
+            tangent_step(run, t, h);
             write_outputs(run, start, t, h, last ? end : start + (t + h));
+            reduce_step(run, start, t, h);
             if (changeable && is_explicit(run->method)) {
                 const double limit = run->method == RACEWAY_DP54 ? 3.25 : 6.1;
                 const double reach = rw_explicit_stiffness(&run->plain, run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES, h,
                                                            run->next, run->weight);
                 stiff = reach > limit ? stiff + 1 : 0;
             }
+            tangent_accept(run);
             memcpy(run->x, run->next, sizeof run->next);
             t = last ? length : t + h;
             if (!last || factor < 1.0) run->step = h * factor;
             rejected_last = 0;
-            if (stiff >= STIFF_STEPS) {
+            if (stiff >= RW_STIFF_STEPS) {
                 run->method = RACEWAY_RODAS5P;
                 result->switches++;
                 stiff = 0;
@@ -269,47 +402,81 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
     return RACEWAY_DONE;
 }
 
-int raceway_run(const raceway_options *options, const double *p, const double *c, double *x, long segments, const double *times,
-                const double *inputs, const unsigned char *restarts, long outputs, const double *output_times, double *output_states,
-                raceway_result *result)
+static int run_all(rw_run *run, const raceway_options *options, const double *p, const double *c, double *x, long segments,
+                   const double *times, const double *inputs, const unsigned char *restarts, long outputs, const double *output_times,
+                   double *output_states, raceway_result *result)
 {
-    rw_run run;
     memset(result, 0, sizeof *result);
     result->state = -1;
     result->time = segments > 0 ? times[0] : 0.0;
-    run.options = options;
-    run.result = result;
-    run.x = x;
-    run.step = 0.0;
-    run.last_error = LOG_SMALL_ERROR;
-    run.method = options->method;
-    run.outputs = outputs;
-    run.output_times = output_times;
-    run.output_states = output_states;
-    run.numbers.p = p;
-    run.numbers.c = c;
+    run->options = options;
+    run->result = result;
+    run->x = x;
+    run->step = 0.0;
+    run->last_error = RW_LOG_SMALL_ERROR;
+    run->method = options->method;
+    run->outputs = outputs;
+    run->output_times = output_times;
+    run->output_states = output_states;
+    run->numbers.p = p;
+    run->numbers.c = c;
     const int changeable = options->method == RACEWAY_AUTO;
     if (options->method < RACEWAY_AUTO || options->method > RACEWAY_DOP853) return result->status = RACEWAY_BAD_ARGUMENT;
-    for (int k = 0; k < RW_NX; k++) run.weight[k] = 1.0 / options->tolerance[k];
+    for (int k = 0; k < RW_NX; k++) run->weight[k] = 1.0 / options->tolerance[k];
     for (long i = 1; i <= segments; i++)
         if (!(times[i] >= times[i - 1])) return result->status = RACEWAY_BAD_ARGUMENT;
     if (!is_finite(x)) return result->status = RACEWAY_NOT_FINITE;
     while (result->written < outputs && output_times[result->written] <= result->time) {
         if (output_states) memcpy(output_states + result->written * RW_NX, x, RW_NX * sizeof *x);
+#ifdef RACEWAY_SENSITIVITIES
+        if (run->tangents && run->tangents->outputs) {
+            const long size = run->tangents->blocks * (RW_NX * RW_LANES);
+            memcpy(run->tangents->outputs + result->written * size, run->tangents->x, (size_t)size * sizeof *x);
+        }
+#endif
         result->written++;
     }
     for (long i = 0; i < segments; i++) {
         result->segment = i;
-        run.numbers.u = inputs + i * RW_NU;
-        result->status = run_segment(&run, times[i], times[i + 1], restarts[i], changeable);
+        run->numbers.u = inputs + i * RW_NU;
+        result->status = run_segment(run, times[i], times[i + 1], restarts[i], changeable);
         if (result->status != RACEWAY_DONE) break;
+#ifdef RACEWAY_SENSITIVITIES
+        if (run->tangents) rw_explicit_rate(&run->numbers, times[i + 1] - times[i], x, run->rate_before);
+#endif
     }
-    result->method = run.method;
+    result->method = run->method;
     return result->status;
 }
 
+int raceway_run(const raceway_options *options, const double *p, const double *c, double *x, long segments, const double *times,
+                const double *inputs, const unsigned char *restarts, long outputs, const double *output_times, double *output_states,
+                raceway_result *result)
+{
+    rw_run run;
+#ifdef RACEWAY_SENSITIVITIES
+    run.tangents = NULL;
+#endif
+    return run_all(&run, options, p, c, x, segments, times, inputs, restarts, outputs, output_times, output_states, result);
+}
+
+#ifdef RACEWAY_SENSITIVITIES
+int raceway_run_tangents(const raceway_options *options, const double *p, const double *c, double *x, long segments, const double *times,
+                         const double *inputs, const unsigned char *restarts, long outputs, const double *output_times,
+                         double *output_states, const raceway_tangents *tangents, raceway_result *result)
+{
+    rw_run run;
+    run.tangents = tangents;
+    run.blocks = (rw_tangent_block *)tangents->work;
+    return run_all(&run, options, p, c, x, segments, times, inputs, restarts, outputs, output_times, output_states, result);
+}
+
+long raceway_tangent_work(long blocks) { return blocks * (long)sizeof(rw_tangent_block); }
+#endif
+
 void raceway_sizes(int *sizes)
 {
+    sizes[5] = RW_LANES;
     sizes[0] = RW_NX;
     sizes[1] = RW_NU;
     sizes[2] = RW_NP;

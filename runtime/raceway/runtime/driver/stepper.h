@@ -36,6 +36,7 @@ typedef struct {
     double smallest_step;    /* [s] */
     double largest_step;     /* [s] */
     const double *tolerance; /* error allowed in a step for each state */
+    double *reduction;       /* on-line reductions, see reductions.h; NULL: none.  Only with RACEWAY_REDUCTIONS */
 } raceway_options;
 
 typedef struct {
@@ -69,7 +70,28 @@ RACEWAY_EXPORT int raceway_run(const raceway_options *options, const double *p, 
                                const double *times, const double *inputs, const unsigned char *restarts, long outputs,
                                const double *output_times, double *output_states, raceway_result *result);
 
-/* Sizes the library was compiled for: states, inputs, parameters, constants, balls. */
+/* Directions along which a run is differentiated, RW_LANES to a block; entries of a block lie next to each other. */
+typedef struct {
+    long blocks;
+    const double *p;     /* of the parameters, [blocks][RW_NP][RW_LANES] */
+    const double *c;     /* of the derived constants, [blocks][RW_NC][RW_LANES] */
+    const double *u;     /* of the inputs, [segments][blocks][RW_NU][RW_LANES] */
+    const double *shift; /* of the time at which each segment starts, [segments][blocks][RW_LANES] [s] */
+    double *x;           /* of the states, [blocks][RW_NX][RW_LANES]: at the start, on return at the end */
+    double *outputs;     /* at the output times, [outputs][blocks][RW_NX][RW_LANES], or NULL */
+    void *work;          /* raceway_tangent_work(blocks) bytes, aligned for double */
+} raceway_tangents;
+
+#ifdef RACEWAY_SENSITIVITIES
+/* The same run with its derivatives. */
+RACEWAY_EXPORT int raceway_run_tangents(const raceway_options *options, const double *p, const double *c, double *x, long segments,
+                                        const double *times, const double *inputs, const unsigned char *restarts, long outputs,
+                                        const double *output_times, double *output_states, const raceway_tangents *tangents,
+                                        raceway_result *result);
+RACEWAY_EXPORT long raceway_tangent_work(long blocks);
+#endif
+
+/* Sizes the library was compiled for: states, inputs, parameters, constants, balls, lanes. */
 RACEWAY_EXPORT void raceway_sizes(int *sizes);
 
 #endif

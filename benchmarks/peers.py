@@ -1,0 +1,375 @@
+"""Contenders a user would pick instead: SciPy, numba, numbalsoda, SUNDIALS, diffrax.
+
+All integrate the scaled states ``z = x / magnitude`` with the same relative and absolute tolerance, from edge to
+edge of the
+load, with the right-hand side of `press`.  None is given a Jacobian.  What is not installed says so.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import math
+import subprocess
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from benchmarks.own import DECADES, HALVES, HAND_FLAGS, Contender, Kept, Unavailable, c_numbers
+from benchmarks.press import Press, make_load, make_loop_rate, make_vector_rate
+from benchmarks.problem import ROOT, Member
+from raceway.runtime.compile import compile_sources, find_compiler
+
+
+def imported(name: str) -> Any:
+    """A module.
+
+    Raises
+    ------
+    Unavailable
+        It is not installed, or cannot be loaded.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as fault:
+        if isinstance(fault, ModuleNotFoundError) and (fault.name or "").split(".")[0] == name.split(".")[0]:
+            raise Unavailable("not installed") from fault
+        raise Unavailable(f"cannot be loaded ({fault})") from fault
+    except OSError as fault:
+        raise Unavailable(f"cannot be loaded ({fault})") from fault
+
+
+def _needs(*names: str) -> Callable[[], None]:
+    def ready() -> None:
+        for name in names:
+            imported(name)
+
+    return ready
+
+
+# -------------------------------------------------------------------------------------------------------------- numba
+
+
+@cache
+def numba_rate() -> Any:
+    """dx/dt into an array, compiled by numba: (numbers, gate, t, x, dx)."""
+    numba = imported("numba")
+    load = numba.njit(make_load(math))
+    return numba.njit(make_loop_rate(load, 8))
+
+
+@cache
+def numba_scaled_rate() -> Any:
+    """dz/dt of the scaled states: (t, z, numbers, gate, scale) -> array."""
+    numba, rate = imported("numba"), numba_rate()
+
+    @numba.njit
+    def scaled(t, z, n, gate, scale):  # type: ignore[no-untyped-def]
+        dx = np.empty(8)
+        rate(n, gate, t, z * scale, dx)
+        return dx / scale
+
+    return scaled
+
+
+# -------------------------------------------------------------------------------------------------------------- SciPy
+
+
+def numpy_rate(tangent: bool) -> Callable[[Press, float, float, np.ndarray], np.ndarray]:
+    """dx/dt in NumPy: (numbers, gate, t, x) -> array."""
+    return make_vector_rate(np, make_load(math), 8, tangent)
+
+
+_numpy_rates = {tangent: numpy_rate(tangent) for tangent in (False, True)}
+
+
+def _scipy(method: str, how: str) -> Contender:
+    def solve(member: Member, tolerance: float) -> np.ndarray:
+        n, scale = member.press, member.magnitude
+        if how == "numba":
+            scaled = numba_scaled_rate()
+
+            def right_side(t: float, z: np.ndarray, gate: float) -> np.ndarray:
+                return scaled(t, z, n, gate, scale)
+        else:
+            rate = _numpy_rates[n.tangent == 1.0]
+
+            def right_side(t: float, z: np.ndarray, gate: float) -> np.ndarray:
+                return rate(n, gate, t, z * scale) / scale
+
+        state = member.start / scale
+        rows = []
+        for a, b, gate, inside in member.pieces:
+            wanted = inside if inside.size and inside[-1] == b else np.append(inside, b)
+            done = solve_ivp(
+                right_side, (a, b), state, method=method, t_eval=wanted, rtol=tolerance, atol=tolerance, args=(gate,)
+            )
+            if not done.success:
+                return np.full((len(member.times), 8), np.nan)
+            rows.append(done.y.T[: len(inside)])
+            state = done.y[:, -1]
+        return np.concatenate(rows) * scale
+
+    words = "numba" if how == "numba" else "NumPy"
+    return Contender(
+        key=f"scipy-{method.lower()}-{how}",
+        label=f"SciPy {method}, {words}",
+        group=f"SciPy, {words}",
+        solve=solve,
+        tolerances=DECADES if method == "LSODA" else DECADES[:-1],
+        errors_like="" if how == "numba" else f"scipy-{method.lower()}-numba",
+        ready=_needs("numba") if how == "numba" else lambda: None,
+    )
+
+
+# --------------------------------------------------------------------------------------------------------- numbalsoda
+
+
+@cache
+def _lsoda_cycle() -> Any:
+    numba, numbalsoda, rate = imported("numba"), imported("numbalsoda"), numba_rate()
+    count = len(Press._fields)
+
+    @numba.cfunc(numbalsoda.lsoda_sig)
+    def scaled(t, z, dz, data):  # type: ignore[no-untyped-def]
+        d = numba.carray(data, (count + 9,))
+        n = Press(
+            d[0], d[1], d[2], d[3], d[4], d[5], d[6], d[7], d[8], d[9], d[10], d[11],
+            d[12], d[13], d[14], d[15], d[16], d[17], d[18], d[19], d[20], d[21], d[22],
+        )  # fmt: skip
+        scale = d[count + 1 :]
+        inside, outside = numba.carray(z, (8,)), numba.carray(dz, (8,))
+        x = np.empty(8)
+        for k in range(8):
+            x[k] = inside[k] * scale[k]
+        rate(n, d[count], t, x, outside)
+        for k in range(8):
+            outside[k] /= scale[k]
+
+    address = scaled.address
+    lsoda = numbalsoda.lsoda
+
+    @numba.njit
+    def cycle(data, start, edges, gates, counts, times, tolerance):  # type: ignore[no-untyped-def]
+        states = np.empty((len(times), 8))
+        scale = data[count + 1 :]
+        z = start / scale
+        row = 0
+        for i in range(len(gates)):
+            data[count] = gates[i]
+            wanted = np.empty(counts[i] + 2)
+            wanted[0] = edges[i]
+            wanted[1:-1] = times[row : row + counts[i]]
+            wanted[-1] = edges[i + 1]
+            if wanted[-2] >= wanted[-1]:
+                wanted = wanted[:-1]
+            found, success = lsoda(address, z, wanted, data, tolerance, tolerance, 10_000_000)
+            if not success:
+                states[:] = np.nan
+                return states
+            states[row : row + counts[i]] = found[1 : counts[i] + 1] * scale
+            z = found[-1]
+            row += counts[i]
+        return states
+
+    return cycle, scaled
+
+
+_lsoda_data = Kept(
+    lambda member: (
+        np.concatenate([np.array(member.press), [0.0], member.magnitude]),
+        np.array(member.gates),
+        np.array([len(inside) for *_, inside in member.pieces]),
+    )
+)
+
+
+def _numbalsoda(member: Member, tolerance: float) -> np.ndarray:
+    data, gates, counts = _lsoda_data(member)
+    cycle, _ = _lsoda_cycle()
+    return np.asarray(cycle(data, member.start, member.edges, gates, counts, member.times, tolerance))
+
+
+# ----------------------------------------------------------------------------------------------------------- SUNDIALS
+
+
+def _sundae(member: Member, tolerance: float) -> np.ndarray:
+    cvode = imported("sksundae.cvode")
+    n, scale, scaled = member.press, member.magnitude, numba_scaled_rate()
+
+    def right_side(t: float, z: np.ndarray, dz: np.ndarray, gate: float) -> None:
+        dz[:] = scaled(t, z, n, gate, scale)
+
+    state = member.start / scale
+    rows = []
+    for a, b, gate, inside in member.pieces:
+        solver = cvode.CVODE(right_side, rtol=tolerance, atol=tolerance, userdata=gate, max_num_steps=10_000_000)
+        wanted = np.concatenate([[a], inside, [] if inside.size and inside[-1] == b else [b]])
+        found = solver.solve(wanted, state)
+        if not found.success:
+            return np.full((len(member.times), 8), np.nan)
+        rows.append(found.y[1 : len(inside) + 1])
+        state = np.array(found.y[-1])
+    return np.concatenate(rows) * scale
+
+
+@cache
+def _cvode_library() -> ctypes.CDLL:
+    package = imported("sksundae")
+    libraries = Path(package.__file__).parent.parent / "scikit_sundae.libs"
+    wanted = ("core", "cvode", "nvecserial", "sunlinsoldense", "sunmatrixdense")
+    found = [next(iter(sorted(libraries.glob(f"libsundials_{name}-*.so*"))), None) for name in wanted]
+    compiler = find_compiler()
+    if compiler is None or any(path is None for path in found):
+        raise Unavailable("needs a C compiler and scikit-sundae's wheel for Linux")
+    for path in found:
+        ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
+    folder = ROOT / "benchmarks"
+    library = compile_sources(
+        (folder / "cvode.c",),
+        compiler,
+        label="cvode",
+        headers=(folder / "hand_written.c",),
+        flags=HAND_FLAGS,
+    )
+    return ctypes.CDLL(str(library.path))
+
+
+_cvode_data = Kept(
+    lambda member: (
+        c_numbers(member),
+        np.array(member.gates),
+        np.array([len(inside) for *_, inside in member.pieces], dtype=ctypes.c_long),
+    )
+)
+
+
+def _cvode(member: Member, tolerance: float) -> np.ndarray:
+    numbers, gates, counts = _cvode_data(member)
+    states = np.empty((len(member.times), 8))
+    code = _cvode_library()
+    pointer = ctypes.c_void_p
+    status = code.cvode_cycle(
+        ctypes.c_double(tolerance),
+        ctypes.byref(numbers),
+        pointer(member.start.ctypes.data),
+        len(gates),
+        pointer(member.edges.ctypes.data),
+        pointer(gates.ctypes.data),
+        pointer(counts.ctypes.data),
+        pointer(member.times.ctypes.data),
+        pointer(states.ctypes.data),
+    )
+    if status:
+        states[:] = np.nan
+    return states
+
+
+def _cvode_ready() -> None:
+    try:
+        _cvode_library()
+    except (OSError, subprocess.SubprocessError) as fault:
+        raise Unavailable(f"cannot be built ({fault})") from fault
+
+
+# ------------------------------------------------------------------------------------------------------------ diffrax
+
+
+@cache
+def _diffrax_cycle(solver: str, tangent: bool, sizes: tuple[int, ...]) -> Any:
+    jax, diffrax = imported("jax"), imported("diffrax")
+    jax.config.update("jax_enable_x64", True)
+    jnp = jax.numpy
+    rate = make_vector_rate(jnp, make_load(jnp), 8, tangent)
+    method = getattr(diffrax, solver)()
+
+    def field(t: Any, z: Any, args: Any) -> Any:
+        n, gate, scale = args
+        return rate(n, gate, t, z * scale) / scale
+
+    def cycle(n: Press, scale: Any, start: Any, edges: Any, gates: Any, times: Any, tolerance: Any) -> Any:
+        z = start / scale
+        rows = []
+        row = 0
+        for k, size in enumerate(sizes):
+            wanted = times[row : row + size]
+            row += size
+            done = diffrax.diffeqsolve(
+                diffrax.ODETerm(field),
+                method,
+                edges[k],
+                edges[k + 1],
+                None,
+                z,
+                args=(n, gates[k], scale),
+                saveat=diffrax.SaveAt(ts=wanted, t1=True),
+                stepsize_controller=diffrax.PIDController(rtol=tolerance, atol=tolerance),
+                max_steps=10_000_000,
+                adjoint=diffrax.ForwardMode(),
+                throw=False,
+            )
+            rows.append(done.ys[:-1])
+            z = done.ys[-1]
+        return jnp.concatenate(rows) * scale
+
+    return jax.jit(cycle)
+
+
+def _diffrax(solver: str) -> Contender:
+    def solve(member: Member, tolerance: float) -> np.ndarray:
+        sizes = tuple(len(inside) for *_, inside in member.pieces)
+        cycle = _diffrax_cycle(solver, member.press.tangent == 1.0, sizes)
+        found = cycle(
+            member.press,
+            member.magnitude,
+            member.start,
+            member.edges,
+            np.array(member.gates),
+            member.times,
+            tolerance,
+        )
+        return np.asarray(found)
+
+    return Contender(
+        key=f"diffrax-{solver.lower()}",
+        label=f"diffrax {solver}",
+        group="diffrax",
+        solve=solve,
+        ready=_needs("jax", "diffrax"),
+    )
+
+
+def peers() -> list[Contender]:
+    """All of them, in the order of tables."""
+    return [
+        Contender(
+            key="numbalsoda",
+            label="numbalsoda LSODA",
+            group="numbalsoda",
+            solve=_numbalsoda,
+            tolerances=HALVES[:-1],
+            ready=_needs("numba", "numbalsoda"),
+        ),
+        Contender(
+            key="cvode-c",
+            label="SUNDIALS CVODE, C",
+            group="SUNDIALS",
+            solve=_cvode,
+            tolerances=HALVES[:-1],
+            ready=_cvode_ready,
+        ),
+        Contender(
+            key="sundae",
+            label="scikit-sundae CVODE, numba",
+            group="SUNDIALS",
+            solve=_sundae,
+            ready=_needs("numba", "sksundae"),
+        ),
+        _diffrax("Tsit5"),
+        _diffrax("Kvaerno5"),
+        *(_scipy(method, how) for how in ("numba", "numpy") for method in ("LSODA", "DOP853", "Radau")),
+    ]

@@ -1,0 +1,51 @@
+/* What single runs and ensembles decide alike: family of methods and first step size. */
+#ifndef RACEWAY_CONTROL_H
+#define RACEWAY_CONTROL_H
+
+#include "explicit.h"
+#include "rosenbrock.h"
+
+enum { RW_STIFF_STEPS = 12 }; /* steps at the stability limit before an explicit method gives up */
+
+/* Logarithm of 1e-4: smaller errors of the step before do not tell the controller more. */
+static const double RW_LOG_SMALL_ERROR = -9.210340371976182;
+
+/* Initial step (Hairer, Norsett & Wanner I, section II.4): from the size of the first and a guess of the second derivative.  Takes two
+   evaluations of the right-hand side. */
+static inline double rw_first_step(const rw_numbers *n, double t, const double *restrict x, double longest, const double *restrict weight,
+                                   double error_exponent)
+{
+    double dx[RW_NX], moved[RW_NX], change[RW_NX];
+    rw_explicit_rate(n, t, x, dx);
+    const double slope = rw_norm(dx, weight), size = rw_norm(x, weight);
+    double h = size > 1e-5 && slope > 1e-5 ? 0.01 * size / slope : 1e-6 * longest;
+    /* from rest the size says nothing: the step of a tolerance's motion does */
+    if (slope > 0.0 && h < 1.0 / slope) h = 1.0 / slope;
+    if (h > longest) h = longest;
+    for (int k = 0; k < RW_NX; k++) moved[k] = x[k] + h * dx[k];
+    rw_explicit_rate(n, t + h, moved, change);
+    for (int k = 0; k < RW_NX; k++) change[k] = (change[k] - dx[k]) / h;
+    const double curvature = rw_norm(change, weight), larger = curvature > slope ? curvature : slope;
+    const double second = larger > 1e-15 ? pow(0.01 / larger, 1.0 / error_exponent) : h * 1e-3;
+    h = 100.0 * h < second ? 100.0 * h : second;
+    return h < longest ? h : longest;
+}
+
+/* Whether the linearly implicit family fits: where damping is faster than the oscillation it damps, for then an explicit method's step is
+   held down by stability and not by accuracy.  A = da/dq, B = da/dv. */
+static inline int rw_is_stiff(const double *restrict A, const double *restrict B)
+{
+    double decay = 0.0, squared = 0.0;
+    for (int i = 0; i < RW_NQ; i++) {
+        double a = 0.0, b = 0.0;
+        for (int j = 0; j < RW_NQ; j++) {
+            a += fabs(A[i * RW_NQ + j]);
+            b += fabs(B[i * RW_NQ + j]);
+        }
+        decay = b > decay ? b : decay;
+        squared = a > squared ? a : squared;
+    }
+    return decay * decay > 2.0 * squared;
+}
+
+#endif

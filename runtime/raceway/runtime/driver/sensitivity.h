@@ -1,0 +1,351 @@
+/* Forward sensitivities: the derivative of the discrete solution along any number of directions of the parameters.
+
+   After a step is accepted, the same formulas are differentiated line by line at fixed step size, RW_LANES directions at a time; what does
+   not depend on the direction (slopes of the law, the small inverse) is computed once for all.  Where a load switches at a time that
+   depends on the parameters, the derivative jumps by (rate before - rate behind) d(time)/d(parameter).
+
+   Compiled in only where RACEWAY_SENSITIVITIES is defined. */
+#ifndef RACEWAY_SENSITIVITY_H
+#define RACEWAY_SENSITIVITY_H
+
+#include <string.h>
+
+#include "explicit.h"
+#include "rosenbrock.h"
+#include "stepper.h"
+#include "tangents.h"
+
+/* An entry for each direction of a block. */
+typedef double rw_lanes[RW_LANES];
+
+/* Work of one block of directions; the caller brings raceway_tangent_work(blocks) bytes. */
+typedef struct {
+    rw_lanes k[RW_METHOD_STAGES][RW_NX]; /* derivatives of slopes or stages */
+    rw_lanes next[RW_NX];
+    rw_lanes dense[RW_DENSE_ROWS][RW_NX];
+    rw_lanes w[RW_NW], wt[RW_NW];
+    rw_lanes A[RW_NQ * RW_NQ], B[RW_NQ * RW_NQ], at[RW_NQ], first[RW_NX];
+} rw_tangent_block;
+
+/* What the directions share at one state and time. */
+typedef struct {
+    const double *x, *w;
+    double r[5], S[2], G[6];
+    double co[RW_NB], si[RW_NB], delta[RW_NB], rate[RW_NB], force[RW_NB], by_delta[RW_NB], by_rate[RW_NB];
+} rw_point;
+
+/* Directions of one block: parameters, constants, inputs of the segment. */
+typedef struct {
+    const double *p, *c, *u;
+} rw_direction;
+
+static inline rw_direction rw_direction_of(const raceway_tangents *tangents, long segment, long block)
+{
+    rw_direction d;
+    d.p = tangents->p + block * (RW_NP * RW_LANES);
+    d.c = tangents->c + block * (RW_NC * RW_LANES);
+    d.u = tangents->u + (segment * tangents->blocks + block) * (RW_NU * RW_LANES);
+    return d;
+}
+
+static inline void rw_point_at(rw_point *restrict at, const rw_numbers *n, const double *restrict w, const double *restrict x)
+{
+    at->x = x;
+    at->w = w;
+    rw_relative(x, n->u, n->p, n->c, w, at->r);
+    const double *restrict r = at->r, cage_cos = w[0], cage_sin = w[1];
+    for (int j = 0; j < RW_NB; j++) {
+        at->co[j] = rw_cos[j] * cage_cos - rw_sin[j] * cage_sin;
+        at->si[j] = rw_sin[j] * cage_cos + rw_cos[j] * cage_sin;
+        at->delta[j] = r[0] + r[1] * at->co[j] + r[2] * at->si[j];
+        at->rate[j] = r[3] * at->co[j] + r[4] * at->si[j];
+        rw_law_slopes(at->delta[j], at->rate[j], n->p, n->c, &at->force[j], &at->by_delta[j], &at->by_rate[j]);
+    }
+    for (int k = 0; k < 2; k++) at->S[k] = 0.0;
+    for (int k = 0; k < 6; k++) at->G[k] = 0.0;
+    for (int j = 0; j < RW_NB; j++) {
+        const double co = at->co[j], si = at->si[j];
+        at->S[0] += at->force[j] * co;
+        at->S[1] += at->force[j] * si;
+        at->G[0] += at->by_delta[j] * co * co;
+        at->G[1] += at->by_delta[j] * co * si;
+        at->G[2] += at->by_delta[j] * si * si;
+        at->G[3] += at->by_rate[j] * co * co;
+        at->G[4] += at->by_rate[j] * co * si;
+        at->G[5] += at->by_rate[j] * si * si;
+    }
+}
+
+/* Derivatives of deflection and rate of ball j, and of its direction. */
+static inline void rw_ball_tangent(const rw_point *restrict at, int j, const double *restrict wd, const double *restrict rd,
+                                   double *restrict co, double *restrict si, double *restrict delta, double *restrict rate)
+{
+#pragma omp simd
+    for (int l = 0; l < RW_LANES; l++) {
+        co[l] = rw_cos[j] * wd[l] - rw_sin[j] * wd[RW_LANES + l];
+        si[l] = rw_sin[j] * wd[l] + rw_cos[j] * wd[RW_LANES + l];
+        delta[l] = rd[l] + rd[RW_LANES + l] * at->co[j] + rd[2 * RW_LANES + l] * at->si[j] + at->r[1] * co[l] + at->r[2] * si[l];
+        rate[l] = rd[3 * RW_LANES + l] * at->co[j] + rd[4 * RW_LANES + l] * at->si[j] + at->r[3] * co[l] + at->r[4] * si[l];
+    }
+}
+
+/* Derivative of dx/dt along the block's directions, for the moved state xd and stage variables wd. */
+static inline void rw_rate_tangent(const rw_point *restrict at, const rw_numbers *n, const rw_direction *d, const double *restrict wd,
+                                   const double *restrict xd, double *restrict out)
+{
+    double rd[5 * RW_LANES], Sd[2 * RW_LANES];
+    rw_relative_tangent_lanes(at->x, n->u, n->p, n->c, at->w, xd, d->u, d->p, d->c, wd, rd);
+    for (int k = 0; k < 2 * RW_LANES; k++) Sd[k] = 0.0;
+    for (int j = 0; j < RW_NB; j++) {
+        double co[RW_LANES], si[RW_LANES], delta[RW_LANES], rate[RW_LANES], force[RW_LANES];
+        rw_ball_tangent(at, j, wd, rd, co, si, delta, rate);
+        rw_law_partial_lanes(at->delta[j], at->rate[j], n->p, n->c, d->p, d->c, force);
+#pragma omp simd
+        for (int l = 0; l < RW_LANES; l++) {
+            const double moved = force[l] + at->by_delta[j] * delta[l] + at->by_rate[j] * rate[l];
+            Sd[l] += moved * at->co[j] + at->force[j] * co[l];
+            Sd[RW_LANES + l] += moved * at->si[j] + at->force[j] * si[l];
+        }
+    }
+    for (int k = 0; k < RW_NQ * RW_LANES; k++) out[k] = xd[RW_NQ * RW_LANES + k];
+    rw_acceleration_tangent_lanes(at->x, at->S, n->u, n->p, n->c, at->w, xd, Sd, d->u, d->p, d->c, wd, out + RW_NQ * RW_LANES);
+}
+
+/* Derivatives of the Jacobian's blocks and of the partial time derivative. */
+static inline void rw_linearize_tangent(const rw_point *restrict at, const rw_numbers *n, const rw_direction *d,
+                                        const double *restrict wt, const double *restrict wd, const double *restrict wtd,
+                                        const double *restrict xd, double *restrict A, double *restrict B, double *restrict rate_d)
+{
+    double rd[5 * RW_LANES], Sd[2 * RW_LANES], Gd[6 * RW_LANES];
+    rw_relative_tangent_lanes(at->x, n->u, n->p, n->c, at->w, xd, d->u, d->p, d->c, wd, rd);
+    for (int k = 0; k < 2 * RW_LANES; k++) Sd[k] = 0.0;
+    for (int k = 0; k < 6 * RW_LANES; k++) Gd[k] = 0.0;
+    for (int j = 0; j < RW_NB; j++) {
+        double co[RW_LANES], si[RW_LANES], delta[RW_LANES], rate[RW_LANES], force[RW_LANES], by_delta[RW_LANES], by_rate[RW_LANES];
+        rw_ball_tangent(at, j, wd, rd, co, si, delta, rate);
+        rw_law_partial_lanes(at->delta[j], at->rate[j], n->p, n->c, d->p, d->c, force);
+        rw_law_slopes_tangent_lanes(at->delta[j], at->rate[j], n->p, n->c, delta, rate, d->p, d->c, by_delta, by_rate);
+        const double c = at->co[j], s = at->si[j], fd = at->by_delta[j], fv = at->by_rate[j];
+#pragma omp simd
+        for (int l = 0; l < RW_LANES; l++) {
+            const double moved = force[l] + fd * delta[l] + fv * rate[l];
+            const double cc = 2.0 * c * co[l], cs = co[l] * s + c * si[l], ss = 2.0 * s * si[l];
+            Sd[l] += moved * c + at->force[j] * co[l];
+            Sd[RW_LANES + l] += moved * s + at->force[j] * si[l];
+            Gd[l] += by_delta[l] * c * c + fd * cc;
+            Gd[RW_LANES + l] += by_delta[l] * c * s + fd * cs;
+            Gd[2 * RW_LANES + l] += by_delta[l] * s * s + fd * ss;
+            Gd[3 * RW_LANES + l] += by_rate[l] * c * c + fv * cc;
+            Gd[4 * RW_LANES + l] += by_rate[l] * c * s + fv * cs;
+            Gd[5 * RW_LANES + l] += by_rate[l] * s * s + fv * ss;
+        }
+    }
+    rw_acceleration_jacobian_tangent_lanes(at->x, at->S, at->G, n->u, n->p, n->c, at->w, xd, Sd, Gd, d->u, d->p, d->c, wd, A, B);
+    rw_acceleration_rate_tangent_lanes(at->x, at->S, at->G, at->r, n->u, n->p, n->c, at->w, wt, xd, Sd, Gd, rd, d->u, d->p, d->c, wd, wtd,
+                                       rate_d);
+}
+
+/* y = x + factor * sum of row[j] k[j] for one block. */
+static inline void rw_combine_lanes(const double *restrict row, int count, rw_lanes k[][RW_NX], double factor,
+                                    const double *restrict x, double *restrict y)
+{
+    double sum[RW_NX * RW_LANES];
+    for (int i = 0; i < RW_NX * RW_LANES; i++) sum[i] = 0.0;
+    for (int j = 0; j < count; j++) {
+        const double a = row[j];
+        if (a == 0.0) continue;
+        const double *restrict slope = &k[j][0][0];
+        for (int i = 0; i < RW_NX * RW_LANES; i++) sum[i] += a * slope[i];
+    }
+    for (int i = 0; i < RW_NX * RW_LANES; i++) y[i] = x[i] + factor * sum[i];
+}
+
+static inline double *rw_tangent_state(const raceway_tangents *tangents, long block) { return tangents->x + block * (RW_NX * RW_LANES); }
+
+/* Derivative of the first slope, where no step before has left it. */
+static inline void rw_explicit_tangent_start(const raceway_tangents *tangents, rw_tangent_block *restrict work, const rw_numbers *n,
+                                             long segment, double t, const double *restrict x)
+{
+    double w[RW_NW];
+    rw_point at;
+    rw_stage(t, n->u, n->p, n->c, w);
+    rw_point_at(&at, n, w, x);
+    for (long b = 0; b < tangents->blocks; b++) {
+        const rw_direction d = rw_direction_of(tangents, segment, b);
+        rw_stage_tangent_lanes(t, n->u, n->p, n->c, d.u, d.p, d.c, &work[b].w[0][0]);
+        rw_rate_tangent(&at, n, &d, &work[b].w[0][0], rw_tangent_state(tangents, b), &work[b].k[0][0][0]);
+    }
+}
+
+/* Differentiate an accepted explicit step; `plain` still holds its slopes. */
+static inline void rw_explicit_tangent_step(const rw_explicit_method *restrict method, const raceway_tangents *tangents,
+                                            rw_tangent_block *restrict work, const rw_explicit *restrict plain, const rw_numbers *n,
+                                            long segment, double t, const double *restrict x, double h, const double *restrict next)
+{
+    for (int i = 1; i <= method->stages; i++) {
+        const int end = i == method->stages;
+        const double time = t + (end ? 1.0 : method->nodes[i]) * h;
+        const double *row = end ? method->weights : method->a[i];
+        double w[RW_NW], y[RW_NX];
+        rw_point at;
+        rw_stage(time, n->u, n->p, n->c, w);
+        if (end) memcpy(y, next, sizeof y);
+        else rw_combine(row, i, (const double(*)[RW_NX])plain->k, h, x, y);
+        rw_point_at(&at, n, w, y);
+        for (long b = 0; b < tangents->blocks; b++) {
+            const rw_direction d = rw_direction_of(tangents, segment, b);
+            double moved[RW_NX * RW_LANES];
+            rw_stage_tangent_lanes(time, n->u, n->p, n->c, d.u, d.p, d.c, &work[b].w[0][0]);
+            rw_combine_lanes(row, i, work[b].k, h, rw_tangent_state(tangents, b), moved);
+            rw_rate_tangent(&at, n, &d, &work[b].w[0][0], moved, &work[b].k[i][0][0]);
+            if (end) memcpy(work[b].next, moved, sizeof moved);
+        }
+    }
+}
+
+/* Terms of the dense output of the derivatives; the same combinations as for the states. */
+static inline void rw_explicit_tangent_dense(const rw_explicit_method *restrict method, const raceway_tangents *tangents,
+                                             rw_tangent_block *restrict work, const rw_explicit *restrict plain, const rw_numbers *n,
+                                             long segment, double t, const double *restrict x, double h)
+{
+    const int end = method->stages;
+    for (int r = 0; r < method->dense_stages; r++) {
+        const double time = t + method->dense_nodes[r] * h;
+        double w[RW_NW], y[RW_NX];
+        rw_point at;
+        rw_stage(time, n->u, n->p, n->c, w);
+        rw_combine(method->dense_a[r], end + 1 + r, (const double(*)[RW_NX])plain->k, h, x, y);
+        rw_point_at(&at, n, w, y);
+        for (long b = 0; b < tangents->blocks; b++) {
+            const rw_direction d = rw_direction_of(tangents, segment, b);
+            double moved[RW_NX * RW_LANES];
+            rw_stage_tangent_lanes(time, n->u, n->p, n->c, d.u, d.p, d.c, &work[b].w[0][0]);
+            rw_combine_lanes(method->dense_a[r], end + 1 + r, work[b].k, h, rw_tangent_state(tangents, b), moved);
+            rw_rate_tangent(&at, n, &d, &work[b].w[0][0], moved, &work[b].k[end + 1 + r][0][0]);
+        }
+    }
+    for (long b = 0; b < tangents->blocks; b++) {
+        const double *restrict from = rw_tangent_state(tangents, b), *restrict to = &work[b].next[0][0];
+        const double *restrict first = &work[b].k[0][0][0], *restrict last = &work[b].k[end][0][0];
+        double *restrict f1 = &work[b].dense[0][0][0], *restrict f2 = &work[b].dense[1][0][0];
+        for (int i = 0; i < RW_NX * RW_LANES; i++) {
+            const double delta = to[i] - from[i];
+            f1[i] = h * first[i] - delta;
+            f2[i] = 2.0 * delta - h * (first[i] + last[i]);
+        }
+        double zero[RW_NX * RW_LANES] = {0.0};
+        for (int row = 0; row < method->dense_rows; row++)
+            rw_combine_lanes(method->dense[row], end + 1 + method->dense_stages, work[b].k, h, zero, &work[b].dense[2 + row][0][0]);
+    }
+}
+
+static inline void rw_explicit_tangent_at(const rw_explicit_method *restrict method, const raceway_tangents *tangents,
+                                          const rw_tangent_block *restrict work, double theta, double *restrict out)
+{
+    const int terms = 2 + method->dense_rows;
+    for (long b = 0; b < tangents->blocks; b++) {
+        const double *restrict from = rw_tangent_state(tangents, b), *restrict to = &work[b].next[0][0];
+        double *restrict y = out + b * (RW_NX * RW_LANES);
+        for (int i = 0; i < RW_NX * RW_LANES; i++) {
+            double inner = 0.0;
+            for (int row = terms - 1; row >= 0; row--)
+                inner = ((&work[b].dense[row][0][0])[i] + inner) * (row % 2 == 0 ? 1.0 - theta : theta);
+            y[i] = from[i] + theta * (to[i] - from[i] + inner);
+        }
+    }
+}
+
+/* Differentiate an accepted linearly implicit step: E u = R gives E u' = R' + J' u. */
+static inline void rw_rosenbrock_tangent_step(const rw_rosenbrock_method *restrict method, const raceway_tangents *tangents,
+                                              rw_tangent_block *restrict work, const rw_rosenbrock *restrict plain,
+                                              const rw_matrix *restrict matrix, const rw_numbers *n, long segment, double t,
+                                              const double *restrict x, double h)
+{
+    const double inverse_s = h * method->gamma, inverse_h = 1.0 / h;
+    rw_point start;
+    rw_point_at(&start, n, plain->w, x);
+    for (long b = 0; b < tangents->blocks; b++) {
+        const rw_direction d = rw_direction_of(tangents, segment, b);
+        rw_tangent_block *restrict own = &work[b];
+        const double *restrict xd = rw_tangent_state(tangents, b);
+        rw_stage_rate_tangent_lanes(t, n->u, n->p, n->c, d.u, d.p, d.c, &own->w[0][0], &own->wt[0][0]);
+        rw_linearize_tangent(&start, n, &d, plain->wt, &own->w[0][0], &own->wt[0][0], xd, &own->A[0][0], &own->B[0][0], &own->at[0][0]);
+        rw_rate_tangent(&start, n, &d, &own->w[0][0], xd, &own->first[0][0]);
+    }
+    for (int i = 0; i < method->stages; i++) {
+        const double time = t + method->nodes[i] * h;
+        double w[RW_NW], y[RW_NX];
+        rw_point at;
+        if (i > 0) {
+            rw_stage(time, n->u, n->p, n->c, w);
+            for (int k = 0; k < RW_NX; k++) y[k] = x[k];
+            for (int j = 0; j < i; j++)
+                for (int k = 0; k < RW_NX; k++) y[k] += method->a[i][j] * plain->u[j][k];
+            rw_point_at(&at, n, w, y);
+        }
+        for (long b = 0; b < tangents->blocks; b++) {
+            const rw_direction d = rw_direction_of(tangents, segment, b);
+            rw_tangent_block *restrict own = &work[b];
+            double R[RW_NX * RW_LANES], moved[RW_NX * RW_LANES], rate[RW_NX * RW_LANES], zero[RW_NX * RW_LANES] = {0.0};
+            if (i == 0) {
+                memcpy(rate, own->first, sizeof rate);
+            } else {
+                if (i == 1 || method->nodes[i] != method->nodes[i - 1])
+                    rw_stage_tangent_lanes(time, n->u, n->p, n->c, d.u, d.p, d.c, &own->w[0][0]);
+                rw_combine_lanes(method->a[i], i, own->k, 1.0, rw_tangent_state(tangents, b), moved);
+                rw_rate_tangent(&at, n, &d, &own->w[0][0], moved, rate);
+            }
+            rw_combine_lanes(method->coupling[i], i, own->k, inverse_h, zero, R);
+            const double hd = h * method->time_weights[i];
+            for (int k = 0; k < RW_NX * RW_LANES; k++) R[k] += rate[k];
+            for (int k = 0; k < RW_NQ; k++) {
+                double *restrict row = R + (RW_NQ + k) * RW_LANES;
+                for (int l = 0; l < RW_LANES; l++) row[l] += hd * own->at[k][l];
+                for (int j = 0; j < RW_NQ; j++) {
+                    const double uq = plain->u[i][j], uv = plain->u[i][RW_NQ + j];
+                    const double *restrict a = own->A[k * RW_NQ + j], *restrict v = own->B[k * RW_NQ + j];
+                    for (int l = 0; l < RW_LANES; l++) row[l] += a[l] * uq + v[l] * uv;
+                }
+            }
+            for (int k = 0; k < RW_NQ; k++) {
+                double kv[RW_LANES] = {0.0};
+                for (int j = 0; j < RW_NX; j++) {
+                    const double entry = matrix->solve[j][k];
+                    for (int l = 0; l < RW_LANES; l++) kv[l] += entry * R[j * RW_LANES + l];
+                }
+                for (int l = 0; l < RW_LANES; l++) {
+                    own->k[i][RW_NQ + k][l] = kv[l];
+                    own->k[i][k][l] = (R[k * RW_LANES + l] + kv[l]) * inverse_s;
+                }
+            }
+        }
+    }
+    for (long b = 0; b < tangents->blocks; b++)
+        rw_combine_lanes(method->weights, method->stages, work[b].k, 1.0, rw_tangent_state(tangents, b), &work[b].next[0][0]);
+}
+
+static inline void rw_rosenbrock_tangent_dense(const rw_rosenbrock_method *restrict method, const raceway_tangents *tangents,
+                                               rw_tangent_block *restrict work)
+{
+    double zero[RW_NX * RW_LANES] = {0.0};
+    for (long b = 0; b < tangents->blocks; b++)
+        for (int row = 0; row < method->dense_rows; row++)
+            rw_combine_lanes(method->dense[row], method->stages, work[b].k, 1.0, zero, &work[b].dense[row][0][0]);
+}
+
+static inline void rw_rosenbrock_tangent_at(const rw_rosenbrock_method *restrict method, const raceway_tangents *tangents,
+                                            const rw_tangent_block *restrict work, double theta, double *restrict out)
+{
+    for (long b = 0; b < tangents->blocks; b++) {
+        const double *restrict from = rw_tangent_state(tangents, b), *restrict to = &work[b].next[0][0];
+        double *restrict y = out + b * (RW_NX * RW_LANES);
+        for (int i = 0; i < RW_NX * RW_LANES; i++) {
+            double inner = 0.0;
+            for (int row = method->dense_rows - 1; row >= 0; row--)
+                inner = (&work[b].dense[row][0][0])[i] + (row < method->dense_rows - 1 ? theta * inner : 0.0);
+            y[i] = from[i] + theta * (to[i] - from[i] + (1.0 - theta) * inner);
+        }
+    }
+}
+
+#endif

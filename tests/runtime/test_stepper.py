@@ -1,0 +1,366 @@
+"""Claims about the driver of the project's own stepper: breakpoints, samples, phases, statuses, threads, memory."""
+
+from __future__ import annotations
+
+import resource
+import tracemalloc
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partialmethod
+
+import mpmath
+import numpy as np
+import pytest
+from stepper_runs import ORDERS, edges_of, run, segments_between
+
+from raceway.runtime import IntegrationError, Model, RequestError, Status, clock
+from raceway.runtime.stepper import End, Family, Segments, Stepper
+
+TURN = 2.0 * np.pi
+
+Make = Callable[..., Model]
+
+
+@pytest.fixture(scope="module")
+def press(make_model: Make) -> Model:
+    return make_model("punching_press_tangent")
+
+
+@pytest.fixture(scope="module")
+def rotor(make_model: Make) -> Model:
+    return make_model("varying_compliance")
+
+
+@pytest.fixture(scope="module")
+def magnitude(press: Model) -> np.ndarray:
+    return np.array(press.simulate(0.1).statistics.magnitudes)
+
+
+# breakpoints
+
+
+@pytest.mark.parametrize("family", ORDERS)
+def test_run_split_where_the_load_jumps_gives_the_same_bits(
+    press: Model, magnitude: np.ndarray, family: Family
+) -> None:
+    numbers = press.numbers()
+    edges = edges_of(press, numbers, 0.0, 2 * press.period())
+    whole = segments_between(press, numbers, edges)
+    tolerance = 1e-7 * magnitude
+    at_once = run(press, numbers, whole, family=family, tolerance=tolerance)
+    cut = 1 + int(np.flatnonzero(whole.restarts[1:])[1])
+    first = Segments(times=edges[: cut + 1], inputs=whole.inputs[:cut], restarts=whole.restarts[:cut])
+    second = Segments(times=edges[cut:], inputs=whole.inputs[cut:], restarts=whole.restarts[cut:])
+    half = run(press, numbers, first, family=family, tolerance=tolerance)
+    rest = run(press, numbers, second, family=family, tolerance=tolerance, start=half.end)
+    assert np.array_equal(rest.end, at_once.end)
+    assert half.outcome.steps + rest.outcome.steps == at_once.outcome.steps
+
+
+@pytest.mark.parametrize("family", ORDERS)
+def test_further_edges_change_nothing_and_a_shifted_one_does(
+    press: Model, magnitude: np.ndarray, family: Family
+) -> None:
+    numbers = press.numbers()
+    edges = edges_of(press, numbers, 0.0, press.period())
+    tolerance = 1e-9 * magnitude
+
+    def end(some: np.ndarray, gates: np.ndarray | None = None) -> np.ndarray:
+        return run(press, numbers, segments_between(press, numbers, some, gates), family=family,
+        tolerance=tolerance).end
+
+    exact = end(edges)
+    further = np.unique(np.concatenate([edges, np.random.default_rng(5).uniform(0.0, edges[-1], 37)]))
+    assert np.max(np.abs(end(further) - exact) / magnitude) < 2e-5
+    # the press lets go a thousandth of a turn late: the driver switches where it is told and nowhere else
+    late = edges.copy()
+    late[2] += 1e-3 * press.period()
+    assert np.max(np.abs(end(late, gates=edges) - exact) / magnitude) > 1e-2
+
+
+def test_load_switches_exactly_at_the_edge_of_its_window(press: Model) -> None:
+    """A window that opens a millionth of a turn later gives a motion that differs in proportion: no step hides it."""
+    name = "mechanism.forces.punch.window.end"
+    base = press.parameters[name]
+
+    def end(shift: float) -> np.ndarray:
+        return press.simulate(
+            0.8, parameters={name: base + shift}, method="stepper-dop853", rtol=1e-12, samples_per_cycle=4
+        ).x[-1]
+
+    small, large = end(1e-6) - end(0.0), end(4e-6) - end(0.0)
+    # the bodies still swing at the end of the run; the response is as linear as a motion with kinks can be
+    assert np.linalg.norm(small) > 0.0
+    np.testing.assert_allclose(large / np.linalg.norm(large), small / np.linalg.norm(small), atol=0.02)
+    np.testing.assert_allclose(np.linalg.norm(large) / np.linalg.norm(small), 4.0, rtol=0.02)
+
+
+# samples
+
+
+@pytest.mark.parametrize("family", ORDERS)
+def test_states_do_not_depend_on_how_often_they_are_looked_at(
+    press: Model, magnitude: np.ndarray, family: Family
+) -> None:
+    numbers = press.numbers()
+    segments = segments_between(press, numbers, edges_of(press, numbers, 0.0, press.period()))
+    ends, shared = [], []
+    for samples in (100, 20_000):
+        times = segments.times[-1] * (np.arange(samples + 1) / samples)
+        found = run(press, numbers, segments, family=family, tolerance=1e-6 * magnitude, output_times=times)
+        assert found.outcome.written == samples + 1
+        assert np.array_equal(found.states[-1], found.end)
+        assert np.array_equal(found.states[0], press.initial())
+        ends.append(found.end)
+        shared.append(found.states[:: samples // 100])
+    assert np.array_equal(ends[0], ends[1])
+    # the same polynomials, at times that differ in the last bit
+    np.testing.assert_allclose(shared[0] / magnitude, shared[1] / magnitude, rtol=0.0, atol=1e-11)
+
+
+def test_grid_of_samples_does_not_move_the_motion(press: Model, magnitude: np.ndarray) -> None:
+    ends = [press.simulate(1, method="stepper", samples_per_cycle=n).x[-1] for n in (1, 3, 7, 64, 333, 2000)]
+    for end in ends[1:]:
+        assert np.array_equal(end, ends[0])
+
+
+def test_last_output_is_written_however_the_times_round(rotor: Model) -> None:
+    """start + (end - start) misses the end by a bit for many numbers; the output there must not be lost."""
+    numbers = rotor.numbers()
+    generator = np.random.default_rng(3)
+    for _ in range(400):
+        end = generator.uniform(1.50e-2, 1.56e-2)
+        segments = segments_between(rotor, numbers, np.array([end * generator.uniform(0.3, 0.4), end]))
+        family = Family(int(generator.integers(1, 5)))
+        found = run(rotor, numbers, segments, family=family, tolerance=np.array([4e-9, 4e-9, 1e-6, 1e-6]))
+        assert found.outcome.written == 2
+        assert np.array_equal(found.states[-1], found.end)
+
+
+# phases
+
+
+def test_phases_are_exact_after_a_hundred_thousand_turns(press: Model) -> None:
+    numbers = press.numbers()
+    turn = clock.period(press.manifest, numbers.values)
+    with mpmath.workdps(50):
+        for turns in (1, 997, 99_999, 100_000):
+            t = turns * turn
+            found = clock.inputs_at(press.manifest.inputs, numbers.values, t)
+            for value, info in zip(found, press.manifest.inputs, strict=True):
+                if info.kind == "phase":
+                    angle = mpmath.mpf(numbers.values[info.offset]) + mpmath.mpf(numbers.values[info.rate]) * t
+                    away = (mpmath.mpf(value) - angle + mpmath.pi) % (2 * mpmath.pi) - mpmath.pi
+                    assert abs(away) < 1e-9, (info.name, turns)
+            start = numbers.values[press.manifest.mechanism.start_angle]
+            away = (clock.crank_angle(press.manifest, numbers.values, t) - start + np.pi) % TURN - np.pi
+            assert abs(away) < 1e-9
+
+
+def test_two_thousandth_turn_is_a_run_that_starts_there(rotor: Model) -> None:
+    """Motion that forgets its start within a turn shows the phase it believes in: after 2 000 turns, that of exact
+    arithmetic."""
+    damping = {"bearing.inner_ring.damping": 3000.0}
+    turns, short = 2000, 12
+    values = rotor.numbers(damping).values
+    ball_angle, bearing = "bearing.ball_angle", rotor.manifest.bearing
+    phase = next(info for info in rotor.manifest.inputs if info.kind == "phase")
+    assert phase.offset == ball_angle
+    assert bearing is not None
+    with mpmath.workdps(50):
+        passed = mpmath.mpf(values[phase.rate]) * (turns - short) * mpmath.mpf(rotor.period())
+        there = float((mpmath.mpf(values[ball_angle]) + passed) % (2 * mpmath.pi))
+    options = {"method": "stepper-rodas5p", "rtol": 1e-9}
+    long = rotor.simulate(turns, parameters=damping, samples_per_cycle=2, **options)
+
+    def last(angle: float) -> np.ndarray:
+        run_there = rotor.simulate(short, parameters=damping | {ball_angle: angle}, samples_per_cycle=2, **options)
+        return run_there.x[-1, :2]
+
+    difference = np.max(np.abs(last(there) - long.x[-1, :2]))
+    moved = np.max(np.abs(last(there + 1e-6) - last(there)))
+    # of the angle: less than a tenth of a microradian, where the integration's own error ends
+    assert moved > 1e-14
+    assert difference < 0.1 * moved
+
+
+# statuses
+
+
+def limited(monkeypatch: pytest.MonkeyPatch, **options: float) -> None:
+    monkeypatch.setattr(Stepper, "run", partialmethod(Stepper.run, **options))
+
+
+def check_message(error: IntegrationError, samples: int) -> None:
+    text = str(error)
+    assert error.status.value in text
+    assert f"t = {error.time:.9g} s" in text
+    assert f"crank angle {np.degrees(error.crank_angle):.4f} deg" in text
+    assert "Step size" in text
+    partial = error.partial
+    assert 0 < len(partial) < samples
+    assert partial.t[-1] <= error.time
+    assert np.all(np.isfinite(partial.x))
+    assert len(partial["ball.force"]) == len(partial)
+
+
+@pytest.mark.parametrize("method", ["stepper", "stepper-rodas4", "stepper-rodas5p", "stepper-dp54", "stepper-dop853"])
+def test_run_of_too_many_steps_tells_and_keeps_its_samples(
+    press: Model, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    whole = press.simulate(1, method=method, samples_per_cycle=400)
+    limited(monkeypatch, max_steps=600)
+    with pytest.raises(IntegrationError) as caught:
+        press.simulate(1, method=method, samples_per_cycle=400)
+    assert caught.value.status is Status.TOO_MANY_STEPS
+    check_message(caught.value, 401)
+    done = len(caught.value.partial)
+    assert np.array_equal(caught.value.partial.x, whole.x[:done])
+
+
+@pytest.mark.parametrize("method", ["stepper-rodas5p", "stepper-dop853"])
+def test_tolerance_that_asks_for_smaller_steps_than_allowed_tells_which_state(
+    press: Model, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    limited(monkeypatch, smallest_step=5e-6)
+    with pytest.raises(IntegrationError) as caught:
+        press.simulate(1, method=method, rtol=1e-9, samples_per_cycle=4000)
+    assert caught.value.status is Status.STEP_TOO_SMALL
+    check_message(caught.value, 4001)
+    assert any(f"worst state {state}." in str(caught.value) for state in press.states)
+
+
+@pytest.mark.parametrize("family", ORDERS)
+def test_motion_that_grows_without_bound_ends_with_a_status(rotor: Model, family: Family) -> None:
+    """A bearing that pushes instead of holding: infinite after a finite time."""
+    numbers = rotor.numbers({"bearing.contact.stiffness": -1e12})
+    segments = segments_between(rotor, numbers, np.array([0.0, 1.0]))
+    tolerance = np.array([1e3, 1e3, 1e6, 1e6])
+    found = run(rotor, numbers, segments, family=family, tolerance=tolerance, max_steps=200_000)
+    assert found.outcome.end in (End.STEP_TOO_SMALL, End.NOT_FINITE)
+    assert 0.0 < found.outcome.time < 1.0
+    assert found.outcome.state >= 0
+    assert np.all(np.isfinite(found.end))
+
+
+@pytest.mark.parametrize("family", [Family.AUTO, *ORDERS])
+def test_what_is_not_a_number_is_refused_or_reported(rotor: Model, family: Family) -> None:
+    numbers = rotor.numbers()
+    segments = segments_between(rotor, numbers, np.array([0.0, 0.01]))
+    tolerance = np.array([4e-12, 4e-12, 1e-9, 1e-9])
+    start = rotor.initial()
+    start[3] = np.nan
+    state = run(rotor, numbers, segments, family=family, tolerance=tolerance, start=start)
+    assert (state.outcome.end, state.outcome.steps, state.outcome.written) == (End.NOT_FINITE, 0, 0)
+    for vector in (numbers.p, numbers.c):
+        for k in range(len(vector)):
+            kept, vector[k] = vector[k], np.nan
+            found = run(rotor, numbers, segments, family=family, tolerance=tolerance)
+            vector[k] = kept
+            # a number the motion does not depend on may be anything
+            assert found.outcome.end in (End.NOT_FINITE, End.DONE), (k, found.outcome)
+            assert np.all(np.isfinite(found.end))
+            if found.outcome.end is End.NOT_FINITE:
+                assert found.outcome.time == 0.0
+                assert found.outcome.steps == 0
+
+
+def test_faulty_calls_are_refused(rotor: Model) -> None:
+    numbers = rotor.numbers()
+    good = segments_between(rotor, numbers, np.array([0.0, 0.005, 0.01]))
+    backward = Segments(times=np.array([0.0, 0.01, 0.005]), inputs=good.inputs, restarts=good.restarts)
+    missing = Segments(times=np.array([0.0, np.nan, 0.01]), inputs=good.inputs, restarts=good.restarts)
+    for segments in (backward, missing):
+        found = run(rotor, numbers, segments, family=Family.DP54, tolerance=1e-9)
+        assert found.outcome.end is End.BAD_ARGUMENT
+        assert np.array_equal(found.end, rotor.initial())
+    with pytest.raises(RequestError, match="stepper-dop853"):
+        rotor.simulate(1, method="stepper-euler")
+    with pytest.raises(TypeError, match="float64"):
+        run(rotor, numbers, good, family=Family.DP54, tolerance=1e-9, output_times=None, start=None)._replace()
+
+
+# discontinuous laws
+
+
+@pytest.mark.parametrize("family", ORDERS)
+def test_law_that_jumps_is_got_through_or_given_up_with_a_status(make_model: Make, family: Family) -> None:
+    model = make_model(
+        "varying_compliance",
+        ('law = "none"  ', 'law = "two-sided-gated"\ncoefficient = "2e4 N*s/m"  '),
+    )
+    numbers = model.numbers({"bearing.clearance": 20e-6})
+    segments = segments_between(model, numbers, edges_of(model, numbers, 0.0, model.period()))
+    tolerance = np.array([4e-6, 4e-6, 1e-3, 1e-3])
+    for rtol in (1e-4, 1e-8, 1e-12):
+        found = run(model, numbers, segments, family=family, tolerance=rtol * tolerance, max_steps=2_000_000)
+        assert found.outcome.end in (End.DONE, End.STEP_TOO_SMALL)
+        assert np.all(np.isfinite(found.end))
+
+
+# threads and memory
+
+
+def test_eight_runs_at_once_give_the_bits_of_one_after_another(press: Model, magnitude: np.ndarray) -> None:
+    settings = [
+        (press.numbers({"bearing.clearance": 1e-6 * k}), family) for k in range(4, 20, 2) for family in ORDERS
+    ]
+
+    def one(setting: tuple) -> np.ndarray:  # type: ignore[type-arg]
+        numbers, family = setting
+        segments = segments_between(press, numbers, edges_of(press, numbers, 0.0, press.period()))
+        times = segments.times[-1] * (np.arange(401) / 400)
+        return run(press, numbers, segments, family=family, tolerance=1e-6 * magnitude, output_times=times).states
+
+    press.stepper  # noqa: B018  compiled once, before the threads
+    serial = [one(setting) for setting in settings]
+    with ThreadPoolExecutor(8) as pool:
+        together = list(pool.map(one, settings * 3))
+    for found, expected in zip(together, serial * 3, strict=True):
+        assert np.array_equal(found, expected)
+
+
+def test_driver_has_no_allocator_to_call(press: Model) -> None:
+    code = press.stepper.library.path.read_bytes()
+    for name in (b"malloc", b"calloc", b"realloc", b"free", b"alloca", b"fopen", b"printf"):
+        assert b"\0" + name + b"\0" not in code
+    # what it calls is in the same list of names
+    assert b"\0raceway_run\0" in code
+    assert b"\0sin\0" in code or b"\0sincos\0" in code
+
+
+def test_memory_stays_flat_over_two_thousand_runs(rotor: Model) -> None:
+    numbers = rotor.numbers()
+    segments = segments_between(rotor, numbers, np.array([0.0, 0.01]))
+    tolerance = np.array([4e-10, 4e-10, 1e-7, 1e-7])
+
+    def runs(count: int) -> None:
+        for k in range(count):
+            run(rotor, numbers, segments, family=Family(k % 5), tolerance=tolerance)
+
+    runs(50)
+    tracemalloc.start()
+    before, peak = tracemalloc.get_traced_memory()[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    runs(2000)
+    kept = tracemalloc.get_traced_memory()[0] - before
+    tracemalloc.stop()
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - peak
+    assert kept < 50_000  # bytes of Python objects
+    assert grown < 4096  # KiB of the process
+
+
+# choice of the family
+
+
+def test_auto_takes_the_family_that_fits(make_model: Make, press: Model) -> None:
+    paper = make_model("punching_press")
+    # the paper's damping number read in SI instead of millimetres
+    stiff = {"bearing.damping.ratio": paper.parameters["bearing.damping.ratio"] * 10.0**1.5}
+    stiff_run = paper.simulate(1, parameters=stiff, method="stepper", rtol=1e-5)
+    light_run = press.simulate(1, method="stepper", rtol=1e-5)
+    assert "rodas" in stiff_run.statistics.reason
+    assert "dp54" in light_run.statistics.reason or "dop853" in light_run.statistics.reason
+    forced = paper.simulate(1, parameters=stiff, method="stepper-dp54", rtol=1e-5)
+    assert stiff_run.statistics.steps is not None
+    assert forced.statistics.steps is not None
+    assert forced.statistics.steps > 5 * stiff_run.statistics.steps

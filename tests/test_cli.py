@@ -1,0 +1,486 @@
+"""Claims about the command ``raceway``: what it prints where, what it leaves behind, and how it says no.
+
+The shipped scenes run once, in processes of their own, in one folder with a cache of its own.  The compiler of these
+tests is a wrapper that can be told to refuse: what works then has compiled nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sysconfig
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from raceway.runtime import NoCompilerWarning, load_solution
+from raceway.runtime.cli import app
+from raceway.runtime.figures import FIGURES
+
+ROOT = Path(__file__).resolve().parent.parent
+SCENES = ROOT / "scenes"
+NAMES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
+PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
+
+#: A compiler that does its work unless the file beside it says no; its version stays the same, hence the cache's keys.
+WRAPPER = """#!/bin/sh
+for word in "$@"; do
+  if [ "$word" = -shared ] && [ -e "{refuse}" ]; then echo "no compiling today" >&2; exit 1; fi
+done
+exec {compiler} "$@"
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Site:
+    """A folder in which the shipped scenes have run.
+
+    Attributes
+    ----------
+    folder : with ``generated/`` and ``results/``
+    cache : folder of the compiled models
+    refuse : while this file is there, compiling fails
+    runs : what each scene's process gave
+    """
+
+    folder: Path
+    cache: Path
+    refuse: Path
+    runs: dict[str, subprocess.CompletedProcess[str]]
+
+    def summary(self, name: str) -> dict[str, Any]:
+        return json.loads(self.runs[name].stdout)
+
+
+def command(*words: str | Path) -> list[str]:
+    return [str(Path(sysconfig.get_path("scripts")) / "raceway"), *map(str, words)]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    if compiler is None:
+        pytest.skip("needs a C compiler: the tests are about when it is called")
+    base = tmp_path_factory.mktemp("cli")
+    folder, cache, refuse, wrapper = (base / name for name in ("site", "cache", "refuse", "cc"))
+    folder.mkdir()
+    wrapper.write_text(WRAPPER.format(refuse=refuse, compiler=compiler), encoding="utf-8")
+    wrapper.chmod(0o755)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CC", str(wrapper))
+        patch.setenv("RACEWAY_CACHE_DIR", str(cache))
+
+        def start(name: str) -> subprocess.CompletedProcess[str]:
+            figures = "--figures" if name == "punching_press" else "--no-figures"
+            words = command("run", SCENES / f"{name}.toml", "--json", figures)
+            return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+
+        with ThreadPoolExecutor(2) as pool:
+            runs = dict(zip(NAMES, pool.map(start, NAMES), strict=True))
+        yield Site(folder=folder, cache=cache, refuse=refuse, runs=runs)
+
+
+@pytest.fixture
+def refusing(site: Site) -> Iterator[None]:
+    site.refuse.touch()
+    yield
+    site.refuse.unlink()
+
+
+@pytest.fixture
+def raceway(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    """The command in this process, called in a folder."""
+
+    def call(folder: Path, *words: str | Path) -> Result:
+        monkeypatch.chdir(folder)
+        return CliRunner().invoke(app, [str(word) for word in words])
+
+    return call
+
+
+def contents(*folders: Path) -> dict[Path, tuple[int, str]]:
+    """Every file and folder below: time of the last change and digest."""
+    found = {}
+    for folder in folders:
+        for path in sorted(folder.rglob("*")):
+            digest = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+            found[path] = (path.stat().st_mtime_ns if path.is_file() else 0, digest)
+    return found
+
+
+def says_no(result: Result, *words: str, code: int = 2) -> None:
+    """Refused on purpose: the exit code, words on stderr, nothing on stdout, no traceback."""
+    assert result.exit_code == code, result.output
+    assert result.exception is None or isinstance(result.exception, SystemExit)
+    assert result.stdout == ""
+    assert "Traceback" not in result.stderr
+    for word in words:
+        assert word in result.stderr
+
+
+# ------------------------------------------------------------------------------------------------------ shipped scenes
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_shipped_scene_gives_one_json_object_on_stdout_and_nothing_else(site: Site, name: str) -> None:
+    run = site.runs[name]
+    assert run.returncode == 0, run.stderr
+    summary = json.loads(run.stdout)  # fails on anything before or behind the object
+    assert summary["scene"] == name
+    assert summary["status"] == "done"
+    assert summary["peak_ball_force"]["total"] > 0.0
+    assert json.loads((site.folder / "results" / name / "summary.json").read_text(encoding="utf-8")) == summary
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_progress_is_one_plain_line_a_stage_where_stderr_is_a_file(site: Site, name: str) -> None:
+    lines = site.runs[name].stderr.splitlines()
+    stages = [re.fullmatch(r" *[0-9]+\.[0-9] s  ([a-zA-Z ]+)", line) for line in lines]
+    assert all(stages), lines
+    words = [stage.group(1) for stage in stages if stage]
+    assert len(set(words)) == len(words)
+    assert "\x1b" not in site.runs[name].stderr
+    assert words[0] == "reading the scene"
+    assert "deriving equations" in words
+    assert "simulating" in words
+
+
+def test_results_are_the_files_that_were_promised(site: Site) -> None:
+    pictures = {f"{kind.name}.png" for kind in FIGURES}
+    folder = site.folder / "results" / "punching_press"
+    assert {path.name for path in folder.iterdir()} == {"solution.nc", "summary.json"} | pictures
+    assert sorted(path.name for path in (site.folder / "results").iterdir()) == sorted(NAMES)
+    solution = load_solution(folder / "solution.nc")
+    summary = site.summary("punching_press")
+    assert summary["inner.y"]["max"] == solution.steady()["inner.y"].max()
+    assert summary["reaction.A.y"]["max"] >= solution.steady()["reaction.A.y"].max()
+
+
+def test_a_second_run_gives_the_same_numbers(site: Site, raceway: Callable[..., Result], tmp_path: Path) -> None:
+    result = raceway(site.folder, "run", SCENES / "four_bar.toml", "--json", "--no-figures", "--out", tmp_path)
+    again, first = json.loads(result.stdout), site.summary("four_bar")
+    del again["wall_time"], first["wall_time"]
+    assert again == first
+
+
+def test_without_json_a_table_and_the_place_of_the_results_are_printed(
+    site: Site, raceway: Callable[..., Result], tmp_path: Path
+) -> None:
+    out = tmp_path / "deep" / "folder"
+    words = ("run", SCENES / "varying_compliance.toml", "--out", out, "--no-figures", "--cycles", "3")
+    before = contents(site.folder)
+    result = raceway(site.folder, *words, "--transient", "1")
+    assert result.exit_code == 0, result.stderr
+    assert "peak_ball_force" in result.stdout
+    assert f"results in {out}: solution.nc, summary.json" in result.stdout
+    assert sorted(path.name for path in out.iterdir()) == ["solution.nc", "summary.json"]
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["steady_cycles"]["value"] == pytest.approx(2.0)
+    assert contents(site.folder) == before
+
+
+# ---------------------------------------------------------------------------------- numbers change, structure does not
+
+
+@pytest.mark.usefixtures("refusing")
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "bearing.clearance=20 um",
+        "mechanism.bodies.rod.mass=3 kg",
+        "mechanism.bodies.crank.points.B=7 mm",
+        "mechanism.forces.punch.window.start=230 deg",
+        "mechanism.driver.speed=600 rpm",
+    ],
+)
+def test_another_number_derives_nothing_and_compiles_nothing(
+    site: Site, raceway: Callable[..., Result], tmp_path: Path, setting: str
+) -> None:
+    before = contents(site.folder, site.cache)
+    words = ("run", SCENES / "punching_press.toml", "--json", "--no-figures", "--out", tmp_path, "--set", setting)
+    result = raceway(site.folder, *words)
+    assert result.exit_code == 0, result.stderr
+    assert "deriving" not in result.stderr
+    # not even rewritten with the same bytes: the times of the last change are compared as well
+    assert contents(site.folder, site.cache) == before
+    changed, printed = json.loads(result.stdout), site.summary("punching_press")
+    assert changed["peak_ball_force"]["total"] != pytest.approx(printed["peak_ball_force"]["total"], rel=1e-4)
+
+
+def test_the_refusing_compiler_would_have_been_noticed(
+    site: Site, raceway: Callable[..., Result], tmp_path: Path, refusing: None
+) -> None:
+    nine = tmp_path / "nine.toml"
+    nine.write_text(PRESS.replace("balls = 8 ", "balls = 9 "), encoding="utf-8")
+    result = raceway(tmp_path, "run", nine)
+    says_no(result, "The C compiler failed with exit code 1", "no compiling today", "set CC", code=1)
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.usefixtures("refusing")
+def test_set_equals_the_same_value_in_the_file(site: Site, raceway: Callable[..., Result], tmp_path: Path) -> None:
+    plain = ("--json", "--no-figures", "--out", tmp_path / "results")
+    by_set = raceway(site.folder, "run", SCENES / "punching_press.toml", *plain, "--set", "bearing.clearance=20e-6 m")
+    edited = tmp_path / "punching_press.toml"
+    edited.write_text(PRESS.replace('clearance = "10 um"', 'clearance = "20 um"'), encoding="utf-8")
+    # derived anew in an empty folder; the same structure gives the same C, which is in the cache
+    by_file = raceway(tmp_path, "run", edited, *plain)
+    assert by_file.exit_code == 0, by_file.stderr
+    assert "deriving equations" in by_file.stderr
+    first, second = json.loads(by_set.stdout), json.loads(by_file.stdout)
+    del first["wall_time"], second["wall_time"]
+    assert first == second
+
+
+# --------------------------------------------------------------------------------------------------- wrong scene files
+
+WRONG = [
+    ("missing unit", 'clearance = "10 um"', 'clearance = "10"', ("bearing.clearance", "unit is missing")),
+    ("wrong dimension", 'clearance = "10 um"', 'clearance = "10 kg"', ("bearing.clearance", "dimension", "length")),
+    ("unknown key", 'clearance = "10 um"', 'clearence = "10 um"', ("clearence", "bearing.clearance")),
+    ("negative mass", 'mass = "2.55 kg"', 'mass = "-2.55 kg"', ("mechanism.bodies.rod.mass", "-2.55 kg", "above zero")),
+    ("locks", 'C = "100 mm"', 'C = "4 mm"', ("cannot be assembled at joint C", "crank angle", "rod")),
+    ("unknown body", 'bodies = ["crank", "rod"]', 'bodies = ["crank", "rood"]', ("mechanism.joints.B", "rood", "rod")),
+    ("NaN", 'clearance = "10 um"', 'clearance = "nan um"', ("bearing.clearance", "nan um", "finite")),
+    ("unknown output", '"drive_torque"]', '"inner.z"]', ("run.outputs", "inner.z", "inner.x")),
+    ("not TOML", "[bearing]", "[bearing", ("not TOML",)),
+]
+
+
+@pytest.mark.parametrize(("name", "old", "new", "words"), WRONG, ids=[case[0] for case in WRONG])
+def test_wrong_scene_is_refused_in_words_and_nothing_is_written(
+    raceway: Callable[..., Result], tmp_path: Path, name: str, old: str, new: str, words: tuple[str, ...]
+) -> None:
+    assert PRESS.count(old) == 1
+    scene = tmp_path / "wrong.toml"
+    scene.write_text(PRESS.replace(old, new), encoding="utf-8")
+    for subcommand in ("run", "derive"):
+        result = raceway(tmp_path, subcommand, scene)
+        says_no(result, str(scene), *words, "given:", "allowed:", "remedy:")
+        assert list(tmp_path.iterdir()) == [scene]
+
+
+def test_all_faults_of_a_scene_are_told_at_once(raceway: Callable[..., Result], tmp_path: Path) -> None:
+    scene = tmp_path / "wrong.toml"
+    text = PRESS.replace('clearance = "10 um"', 'clearance = "10"').replace('mass = "2.55 kg"', 'mass = "-1 kg"')
+    scene.write_text(text, encoding="utf-8")
+    clearance, mass = (text[: text.index(key)].count("\n") + 1 for key in ('clearance = "10"', 'mass = "-1 kg"'))
+    result = raceway(tmp_path, "run", scene)
+    says_no(result, "2 faults", f"bearing.clearance (line {clearance})", f"mechanism.bodies.rod.mass (line {mass})")
+
+
+def test_empty_and_missing_files_are_refused_by_the_process(site: Site, tmp_path: Path) -> None:
+    empty = tmp_path / "empty.toml"
+    empty.touch()
+    for path, words in ((empty, "the file is empty"), (tmp_path / "missing.toml", "No such file")):
+        run = subprocess.run(
+            command("run", path, "--json"), cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+        )
+        assert run.returncode == 2
+        assert run.stdout == ""
+        assert words in run.stderr
+        assert "remedy:" in run.stderr
+        assert "Traceback" not in run.stderr
+    assert list(tmp_path.iterdir()) == [empty]
+
+
+# ------------------------------------------------------------------------------------------------------ wrong requests
+
+REFUSED = [
+    (
+        "unknown parameter",
+        ("--set", "bearing.clearence=20 um"),
+        ("bearing.clearence", 'did you mean "bearing.clearance"'),
+    ),
+    ("no unit", ("--set", "bearing.clearance=20"), ("--set", "bearing.clearance", "unit is missing", "remedy:")),
+    ("wrong dimension", ("--set", "bearing.clearance=20 kg"), ("bearing.clearance", "20 kg", "remedy:")),
+    ("NaN", ("--set", "bearing.clearance=nan um"), ("bearing.clearance", "finite")),
+    ("negative mass", ("--set", "mechanism.bodies.rod.mass=-1 kg"), ("mechanism.bodies.rod.mass", "above zero")),
+    ("no value", ("--set", "bearing.clearance"), ("PATH=VALUE",)),
+    ("structure", ("--set", "bearing.balls=9"), ("bearing.balls", "change it in the scene file")),
+    ("locks", ("--set", "mechanism.bodies.rod.points.C=3 mm"), ("joint C", "crank angle", "allowed:", "remedy:")),
+    ("two faults", ("--set", "a=1 m", "--set", "bearing.clearance=1"), ("2 faults", "a:", "bearing.clearance")),
+    ("method", ("--method", "runge"), ("'runge'", "auto, stepper", "cvodes")),
+    ("tolerance", ("--rtol", "5"), ("--rtol", "5", "1e-13 to 0.1")),
+    ("tolerance NaN", ("--rtol", "nan"), ("--rtol", "nan", "1e-13 to 0.1")),
+    ("no cycles", ("--cycles", "0"), ("--cycles", "above 0")),
+    ("infinite cycles", ("--cycles", "inf"), ("--cycles", "above 0")),
+    ("all transient", ("--cycles", "2"), ("2 transient", "--transient 0")),
+    ("negative transient", ("--transient", "-1"), ("--transient", "from 0 on")),
+    ("no number", ("--cycles", "many"), ("--cycles", "number")),
+    ("unknown option", ("--cycle", "3"), ("--cycle", "--cycles")),
+    ("file in the way", ("--out", "file/results"), ("file/results", "cannot be written", "--out DIR")),
+]
+
+
+@pytest.mark.parametrize(("name", "words", "said"), REFUSED, ids=[case[0] for case in REFUSED])
+def test_wrong_request_is_refused_before_anything_is_written(
+    raceway: Callable[..., Result], tmp_path: Path, name: str, words: tuple[str, ...], said: tuple[str, ...]
+) -> None:
+    (tmp_path / "file").touch()
+    result = raceway(tmp_path, "run", SCENES / "punching_press.toml", *words)
+    says_no(result, *said)
+    assert "compiling" not in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="the superuser may write everywhere")
+def test_folder_without_permission_is_refused(raceway: Callable[..., Result], tmp_path: Path) -> None:
+    locked = tmp_path / "locked"
+    locked.mkdir(mode=0o555)
+    result = raceway(tmp_path, "run", SCENES / "punching_press.toml", "--out", locked / "results")
+    says_no(result, str(locked), "may not be written", "--out DIR")
+    result = raceway(tmp_path, "derive", SCENES / "punching_press.toml", "--out", locked / "generated")
+    says_no(result, str(locked), "permissions")
+
+
+def test_folder_that_cannot_be_made_is_refused_by_derive(raceway: Callable[..., Result], tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    result = raceway(tmp_path, "derive", SCENES / "varying_compliance.toml", "--out", tmp_path / "file" / "generated")
+    says_no(result, "file", "Check the path")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+# --------------------------------------------------------------------------------------------------- derive, equations
+
+
+def test_check_tells_fresh_stale_and_missing_and_its_remedy_works(
+    raceway: Callable[..., Result], tmp_path: Path
+) -> None:
+    scene = tmp_path / "rotor.toml"
+    text = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
+    scene.write_text(text, encoding="utf-8")
+    says_no(raceway(tmp_path, "derive", "--check", scene), "does not exist", f"raceway derive {scene}", code=1)
+    assert raceway(tmp_path, "derive", scene).stdout == "generated/rotor\n"
+    before = contents(tmp_path)
+    assert raceway(tmp_path, "derive", "--check", scene).exit_code == 0
+
+    # a number is in the manifest, the text of the equations in a file of its own
+    scene.write_text(text.replace('clearance = "0 um"', 'clearance = "1 um"'), encoding="utf-8")
+    assert scene.read_text(encoding="utf-8") != text
+    says_no(raceway(tmp_path, "derive", "--check", scene), "stale: manifest.json.", f"raceway derive {scene}", code=1)
+    scene.write_text(text, encoding="utf-8")
+    (tmp_path / "generated" / "rotor" / "EQUATIONS.md").write_text("x = 1\n", encoding="utf-8")
+    says_no(raceway(tmp_path, "derive", "--check", scene), "stale: EQUATIONS.md.", code=1)
+
+    assert raceway(tmp_path, "derive", scene).exit_code == 0
+    assert raceway(tmp_path, "derive", "--check", scene).stdout == "generated/rotor is up to date\n"
+    after = contents(tmp_path)
+    assert {path: digest for path, (_, digest) in after.items()} == {
+        path: digest for path, (_, digest) in before.items()
+    }
+
+
+def test_equations_are_markdown_with_the_matrix_of_eq_1(raceway: Callable[..., Result], tmp_path: Path) -> None:
+    result = raceway(tmp_path, "equations", SCENES / "punching_press.toml")
+    assert result.exit_code == 0
+    assert re.search(r"^# \S", result.stdout, re.MULTILINE)
+    assert "matrix}" in result.stdout
+    assert "Eq. (1)" in result.stdout
+    assert "`bearing.clearance`" in result.stdout
+    assert result.stdout.endswith("\n")
+    assert not list(tmp_path.iterdir())
+    # what is committed beside the C is the same text
+    assert result.stdout == (ROOT / "generated" / "punching_press" / "EQUATIONS.md").read_text(encoding="utf-8")
+
+
+def test_version_and_help_are_printed(raceway: Callable[..., Result], tmp_path: Path) -> None:
+    assert re.fullmatch(r"raceway \d+\.\d+\.\d+\S*\n", raceway(tmp_path, "--version").stdout)
+    help_text = raceway(tmp_path, "--help").stdout
+    assert all(name in help_text for name in ("run", "derive", "equations", "--version"))
+    assert "--transient" in raceway(tmp_path, "run", "--help").stdout
+
+
+# ------------------------------------------------------------------------------- interruptions, and results that exist
+
+
+def started(site: Site, folder: Path, *words: str) -> subprocess.Popen[str]:
+    """A run of the press in `folder` that has begun to simulate."""
+    process = subprocess.Popen(
+        command("run", SCENES / "punching_press.toml", "--out", str(folder), *words),
+        cwd=site.folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    for line in process.stderr:
+        if "simulating" in line:
+            return process
+    raise AssertionError(f"ended with {process.wait()}")
+
+
+@pytest.mark.parametrize("method", ["stepper", "cvodes"])
+def test_interrupted_run_leaves_no_results_and_says_so(site: Site, tmp_path: Path, method: str) -> None:
+    if method == "stepper":
+        old = tmp_path / "results"
+        shutil.copytree(site.folder / "results" / "punching_press", old)
+    before = contents(tmp_path)
+    with started(site, tmp_path / "results", "--method", method, "--cycles", "500", "--rtol", "1e-12") as process:
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(0.5)  # it is on the way
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "interrupted" in err
+    assert "Traceback" not in err
+    assert "integrator could not" not in err
+    assert out == ""
+    assert contents(tmp_path) == before
+
+
+def test_interruption_while_writing_leaves_nothing_half_written(
+    site: Site, raceway: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: Any) -> None:
+        assert list(tmp_path.rglob("solution.nc")), "the solution is written before the figures"
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("raceway.runtime.figures.draw_all", interrupted)
+    words = ("run", SCENES / "varying_compliance.toml", "--cycles", "3", "--transient", "1", "--out")
+    says_no(raceway(site.folder, *words, tmp_path / "new" / "results"), "interrupted", code=130)
+    assert not list(tmp_path.iterdir())
+
+
+def test_results_are_replaced_file_by_file(site: Site, raceway: Callable[..., Result], tmp_path: Path) -> None:
+    scene = SCENES / "varying_compliance.toml"
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
+    (tmp_path / "orbit.png").write_bytes(b"of an earlier run")
+    (tmp_path / "summary.json").write_text("old", encoding="utf-8")
+    with (tmp_path / "summary.json").open(encoding="utf-8") as reader:
+        words = ("--cycles", "3", "--transient", "1", "--no-figures", "--out", tmp_path)
+        assert raceway(site.folder, "run", scene, *words).exit_code == 0
+        assert reader.read() == "old"  # who reads the old file reads it to its end
+    # a figure of another run would pass for one of this
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.txt", "solution.nc", "summary.json"]
+    assert (tmp_path / "notes.txt").read_text(encoding="utf-8") == "mine"
+    assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["scene"] == "varying_compliance"
+    assert np.isfinite(load_solution(tmp_path / "solution.nc")["inner.x"]).all()
+
+
+@pytest.mark.filterwarnings("default::raceway.runtime.NoCompilerWarning")
+def test_without_a_compiler_a_warning_names_the_cost_and_the_numbers_agree(
+    site: Site, raceway: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("raceway.runtime.compile.find_compiler", lambda command: None)
+    words = ("run", SCENES / "punching_press.toml", "--json", "--no-figures", "--out", tmp_path)
+    result = raceway(site.folder, *words)
+    assert result.exit_code == 0, result.stderr
+    assert issubclass(NoCompilerWarning, UserWarning)
+    assert "warning: No C compiler was found" in result.stderr
+    assert "times as long" in result.stderr
+    found, compiled = json.loads(result.stdout), site.summary("punching_press")
+    assert found["compiled"] is False
+    # two methods at a relative tolerance of 1e-6 per step
+    assert found["peak_ball_force"]["total"] == pytest.approx(compiled["peak_ball_force"]["total"], rel=1e-4)
