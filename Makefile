@@ -3,13 +3,14 @@
 # make lint    style, types, import contract, freshness of the committed artefact
 # make docs    builds the documentation into docs/_build/html
 # make generated   derives the committed artefact anew
+# make bench   installs the peers into a venv of their own and measures (a quarter of an hour); QUICK=1: a minute, for show
 
 PYTHON ?= python3
 VENV ?= .venv
 export PYTHON VENV
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint docs generated clean
+.PHONY: demo test lint docs generated bench clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.ready
@@ -31,6 +32,18 @@ docs: $(VENV)/.ready-docs
 
 generated: $(VENV)/.ready
 	$(BIN)/raceway derive scenes/punching_press.toml
+
+BENCH_VENV := benchmarks/.venv
+
+bench: $(BENCH_VENV)/.ready
+	$(BENCH_VENV)/bin/python -m benchmarks $(if $(QUICK),--quick --out build/benchmarks/quick) $(if $(FRESH),--fresh)
+
+$(BENCH_VENV)/.ready: pyproject.toml requirements.txt benchmarks/requirements.txt scripts/setup.sh
+	@VENV=$(BENCH_VENV) scripts/setup.sh
+	@$(BENCH_VENV)/bin/python -m pip install --quiet --disable-pip-version-check -c requirements.txt -c benchmarks/requirements.txt -e ".[bench]"
+	@$(BENCH_VENV)/bin/python -m pip install --quiet --disable-pip-version-check -c benchmarks/requirements.txt numbalsoda || \
+	  printf '%s\n' "bench: numbalsoda could not be installed (it has no wheel and needs gfortran and cmake; Debian: apt install gfortran); going on without" >&2
+	@touch $@
 
 clean:
 	rm -rf results docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

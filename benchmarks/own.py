@@ -191,6 +191,10 @@ def hand_run(member: Member, tolerance: float, method: str, *, outputs: bool = T
     return states, counts
 
 
+def _hand_ready() -> None:
+    hand()
+
+
 def _by_hand(method: str) -> Contender:
     def counts(member: Member, tolerance: float) -> dict[str, int]:
         _, found = hand_run(member, tolerance, method)
@@ -202,7 +206,7 @@ def _by_hand(method: str) -> Contender:
         group="by hand in C",
         solve=lambda member, tolerance: hand_run(member, tolerance, method)[0],
         tolerances=HALVES,
-        ready=lambda: hand() and None,
+        ready=_hand_ready,
         counts=counts,
     )
 
@@ -264,8 +268,8 @@ class CasadiIntegrators:
 
 
 def _integrator(member: Member, plugin: str, segment: int, grid: list[float], jit: bool) -> casadi.Function:
-    """An integrator of the scaled states over a normalised segment, as in raceway.runtime.integrators, with this
-    grid.""" model, rhs = member.model, member.model.symbolic("rhs")
+    """An integrator of the scaled states over a normalised segment, as in raceway.runtime.integrators."""
+    model, rhs = member.model, member.model.symbolic("rhs")
     manifest = model.manifest
     sizes = {"u": len(manifest.inputs), "p": len(manifest.parameters), "c": len(manifest.constants)}
     symbols = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
@@ -286,7 +290,9 @@ def _integrator(member: Member, plugin: str, segment: int, grid: list[float], ji
     name = f"{plugin}_{segment}"
     if not jit:
         return casadi.integrator(name, plugin, equations, 0.0, grid, options)
-    options.update(jit=True, compiler="shell", jit_cleanup=False, jit_options={"flags": ["-O3", "-march=native"], "cleanup": False})
+    options.update(
+        jit=True, compiler="shell", jit_cleanup=False, jit_options={"flags": ["-O3", "-march=native"], "cleanup": False}
+    )
     here = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:  # CasADi compiles in the working folder
         os.chdir(folder)

@@ -91,7 +91,9 @@ def press_numbers(model: Model, parameters: dict[str, float]) -> Press:
         and numbers.half_clearance >= 0.0
     )
     if not fitting:
-        raise ValueError("press: a balanced crank, a vertical guide below it and a clearance are what the formulas hold for")
+        raise ValueError(
+            "press: a balanced crank, a vertical guide below it and a clearance are what the formulas hold for"
+        )
     return numbers
 
 
@@ -129,8 +131,17 @@ def make_load(xp: ModuleType) -> Load:
 Rate = Callable[[Press, float, Any, Any], Any]
 
 
-def make_vector_rate(xp: ModuleType, load: Load, balls: int, tangent: bool) -> Rate:
-    """dx/dt with the balls as a vector; `xp`: numpy or jax.numpy."""
+def make_vector_rate(
+    xp: ModuleType, load: Load, balls: int, tangent: bool, root_of: Callable[[Any], Any] | None = None
+) -> Rate:
+    """dx/dt with the balls as a vector.
+
+    Parameters
+    ----------
+    xp : numpy or jax.numpy
+    root_of : a square root whose derivative at zero is finite, where one is needed
+    """
+    square_root = root_of or xp.sqrt
     spread = 2.0 * np.pi * np.arange(balls) / balls
 
     def rate(n, gate, t, x):  # type: ignore[no-untyped-def]
@@ -142,7 +153,7 @@ def make_vector_rate(xp: ModuleType, load: Load, balls: int, tangent: bool) -> R
         vy = x[5] - x[7] - n.cage_speed * rx
         deflection = xp.maximum(rx * co + ry * si - n.half_clearance, 0.0)
         closing = vx * co + vy * si
-        root = xp.sqrt(deflection)
+        root = square_root(deflection)
         if tangent:
             force = n.contact * root * (deflection + 1.5 * n.rate * closing)
         else:

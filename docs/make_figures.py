@@ -20,7 +20,7 @@ IMAGES = ROOT / "docs" / "images"
 PICTURES = {
     "punching_press": ("load_curve", "orbit", "spectra", "phase_portrait", "ball_loads", "peak_moment"),
     "four_bar": ("peak_moment",),
-    "varying_compliance": ("orbit",),
+    "varying_compliance": ("orbit", "peak_moment"),
 }
 
 

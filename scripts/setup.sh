@@ -15,11 +15,13 @@ command -v "$python" >/dev/null 2>&1 ||
 "$python" -c 'import venv, ensurepip' 2>/dev/null ||
   missing "Python's venv module is missing (Debian: apt install python3-venv)"
 if ! command -v cc >/dev/null 2>&1 && ! command -v gcc >/dev/null 2>&1 && ! command -v clang >/dev/null 2>&1; then
-  printf '%s\n' "setup: no C compiler found (Debian: apt install gcc). Going on without: simulations run in a virtual machine, many times slower." >&2
+  printf '%s\n' "setup: no C compiler found (Debian: apt install gcc; without root, later: $venv/bin/pip install ziglang). Going on without: simulations run in CasADi's virtual machine, some ten times slower." >&2
 fi
 
-[ -x "$venv/bin/python" ] || { printf '%s\n' "setup: making $venv"; "$python" -m venv "$venv"; }
-printf '%s\n' "setup: installing raceway${extras:+ with $extras} (first time: some 150 MB of downloads)"
+# an environment with pip, not just a folder: a setup that was interrupted is taken up again
+"$venv/bin/python" -c 'import pip, sys; sys.exit(sys.prefix == sys.base_prefix)' 2>/dev/null ||
+  { printf '%s\n' "setup: making $venv"; "$python" -m venv "$venv"; }
+printf '%s\n' "setup: installing raceway${extras:+ with $extras} into $venv (first time: some 150 MB of downloads, a minute or so)"
 target=.
 [ -z "$extras" ] || target=".[$extras]"
 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -c requirements.txt -e "$target"

@@ -33,12 +33,13 @@ SCENES = ROOT / "scenes"
 NAMES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
 PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
 
-#: A compiler that does its work unless the file beside it says no; its version stays the same, hence the cache's keys.
+#: A compiler that does its work, in a hurry, unless the file beside it says no; its version stays the same, hence the
+#: cache's keys.
 WRAPPER = """#!/bin/sh
 for word in "$@"; do
   if [ "$word" = -shared ] && [ -e "{refuse}" ]; then echo "no compiling today" >&2; exit 1; fi
 done
-exec {compiler} "$@"
+exec {compiler} "$@" -O0
 """
 
 

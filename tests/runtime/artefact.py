@@ -33,6 +33,8 @@ DEFAULTS = {
     "table.y.1": ("N", 0.0),
     "table.y.2": ("N", 0.0),
     "table.y.3": ("N", 0.0),
+    "mechanism.forces.push.force.x": ("N", 5.0),
+    "mechanism.forces.push.force.y": ("N", 0.0),
     "initial.x": ("m", 0.01),
     "initial.v": ("m/s", -0.2),
 }
@@ -178,8 +180,9 @@ def manifest(
             speed="driver.speed",
             start_angle="driver.start_angle",
             joints=(),
-            points=(),
+            points=(mf.PointInfo(body="pin", point="P"),),
             margins=(mf.MarginInfo(joint="C", description="reach of the rod"),),
+            forces=(("push", "pin", "P", "gate.push"),),
         )
         if mechanism
         else None,

@@ -12,16 +12,18 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from matplotlib.text import Text
+from matplotlib.text import Annotation, Text
 
 from raceway.runtime import Model, Solution
 from raceway.runtime.errors import RequestError
 from raceway.runtime.figures import FIGURES, draw, draw_all
 from raceway.runtime.figures.canvas import INK, PALE, SAND, SIGNAL
+from raceway.runtime.figures.mechanism import draw_mechanism
 from raceway.runtime.figures.record import gather
 
 Run = tuple[Model, Solution]
@@ -207,6 +209,47 @@ def test_drawn_bearing_shows_the_moment_of_the_highest_ball_force(press: Run) ->
     for patch, angle in zip(balls, angles, strict=True):
         assert np.hypot(*patch.center) == pytest.approx(33.5e-3 / 2, rel=0.06)
         assert patch.center / np.hypot(*patch.center) == pytest.approx([np.cos(angle), np.sin(angle)], abs=1e-6)
+
+
+def arrows(axes: Axes) -> list[Annotation]:
+    return [item for item in axes.findobj(Annotation) if item.arrow_patch is not None]
+
+
+def test_applied_force_is_drawn_where_it_acts_and_while_it_acts(press: Run) -> None:
+    """The punch pushes the slider up, from 237 to 267 degrees of the crank: a second arrow there, one elsewhere."""
+    record = gather(*press)
+    angles = np.degrees(record.crank_angle()) % 360.0
+    for angle, names in ((236.9, []), (237.1, ["punch"]), (266.9, ["punch"]), (267.1, []), (90.0, [])):
+        sample = int(np.argmin(np.abs(angles - angle)))
+        axes = Figure().add_subplot()
+        draw_mechanism(axes, record, sample)
+        written = [text.get_text() for text in axes.texts]
+        assert [text.split("\n")[0] for text in written if text.startswith("punch")] == names
+        assert len(arrows(axes)) == 1 + len(names)
+        if names:
+            arrow = arrows(axes)[-1]
+            slider = record.points(float(record.t[sample]))["slider", "C"]
+            assert arrow.xy == pytest.approx(slider)
+            assert arrow.xyann[0] == pytest.approx(slider[0])
+            assert arrow.xyann[1] < slider[1] - 0.01
+            assert "punch\n8965 N" in written
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ('force = { magnitude = "50 N", direction = "120 deg" }', (-25.0, 25.0 * np.sqrt(3.0))),
+        ('force = ["3 N", "-4 N"]', (3.0, -4.0)),
+    ],
+)
+def test_applied_force_has_the_components_of_the_scene(
+    make_model: Callable[..., Model], change: str, expected: tuple[float, float]
+) -> None:
+    always = ('window = { start = "237 deg", end = "267 deg" }', "")
+    model = make_model("punching_press", ('force = ["0 N", "8964.8 N"]', change), always)
+    ((name, place, force),) = gather(model, model.simulate(cycles=0.01, transient=0)).applied_forces(1e-4)
+    assert (name, place) == ("punch", ("slider", "C"))
+    assert force == pytest.approx(expected)
 
 
 def luminance(colour: tuple[float, float, float]) -> float:

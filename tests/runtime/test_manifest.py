@@ -52,6 +52,16 @@ def test_round_trip_gives_the_same_record_and_the_same_bytes(folder: Path) -> No
         (lambda d: d.update(initial=["initial.x"]), ["initial: 2 names"]),
         (lambda d: d["run"].update(duration=1.0), ["exactly one of cycles and duration"]),
         (lambda d: d.update(mechanism=3), ["mechanism: an object", "number 3"]),
+        (lambda d: d["mechanism"]["forces"][0].pop(), ["mechanism.forces[0]: 4 entries"]),
+        (
+            lambda d: d["mechanism"]["forces"][0].__setitem__(2, "Q"),
+            ["mechanism.forces[push]: 'Q' of 'pin' is no point"],
+        ),
+        (lambda d: d["mechanism"]["forces"][0].__setitem__(3, "gate.pull"), ["'gate.pull' is no gate"]),
+        (
+            lambda d: d["mechanism"]["forces"][0].__setitem__(0, "pull"),
+            ["mechanism.forces.pull.force.x and", "missing"],
+        ),
     ],
 )
 def test_each_fault_is_named(folder: Path, change: Any, words: list[str]) -> None:

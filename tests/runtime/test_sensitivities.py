@@ -56,8 +56,8 @@ def extrapolated(function: Callable[[float], np.ndarray], step: float) -> np.nda
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda f: f.name.lower())
 def test_every_method_differentiates_its_own_steps_exactly(make_model: Callable[..., Model], family: Family) -> None:
-    """All parameters in one pass, against differences of the same discrete map; 1e-6 is what the differences can
-    show.""" model = make_model("punching_press_tangent")
+    """All parameters in one pass, against differences of the same discrete map, which show no more than 1e-6."""
+    model = make_model("punching_press_tangent")
     names = list(model.parameters)
     plain, _ = fixed_steps(model, family, SMOOTH, [], step=4e-6, duration=1e-3)
     states, derivatives = fixed_steps(model, family, SMOOTH, names, step=4e-6, duration=1e-3)
@@ -106,8 +106,8 @@ def test_derivatives_by_moving_edges_of_a_load(make_model: Callable[..., Model])
 
 
 def test_static_deflection_follows_the_two_thirds_power(make_model: Callable[..., Model]) -> None:
-    """At rest under F with zero clearance, delta = const * (F/k)^(2/3): d(delta)/dF = 2 delta/(3 F), d/dk = -2
-    delta/(3 k).""" model = make_model("varying_compliance")
+    """At rest with zero clearance delta = const (F/k)^(2/3), so d(delta)/dF = 2 delta/(3 F), d/dk = -2 delta/(3 k)."""
+    model = make_model("varying_compliance")
     parameters = {"shaft.speed": 0.0, "bearing.initial.inner.y": 0.0, "bearing.inner_ring.damping": 4e5}
     names = ["load.force.x", "bearing.contact.stiffness"]
     result = model.sensitivities(names, duration=1.0, parameters=parameters, rtol=1e-9, samples_per_cycle=16)

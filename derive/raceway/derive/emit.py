@@ -285,6 +285,7 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
         joints=tuple((j.name, j.kind, j.bodies[0], j.points[0], j.bodies[1], j.points[1]) for j in mechanism.joints),
         points=tuple(mf.PointInfo(body=p.body, point=p.point) for p in linkage.points),
         margins=tuple(mf.MarginInfo(joint=m.joint, description=m.description) for m in linkage.margins),
+        forces=tuple((f.name, f.body, f.point, f"gate.{f.name}" if f.windows else "") for f in mechanism.forces),
     )
 
 

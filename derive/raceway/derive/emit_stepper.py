@@ -106,8 +106,8 @@ def methods_header() -> str:
         _NOTE,
         "#ifndef RACEWAY_METHODS_H\n#define RACEWAY_METHODS_H",
         f"enum {{ RW_METHOD_STAGES = {stages}, RW_DENSE_ROWS = {rows}, {sizes} }};",
-        "typedef struct {\n    int stages, inner, dense_rows; /* inner: stages between start and end */\n    double
-        error_exponent, gamma;\n" "    double nodes[RW_METHOD_STAGES], time_weights[RW_METHOD_STAGES];\n"
+        "typedef struct {\n    int stages, inner, dense_rows; /* inner: stages between start and end */\n"
+        "    double error_exponent, gamma;\n    double nodes[RW_METHOD_STAGES], time_weights[RW_METHOD_STAGES];\n"
         "    double a[RW_METHOD_STAGES][RW_METHOD_STAGES], coupling[RW_METHOD_STAGES][RW_METHOD_STAGES];\n"
         "    double weights[RW_METHOD_STAGES], error_weights[RW_METHOD_STAGES];\n"
         "    double dense[RW_DENSE_ROWS][RW_METHOD_STAGES];\n} rw_rosenbrock_method;",

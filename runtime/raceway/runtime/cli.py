@@ -56,6 +56,7 @@ _STAGES = {
     "emit": "generating C",
     "check": "deriving to compare",
     "compile": "compiling",
+    "export": "writing the C program",
     "simulate": "simulating",
     "draw": "drawing figures",
     "write": "writing results",
@@ -252,6 +253,36 @@ def equations(scene: SceneFile) -> None:
     with _reported(), _faults_of(scene):
         text = deriving.equations(deriving.derive(deriving.read_scene(scene)))
     typer.echo(text, nl=False)
+
+
+@app.command()
+def export(
+    scene: SceneFile,
+    c: Annotated[
+        bool, typer.Option("--c", help="A C99 program with the model, the stepper, a Makefile and a main.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder to write; export/<scene> if not given.")
+    ] = None,
+) -> None:
+    """Write a scene as a program that runs without Python: make, and it prints the motion as CSV."""
+    from raceway.derive import generate, read_scene
+
+    with _reported(), _warnings_shown():
+        if not c:
+            raise RequestError("export: no format was given. Allowed: --c, a program in C99.")
+        with _Stages() as stages, _faults_of(scene):
+            stages("read")
+            read = read_scene(scene)
+            folder = out if out is not None else Path("export") / read.name
+            _check_folder(folder)
+            generated = generate(read, progress=stages)
+            stages("export")
+            # here, for it brings CasADi
+            from raceway.runtime.export import export_c
+
+            export_c(generated, folder)
+    typer.echo(str(folder))
 
 
 @contextlib.contextmanager

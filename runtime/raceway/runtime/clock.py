@@ -146,8 +146,8 @@ def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float)
                 found[((item.times[int(k)], 1.0),)] = None
     if len(found) > 1:
         raise RequestError(
-            f"At t = {t:.9g} s several loads switch at once ({', '.join(entry[0][0] for entry in found)}): the motion has "
-            "no derivative along a parameter that moves only one of them. Move their edges apart."
+            f"At t = {t:.9g} s several loads switch at once ({', '.join(entry[0][0] for entry in found)}): the motion "
+            "has no derivative along a parameter that moves only one of them. Move their edges apart."
         )
     return [pair for entry in found for pair in entry]
 

@@ -131,7 +131,11 @@ class BearingInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MechanismInfo:
-    """What observables need of the linkage: driver joint, names of its parameters, joints, points for drawing."""
+    """What observables need of the linkage: driver joint, names of its parameters, joints, points for drawing.
+
+    The components of an applied force are the parameters ``mechanism.forces.<name>.force.x`` and ``.y``, or
+    ``.magnitude`` and ``.direction`` (see `force_components`).
+    """
 
     driver_joint: str
     speed: str
@@ -139,6 +143,7 @@ class MechanismInfo:
     joints: tuple[tuple[str, str, str, str, str, str], ...]  # name, kind, body, point, body, point
     points: tuple[PointInfo, ...]
     margins: tuple[MarginInfo, ...]
+    forces: tuple[tuple[str, str, str, str], ...] = ()  # name, body, point, input that gates it or "": acts always
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -369,9 +374,32 @@ def _contradictions(manifest: Manifest) -> list[str]:
             faults.append(f"{place}: as many times as values are expected, at least two")
     if manifest.mechanism is not None:
         used += [(f"mechanism.{k}", getattr(manifest.mechanism, k), values) for k in ("speed", "start_angle")]
+        faults += _force_faults(manifest, manifest.mechanism, parameters)
     if manifest.bearing is not None:
         used.append(("bearing.shaft_speed", manifest.bearing.shaft_speed, values))
     faults += [f"{place}: {name!r} is no parameter or constant" for place, name, known in used if name not in known]
     if (manifest.run.cycles is None) == (manifest.run.duration is None):
         faults.append("run: exactly one of cycles and duration must be a number")
+    return faults
+
+
+def force_components(name: str) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Names of the parameters that hold an applied force: x and y [N], or magnitude [N] and direction [rad]."""
+    path = f"mechanism.forces.{name}.force"
+    return (f"{path}.x", f"{path}.y"), (f"{path}.magnitude", f"{path}.direction")
+
+
+def _force_faults(manifest: Manifest, mechanism: MechanismInfo, parameters: set[str]) -> list[str]:
+    faults = []
+    points = {(item.body, item.point) for item in mechanism.points}
+    gates = {item.name for item in manifest.inputs if item.kind == "gate"}
+    for name, body, point, gate in mechanism.forces:
+        place = f"mechanism.forces[{name}]"
+        if (body, point) not in points:
+            faults.append(f"{place}: {point!r} of {body!r} is no point of the mechanism")
+        if gate and gate not in gates:
+            faults.append(f"{place}: {gate!r} is no gate among the inputs")
+        forms = force_components(name)
+        if not any(parameters.issuperset(form) for form in forms):
+            faults.append(f"{place}: the parameters {' or '.join(' and '.join(form) for form in forms)} are missing")
     return faults

@@ -12,15 +12,19 @@ import numpy as np
 
 from raceway.runtime import clock
 from raceway.runtime.assembly import check_assembly
-from raceway.runtime.compile import CompiledLibrary, compile_model, find_compiler
+from raceway.runtime.compile import CompiledLibrary, Compiler, compile_model, find_compiler
+from raceway.runtime.ensemble import EnsembleResult, simulate_many
+from raceway.runtime.ensemble_driver import EnsembleDriver, compile_ensemble
 from raceway.runtime.errors import ArtefactError, CompileError, RequestError
 from raceway.runtime.integrators import available_methods, make_integrator
 from raceway.runtime.kernel import Kernel, Loop
 from raceway.runtime.manifest import Manifest, check_files, read_manifest
+from raceway.runtime.members import Table
 from raceway.runtime.parameters import Parameters, resolve_parameters, unknown_name
 from raceway.runtime.peaks import Peak, refine_peak
+from raceway.runtime.reductions import Reductions, reduce_run
 from raceway.runtime.sensitivity import Sensitivities, sensitivities
-from raceway.runtime.simulate import Numbers, Request, simulate
+from raceway.runtime.simulate import Numbers, Request, run_length, simulate, start_state
 from raceway.runtime.stepper import HEADERS, Stepper, compile_stepper
 from raceway.runtime.stepper import METHODS as STEPPERS
 
@@ -83,6 +87,7 @@ class Model:
         self._symbolic: dict[str, casadi.Function] = {}
         self._compiler = compiler
         self._stepper: Stepper | None = None
+        self._ensemble: EnsembleDriver | None = None
         self._differentiating: Stepper | None = None
 
     def __repr__(self) -> str:
@@ -144,13 +149,25 @@ class Model:
             self._differentiating = self._make_stepper(sensitivities=True)
         return self._differentiating
 
-    def _make_stepper(self, *, sensitivities: bool) -> Stepper:
+    @property
+    def ensemble_driver(self) -> EnsembleDriver:
+        """The driver of ensembles and reductions, compiled when first asked for; errors as for `stepper`."""
+        if self._ensemble is None:
+            library = compile_ensemble(self._folder, self.manifest, self._stepper_compiler())
+            self._ensemble = EnsembleDriver(library, self.manifest)
+        return self._ensemble
+
+    def _stepper_compiler(self) -> Compiler:
         compiler = find_compiler(self._compiler) if self.has_stepper else None
         if compiler is None:
             raise RequestError(
                 "method stepper: it needs a C compiler and the kernels in the generated folder. Install gcc or "
                 "clang, write the folder again, or take another method."
             )
+        return compiler
+
+    def _make_stepper(self, *, sensitivities: bool) -> Stepper:
+        compiler = self._stepper_compiler()
         library = compile_stepper(self._folder, self.manifest, compiler, sensitivities=sensitivities)
         return Stepper(library, self.manifest)
 
@@ -367,6 +384,100 @@ class Model:
             progress=progress,
         )
         return sensitivities(self, numbers, request, [wrt] if isinstance(wrt, str) else list(wrt))
+
+    def reduce(
+        self,
+        cycles: float | None = None,
+        *,
+        duration: float | None = None,
+        transient: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        method: str | None = None,
+        rtol: float | None = None,
+        initial: Sequence[float] | np.ndarray | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Reductions:
+        """Extremes with their times, mean and rms of a run behind its transient, without a stored trajectory.
+
+        Parameters are those of `simulate`; the transient's turns do not count.  The memory does not grow with the run.
+
+        Raises
+        ------
+        RequestError
+            A wrong request, or a linkage that cannot be assembled.
+        SimulationError
+            The computation failed.
+        """
+        numbers = self.numbers(parameters)
+        check_assembly(self, numbers)
+        run = self.manifest.run
+        request = Request(
+            cycles=cycles, duration=duration, initial=None if initial is None else np.asarray(initial, dtype=float)
+        )
+        return reduce_run(
+            self,
+            numbers,
+            initial=start_state(self, numbers, request.initial),
+            duration=run_length(self, request, clock.period(self.manifest, numbers.values)),
+            transient=run.transient_cycles if transient is None else float(transient),
+            method=method or run.method,
+            rtol=run.rtol if rtol is None else float(rtol),
+            progress=progress,
+        )
+
+    def simulate_many(
+        self,
+        parameters: Table,
+        observables: Sequence[str],
+        *,
+        cycles: float | None = None,
+        duration: float | None = None,
+        transient: float | None = None,
+        rtol: float | None = None,
+        method: str | None = None,
+        threads: int | None = None,
+        lanes: bool = True,
+        progress: Callable[[float], None] | None = None,
+    ) -> EnsembleResult:
+        """Simulate many parameter sets, keeping only observables.
+
+        The results of a member are those of a single run within the tolerance, and the same bits for any number of
+        threads.  A member that fails is reported in ``failures`` and has NaN in its place.  An interrupt (Ctrl-C) ends
+        the ensemble soon, and the members finished by then are kept.
+
+        Parameters
+        ----------
+        parameters : overrides, SI: name to one value for each member, or a mapping for each member, or a structured
+            array
+        observables : ``max:``, ``min:``, ``mean:``, ``rms:``, ``range:``, ``peak_time:``, ``peak_ball:``, ``min_time:``
+            or ``end:``, and a state or one of ball.force, ball.elastic_force, ball.damping_force, ball.deflection (of
+            the most loaded ball); also written ``peak_ball_force``, ``rms_inner_y``
+        cycles, duration : turns of driver or shaft, or time [s]; one of them
+        transient : turns at the start that do not count
+        rtol : error allowed per step, relative to each member's own magnitudes
+        method : ``auto``, or one of the project's own stepper
+        threads : default: as many as processors
+        lanes : False advances one member at a time
+        progress : called with the finished fraction
+
+        Raises
+        ------
+        RequestError
+            A wrong request: unknown names, columns of unequal length, values that are no finite numbers.
+        """
+        return simulate_many(
+            self,
+            parameters,
+            observables,
+            cycles=cycles,
+            duration=duration,
+            transient=transient,
+            rtol=rtol,
+            method=method,
+            threads=threads,
+            lanes=lanes,
+            progress=progress,
+        )
 
     def refine_peak(
         self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max", candidates: int = 6

@@ -93,7 +93,8 @@ class Directions:
 
     def _derivative(self, name: str) -> np.ndarray:
         """Derivative of a parameter or derived constant along all directions."""
-        return self._p[self._rows[name]] if name in self._rows else self._c[self._constants[name]]
+        matrix, row = (self._p, self._rows) if name in self._rows else (self._c, self._constants)
+        return np.asarray(matrix[row[name]])
 
     def tangents(self, segments: Segments, first: int, count: int) -> Tangents:
         """What the driver needs for `segments`, whose samples are `first` ... `first + count`."""
@@ -137,8 +138,8 @@ def sensitivities(model: Model, numbers: Numbers, request: Request, names: Seque
     jumping = [law for law, smoothness in model.manifest.smoothness if smoothness == "discontinuous"]
     if jumping:
         raise RequestError(
-            f"sensitivities: the {' and '.join(jumping)} law of this scene is discontinuous (its force jumps at contact), "
-            "so the derivative of the steps is not that of the motion. Take the damping law tangent or one-sided."
+            f"sensitivities: the {' and '.join(jumping)} law of this scene is discontinuous (its force jumps at "
+            "contact), so the derivative of the steps is not that of the motion. Take the law tangent or one-sided."
         )
     method = request.method or model.manifest.run.method
     if method not in ("auto", *METHODS):

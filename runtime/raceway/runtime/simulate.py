@@ -119,7 +119,7 @@ def simulate(
     started = clocks.perf_counter()
     run = model.manifest.run
     turn = clock.period(model.manifest, numbers.values)
-    duration = _duration(model, request, turn)
+    duration = run_length(model, request, turn)
     per_cycle = _whole("samples_per_cycle", request.samples_per_cycle, run.samples_per_cycle)
     count = max(1, round(per_cycle * duration / turn)) if math.isfinite(turn) else per_cycle
     transient = run.transient_cycles if request.transient_cycles is None else float(request.transient_cycles)
@@ -128,7 +128,7 @@ def simulate(
     rtol = run.rtol if request.rtol is None else float(request.rtol)
     if not TOLERANCES[0] <= rtol <= TOLERANCES[1]:
         raise RequestError(f"rtol: a number from {TOLERANCES[0]:g} to {TOLERANCES[1]:g} is expected, not {rtol!r}.")
-    initial = _initial(model, numbers, request.initial)
+    initial = start_state(model, numbers, request.initial)
 
     if len(initial):
         scales = model_scales(model, numbers, initial, duration, turn)
@@ -329,12 +329,13 @@ def step_through(
         if outcome.end is not End.DONE:
             name = model.states[outcome.state] if outcome.state >= 0 else ""
             detail = f"Step size {outcome.step:.3g} s" + (f", worst state {name}." if name else ".")
-            raise Interrupted(_STATUS[outcome.end], outcome.time, detail)
+            raise Interrupted(STATUS_OF_END[outcome.end], outcome.time, detail)
         if progress is not None:
             progress((float(part[-1]) - begin) / (end - begin))
 
 
-_STATUS = {
+#: What the ways of the stepper to end mean to people.
+STATUS_OF_END = {
     End.TOO_MANY_STEPS: Status.TOO_MANY_STEPS,
     End.STEP_TOO_SMALL: Status.STEP_TOO_SMALL,
     End.NOT_FINITE: Status.NOT_FINITE,
@@ -466,7 +467,8 @@ def choose_method(model: Model, asked: str, scales: Scales) -> tuple[str, str]:
     return asked, "asked for"
 
 
-def _duration(model: Model, request: Request, turn: float) -> float:
+def run_length(model: Model, request: Request, turn: float) -> float:
+    """Length of the run that is asked for [s]."""
     run = model.manifest.run
     cycles, duration = request.cycles, request.duration
     if cycles is not None and duration is not None:
@@ -484,7 +486,8 @@ def _duration(model: Model, request: Request, turn: float) -> float:
     return float(duration)
 
 
-def _initial(model: Model, numbers: Numbers, given: np.ndarray | None) -> np.ndarray:
+def start_state(model: Model, numbers: Numbers, given: np.ndarray | None) -> np.ndarray:
+    """State at the start: as given, else from the parameters."""
     if given is None:
         return np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
     names = [state.name for state in model.manifest.states]

@@ -238,6 +238,7 @@ class Stepper:
         output_times: np.ndarray,
         output_states: np.ndarray | None,
         tangents: Tangents | None = None,
+        reduction: np.ndarray | None = None,
         max_steps: int = MAX_STEPS,
         first_step: float = 0.0,
         smallest_step: float = 0.0,
@@ -253,6 +254,7 @@ class Stepper:
         output_times : increasing, shape (n,) [s]
         output_states : C-contiguous, shape (n, states), or None
         tangents : directions to differentiate along; the library must have been compiled with sensitivities
+        reduction : row of on-line reductions to add to; the library must have been compiled with reductions
         """
         inputs = segments.inputs if segments.inputs.shape[1] else np.zeros((len(segments.inputs), self._inputs))
         arrays = {
@@ -266,7 +268,8 @@ class Stepper:
         }
         pointers = {name: _pointer(name, array) for name, array in arrays.items()}
         restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
-        options = _Options(family, max_steps, first_step, smallest_step, largest_step, pointers["tolerance"])
+        reduced = None if reduction is None else _pointer("reduction", reduction)
+        options = _Options(family, max_steps, first_step, smallest_step, largest_step, pointers["tolerance"], reduced)
         result = _Result()
         call = self._run if tangents is None else self._differentiated(tangents)
         call(

@@ -23,38 +23,41 @@ typedef struct {
     const double *c;
 } rw_lane_numbers;
 
-/* Natural logarithm and exponential without branches and tables, for the step size controller: to 1e-11, and the same in every lane. */
-RW_INLINE double rw_log_lane(double x)
+/* Bits of a number in each lane. */
+typedef union {
+    double value[RW_L];
+    uint64_t bits[RW_L];
+} rw_lane_bits;
+
+/* Natural logarithm of positive numbers and exponential of moderate ones without branches and tables, for the step size controller: to
+   1e-11, and the same in every lane. */
+static inline void rw_lane_log(const double *restrict x, double *restrict y)
 {
-    uint64_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    const uint64_t exponent_bits = (bits >> 52) | UINT64_C(0x4330000000000000), fraction_bits = (bits & UINT64_C(0xFFFFFFFFFFFFF)) | UINT64_C(0x3FF0000000000000);
-    double exponent, m;
-    memcpy(&exponent, &exponent_bits, sizeof exponent);
-    memcpy(&m, &fraction_bits, sizeof m);
-    exponent -= 4503599627370496.0 + 1023.0;
-    const int large = m > 1.4142135623730951;
-    m = large ? 0.5 * m : m;
-    exponent = large ? exponent + 1.0 : exponent;
-    const double s = (m - 1.0) / (m + 1.0), z = s * s;
-    const double series = 1.0 + z * (1.0 / 3 + z * (1.0 / 5 + z * (1.0 / 7 + z * (1.0 / 9 + z * (1.0 / 11 + z * (1.0 / 13))))));
-    return exponent * 0.6931471805599453 + 2.0 * s * series;
+    rw_lane_bits from RW_ALIGNED, exponent RW_ALIGNED, fraction RW_ALIGNED;
+    RW_EACH_LANE from.value[lane] = x[lane] * 1.4142135623730951; /* so that the fraction is about one */
+    RW_EACH_LANE exponent.bits[lane] = (from.bits[lane] >> 52) | UINT64_C(0x4330000000000000);
+    RW_EACH_LANE fraction.bits[lane] = (from.bits[lane] & UINT64_C(0xFFFFFFFFFFFFF)) | UINT64_C(0x3FF0000000000000);
+    RW_EACH_LANE {
+        const double m = fraction.value[lane] * 0.7071067811865476, s = (m - 1.0) / (m + 1.0), z = s * s;
+        const double series = 1.0 + z * (1.0 / 3 + z * (1.0 / 5 + z * (1.0 / 7 + z * (1.0 / 9 + z * (1.0 / 11 + z * (1.0 / 13))))));
+        y[lane] = (exponent.value[lane] - (4503599627370496.0 + 1023.0)) * 0.6931471805599453 + 2.0 * s * series;
+    }
 }
 
-RW_INLINE double rw_exp_lane(double x)
+static inline void rw_lane_exp(const double *restrict x, double *restrict y)
 {
-    x = x > 40.0 ? 40.0 : x < -40.0 ? -40.0 : x;
-    /* adding 1.5 * 2^52 rounds to a whole number and puts it into the low bits */
-    const double shifted = x * 1.4426950408889634 + 6755399441055744.0;
-    uint64_t bits;
-    memcpy(&bits, &shifted, sizeof bits);
-    const double r = x - (shifted - 6755399441055744.0) * 0.6931471805599453;
-    const double series = 1.0 + r * (1.0 + r * (1.0 / 2 + r * (1.0 / 6 + r * (1.0 / 24 + r * (1.0 / 120 + r * (1.0 / 720 + r * (1.0 / 5040
-                          + r * (1.0 / 40320 + r * (1.0 / 362880)))))))));
-    const uint64_t power_bits = (bits + UINT64_C(1023)) << 52;
-    double power;
-    memcpy(&power, &power_bits, sizeof power);
-    return series * power;
+    rw_lane_bits shifted RW_ALIGNED, power RW_ALIGNED;
+    double series[RW_L] RW_ALIGNED;
+    RW_EACH_LANE {
+        /* adding 1.5 * 2^52 rounds to a whole number and puts it into the low bits */
+        const double bounded = x[lane] > 40.0 ? 40.0 : x[lane], z = bounded < -40.0 ? -40.0 : bounded;
+        shifted.value[lane] = z * 1.4426950408889634 + 6755399441055744.0;
+        const double r = z - (shifted.value[lane] - 6755399441055744.0) * 0.6931471805599453;
+        series[lane] = 1.0 + r * (1.0 + r * (1.0 / 2 + r * (1.0 / 6 + r * (1.0 / 24 + r * (1.0 / 120 + r * (1.0 / 720 + r * (1.0 / 5040
+                       + r * (1.0 / 40320 + r * (1.0 / 362880)))))))));
+    }
+    RW_EACH_LANE power.bits[lane] = (shifted.bits[lane] + UINT64_C(1023)) << 52;
+    RW_EACH_LANE y[lane] = series[lane] * power.value[lane];
 }
 
 /* Sums over the balls of F cos, F sin. */

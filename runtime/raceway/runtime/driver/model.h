@@ -112,7 +112,7 @@ static inline double rw_norm(const double *restrict error, const double *restric
         const double e = error[k] * weight[k];
         sum += e * e;
     }
-    return sqrt(sum / RW_NX);
+    return sqrt(sum / (double)RW_NX);
 }
 
 #endif

@@ -5,7 +5,8 @@
 
    Integrals are taken by Boole's rule, which is exact up to degree five.  Extremes: a parabola through the three best points says whether
    and where there is a larger value between them; the channel is evaluated there from the dense output, and the parabola drawn anew.  So an
-   extreme is always a value that the solution takes, never an extrapolation across a kink.
+   extreme is always a value that the solution takes, never an extrapolation across a kink.  At a kink it is met to a part of a quarter
+   step: the smallest value of the most loaded ball is such a place, for there two balls change rank.
 
    A reduction is a row of RW_REDUCTION numbers, which a run adds to: it can go on in another call. */
 #ifndef RACEWAY_REDUCTIONS_H

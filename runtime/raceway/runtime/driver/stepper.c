@@ -52,6 +52,15 @@ static int is_finite(const double *x)
     return 1;
 }
 
+/* Whether the tolerance is above the rounding of the states reached.  A motion that grows without bound ends where it is not: error
+   control would follow it with ever smaller steps for hours. */
+static int within_reach(const rw_run *run)
+{
+    for (int k = 0; k < RW_NX; k++)
+        if (!(fabs(run->next[k]) * run->weight[k] <= 1.0 / DBL_EPSILON)) return 0;
+    return 1;
+}
+
 static double error_exponent(int method)
 {
     switch (method) {
@@ -314,6 +323,8 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
     raceway_result *result = run->result;
     const raceway_options *options = run->options;
     const double length = end - start;
+    /* of time within the segment; at t = 0 the sum start + t would take steps down to the smallest of all numbers */
+    const double resolution = DBL_EPSILON * (fabs(start) > fabs(end) ? fabs(start) : fabs(end));
     double t = 0.0;
     if (!(length > 0.0)) return RACEWAY_DONE;
     if (restart || run->step == 0.0) {
@@ -326,6 +337,8 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
         run->step = estimate;
         run->last_error = RW_LOG_SMALL_ERROR;
     }
+    /* slopes that overflow give an estimate of zero, or none */
+    if (!(run->step > 2.0 * resolution)) run->step = 2.0 * resolution;
     int stiff = 0, rejected_last = 0;
     reduce_start(run, start);
     tangent_jump(run);
@@ -346,9 +359,15 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
             result->step = h;
             return RACEWAY_TOO_MANY_STEPS;
         }
+        if (!last && run->step <= resolution) {
+            /* accepted steps may shrink as well: they would no longer move the time */
+            result->step = run->step;
+            result->state = worst_state(run);
+            return RACEWAY_STEP_TOO_SMALL;
+        }
         const double error = try_step(run, t, h);
         const double q = error_exponent(run->method);
-        if (error >= 0.0 && error <= 1.0 && is_finite(run->next)) {
+        if (error >= 0.0 && error <= 1.0 && within_reach(run)) {
             /* PI controller (Hairer & Wanner II, section IV.2) */
             const double log_error = log(error > 1e-10 ? error : 1e-10);
             double factor = 0.9 * exp((0.4 * run->last_error - 0.7 * log_error) / q);
@@ -382,14 +401,14 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
                 linearize(run, t, 0);
             }
         } else {
-            const int finite = error >= 0.0 && error <= DBL_MAX;
-            double factor = finite ? 0.9 * pow(error, -1.0 / q) : 0.1;
+            const int finite = error >= 0.0 && error <= DBL_MAX && is_finite(run->next);
+            double factor = finite && error > 1.0 ? 0.9 * pow(error, -1.0 / q) : 0.1;
             if (factor < 0.1) factor = 0.1;
             if (factor > 0.9) factor = 0.9;
             result->rejected++;
             rejected_last = 1;
             run->step = h * factor;
-            if (run->step < options->smallest_step || start + t + run->step == start + t) {
+            if (run->step < options->smallest_step || run->step <= resolution) {
                 result->step = run->step;
                 result->state = worst_state(run);
                 result->time = start + t;

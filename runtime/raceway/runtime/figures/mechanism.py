@@ -1,4 +1,4 @@
-"""The mechanism at one moment: links, joints, frame, guide and slider block, and the forces on the frame."""
+"""The mechanism at one moment: links, joints, frame, guide and slider block, forces on the frame and applied ones."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _Points = dict[tuple[str, str], Array]
 
 
 def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
-    """Draw the mechanism at a sample of the record, with the paths of its joints and the reactions on the frame."""
+    """Draw the mechanism at a sample of the record, with the paths of its joints and the forces."""
     mechanism = record.manifest.mechanism
     assert mechanism is not None  # drawn of scenes with a mechanism only
     now = record.points(float(record.t[sample]))
@@ -46,7 +46,7 @@ def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
                     tuple(now[first, point]), 0.017 * size, facecolor="white", edgecolor=INK, linewidth=1.5, zorder=6
                 )
             )
-    arrows = _draw_reactions(axes, record, now, sample, size)
+    arrows = _draw_forces(axes, record, now, sample, size)
     _draw_names(axes, record, now, _busy(record, used, now, trace, size) + arrows, size)
     corners = np.vstack([everything, *((at + way)[None, :] for at, way in arrows)])
     margin = 0.16 * size
@@ -219,11 +219,43 @@ def _busy(
     return busy
 
 
-def _draw_reactions(axes: Axes, record: Record, now: _Points, sample: int, size: float) -> list[tuple[Array, Array]]:
-    """Arrows of the forces on the frame at revolute joints whose reaction is an output; their feet and vectors [m]."""
+def _draw_forces(axes: Axes, record: Record, now: _Points, sample: int, size: float) -> list[tuple[Array, Array]]:
+    """Arrows of the reactions on the frame and of the applied forces that act, all to one scale.
+
+    Returns
+    -------
+    where an arrow is: pairs of the place the force acts at and the way from there to the arrow's other end [m]
+    """
+    reactions = _reactions(record, now, sample)
+    applied = [(name, now[key], force) for name, key, force in record.applied_forces(float(record.t[sample]))]
+    everything = [force for _, force in reactions] + [force for _, _, force in applied]
+    greatest = max((float(np.hypot(*force)) for force in everything), default=0.0)
+    drawn: list[tuple[Array, Array]] = []
+    for at, force in reactions:
+        strength = float(np.hypot(*force))
+        if strength <= 0.02 * greatest:
+            continue
+        tip = at + _arrow_length(strength / greatest, size) * force / strength
+        _draw_arrow(axes, at, tip, SIGNAL)
+        _write_force(axes, tip, force[0] >= 0.0, f"{strength:.0f} N", SIGNAL, size)
+        drawn.append((at, tip - at))
+    for name, at, force in applied:
+        strength = float(np.hypot(*force))
+        if strength <= 0.02 * greatest:
+            continue
+        # it pushes: its tip is where it acts
+        foot = at - _arrow_length(strength / greatest, size) * force / strength
+        _draw_arrow(axes, foot, at, INK)
+        _write_force(axes, foot, force[0] <= 0.0, f"{name}\n{strength:.0f} N", INK, size)
+        drawn.append((at, foot - at))
+    return drawn
+
+
+def _reactions(record: Record, now: _Points, sample: int) -> list[tuple[Array, Array]]:
+    """Places of the frame's revolute joints whose reaction is an output [m], and the forces on the frame there [N]."""
     mechanism = record.manifest.mechanism
     assert mechanism is not None
-    arrows: list[tuple[Array, Array]] = []
+    found: list[tuple[Array, Array]] = []
     for name, kind, first, point, second, _ in mechanism.joints:
         if (
             kind != "revolute"
@@ -234,32 +266,41 @@ def _draw_reactions(axes: Axes, record: Record, now: _Points, sample: int, size:
         # the reaction is the force of the second body on the first
         sign = 1.0 if first == FRAME else -1.0
         force = sign * np.array([record.solution[f"reaction.{name}.{axis}"][sample] for axis in "xy"])
-        arrows.append((now[first, point], force))
-    greatest = max((float(np.hypot(*force)) for _, force in arrows), default=0.0)
-    drawn: list[tuple[Array, Array]] = []
-    for at, force in arrows:
-        strength = float(np.hypot(*force))
-        if strength <= 0.02 * greatest:
-            continue
-        tip = at + (0.08 + 0.24 * strength / greatest) * size * force / strength
-        axes.annotate(
-            "",
-            xy=tuple(tip),
-            xytext=tuple(at),
-            arrowprops={"arrowstyle": "-|>", "color": SIGNAL, "linewidth": 2.6, "mutation_scale": 17},
-            zorder=7,
-        )
-        right = force[0] >= 0.0
-        axes.text(
-            tip[0] + (0.02 if right else -0.02) * size,
-            tip[1],
-            f"{strength:.0f} N",
-            ha="left" if right else "right",
-            va="center",
-            color=SIGNAL,
-            fontweight="bold",
-            fontsize=9.5,
-            zorder=8,
-        )
-        drawn.append((at, tip - at))
-    return drawn
+        found.append((now[first, point], force))
+    return found
+
+
+def _arrow_length(share: float, size: float) -> float:
+    """Length of the arrow of a force [m], for its share of the greatest one."""
+    return (0.08 + 0.24 * share) * size
+
+
+def _draw_arrow(axes: Axes, foot: Array, tip: Array, colour: str) -> None:
+    axes.annotate(
+        "",
+        xy=tuple(tip),
+        xytext=tuple(foot),
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": colour,
+            "linewidth": 2.6,
+            "mutation_scale": 17,
+            "shrinkA": 0.0,
+            "shrinkB": 0.0,
+        },
+        zorder=7,
+    )
+
+
+def _write_force(axes: Axes, at: Array, right: bool, words: str, colour: str, size: float) -> None:
+    axes.text(
+        at[0] + (0.02 if right else -0.02) * size,
+        at[1],
+        words,
+        ha="left" if right else "right",
+        va="center",
+        color=colour,
+        fontweight="bold",
+        fontsize=9.5,
+        zorder=8,
+    )

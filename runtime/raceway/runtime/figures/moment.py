@@ -38,11 +38,11 @@ def peak_moment(record: Record) -> Figure:
     else:
         draw_mechanism(figure.add_subplot(), record, sample)
     if with_mechanism:
-        text += (
-            "Left: force on the frame, dashed paths of the joints. "
-            if with_bearing
-            else "Forces on the frame, dashed paths of the joints. "
-        )
+        words = "force on the frame" if with_bearing else "forces on the frame"
+        if record.applied_forces(float(record.t[sample])):
+            words += ", applied force (dark)"
+        words += ", dashed paths of the joints. "
+        text += f"Left: {words}" if with_bearing else words.capitalize()
     if with_bearing:
         words, _ = record.ball_force()
         text += f"Bearing: balls coloured by {words}; clearance and displacement between the rings ×{factor:g}"

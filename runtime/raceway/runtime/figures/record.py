@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from raceway.runtime.manifest import force_components
 from raceway.runtime.observables import KinematicFrequencies, ball_angles, kinematic_frequencies, turns
 
 if TYPE_CHECKING:
@@ -130,6 +131,27 @@ class Record:
         # Eq. (2): the force on the frame presses the ring; the reaction is that of the second body on the first
         share = self.parameter("bearing.share") * (1.0 if first == FRAME else -1.0)
         return share * np.column_stack([self.solution[name] for name in names])
+
+    def applied_forces(self, t: float) -> tuple[tuple[str, tuple[str, str], Array], ...]:
+        """Applied forces that act at a time: name, (body, point), components (2,) [N]."""
+        mechanism = self.manifest.mechanism
+        assert mechanism is not None  # drawn of scenes with a mechanism only
+        parameters = self.solution.parameters
+        inputs = dict(
+            zip((i.name for i in self.manifest.inputs), self.model.inputs_at(t, parameters), strict=True),
+        )
+        acting = []
+        for name, body, point, gate in mechanism.forces:
+            if gate and inputs[gate] == 0.0:
+                continue
+            cartesian, (magnitude, direction) = force_components(name)
+            if cartesian[0] in parameters:
+                force = np.array([parameters[component] for component in cartesian])
+            else:
+                angle = parameters[direction]
+                force = parameters[magnitude] * np.array([np.cos(angle), np.sin(angle)])
+            acting.append((name, (body, point), force))
+        return tuple(acting)
 
     def points(self, t: float) -> dict[tuple[str, str], Array]:
         """Coordinates of the mechanism's points at a time: (body, point) -> (2,) [m]."""

@@ -1,0 +1,231 @@
+"""The page docs/benchmarks.md and its figures, from benchmarks/results/*.json alone: ``python -m benchmarks.report``.
+
+A further part is an entry of `parts` in `benchmarks.__main__`, which writes a file of results, and an entry of
+`SECTIONS` here: name of the file, and a function from its content to lines.  A section without its file is left out.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks import figures
+from benchmarks.curves import LEVELS, curve, lower, time_at
+from benchmarks.problem import SPREAD
+from benchmarks.targets import targets
+
+Result = dict[str, Any]
+
+#: The page's text around the numbers.
+TEMPLATE = Path(__file__).with_name("page.md")
+
+
+def write(folder: Path, page: Path) -> None:
+    """Write page and figures from the results in a folder.
+
+    Raises
+    ------
+    FileNotFoundError
+        There are no results of part 1.
+    """
+    results = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.json"))}
+    images = page.parent / "images"
+    cases = [results[f"work_precision_{key}"] for key in _ORDER if f"work_precision_{key}" in results]
+    if not cases:
+        raise FileNotFoundError(f"{folder}: no results of work_precision are here; measure them first")
+    quick = any(result["quick"] for result in results.values())
+    sections = [line for name, section in SECTIONS if name in results for line in (*section(results[name], images), "")]
+    text = TEMPLATE.read_text(encoding="utf-8").format(
+        note="**Measured with `QUICK=1`: these numbers only show that the scripts run.**\n\n" if quick else "",
+        machine="\n".join(_machine(results)),
+        spread=f"{100 * SPREAD:g} %",
+        cases="\n".join(line for case in cases for line in _case(case, images)),
+        targets="\n".join(targets(cases, results.get("regeneration"), results.get("balls"))),
+        sections="\n".join(sections),
+        **_conditions(cases),
+    )
+    page.parent.mkdir(parents=True, exist_ok=True)
+    page.write_text(text.rstrip() + "\n", encoding="utf-8")
+
+
+_ORDER = ("stiff", "onesided", "tangent")
+
+
+def milliseconds(seconds: float | None) -> str:
+    """Three digits, or a dash."""
+    return "–" if seconds is None else f"{1e3 * seconds:.3g}"
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Markdown table, numbers to the right."""
+    marks = ["---", *("---:" for _ in head[1:])]
+    return [f"| {' | '.join(cells)} |" for cells in (head, marks, *rows)]
+
+
+def _machine(results: dict[str, Result]) -> list[str]:
+    newest = next(iter(results.values()))["machine"]
+    packages = ", ".join(f"{name} {version}" for name, version in newest["packages"].items())
+    loads = [result["machine"]["load"] for result in results.values() if result["machine"]["load"] is not None]
+    lines = [
+        f"Machine: {newest['processor']}, {newest['cores']} cores, {newest['vectors'] or 'no wide vectors'}; "
+        f"{newest['system']}; {newest['compiler']}; Python {newest['python']}; {packages}."
+    ]
+    if loads and max(loads) > 1.5:
+        lines += [
+            "",
+            f"The machine was not quiet: its load was {min(loads):.1f} to {max(loads):.1f} when parts began. Times may "
+            "be long, ratios less so.",
+        ]
+    return lines
+
+
+def _conditions(cases: Sequence[Result]) -> dict[str, object]:
+    """What all cases have in common, for the template."""
+    rates: dict[str, float] = {}
+    for case in cases:
+        for name, value in case["rate_agreement"].items():
+            rates[name] = max(value, rates.get(name, 0.0))
+    return {
+        "transient": cases[0]["transient_cycles"],
+        "points": f"{cases[0]['points']:,}".replace(",", " "),
+        "members": cases[0]["members"],
+        "reference": " and ".join(cases[0]["reference"]["methods"]),
+        "agreement": f"{max(case['reference']['worst_agreement'] for case in cases):.0e}",
+        "rates": ", ".join(f"{name} within {value:.0e}" for name, value in rates.items()),
+    }
+
+
+def _case(case: Result, images: Path) -> list[str]:
+    contenders = case["contenders"]
+    curves: dict[str, figures.Curve] = {c["key"]: curve(c) for c in contenders}
+    curves["hand-best"] = lower([curves[c["key"]] for c in contenders if c["key"].startswith("hand-")])
+    labels = {c["key"]: c["label"] for c in contenders} | {
+        "stepper": "stepper (auto)",
+        "hand-best": "by hand in C, best",
+    }
+    figures.work_precision(images / f"bench_{case['case']}.png", case["words"], curves, labels)
+    base = {level: time_at(curves["stepper"], level) for level in LEVELS}
+    rows = []
+    for c in contenders:
+        if "absent" in c:
+            rows.append([c["label"], *(c["absent"], *[""] * (2 * len(LEVELS) - 1))])
+            continue
+        cells = [labels[c["key"]]]
+        for level in LEVELS:
+            taken, own = time_at(curves[c["key"]], level), base[level]
+            cells += [milliseconds(taken), "–" if taken is None or own is None else f"{taken / own:.3g}"]
+        rows.append(cells)
+    head = ["ms a cycle at error", *(word for level in LEVELS for word in (f"{level:.0e}", "× stepper"))]
+    lines = [
+        f"### Damping {case['words']}",
+        "",
+        f"![Time against error, damping {case['words']}](images/bench_{case['case']}.png)",
+        "",
+        *table(head, rows),
+        "",
+    ]
+    return lines + _faults(contenders)
+
+
+def _faults(contenders: Sequence[Result]) -> list[str]:
+    lines = []
+    for c in contenders:
+        faults = [(row["tolerance"], row["fault"]) for row in c.get("runs", ()) if "fault" in row]
+        if faults:
+            where = ", ".join(f"{tolerance:.0e}" for tolerance, _ in faults)
+            lines.append(f"- {c['label']} failed at tolerance {where}: {faults[0][1]}")
+    return [*lines, ""] if lines else []
+
+
+def _one_step(result: Result, _: Path) -> list[str]:
+    def nanoseconds(value: Result) -> str:
+        return f"{1e9 * value['median']:.3g} ({1e9 * value['p10']:.3g} … {1e9 * value['p90']:.3g})"
+
+    rates = [row for row in result["rows"] if row["kind"] == "rate"]
+    steps = [row for row in result["rows"] if row["kind"] == "step"]
+    return [
+        "## One right-hand side, one step",
+        "",
+        f"Median and 10th to 90th percentile, damping case `{result['case']}`. One right-hand side alone, load and "
+        "sines of its own time included:",
+        "",
+        *table(
+            ["right-hand side", "ns"],
+            [[row["label"], row.get("absent") or nanoseconds(row["seconds_each"])] for row in rates],
+        ),
+        "",
+        f"Within a run at tolerance {result['tolerance']:.0e} without outputs: a step, and the run's time over its "
+        "evaluations (stage algebra, linear systems and step control included; stages at one time share its load):",
+        "",
+        *table(
+            ["method", "ns a step", "ns an evaluation"],
+            [
+                [row["label"], nanoseconds(row["seconds_each"]), nanoseconds(row["seconds_an_evaluation"])]
+                for row in steps
+            ],
+        ),
+    ]
+
+
+def _balls(result: Result, images: Path) -> list[str]:
+    figures.balls(images / "bench_balls.png", result["rows"], result["fits"])
+    rows = [
+        [
+            f"{row['balls']} balls, {row['method']}",
+            f"{1e9 * row['seconds_an_evaluation']['median']:.3g}",
+            milliseconds(row["seconds"]["median"]),
+            str(row["evaluations"]),
+            f"{row['kernel_bytes'] / 1024:.1f}",
+        ]
+        for row in result["rows"]
+    ]
+    fits = [
+        f"- {fit['method']}: {1e9 * fit['seconds_without']:.3g} ns + {1e9 * fit['seconds_a_ball']:.3g} ns a ball, "
+        f"every point within {100 * fit['largest_deviation']:.0f} % of the line."
+        for fit in result["fits"]
+    ]
+    return [
+        "## Number of balls",
+        "",
+        "The press with small balls (1.5 mm), whose contact stiffness and damping together stay the same, so that the "
+        f"motion hardly depends on their number. Tolerance {result['tolerance']:.0e}, no outputs.",
+        "",
+        "![Time of an evaluation against the number of balls](images/bench_balls.png)",
+        "",
+        *table(["", "ns an evaluation", "ms a cycle", "evaluations", "kernels.h, kB"], rows),
+        "",
+        *fits,
+    ]
+
+
+def _regeneration(result: Result, _: Path) -> list[str]:
+    words = {
+        "cold": "Nothing there: everything is derived, written and compiled",
+        "warm": "Everything there",
+        "number": "A number in the scene has changed",
+    }
+    lines = ["## From scene to model", "", f"Each time a new process; medians over {result['repeats']}, in ms.", ""]
+    for how, stages in result["stages"].items():
+        rows = [[stage, milliseconds(value["median"])] for stage, value in stages.items()]
+        total = sum(value["median"] for stage, value in stages.items() if stage != "read" or how != "number")
+        lines += [f"**{words[how]}**", "", *table(["stage", "ms"], [*rows, ["sum", milliseconds(total)]]), ""]
+    again = "something was compiled again" if result["compiled_again"] else "nothing was compiled again"
+    return [
+        *lines,
+        f"Warm, and after a changed number, {again}. `read` is the scene alone; `generate` reads it once more.",
+    ]
+
+
+#: Name of a file of results, and what makes lines of it.
+SECTIONS: tuple[tuple[str, Callable[[Result, Path], list[str]]], ...] = (
+    ("one_step", _one_step),
+    ("balls", _balls),
+    ("regeneration", _regeneration),
+)
+
+
+if __name__ == "__main__":
+    here = Path(__file__).resolve().parent
+    write(here / "results", here.parent / "docs" / "benchmarks.md")

@@ -1,0 +1,135 @@
+"""What the project set out to reach, what it reaches, and why not where it does not; all from the results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from benchmarks.curves import LEVELS, curve, lower, time_at, tolerance_at
+
+Result = dict[str, Any]
+
+#: (rival: keys that count as one, words, level, factor, whether the stepper may take `factor` times the rival's time)
+_AT_1E3 = (
+    (("hand-",), "by hand in C", 1.5, True),
+    (("numbalsoda",), "numbalsoda LSODA", 4.0, False),
+    (("erk",), "CasADi erk in C", 4.0, False),
+    (("cvodes-compiled",), "CasADi cvodes, compiled", 20.0, False),
+    (("scipy-lsoda-numpy", "scipy-dop853-numpy", "scipy-radau-numpy"), "best SciPy with NumPy", 300.0, False),
+)
+
+#: Not peers: the project itself, and the limit.
+_NOT_PEERS = ("stepper", "simulate", "hand-")
+
+
+def targets(cases: Sequence[Result], regeneration: Result | None, balls: Result | None) -> list[str]:
+    """The section on targets."""
+    rows: list[tuple[str, str, str, str]] = []
+    reasons: list[str] = []
+    for case in cases:
+        _speed(case, rows, reasons)
+    if balls:
+        worst = max(fit["largest_deviation"] for fit in balls["fits"])
+        rows.append(("cost linear in the balls", "", f"within {100 * worst:.0f} % of a line", _met(worst < 0.15)))
+    if regeneration:
+        cold, warm = (regeneration["stages"][how] for how in ("cold", "warm"))
+        derive = sum(v["median"] for k, v in cold.items() if not k.startswith(("C compiler", "first", "load")))
+        rows.append(("cold, without the C compiler ≤ 3 s", "", f"{derive:.2f} s", _met(derive <= 3.0)))
+        load = warm["load"]["median"]
+        rows.append(("warm load ≤ 50 ms", "", f"{1e3 * load:.0f} ms, imports not counted", _met(load <= 0.05)))
+        rows.append(
+            (
+                "changed number: nothing compiled",
+                "",
+                "compiled" if regeneration["compiled_again"] else "nothing",
+                _met(not regeneration["compiled_again"]),
+            )
+        )
+    lines = ["## Targets", "", "Ratios are of times at equal error; `stepper` with its own choice of method.", ""]
+    lines += ["| target | damping | measured | |", "| --- | --- | ---: | --- |"]
+    lines += [f"| {' | '.join(row)} |" for row in rows]
+    if reasons:
+        lines += ["", "Where a case falls short, and why:", "", *(f"- {reason}" for reason in reasons)]
+    return [*lines, ""]
+
+
+def _met(reached: bool) -> str:
+    return "met" if reached else "**short**"
+
+
+def _speed(case: Result, rows: list[tuple[str, str, str, str]], reasons: list[str]) -> None:
+    contenders = {c["key"]: c for c in case["contenders"]}
+    curves = {key: curve(c) for key, c in contenders.items()}
+    own = {level: time_at(curves["stepper"], level) for level in LEVELS}
+    for keys, words, factor, limit in _AT_1E3:
+        some = [key for key in curves if key.startswith(keys)]
+        text = f"1e-3: at most {factor:g}× the time {words}" if limit else f"1e-3: {words} takes at least {factor:g}×"
+        absent = [contenders[key]["absent"] for key in some if "absent" in contenders[key]]
+        theirs = time_at(lower([curves[key] for key in some]), LEVELS[0])
+        mine = own[LEVELS[0]]
+        if theirs is None or mine is None:
+            rows.append((text, case["words"], absent[0] if absent else "not reached", "–"))
+            continue
+        ratio = mine / theirs if limit else theirs / mine
+        reached = ratio <= factor if limit else ratio >= factor
+        rows.append((text, case["words"], f"{ratio:.3g}×", _met(reached)))
+        if not reached:
+            best = min(some, key=lambda key: time_at(curves[key], LEVELS[0]) or float("inf"))
+            reasons.append(_why(case, contenders, best, ratio, limit))
+    for level in LEVELS[1:]:
+        peers = {
+            key: taken
+            for key, points in curves.items()
+            if not key.startswith(_NOT_PEERS) and (taken := time_at(points, level)) is not None
+        }
+        mine = own[level]
+        if not peers or mine is None:
+            rows.append((f"{level:.0e}: every peer takes at least 3×", case["words"], "not reached", "–"))
+            continue
+        nearest = min(peers, key=lambda key: peers[key])
+        ratio = peers[nearest] / mine
+        measured = f"{ratio:.3g}× ({contenders[nearest]['label']})"
+        rows.append((f"{level:.0e}: every peer takes at least 3×", case["words"], measured, _met(ratio >= 3.0)))
+        if ratio < 3.0:
+            reasons.append(_families(case, contenders, curves, level, nearest, ratio))
+
+
+def _why(case: Result, contenders: dict[str, Result], rival: str, ratio: float, limit: bool) -> str:
+    """Split a ratio into number of evaluations and time of each where both are counted, else name the times."""
+    mine, theirs = (tolerance_at(contenders[key], LEVELS[0]) for key in ("stepper", rival))
+    label = contenders[rival]["label"]
+    start = f"{case['words']}, against {label}: {ratio:.3g}×."
+    if mine is None or theirs is None:
+        return start
+    if not (limit and "counts" in mine and "counts" in theirs):
+        times = [f"{1e3 * row['time']['median']:.3g} ms at an error of {_worst(row):.1e}" for row in (mine, theirs)]
+        return f"{start} At the nearest tolerances the stepper takes {times[0]}, {label} {times[1]}."
+    each = [1e9 * row["time"]["median"] / row["counts"]["evaluations"] for row in (mine, theirs)]
+    counts = [row["counts"]["evaluations"] for row in (mine, theirs)]
+    return (
+        f"{start} At the nearest tolerances the stepper takes {counts[0]:.0f} evaluations of {each[0]:.0f} ns with "
+        f"outputs and step control, {label} {counts[1]:.0f} of {each[1]:.0f} ns: "
+        f"a factor of {counts[0] / counts[1]:.2g} from the method that is chosen, "
+        f"{each[0] / each[1]:.2g} from what this one machine allows by hand (see above)."
+    )
+
+
+def _worst(row: Result) -> float:
+    return float(row["error"]["worst"]["median"])
+
+
+def _families(
+    case: Result, contenders: dict[str, Result], curves: dict[str, Any], level: float, nearest: str, ratio: float
+) -> str:
+    """Say whether another family of the stepper would have reached the target."""
+    families = {
+        key: taken
+        for key, points in curves.items()
+        if key.startswith("stepper-") and (taken := time_at(points, level)) is not None
+    }
+    start = f"{case['words']} at {level:.0e}, against {contenders[nearest]['label']}: {ratio:.3g}×."
+    rival = time_at(curves[nearest], level)
+    if not families or rival is None:
+        return start
+    best = min(families, key=lambda key: families[key])
+    return f"{start} The stepper's own choice of method; asked for, {best} would reach {rival / families[best]:.3g}×."

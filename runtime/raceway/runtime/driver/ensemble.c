@@ -1,0 +1,560 @@
+/* Members in and out of lanes, step sizes, segments, reductions.  See ensemble.h; the steps themselves are in lanes.h.
+
+   Two passes take turns until every member is done: one advances members by Dormand and Prince, the other those by Rodas5P.  A member that
+   changes its family leaves its lane and waits for the other pass. */
+#include "ensemble.h"
+
+#include <float.h>
+
+#include "lanes.h"
+#include "reductions.h"
+#include "scales.h"
+
+enum { RW_WAITING = 0, RW_FINISHED = 1 };
+enum { RW_STOP_INTERVAL = 64 }; /* rounds between looks at the caller's wish to stop */
+
+/* A member outside the lanes. */
+typedef struct {
+    double t, step, log_error; /* t counts from the segment's start */
+    int phase, method, begun;  /* begun: the segment is under way, it was left in its middle or before its first step */
+} rw_member;
+
+typedef struct {
+    const raceway_ensemble_options *options;
+    long members;
+    const double *p, *c, *tolerance;
+    double *x;
+    const long *first;
+    const double *times, *inputs;
+    const unsigned char *restarts;
+    double *reductions;
+    rw_member *member;
+    raceway_result *results;
+} rw_job;
+
+typedef struct {
+    /* numbers of the members in the lanes */
+    double p[(RW_NP > 0 ? RW_NP : 1) * RW_L] RW_ALIGNED, c[(RW_NC > 0 ? RW_NC : 1) * RW_L] RW_ALIGNED, u[RW_NU * RW_L] RW_ALIGNED;
+    double weight[RW_NX * RW_L] RW_ALIGNED;
+    /* where they are */
+    double x[RW_NX * RW_L] RW_ALIGNED, next[RW_NX * RW_L] RW_ALIGNED;
+    double t[RW_L] RW_ALIGNED, length[RW_L] RW_ALIGNED, step[RW_L] RW_ALIGNED, log_error[RW_L] RW_ALIGNED;
+    double h[RW_L] RW_ALIGNED, error[RW_L] RW_ALIGNED;
+    /* flags, as numbers so that they live in lanes as well */
+    double active[RW_L] RW_ALIGNED, last[RW_L] RW_ALIGNED, accepted[RW_L] RW_ALIGNED, rejected_last[RW_L] RW_ALIGNED;
+    double stiff[RW_L] RW_ALIGNED, small[RW_L] RW_ALIGNED, reducing[RW_L] RW_ALIGNED;
+    double steps[RW_L] RW_ALIGNED, rejected[RW_L] RW_ALIGNED; /* since the member entered its lane */
+    rw_lane_explicit plain;
+    rw_lane_linear linear;
+    /* reductions */
+    double dense[RW_DENSE_ROWS][RW_NX * RW_L] RW_ALIGNED;
+    double sampled[RW_POINTS][RW_CHANNELS * RW_L] RW_ALIGNED;
+    double maximum[RW_CHANNELS * RW_L] RW_ALIGNED, minimum[RW_CHANNELS * RW_L] RW_ALIGNED;
+    double integral[RW_CHANNELS * RW_L] RW_ALIGNED, square[RW_CHANNELS * RW_L] RW_ALIGNED;
+    long who[RW_L];
+    double start[RW_L] RW_ALIGNED, resolution[RW_L] RW_ALIGNED; /* of the segment, and of time within it [s] */
+    int linearly;       /* which family this pass advances */
+    int balls;          /* whether channels of the balls are reduced */
+    int any_reducing;
+    rw_lane_numbers numbers;
+} rw_block;
+
+static void put(double *lanes, int lane, const double *row, int count)
+{
+    for (int k = 0; k < count; k++) lanes[k * RW_L + lane] = row[k];
+}
+
+static void get(const double *lanes, int lane, double *row, int count)
+{
+    for (int k = 0; k < count; k++) row[k] = lanes[k * RW_L + lane];
+}
+
+static rw_numbers member_numbers(const rw_job *job, long m)
+{
+    rw_numbers n;
+    n.p = job->p + m * RW_NP;
+    n.c = job->c + m * RW_NC;
+    n.u = job->inputs + (job->first[m] + job->results[m].segment) * RW_NU;
+    return n;
+}
+
+static double member_end(const rw_job *job, long m) { return job->times[job->first[m] + m + job->results[m].segment + 1]; }
+static double member_start(const rw_job *job, long m) { return job->times[job->first[m] + m + job->results[m].segment]; }
+
+/* Decide method and step size where a segment begins. */
+static void begin_segment(const rw_job *job, long m)
+{
+    rw_member *at = job->member + m;
+    raceway_result *result = job->results + m;
+    const rw_numbers n = member_numbers(job, m);
+    double *x = job->x + m * RW_NX, weight[RW_NX];
+    at->t = 0.0;
+    at->begun = 1;
+    if (!job->restarts[job->first[m] + result->segment] && at->step > 0.0) return;
+    int method = job->options->method;
+    if (method == RACEWAY_AUTO) {
+        rw_rosenbrock work;
+        rw_rosenbrock_start(&work, &n, 0.0, x, 1);
+        result->evaluations++;
+        method = rw_is_stiff(work.A, work.B) ? RACEWAY_RODAS5P : RACEWAY_DP54;
+        result->switches += at->method != method && at->method != RACEWAY_AUTO;
+    }
+    at->method = method;
+    for (int k = 0; k < RW_NX; k++) weight[k] = 1.0 / job->tolerance[m * RW_NX + k];
+    at->step = rw_first_step(&n, 0.0, x, member_end(job, m) - member_start(job, m), weight,
+                             method == RACEWAY_DP54 ? rw_dp54.error_exponent : rw_rodas5p.error_exponent);
+    at->log_error = RW_LOG_SMALL_ERROR;
+    result->evaluations += 2;
+}
+
+/* Put a member whose segment has begun into a lane, all that depends on the segment included. */
+static void enter_segment(const rw_job *job, rw_block *b, int lane)
+{
+    const long m = b->who[lane];
+    const rw_member *at = job->member + m;
+    const rw_numbers n = member_numbers(job, m);
+    double x[RW_NX], slope[RW_NX], w[RW_NW], wt[RW_NW];
+    get(b->x, lane, x, RW_NX);
+    put(b->u, lane, n.u, RW_NU);
+    b->start[lane] = member_start(job, m);
+    b->length[lane] = member_end(job, m) - b->start[lane];
+    b->resolution[lane] = DBL_EPSILON * fmax(fabs(b->start[lane]), fabs(member_end(job, m)));
+    b->t[lane] = at->t;
+    b->step[lane] = at->step;
+    b->log_error[lane] = at->log_error;
+    b->stiff[lane] = b->rejected_last[lane] = 0.0;
+    if (b->linearly) {
+        rw_stage_rate(at->t, n.u, n.p, n.c, w, wt);
+        put(b->linear.w, lane, w, RW_NW);
+        put(b->linear.wt, lane, wt, RW_NW);
+    } else {
+        rw_explicit_rate(&n, at->t, x, slope);
+        put(b->plain.k[0], lane, slope, RW_NX);
+    }
+    job->results[m].evaluations++;
+    b->reducing[lane] = 0.0;
+    if (job->reductions != NULL && b->start[lane] >= job->reductions[m * RW_REDUCTION + RW_FROM]) {
+        double value[RW_CHANNELS];
+        rw_channels(&n, at->t, x, b->balls, value);
+        put(b->sampled[0], lane, value, RW_CHANNELS);
+        b->reducing[lane] = 1.0;
+    }
+}
+
+static void enter_lane(const rw_job *job, rw_block *b, int lane, long m)
+{
+    double weight[RW_NX];
+    b->who[lane] = m;
+    b->active[lane] = 1.0;
+    b->steps[lane] = b->rejected[lane] = 0.0;
+    put(b->p, lane, job->p + m * RW_NP, RW_NP);
+    put(b->c, lane, job->c + m * RW_NC, RW_NC);
+    put(b->x, lane, job->x + m * RW_NX, RW_NX);
+    for (int k = 0; k < RW_NX; k++) weight[k] = 1.0 / job->tolerance[m * RW_NX + k];
+    put(b->weight, lane, weight, RW_NX);
+    if (job->reductions != NULL) {
+        const double *row = job->reductions + m * RW_REDUCTION;
+        const int begun = row[RW_DURATION] > 0.0;
+        for (int k = 0; k < RW_CHANNELS; k++) {
+            b->maximum[k * RW_L + lane] = begun ? row[RW_MAX + k] : -INFINITY;
+            b->minimum[k * RW_L + lane] = begun ? row[RW_MIN + k] : INFINITY;
+            b->integral[k * RW_L + lane] = row[RW_INTEGRAL + k];
+            b->square[k * RW_L + lane] = row[RW_SQUARE + k];
+        }
+    }
+    enter_segment(job, b, lane);
+}
+
+/* Keep what a lane knows of its member, and free the lane. */
+static void leave_lane(const rw_job *job, rw_block *b, int lane, int status)
+{
+    const long m = b->who[lane];
+    raceway_result *result = job->results + m;
+    rw_member *at = job->member + m;
+    get(b->x, lane, job->x + m * RW_NX, RW_NX);
+    const long steps = (long)b->steps[lane], rejected = (long)b->rejected[lane];
+    result->steps += steps;
+    result->rejected += rejected;
+    result->evaluations += (steps + rejected) * (b->linearly ? RW_RODAS5P_STAGES : RW_DP54_STAGES);
+    result->factorizations += b->linearly ? steps + rejected : 0;
+    result->status = status;
+    result->method = b->linearly ? RACEWAY_RODAS5P : RACEWAY_DP54;
+    result->step = b->step[lane];
+    if (job->reductions != NULL) {
+        double *row = job->reductions + m * RW_REDUCTION;
+        get(b->integral, lane, row + RW_INTEGRAL, RW_CHANNELS);
+        get(b->square, lane, row + RW_SQUARE, RW_CHANNELS);
+    }
+    at->t = b->t[lane];
+    at->step = b->step[lane];
+    at->log_error = b->log_error[lane];
+    /* an idle lane goes on with numbers that do no harm */
+    b->active[lane] = b->reducing[lane] = b->t[lane] = 0.0;
+    b->length[lane] = 1.0;
+    b->step[lane] = 1e-9;
+    b->who[lane] = -1;
+}
+
+/* A channel of the member in a lane within the step just taken, for rw_extreme. */
+typedef struct {
+    const rw_block *b;
+    rw_numbers n;
+    int lane;
+} rw_lane_source;
+
+static double lane_channel(const void *from, int channel, double theta, int *ball)
+{
+    const rw_lane_source *source = from;
+    const rw_block *b = source->b;
+    double y[RW_NX];
+    for (int k = 0; k < RW_NX; k++) {
+        const int i = k * RW_L + source->lane;
+        if (channel < RW_NX && k != channel) continue;
+        if (b->linearly) y[k] = rw_linear_entry(b->dense[0] + i, RW_NX * RW_L, b->x[i], b->next[i], theta);
+        else y[k] = rw_explicit_entry(b->dense[0] + i, RW_NX * RW_L, b->x[i], b->next[i], theta);
+    }
+    return rw_channel(&source->n, b->t[source->lane] + theta * b->h[source->lane], y, channel, ball);
+}
+
+/* Reductions of the lanes whose step was accepted; the same rules as rw_reduce. */
+static void reduce(const rw_job *job, rw_block *b)
+{
+    const int channels = b->balls ? RW_CHANNELS : RW_NX;
+    double add[RW_L] RW_ALIGNED;
+    RW_EACH_LANE add[lane] = b->accepted[lane] * b->reducing[lane];
+    if (b->linearly) rw_lane_linear_dense(&b->linear, b->dense);
+    else rw_lane_explicit_dense(&b->plain, b->x, b->h, b->next, b->dense);
+    for (int q = 1; q < RW_POINTS; q++) {
+        const double theta = (double)q / (RW_POINTS - 1);
+        double *restrict y = b->sampled[q], time[RW_L] RW_ALIGNED;
+        if (q == RW_POINTS - 1) {
+            for (int i = 0; i < RW_NX * RW_L; i++) y[i] = b->next[i];
+        } else if (b->linearly) {
+            for (int i = 0; i < RW_NX * RW_L; i++) y[i] = rw_linear_entry(b->dense[0] + i, RW_NX * RW_L, b->x[i], b->next[i], theta);
+        } else {
+            for (int i = 0; i < RW_NX * RW_L; i++) y[i] = rw_explicit_entry(b->dense[0] + i, RW_NX * RW_L, b->x[i], b->next[i], theta);
+        }
+        if (!b->balls) continue;
+        RW_EACH_LANE time[lane] = b->t[lane] + theta * b->h[lane];
+        rw_lane_ball_channels(&b->numbers, time, y, y + RW_NX * RW_L);
+    }
+    for (int k = 0; k < channels; k++) {
+        double news[RW_L] RW_ALIGNED, any = 0.0;
+        const int row = k * RW_L;
+        RW_EACH_LANE {
+            const double v0 = b->sampled[0][row + lane], v1 = b->sampled[1][row + lane], v2 = b->sampled[2][row + lane];
+            const double v3 = b->sampled[3][row + lane], v4 = b->sampled[4][row + lane];
+            const double sum = rw_boole[0] * (v0 + v4) + rw_boole[1] * (v1 + v3) + rw_boole[2] * v2;
+            const double squares = rw_boole[0] * (v0 * v0 + v4 * v4) + rw_boole[1] * (v1 * v1 + v3 * v3) + rw_boole[2] * (v2 * v2);
+            b->integral[row + lane] += add[lane] != 0.0 ? b->h[lane] * sum : 0.0;
+            b->square[row + lane] += add[lane] != 0.0 ? b->h[lane] * squares : 0.0;
+            const double a = v0 > v1 ? v0 : v1, c = v0 > v1 ? v1 : v0, d = v2 > v3 ? v2 : v3, e = v2 > v3 ? v3 : v2;
+            double high = a > d ? a : d, low = c < e ? c : e;
+            high = v4 > high ? v4 : high;
+            low = v4 < low ? v4 : low;
+            /* a parabola through three of the points rises above them by no more than an eighth of their range */
+            const double reach = 0.1250001 * (high - low);
+            const double above = high + reach > b->maximum[row + lane] ? 1.0 : 0.0, below = low - reach < b->minimum[row + lane] ? 1.0 : 0.0;
+            news[lane] = add[lane] * (above + 2.0 * below);
+        }
+        for (int lane = 0; lane < RW_L; lane++) any += news[lane];
+        if (any == 0.0) continue;
+        for (int lane = 0; lane < RW_L; lane++) {
+            if (news[lane] == 0.0) continue;
+            const long m = b->who[lane];
+            double *reduction = job->reductions + m * RW_REDUCTION;
+            const rw_lane_source source = {b, member_numbers(job, m), lane};
+            const double time = b->start[lane] + b->t[lane], *v = b->sampled[0] + row + lane;
+            if (news[lane] != 2.0) rw_extreme(reduction, RW_MAX, k, 1.0, v, RW_CHANNELS * RW_L, time, b->h[lane], lane_channel, &source);
+            if (news[lane] != 1.0) rw_extreme(reduction, RW_MIN, k, -1.0, v, RW_CHANNELS * RW_L, time, b->h[lane], lane_channel, &source);
+            b->maximum[row + lane] = reduction[RW_MAX + k];
+            b->minimum[row + lane] = reduction[RW_MIN + k];
+        }
+    }
+    for (int lane = 0; lane < RW_L; lane++)
+        if (add[lane] != 0.0) job->reductions[b->who[lane] * RW_REDUCTION + RW_DURATION] += b->h[lane];
+    for (int k = 0; k < channels; k++)
+        RW_EACH_LANE {
+            const int i = k * RW_L + lane;
+            b->sampled[0][i] = add[lane] != 0.0 ? b->sampled[RW_POINTS - 1][i] : b->sampled[0][i];
+        }
+}
+
+/* Sizes of the steps to try: as proposed, or so that the segment's end is met. */
+static void choose_steps(rw_block *b)
+{
+    RW_EACH_LANE {
+        const double proposed = b->step[lane], left = b->length[lane] - b->t[lane];
+        b->last[lane] = proposed * 1.0001 >= left ? 1.0 : 0.0;
+        b->h[lane] = proposed * 1.0001 >= left ? left : 2.0 * proposed > left ? 0.5 * left : proposed;
+    }
+}
+
+/* Accept or reject; propose the next step sizes by the PI controller (Hairer & Wanner II, section IV.2). */
+static void judge(rw_block *b, int changeable)
+{
+    const double exponent = 1.0 / (b->linearly ? rw_rodas5p.error_exponent : rw_dp54.error_exponent);
+    const double log_least = -23.025850929940457; /* of 1e-10 */
+    double finite[RW_L] RW_ALIGNED, fine[RW_L] RW_ALIGNED, bounded[RW_L] RW_ALIGNED, log_error[RW_L] RW_ALIGNED;
+    double grow[RW_L] RW_ALIGNED, shrink[RW_L] RW_ALIGNED, log_grow[RW_L] RW_ALIGNED, log_shrink[RW_L] RW_ALIGNED;
+    RW_EACH_LANE finite[lane] = 0.0;
+    for (int k = 0; k < RW_NX; k++) RW_EACH_LANE finite[lane] += b->next[k * RW_L + lane] * 0.0;
+    RW_EACH_LANE {
+        /* a comparison with what is no number is false */
+        fine[lane] = b->error[lane] <= DBL_MAX && finite[lane] == 0.0 ? 1.0 : 0.0;
+        const double least = b->error[lane] > 1e-10 ? b->error[lane] : 1e-10;
+        bounded[lane] = least <= DBL_MAX ? least : 1.0;
+    }
+    rw_lane_log(bounded, log_error);
+    RW_EACH_LANE {
+        log_error[lane] = log_error[lane] > log_least ? log_error[lane] : log_least;
+        log_grow[lane] = (0.4 * b->log_error[lane] - 0.7 * log_error[lane]) * exponent;
+        log_shrink[lane] = -log_error[lane] * exponent;
+    }
+    rw_lane_exp(log_grow, grow);
+    rw_lane_exp(log_shrink, shrink);
+    RW_EACH_LANE {
+        double accepted = b->error[lane] <= 1.0 ? b->active[lane] : 0.0;
+        accepted = finite[lane] == 0.0 ? accepted : 0.0;
+        double up = 0.9 * grow[lane];
+        up = up > 6.0 ? 6.0 : up;
+        up = up < 0.2 ? 0.2 : up;
+        const double bound = b->rejected_last[lane] != 0.0 ? 1.0 : 6.0;
+        up = up > bound ? bound : up;
+        double down = fine[lane] != 0.0 ? 0.9 * shrink[lane] : 0.1;
+        down = down < 0.1 ? 0.1 : down;
+        down = down > 0.9 ? 0.9 : down;
+        /* a last step cut short says nothing against the size that was proposed */
+        const double cut = up >= 1.0 ? b->last[lane] : 0.0;
+        const double kept = cut != 0.0 ? b->step[lane] : b->h[lane] * up;
+        const double tried = b->active[lane] != 0.0 ? b->h[lane] * down : b->step[lane];
+        b->step[lane] = accepted != 0.0 ? kept : tried;
+        const double remembered = log_error[lane] > RW_LOG_SMALL_ERROR ? log_error[lane] : RW_LOG_SMALL_ERROR;
+        b->log_error[lane] = accepted != 0.0 ? remembered : b->log_error[lane];
+        b->accepted[lane] = accepted;
+        b->rejected_last[lane] = 1.0 - accepted;
+        b->steps[lane] += accepted;
+        b->rejected[lane] += b->active[lane] - accepted;
+        b->small[lane] = b->step[lane] <= b->resolution[lane] ? b->active[lane] - accepted : 0.0;
+    }
+    if (changeable && !b->linearly) {
+        double reach[RW_L] RW_ALIGNED;
+        rw_lane_stiffness(&b->plain, b->h, b->next, b->weight, reach);
+        RW_EACH_LANE {
+            const double count = reach[lane] > 3.25 ? b->stiff[lane] + 1.0 : 0.0;
+            b->stiff[lane] = b->accepted[lane] != 0.0 ? count : b->stiff[lane];
+        }
+    }
+}
+
+/* Take over what accepted steps reached. */
+static void advance(rw_block *b)
+{
+    for (int k = 0; k < RW_NX; k++)
+        RW_EACH_LANE {
+            const int i = k * RW_L + lane;
+            b->x[i] = b->accepted[lane] != 0.0 ? b->next[i] : b->x[i];
+        }
+    if (b->linearly) {
+        for (int k = 0; k < RW_NW; k++)
+            RW_EACH_LANE {
+                const int i = k * RW_L + lane;
+                b->linear.w[i] = b->accepted[lane] != 0.0 ? b->linear.end_w[i] : b->linear.w[i];
+                b->linear.wt[i] = b->accepted[lane] != 0.0 ? b->linear.end_wt[i] : b->linear.wt[i];
+            }
+    } else {
+        for (int k = 0; k < RW_NX; k++)
+            RW_EACH_LANE {
+                const int i = k * RW_L + lane;
+                b->plain.k[0][i] = b->accepted[lane] != 0.0 ? b->plain.k[RW_DP54_STAGES][i] : b->plain.k[0][i];
+            }
+    }
+    RW_EACH_LANE {
+        const double there = b->last[lane] != 0.0 ? b->length[lane] : b->t[lane] + b->h[lane];
+        b->t[lane] = b->accepted[lane] != 0.0 ? there : b->t[lane];
+    }
+}
+
+/* The state that moved most against its tolerance, or the first that is no number. */
+static int worst_state(const rw_block *b, int lane)
+{
+    int worst = 0;
+    double largest = -1.0;
+    for (int k = 0; k < RW_NX; k++) {
+        const int i = k * RW_L + lane;
+        if (!(fabs(b->next[i]) <= DBL_MAX)) return k;
+        const double change = fabs(b->next[i] - b->x[i]) * b->weight[i];
+        if (change > largest) {
+            largest = change;
+            worst = k;
+        }
+    }
+    return worst;
+}
+
+/* What happens to a lane beyond a step: ends of segments, failures, changes of method.  Returns whether the lane has become free. */
+static int settle(const rw_job *job, rw_block *b, int lane)
+{
+    const long m = b->who[lane];
+    raceway_result *result = job->results + m;
+    rw_member *at = job->member + m;
+    int status = RACEWAY_DONE;
+    if (b->linearly) result->pivoted += b->linear.pivoted[lane];
+    result->time = b->start[lane] + b->t[lane];
+    if (b->accepted[lane] != 0.0 && b->last[lane] != 0.0) {
+        const long segments = job->first[m + 1] - job->first[m];
+        result->time = member_end(job, m);
+        at->step = b->step[lane];
+        at->log_error = b->log_error[lane];
+        while (result->segment + 1 < segments) {
+            result->segment++;
+            if (!(member_end(job, m) > member_start(job, m))) continue;
+            get(b->x, lane, job->x + m * RW_NX, RW_NX);
+            begin_segment(job, m);
+            if ((at->method == RACEWAY_RODAS5P) == b->linearly) {
+                enter_segment(job, b, lane);
+                return 0;
+            }
+            /* the other pass takes it: step size and time as the new segment wants them */
+            const rw_member begun = *at;
+            leave_lane(job, b, lane, RACEWAY_DONE);
+            *at = begun;
+            return 1;
+        }
+        at->phase = RW_FINISHED;
+        leave_lane(job, b, lane, RACEWAY_DONE);
+        return 1;
+    }
+    if (b->stiff[lane] >= RW_STIFF_STEPS) {
+        at->method = RACEWAY_RODAS5P;
+        result->switches++;
+        leave_lane(job, b, lane, RACEWAY_DONE);
+        return 1;
+    }
+    if (b->small[lane] != 0.0) {
+        status = b->error[lane] <= DBL_MAX ? RACEWAY_STEP_TOO_SMALL : RACEWAY_NOT_FINITE;
+        for (int k = 0; k < RW_NX; k++)
+            if (!(fabs(b->next[k * RW_L + lane]) <= DBL_MAX)) status = RACEWAY_NOT_FINITE;
+    }
+    if (status == RACEWAY_DONE && result->steps + result->rejected + (long)b->steps[lane] + (long)b->rejected[lane] >= job->options->max_steps)
+        status = RACEWAY_TOO_MANY_STEPS;
+    if (status == RACEWAY_DONE) return 0;
+    if (b->small[lane] != 0.0) result->state = worst_state(b, lane);
+    at->phase = RW_FINISHED;
+    leave_lane(job, b, lane, status);
+    return 1;
+}
+
+/* The next member that waits for this pass, from `from` on; -1 if none. */
+static long next_member(const rw_job *job, int linearly, long from)
+{
+    for (long m = from; m < job->members; m++)
+        if (job->member[m].phase == RW_WAITING && (job->member[m].method == RACEWAY_RODAS5P) == linearly) return m;
+    return -1;
+}
+
+/* Advance all members that wait for a family until they are done or leave it; returns 0 when asked to stop. */
+static int pass(const rw_job *job, rw_block *b, int linearly)
+{
+    const int changeable = job->options->method == RACEWAY_AUTO;
+    long waiting = next_member(job, linearly, 0);
+    int filled = 0, stopped = 0;
+    if (waiting < 0) return 1;
+    memset(b, 0, sizeof *b);
+    b->linearly = linearly;
+    b->balls = job->reductions != NULL && job->reductions[RW_BALLS] != 0.0;
+    b->numbers.u = b->u;
+    b->numbers.p = b->p;
+    b->numbers.c = b->c;
+    for (int lane = 0; lane < RW_L; lane++) {
+        /* every lane starts with a member's numbers, so that idle ones do no harm either */
+        enter_lane(job, b, lane, waiting >= 0 ? waiting : b->who[0]);
+        if (waiting >= 0) {
+            filled++;
+            waiting = next_member(job, linearly, waiting + 1);
+        } else {
+            job->results[b->who[lane]].evaluations--;
+            b->active[lane] = b->reducing[lane] = b->t[lane] = 0.0;
+            b->length[lane] = 1.0;
+            b->step[lane] = 1e-9;
+            b->who[lane] = -1;
+        }
+    }
+    for (long round = 0; filled > 0 && !stopped; round++) {
+        choose_steps(b);
+        if (linearly) rw_lane_linear_step(&b->linear, &b->numbers, b->t, b->x, b->h, b->weight, b->next, b->error);
+        else rw_lane_explicit_step(&b->plain, &b->numbers, b->t, b->x, b->h, b->weight, b->next, b->error);
+        judge(b, changeable);
+        double reducing = 0.0;
+        for (int lane = 0; lane < RW_L; lane++) reducing += b->reducing[lane];
+        if (reducing > 0.0) reduce(job, b);
+        advance(b);
+        for (int lane = 0; lane < RW_L; lane++) {
+            if (b->active[lane] == 0.0 || !settle(job, b, lane)) continue;
+            if (waiting >= 0) {
+                enter_lane(job, b, lane, waiting);
+                waiting = next_member(job, linearly, waiting + 1);
+            } else {
+                filled--;
+            }
+        }
+        stopped = job->options->stop != NULL && round % RW_STOP_INTERVAL == 0 && *job->options->stop;
+    }
+    for (int lane = 0; lane < RW_L; lane++)
+        if (b->active[lane] != 0.0) leave_lane(job, b, lane, RACEWAY_STOPPED);
+    return !stopped;
+}
+
+int raceway_ensemble(const raceway_ensemble_options *options, long members, const double *p, const double *c, const double *tolerance,
+                     double *x, const long *first, const double *times, const double *inputs, const unsigned char *restarts,
+                     double *reductions, void *work, raceway_result *results)
+{
+    const rw_job job = {options, members, p, c, tolerance, x, first, times, inputs, restarts, reductions, work, results};
+    rw_block block;
+    if (options->method != RACEWAY_AUTO && options->method != RACEWAY_DP54 && options->method != RACEWAY_RODAS5P) return RACEWAY_BAD_ARGUMENT;
+    for (long m = 0; m < members; m++) {
+        raceway_result *result = results + m;
+        rw_member *at = job.member + m;
+        const long segments = first[m + 1] - first[m];
+        const double *own = times + first[m] + m;
+        memset(result, 0, sizeof *result);
+        memset(at, 0, sizeof *at);
+        result->state = -1;
+        result->time = own[0];
+        result->status = RACEWAY_DONE;
+        at->phase = RW_FINISHED;
+        for (long i = 0; i < segments; i++)
+            if (!(own[i + 1] >= own[i])) result->status = RACEWAY_BAD_ARGUMENT;
+        for (int k = 0; k < RW_NX; k++)
+            if (!(fabs(x[m * RW_NX + k]) <= DBL_MAX)) result->status = RACEWAY_NOT_FINITE;
+        if (result->status != RACEWAY_DONE || !(own[segments] > own[0])) continue;
+        while (!(member_end(&job, m) > member_start(&job, m))) result->segment++;
+        begin_segment(&job, m);
+        at->phase = RW_WAITING;
+        result->status = RACEWAY_STOPPED; /* unless it comes to another end */
+    }
+    for (int linearly = 0;; linearly = !linearly) {
+        if (next_member(&job, linearly, 0) < 0 && next_member(&job, !linearly, 0) < 0) return RACEWAY_DONE;
+        if (!pass(&job, &block, linearly)) break;
+    }
+    for (long m = 0; m < members; m++)
+        if (job.member[m].phase == RW_WAITING) results[m].status = RACEWAY_STOPPED;
+    return RACEWAY_STOPPED;
+}
+
+void raceway_ensemble_magnitudes(long members, const double *p, const double *c, const double *initial, const long *first,
+                                 const double *inputs, const double *horizons, double *magnitudes)
+{
+    for (long m = 0; m < members; m++)
+        rw_magnitudes(p + m * RW_NP, c + m * RW_NC, initial + m * RW_NX, first[m + 1] - first[m], inputs + first[m] * RW_NU, horizons[m],
+                      magnitudes + m * RW_NX);
+}
+
+long raceway_ensemble_work(long members) { return members * (long)sizeof(rw_member); }
+
+void raceway_ensemble_sizes(int *sizes)
+{
+    sizes[0] = RW_REDUCTION;
+    sizes[1] = RW_CHANNELS;
+    sizes[2] = RW_L;
+}

@@ -1,0 +1,50 @@
+/* The ensembles' interface: one call integrates any number of members, RW_LANES of them at a time.
+
+   Every member has its own parameters, segments, step sizes and method; a lane whose member is done takes the next one.  A member's numbers
+   do not depend on its neighbours, so results are the same bits however members are spread over calls and threads.
+
+   No static state, no allocation: callable from many threads at once. */
+#ifndef RACEWAY_ENSEMBLE_H
+#define RACEWAY_ENSEMBLE_H
+
+#include "stepper.h"
+
+enum { RACEWAY_STOPPED = 5 }; /* status of members that were under way when the caller asked to stop */
+
+typedef struct {
+    int method;              /* RACEWAY_AUTO, RACEWAY_DP54 or RACEWAY_RODAS5P */
+    long max_steps;          /* of a member, accepted and rejected */
+    const volatile int *stop; /* the call ends soon after this becomes nonzero; or NULL */
+} raceway_ensemble_options;
+
+/* Integrate members from x to the ends of their last segments.
+
+   members      number of members; their rows follow each other in every array
+   p, c         parameters, derived constants
+   tolerance    error allowed in a step, [members][states]
+   x            states; on return those reached
+   first        first segment of each member, [members + 1]
+   times        ends of the segments, [segments + 1] values a member: those of member m start at first[m] + m [s]
+   inputs       u of each segment
+   restarts     1 where the load jumps at the segment's start
+   reductions   rows of raceway_reduction_size() numbers, head filled in (see reductions.h), or NULL
+   work         raceway_ensemble_work(members) bytes, aligned for double
+   results      one for each member; `written` is not used */
+RACEWAY_EXPORT int raceway_ensemble(const raceway_ensemble_options *options, long members, const double *p, const double *c,
+                                    const double *tolerance, double *x, const long *first, const double *times, const double *inputs,
+                                    const unsigned char *restarts, double *reductions, void *work, raceway_result *results);
+
+/* Magnitudes of the states, [members][states], from inputs at moments spread over each member's run.
+
+   first        first moment of each member, [members + 1]
+   inputs       u at each moment
+   horizons     a turn, or the run [s]: bounds the travel of a body that nothing holds */
+RACEWAY_EXPORT void raceway_ensemble_magnitudes(long members, const double *p, const double *c, const double *initial, const long *first,
+                                                const double *inputs, const double *horizons, double *magnitudes);
+
+RACEWAY_EXPORT long raceway_ensemble_work(long members);
+
+/* Numbers in a reduction, its channels, and the lanes of this library. */
+RACEWAY_EXPORT void raceway_ensemble_sizes(int *sizes);
+
+#endif

@@ -1,0 +1,149 @@
+/* Magnitudes of the states of a run, from its most loaded moments: what raceway.runtime.scales does, for one member after another. */
+#ifndef RACEWAY_SCALES_H
+#define RACEWAY_SCALES_H
+
+#include <float.h>
+#include <string.h>
+
+#include "model.h"
+
+enum { RW_LOADED_MOMENTS = 3, RW_ITERATIONS = 80 };
+
+/* Accelerations and their slopes by position at a state, t = 0. */
+static inline void rw_field(const rw_numbers *n, const double *x, double *a, double *A)
+{
+    double w[RW_NW], wt[RW_NW], dx[RW_NX], B[RW_NQ * RW_NQ], at[RW_NQ];
+    rw_stage_rate(0.0, n->u, n->p, n->c, w, wt);
+    rw_linearize(n, w, wt, x, dx, A, B, at);
+    memcpy(a, dx + RW_NQ, RW_NQ * sizeof *a);
+}
+
+static inline double rw_size(const double *v)
+{
+    double sum = 0.0;
+    for (int k = 0; k < RW_NQ; k++) sum += v[k] * v[k];
+    return sqrt(sum);
+}
+
+static inline double rw_largest(const double *v)
+{
+    double most = 0.0;
+    for (int k = 0; k < RW_NQ; k++) most = fabs(v[k]) > most ? fabs(v[k]) : most;
+    return most;
+}
+
+/* Solve (I/tau - A) d = a by elimination with pivoting; returns 0 where it is singular. */
+static inline int rw_solve(const double *A, double tau, const double *a, double *d)
+{
+    double rows[RW_NQ][RW_NQ + 1];
+    for (int i = 0; i < RW_NQ; i++) {
+        for (int j = 0; j < RW_NQ; j++) rows[i][j] = (i == j ? 1.0 / tau : 0.0) - A[i * RW_NQ + j];
+        rows[i][RW_NQ] = a[i];
+    }
+    for (int k = 0; k < RW_NQ; k++) {
+        int best = k;
+        for (int i = k + 1; i < RW_NQ; i++)
+            if (fabs(rows[i][k]) > fabs(rows[best][k])) best = i;
+        if (rows[best][k] == 0.0) return 0;
+        for (int j = 0; j <= RW_NQ; j++) {
+            const double swap = rows[k][j];
+            rows[k][j] = rows[best][j];
+            rows[best][j] = swap;
+        }
+        for (int i = k + 1; i < RW_NQ; i++) {
+            const double factor = rows[i][k] / rows[k][k];
+            for (int j = k; j <= RW_NQ; j++) rows[i][j] -= factor * rows[k][j];
+        }
+    }
+    for (int i = RW_NQ - 1; i >= 0; i--) {
+        d[i] = rows[i][RW_NQ];
+        for (int j = i + 1; j < RW_NQ; j++) d[i] -= rows[i][j] * d[j];
+        d[i] /= rows[i][i];
+    }
+    return 1;
+}
+
+/* Positions at rest with vanishing acceleration, by pseudo-transient continuation; returns 0 when it finds none. */
+static inline int rw_equilibrium(const rw_numbers *n, double *x)
+{
+    double a[RW_NQ], A[RW_NQ * RW_NQ], there[RW_NQ], slopes[RW_NQ * RW_NQ], d[RW_NQ];
+    rw_field(n, x, a, A);
+    double size = rw_size(a);
+    const double first = size;
+    if (size == 0.0) return 1;
+    /* the first step moves by a nanometre: well inside any clearance */
+    double tau = 1e-9 * (1.0 + rw_largest(x)) / size;
+    for (int i = 0; i < RW_ITERATIONS; i++) {
+        double trial[RW_NX];
+        if (!rw_solve(A, tau, a, d)) return 0;
+        memcpy(trial, x, sizeof trial);
+        for (int k = 0; k < RW_NQ; k++) trial[k] += d[k];
+        rw_field(n, trial, there, slopes);
+        const double reached = rw_size(there);
+        if (!(reached <= DBL_MAX) || reached > 1.5 * size) {
+            tau /= 8.0;
+            continue;
+        }
+        memcpy(x, trial, sizeof trial);
+        memcpy(a, there, sizeof a);
+        memcpy(A, slopes, sizeof A);
+        double gain = reached > 0.0 ? size / reached : 1.0;
+        gain = gain < 1.0 ? 1.0 : gain > 16.0 ? 16.0 : gain;
+        tau *= 4.0 * gain;
+        size = reached;
+        if (size <= 1e-6 * first) return 1;
+    }
+    return 0;
+}
+
+/* Magnitudes of a member whose inputs at so many moments are the rows of u. */
+static inline void rw_magnitudes(const double *p, const double *c, const double *initial, long moments, const double *u, double horizon,
+                                 double *magnitude)
+{
+    const double turn = 6.283185307179586;
+    rw_numbers n = {u, p, c};
+    double rest[RW_NX] = {0.0}, a[RW_NQ], A[RW_NQ * RW_NQ], highest = 0.0, position = 0.0, speed;
+    double loaded[RW_LOADED_MOMENTS];
+    long which[RW_LOADED_MOMENTS];
+    int kept = 0, found = 0;
+    memcpy(rest, initial, RW_NQ * sizeof *rest);
+    for (long i = 0; i < moments; i++) {
+        n.u = u + i * RW_NU;
+        rw_field(&n, rest, a, A);
+        double size = rw_largest(a);
+        if (!(size <= DBL_MAX)) size = 0.0;
+        int place = kept;
+        while (place > 0 && size > loaded[place - 1]) place--;
+        if (place >= RW_LOADED_MOMENTS) continue;
+        for (int k = kept < RW_LOADED_MOMENTS ? kept : RW_LOADED_MOMENTS - 1; k > place; k--) {
+            loaded[k] = loaded[k - 1];
+            which[k] = which[k - 1];
+        }
+        loaded[place] = size;
+        which[place] = i;
+        if (kept < RW_LOADED_MOMENTS) kept++;
+    }
+    if (kept > 0) highest = loaded[0];
+    for (int i = 0; i < kept; i++) {
+        double x[RW_NX];
+        memcpy(x, rest, sizeof x);
+        n.u = u + which[i] * RW_NU;
+        if (!rw_equilibrium(&n, x)) continue;
+        found = 1;
+        position = rw_largest(x) > position ? rw_largest(x) : position;
+    }
+    /* nothing holds the body: what it travels in the time at hand */
+    if (!found && highest > 0.0) position = highest * (horizon / turn) * (horizon / turn);
+    if (rw_largest(initial) > position) position = rw_largest(initial);
+    speed = sqrt(highest * position);
+    if (rw_largest(initial + RW_NQ) > speed) speed = rw_largest(initial + RW_NQ);
+    /* a model at rest without load: any magnitude will do */
+    if (position == 0.0) position = speed > 0.0 ? speed * horizon / turn : 1.0;
+    if (speed == 0.0) speed = position * turn / horizon;
+    for (int k = 0; k < RW_NQ; k++) {
+        magnitude[k] = position;
+        magnitude[RW_NQ + k] = speed;
+    }
+}
+
+#endif

@@ -1,0 +1,183 @@
+/* See schedule.h.  Angles are reduced modulo a turn here, so that the model sees small arguments in the thousandth turn as well. */
+#include "schedule.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#define TURN 6.283185307179586476925286766559
+
+/* Angles closer than this are one angle [rad]: an edge hit by rounding belongs to the window that starts there. */
+static const double ANGLE_RESOLUTION = 1e-11;
+
+/* Times closer than this fraction of the run are one time. */
+static const double TIME_RESOLUTION = 1e-12;
+
+typedef struct {
+    double *times;
+    long count, room;
+    int short_of_memory;
+} time_list;
+
+static void add(time_list *list, double time)
+{
+    if (list->count == list->room) {
+        const long room = list->room ? 2 * list->room : 64;
+        double *moved = realloc(list->times, (size_t)room * sizeof *moved);
+        if (!moved) {
+            list->short_of_memory = 1;
+            return;
+        }
+        list->times = moved;
+        list->room = room;
+    }
+    list->times[list->count++] = time;
+}
+
+static int by_size(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Remainder with the sign of the divisor, which is positive. */
+static double modulo(double a, double b)
+{
+    const double rest = fmod(a, b);
+    return rest < 0.0 ? rest + b : rest;
+}
+
+/* Start in [0, 2 pi) and width of a window; an end before the start lies in the next turn. */
+static void window(double first, double last, double *start, double *width)
+{
+    double wide = last - first;
+    if (wide < 0.0) {
+        wide = modulo(wide, TURN);
+        if (TURN - wide < ANGLE_RESOLUTION) wide = 0.0;
+    } else if (wide > TURN - ANGLE_RESOLUTION) {
+        wide = TURN;
+    }
+    *start = modulo(first, TURN);
+    *width = wide;
+}
+
+/* Times in [begin, end] at which offset + rate t passes `edge` modulo a turn. */
+static void add_passages(time_list *list, double edge, double offset, double rate, double begin, double end)
+{
+    const double a = (offset + rate * begin - edge) / TURN, b = (offset + rate * end - edge) / TURN;
+    const double first = ceil((a < b ? a : b) - 1e-9), last = floor((a < b ? b : a) + 1e-9);
+    for (double turn = first; turn <= last && !list->short_of_memory; turn += 1.0) add(list, (edge - offset + TURN * turn) / rate);
+}
+
+static int covers(double angle, double start, double width)
+{
+    if (width <= 0.0 || width >= TURN) return width >= TURN;
+    double past = modulo(angle - start, TURN);
+    if (TURN - past < ANGLE_RESOLUTION) past = 0.0;
+    return past < width - ANGLE_RESOLUTION;
+}
+
+/* The interval of a table in which `time` lies: number of knots at or before it. */
+static int knots_before(const schedule_input *input, const double *values, double time)
+{
+    int before = 0;
+    while (before < input->knots && values[input->times[before]] <= time) before++;
+    return before;
+}
+
+static double table(const schedule_input *input, const double *values, double t, double inside)
+{
+    const int slope_only = input->kind == SCHEDULE_TABLE_RATE, k = knots_before(input, values, inside);
+    if (k == 0 || k == input->knots) return slope_only ? 0.0 : values[input->heights[k == 0 ? 0 : k - 1]];
+    const double left = values[input->times[k - 1]], right = values[input->times[k]];
+    const double low = values[input->heights[k - 1]], high = values[input->heights[k]];
+    const double slope = (high - low) / (right - left);
+    return slope_only ? slope : low + slope * (t - left);
+}
+
+void schedule_inputs(const schedule_input *inputs, int count, const double *values, double t, double inside, double *u)
+{
+    for (int i = 0; i < count; i++) {
+        const schedule_input *input = &inputs[i];
+        if (input->kind == SCHEDULE_PHASE) {
+            u[i] = modulo(values[input->offset] + values[input->rate] * t, TURN);
+        } else if (input->kind == SCHEDULE_GATE) {
+            const double angle = values[input->offset] + values[input->rate] * inside;
+            u[i] = 0.0;
+            for (int k = 0; k < input->windows; k++) {
+                double start, width;
+                window(values[input->edges[2 * k]], values[input->edges[2 * k + 1]], &start, &width);
+                if (covers(angle, start, width)) u[i] = 1.0;
+            }
+        } else {
+            u[i] = table(input, values, t, inside);
+        }
+    }
+}
+
+int schedule_fault(const schedule_input *inputs, int count, const double *values)
+{
+    for (int i = 0; i < count; i++)
+        for (int k = 1; k < inputs[i].knots; k++)
+            if (!(values[inputs[i].times[k]] > values[inputs[i].times[k - 1]])) return i;
+    return -1;
+}
+
+/* Times at which something switches, sorted, those that are one time once. */
+static void add_breakpoints(time_list *list, const schedule_input *inputs, int count, const double *values, double begin, double end)
+{
+    time_list found = {NULL, 0, 0, 0};
+    for (int i = 0; i < count; i++) {
+        const schedule_input *input = &inputs[i];
+        if (input->kind == SCHEDULE_GATE && values[input->rate] != 0.0) {
+            for (int k = 0; k < input->windows; k++) {
+                double start, width;
+                window(values[input->edges[2 * k]], values[input->edges[2 * k + 1]], &start, &width);
+                if (width <= 0.0 || width >= TURN) continue;
+                add_passages(&found, start, values[input->offset], values[input->rate], begin, end);
+                add_passages(&found, start + width, values[input->offset], values[input->rate], begin, end);
+            }
+        }
+        for (int k = 0; k < input->knots; k++) add(&found, values[input->times[k]]);
+    }
+    if (found.count) qsort(found.times, (size_t)found.count, sizeof *found.times, by_size);
+    const double largest = fabs(begin) > fabs(end) ? fabs(begin) : fabs(end), near = TIME_RESOLUTION * largest;
+    const long before = list->count;
+    for (long i = 0; i < found.count; i++) {
+        const double time = found.times[i];
+        const int apart = list->count == before || time - list->times[list->count - 1] > near;
+        if (begin + near < time && time < end - near && apart) add(list, time);
+    }
+    if (found.short_of_memory) list->short_of_memory = 1;
+    free(found.times);
+}
+
+/* Whole turns that are no breakpoint already; `breakpoints` sorted entries stand behind the run's begin. */
+static void add_turns(time_list *list, long breakpoints, double begin, double end, double turn)
+{
+    double near = fabs(begin) > fabs(end) ? fabs(begin) : fabs(end);
+    near = TIME_RESOLUTION * (near > turn ? near : turn);
+    long next = 1;
+    for (double k = floor(begin / turn) + 1.0; k < ceil(end / turn) && !list->short_of_memory; k += 1.0) {
+        const double whole = k * turn;
+        while (next <= breakpoints && list->times[next] < whole) next++;
+        const int below = next > 1 && whole - list->times[next - 1] <= near;
+        const int above = next <= breakpoints && list->times[next] - whole <= near;
+        if (begin + near < whole && whole < end - near && !below && !above) add(list, whole);
+    }
+}
+
+long schedule_edges(const schedule_input *inputs, int count, const double *values, double begin, double end, double turn, double **edges)
+{
+    time_list list = {NULL, 0, 0, 0};
+    add(&list, begin);
+    if (!list.short_of_memory) add_breakpoints(&list, inputs, count, values, begin, end);
+    if (!list.short_of_memory && isfinite(turn)) add_turns(&list, list.count - 1, begin, end, turn);
+    add(&list, end);
+    if (list.short_of_memory) {
+        free(list.times);
+        return -1;
+    }
+    qsort(list.times, (size_t)list.count, sizeof *list.times, by_size);
+    *edges = list.times;
+    return list.count - 1;
+}

@@ -1,0 +1,38 @@
+/* When loads switch and which inputs hold in between: the run's segments. */
+#ifndef SCHEDULE_H
+#define SCHEDULE_H
+
+enum schedule_kind { SCHEDULE_PHASE, SCHEDULE_GATE, SCHEDULE_TABLE, SCHEDULE_TABLE_RATE };
+
+/* An input that is constant within a segment.  Numbers are named by their place among parameters and, behind these, derived constants.
+
+   phase        the angle offset + rate t at the segment's start [rad]
+   gate         1 while that angle lies in one of the windows, else 0
+   table        value of the piecewise linear table at the segment's start
+   table rate   its slope there */
+typedef struct {
+    enum schedule_kind kind;
+    int offset, rate;
+    int windows;       /* number of pairs start, end in `edges` */
+    const int *edges;  /* [2 windows] */
+    int knots;         /* number of entries in `times` and `heights` */
+    const int *times;  /* [knots] */
+    const int *heights; /* [knots] */
+} schedule_input;
+
+/* Ends of the segments of a run: its begin, every time at which a gate switches or a table has a knot, whole turns, its end.
+
+   inputs, count   the model's inputs
+   values          parameters and derived constants
+   turn            time of a turn [s], or infinity
+   edges           on return memory with them, increasing [s]; the caller frees it
+   Returns the number of segments, or -1 where memory is short. */
+long schedule_edges(const schedule_input *inputs, int count, const double *values, double begin, double end, double turn, double **edges);
+
+/* Inputs for a segment that starts at t; `inside` is a time within it, for which gates and slopes hold. */
+void schedule_inputs(const schedule_input *inputs, int count, const double *values, double t, double inside, double *u);
+
+/* The first table whose times do not increase, -1 where all do. */
+int schedule_fault(const schedule_input *inputs, int count, const double *values);
+
+#endif

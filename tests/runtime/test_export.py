@@ -1,0 +1,330 @@
+"""Claims about the exported C program: the same numbers as the model in Python, clean code, honest messages."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from artefact import write_folder
+
+from raceway.derive import generate
+from raceway.derive.read import scene_from_text
+from raceway.runtime import ArtefactError, Model, RequestError, load
+from raceway.runtime.export import default_magnitudes, export_c
+
+SCENES = ("punching_press", "punching_press_tangent", "four_bar", "offset_slider", "varying_compliance")
+WARNINGS = "-Wall -Wextra -Wconversion -Wshadow -pedantic -Werror"
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("make") is None or shutil.which("cc") is None, reason="needs make and a C compiler"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Program:
+    """An exported scene: the folder generated, the folder exported, and what make said."""
+
+    name: str
+    generated: Path
+    folder: Path
+    messages: str
+
+    def __call__(self, *arguments: str, binary: Path | None = None) -> subprocess.CompletedProcess[str]:
+        command = [str(binary or self.folder / self.name), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+
+    def table(self, *arguments: str, binary: Path | None = None) -> np.ndarray:
+        done = self(*arguments, binary=binary)
+        assert (done.returncode, done.stderr) == (0, ""), done.stderr
+        return np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
+
+    @property
+    def model(self) -> Model:
+        return load(self.generated)
+
+
+def build(folder: Path, *settings: str, into: Path | None = None, target: str = "") -> str:
+    """Messages of make in a copy of an exported folder, or in the folder itself."""
+    place = folder
+    if into is not None:
+        place = Path(shutil.copytree(folder, into, ignore=shutil.ignore_patterns("*.o")))
+    command = ["make", "-s", "-j2", "-C", str(place), *settings, *([target] if target else [])]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., str]) -> Callable[..., Program]:
+    """A scene, with replacements in its text, exported and built once with warnings as errors."""
+    kept: dict[tuple[object, ...], Program] = {}
+
+    def make(name: str, *changes: tuple[str, str]) -> Program:
+        if (name, *changes) not in kept:
+            place = tmp_path_factory.mktemp(name)
+            generated = generate(scene_from_text(scene_text(name, *changes), name), place / name)
+            folder = export_c(generated, place / "c")
+            flags = next(line for line in (folder / "Makefile").read_text().splitlines() if line.startswith("CFLAGS"))
+            strict = f"{flags.partition('?= ')[2].replace('$(NATIVE)', '-march=native')} {WARNINGS}"
+            messages = build(folder, f"CFLAGS={strict}")
+            kept[name, *changes] = Program(name=name, generated=generated, folder=folder, messages=messages)
+        return kept[name, *changes]
+
+    return make
+
+
+# numbers
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_program_prints_the_numbers_of_the_model_and_compiles_without_warnings(
+    exported: Callable[..., Program], scene: str
+) -> None:
+    program = exported(scene)
+    assert program.messages == ""
+    solution = program.model.simulate(method="stepper")
+    rows = program.table()
+    header = program("--cycles", "0.01").stdout.splitlines()[0]
+    assert header == ",".join(["t", *program.model.states])
+    np.testing.assert_allclose(rows[:, 0], solution.t, rtol=1e-15, atol=0.0)
+    magnitude = np.array(solution.statistics.magnitudes)
+    assert rows.shape == (len(solution), 1 + len(magnitude))
+    assert np.max(np.abs(rows[:, 1:] - solution.x) / magnitude) < 1e-12
+
+
+def test_options_do_what_the_arguments_of_simulate_do(exported: Callable[..., Program]) -> None:
+    program = exported("varying_compliance")
+    model = program.model
+    arguments = ["--cycles=2.3", "--rtol=1e-11", "--samples", "37"]
+    # magnitudes, hence tolerances, belong to runs of the scene's own length in C: the last digits differ
+    for method in ("rodas4", "rodas5p", "dp54", "dop853"):
+        found = program.table(*arguments, "--method", method)
+        solution = model.simulate(2.3, rtol=1e-11, samples_per_cycle=37, method=f"stepper-{method}")
+        assert np.array_equal(found[:, 0], solution.t)
+        assert np.max(np.abs(found[:, 1:] - solution.x) / solution.statistics.magnitudes) < 1e-7
+        rough = program.table("--cycles=2.3", "--rtol=1e-3", "--samples=37", f"--method={method}")
+        assert np.max(np.abs(rough[:, 1:] - solution.x) / solution.statistics.magnitudes) > 1e-5
+    found = program.table("--duration=0.05", "--samples=100")
+    solution = model.simulate(duration=0.05, samples_per_cycle=100, method="stepper")
+    assert np.array_equal(found[:, 0], solution.t)
+    assert np.max(np.abs(found[:, 1:] - solution.x) / solution.statistics.magnitudes) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes"),
+    [
+        # a stroke that starts in one turn and ends in the next, and a driver that runs backward
+        ("four_bar", {"mechanism.torques.work.window.start": 5.6, "mechanism.torques.work.window.end": 0.9}),
+        ("four_bar", {"mechanism.driver.speed": -55.0, "mechanism.driver.start_angle": 2.5}),
+        # edges shared by both windows, at the start and at whole turns
+        (
+            "offset_slider",
+            {
+                "mechanism.forces.tool.window.start": 0.0,
+                "mechanism.forces.tool.window.end": 4.0,
+                "mechanism.forces.strip.window.start": 4.0,
+                "mechanism.forces.strip.window.end": 6.283185307179586,
+            },
+        ),
+        # a window without width, and a clearance that changes the derived constants' neighbours
+        ("offset_slider", {"mechanism.forces.tool.window.end": 4.014257279586958, "bearing.clearance": 4e-6}),
+        ("punching_press", {"bearing.ball_diameter": 7.5e-3, "bearing.contact.young_modulus": 310e9}),
+    ],
+)
+def test_changed_parameters_move_loads_and_constants_as_in_python(
+    exported: Callable[..., Program], scene: str, changes: dict[str, float]
+) -> None:
+    """Tolerances differ, for they follow the scene's own numbers in C: hence tight ones, and a bound to match."""
+    program = exported(scene)
+    solution = program.model.simulate(2, parameters=changes, method="stepper-dop853", rtol=1e-12, samples_per_cycle=50)
+    overrides = [f"{name}={value!r}" for name, value in changes.items()]
+    found = program.table("--cycles=2", "--rtol=1e-12", "--samples=50", "--method=dop853", *overrides)
+    assert np.array_equal(found[:, 0], solution.t)
+    assert np.max(np.abs(found[:, 1:] - solution.x) / np.array(solution.statistics.magnitudes)) < 1e-5
+    # and they matter
+    plain = program.table("--cycles=2", "--rtol=1e-12", "--samples=50", "--method=dop853")
+    assert np.max(np.abs(found[:, 1:] - plain[:, 1:]) / np.array(solution.statistics.magnitudes)) > 1e-3
+
+
+def test_table_of_loads_and_many_segments_equal_python(exported: Callable[..., Program]) -> None:
+    program = exported(
+        "varying_compliance",
+        ('type = "constant"  ', 'type = "table"  '),
+        (
+            'force = ["196 N", "0 N"]',
+            'time = ["10 ms", "0.05 s", "0.153 s", "0.3 s"]\n'
+            'x = ["0 N", "300 N", "100 N", "196 N"]\ny = ["5 N", "0 N", "90 N", "0 N"]\n#',
+        ),
+    )
+    solution = program.model.simulate(method="stepper", cycles=3)
+    found = program.table("--cycles=3")
+    assert np.array_equal(found[:, 0], solution.t)
+    np.testing.assert_allclose(found[:, 1:], solution.x, rtol=0.0, atol=1e-16)
+    # more segments than one call takes
+    solution = program.model.simulate(method="stepper", cycles=1500, rtol=1e-4, samples_per_cycle=1)
+    found = program.table("--cycles=1500", "--rtol=1e-4", "--samples=1")
+    assert solution.statistics.calls > 2
+    assert np.array_equal(found[:, 0], solution.t)
+    np.testing.assert_allclose(found[:, 1:], solution.x, rtol=0.0, atol=1e-16)
+    refused = program("load.time.2=0.5")
+    assert refused.returncode == 2
+    assert "increase" in refused.stderr
+
+
+def test_magnitudes_are_those_of_a_default_run(exported: Callable[..., Program]) -> None:
+    for scene in ("punching_press", "varying_compliance"):
+        model = exported(scene).model
+        assert tuple(default_magnitudes(model)) == model.simulate(method="stepper").statistics.magnitudes
+
+
+# code
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_program_runs_clean_under_the_sanitizers(exported: Callable[..., Program], tmp_path: Path, scene: str) -> None:
+    program = exported(scene)
+    probe = tmp_path / "probe.c"
+    probe.write_text("int main(void) { return 0; }\n", encoding="utf-8")
+    sanitize = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    able = subprocess.run(
+        ["cc", *sanitize, str(probe), "-o", str(tmp_path / "probe")], capture_output=True, check=False
+    )
+    if able.returncode != 0:
+        pytest.skip("the compiler has no sanitizers")
+    flags = f"-g -O0 -std=c99 -ffp-contract=off {' '.join(sanitize)}"
+    build(program.folder, f"CFLAGS={flags}", into=tmp_path / "c")
+    binary = tmp_path / "c" / scene
+    expected = program.table("--cycles=1", "--samples=101")
+    for method in ("auto", "rodas4", "rodas5p", "dp54", "dop853"):
+        found = program.table("--cycles=1", "--samples=101", "--method", method, binary=binary)
+        if method == "auto":
+            scale = np.max(np.abs(expected[:, 1:]), axis=0)
+            assert np.max(np.abs(found[:, 1:] - expected[:, 1:]) / scale) < 1e-9
+    # what fails must fail cleanly as well
+    bad = program("--cycles=1", "bearing.initial.inner_velocity.x=1e300", binary=binary)
+    assert bad.returncode == 1
+    assert bad.stderr.startswith("error: ")
+    assert "runtime error" not in bad.stderr
+    assert "Sanitizer" not in bad.stderr
+
+
+def other_compilers() -> list[tuple[str, str]]:
+    found = [(name, path) for name in ("clang", "tcc") if (path := shutil.which(name)) is not None]
+    if importlib.util.find_spec("ziglang") is not None:
+        found.append(("ziglang", f"{sys.executable} -m ziglang cc"))
+    return found
+
+
+@pytest.mark.parametrize("scene", ["punching_press", "varying_compliance"])
+def test_another_compiler_gives_the_same_numbers(exported: Callable[..., Program], tmp_path: Path, scene: str) -> None:
+    others = other_compilers()
+    if not others:
+        pytest.skip("neither clang nor tcc nor ziglang is installed")
+    program = exported(scene)
+    arguments = ("--cycles=1", "--samples=101", "--rtol=1e-6", "--method=rodas5p")
+    expected = program.table(*arguments)
+    for name, command in others:
+        build(program.folder, f"CC={command}", into=tmp_path / name)
+        found = program.table(*arguments, binary=tmp_path / name / scene)
+        scale = np.max(np.abs(expected[:, 1:]), axis=0)
+        assert np.max(np.abs(found[:, 1:] - expected[:, 1:]) / scale) < 1e-12, name
+
+
+def test_exported_folder_knows_no_machine_and_repeats_byte_for_byte(
+    exported: Callable[..., Program], tmp_path: Path
+) -> None:
+    program = exported("four_bar")
+    again = export_c(program.generated, tmp_path / "again")
+    for path in sorted(again.iterdir()):
+        content = path.read_bytes()
+        assert content == (program.folder / path.name).read_bytes(), path.name
+        assert str(tmp_path).encode() not in content
+        assert os.sep.encode() + b"tmp" not in content
+        assert str(Path.home()).encode() not in content
+    assert {"Makefile", "README.md", "main.c", "scene.c", "constants.c", "kernels.h", "methods.h", "stepper.c"} <= {
+        path.name for path in again.iterdir()
+    }
+
+
+# messages
+
+
+def test_wrong_requests_name_what_was_given_and_what_is_allowed(exported: Callable[..., Program]) -> None:
+    program = exported("varying_compliance")
+    wrong = {
+        "--cycles=0": "above 0",
+        "--cycles=many": "above 0",
+        "--rtol=1": "1e-13 to 0.1",
+        "--samples=1.5": "whole number",
+        "--samples=-3": "above 0",
+        "--method=euler": "rodas5p",
+        "--steps=3": "--help",
+        "--rtol": "a value behind it",
+        "bearing.clearence=1e-5": "--list",
+        "bearing.clearance": "SI units",
+        "bearing.clearance=": "SI units",
+        "bearing.clearance=1e-5m": "SI units",
+        "bearing.clearance=nan": "SI units",
+        "1e-5": "--list",
+        "shaft.speed=0": "--duration",
+        "bearing.inner_ring.mass=0": "derived constant",
+    }
+    for argument, allowed in wrong.items():
+        done = program(argument)
+        assert done.returncode == 2, argument
+        assert done.stdout == "", argument
+        assert done.stderr.startswith("error: "), argument
+        assert allowed in done.stderr, done.stderr
+
+
+def test_help_and_list_are_answers_and_not_errors(exported: Callable[..., Program]) -> None:
+    program = exported("varying_compliance")
+    helped, listed = program("--help"), program("--list", "bearing.clearance=3e-6")
+    assert (helped.returncode, listed.returncode) == (0, 0)
+    for option in ("--cycles", "--duration", "--rtol", "--samples", "--method", "--list"):
+        assert option in helped.stdout
+    lines = dict(line.split("  ", 1)[0].split("=") for line in listed.stdout.splitlines())
+    assert list(lines) == list(program.model.parameters)
+    assert float(lines["bearing.clearance"]) == 3e-6
+
+
+def test_failed_run_prints_the_rows_it_reached(exported: Callable[..., Program]) -> None:
+    program = exported("varying_compliance")
+    # no contact, and damping that feeds the motion
+    done = program(
+        "bearing.contact.stiffness=0",
+        "bearing.inner_ring.damping=-1e6",
+        "--method=dp54",
+        "--duration=0.1",
+        "--samples=50000",
+    )
+    assert done.returncode == 1
+    assert "written" in done.stderr
+    assert "t = " in done.stderr
+    rows = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1)
+    assert 1 < len(rows) < 50_001
+    assert np.all(np.isfinite(rows))
+
+
+def test_model_without_states_and_edited_folders_are_refused(tmp_path: Path, exported: Callable[..., Program]) -> None:
+    bare = write_folder(tmp_path / "bare", states=False)
+    with pytest.raises(RequestError, match="no states"):
+        export_c(bare, tmp_path / "out")
+    edited = Path(shutil.copytree(exported("varying_compliance").generated, tmp_path / "edited"))
+    (edited / "kernels.h").write_text("/* nothing */\n", encoding="utf-8")
+    with pytest.raises(ArtefactError, match=r"kernels\.h"):
+        export_c(edited, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    without = write_folder(tmp_path / "without")
+    with pytest.raises(ArtefactError, match=r"methods\.h"):
+        export_c(without, tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,137 @@
+"""Claims about the benchmarks: one command measures and writes the page, and nothing is left out in silence.
+
+The numbers of a quick run mean nothing; that all is there, and that what is compared is the same, does.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from raceway.runtime.compile import find_compiler
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a quick run."""
+    if find_compiler() is None:
+        pytest.skip("the benchmarks compile C; no compiler is here")
+    folder = tmp_path_factory.mktemp("benchmarks")
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks", "--quick", "--out", str(folder)],
+        cwd=ROOT,
+        env={**os.environ, "MPLBACKEND": "Agg"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def _result(folder: Path, name: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "results" / f"{name}.json").read_text(encoding="utf-8"))
+    return found
+
+
+def test_every_contender_has_runs_or_says_why_not(quick: Path) -> None:
+    page = (quick / "benchmarks.md").read_text(encoding="utf-8")
+    contenders = _result(quick, "work_precision_onesided")["contenders"]
+    assert {"stepper", "simulate", "hand-dp54", "erk", "cvodes", "numbalsoda", "diffrax-tsit5"} <= {
+        c["key"] for c in contenders
+    }
+    for contender in contenders:
+        assert ("runs" in contender) != ("absent" in contender)
+        row = next(line for line in page.splitlines() if line.startswith(f"| {contender['label']}"))
+        if "absent" in contender:
+            assert contender["absent"] in row
+        else:
+            assert any("time" in run for run in contender["runs"]), contender
+
+
+def test_all_methods_converge_to_the_same_cycle(quick: Path) -> None:
+    for contender in _result(quick, "work_precision_onesided")["contenders"]:
+        errors = [run["error"]["worst"]["median"] for run in contender.get("runs", ()) if "error" in run]
+        if errors:
+            assert min(errors) < 1e-3, contender["key"]
+            assert errors[-1] < errors[0] or max(errors) < 1e-6, contender["key"]
+
+
+def test_stepper_takes_the_steps_of_the_same_method_by_hand(quick: Path) -> None:
+    contenders = {c["key"]: c for c in _result(quick, "work_precision_onesided")["contenders"]}
+    for method in ("dp54", "rodas4", "rodas5p"):
+        own, hand = (contenders[f"{who}-{method}"]["runs"] for who in ("stepper", "hand"))
+        for mine, theirs in zip(own, hand, strict=True):
+            assert mine["counts"]["steps"] == pytest.approx(theirs["counts"]["steps"], rel=0.05)
+            if theirs["error"]["worst"]["median"] < 1e-2:
+                assert mine["error"]["worst"]["median"] == pytest.approx(theirs["error"]["worst"]["median"], rel=0.5)
+
+
+def test_two_references_agree_and_right_hand_sides_are_one_model(quick: Path) -> None:
+    result = _result(quick, "work_precision_onesided")
+    assert result["reference"]["worst_agreement"] < 1e-8
+    assert {"NumPy", "C"} <= set(result["rate_agreement"])
+    assert all(value < 1e-12 for value in result["rate_agreement"].values())
+
+
+def test_page_shows_figures_and_names_no_paths(quick: Path) -> None:
+    page = (quick / "benchmarks.md").read_text(encoding="utf-8")
+    for title in (
+        "How to read it",
+        "Work and precision",
+        "Targets",
+        "One right-hand side",
+        "Number of balls",
+        "From scene",
+    ):
+        assert f"## {title}" in page
+    images = re.findall(r"\]\((images/[^)]+)\)", page)
+    assert images
+    for image in images:
+        assert (quick / image).read_bytes().startswith(b"\x89PNG")
+    everything = page + "".join(p.read_text(encoding="utf-8") for p in (quick / "results").glob("*.json"))
+    for place in (str(ROOT), str(Path.home()), str(quick)):
+        assert place not in everything
+
+
+def test_time_at_an_error_follows_a_power_law() -> None:
+    from benchmarks.curves import lower, time_at
+
+    errors = 10.0 ** -np.arange(1.0, 9.0)
+    slow = [(float(e), float(e**-0.2)) for e in errors]
+    fast = [(float(e), float(0.01 * e**-0.5)) for e in errors]
+    assert time_at(slow, 3e-5) == pytest.approx(3e-5**-0.2)
+    assert time_at(slow, 1e-12) is None
+    assert time_at(slow[3:], 1e-1) == slow[3][1]  # more accurate than asked for
+    crossing = lower([slow, fast])
+    assert crossing[0][1] == pytest.approx(min(slow[0][1], fast[0][1]))
+    assert crossing[-1][1] == pytest.approx(min(slow[-1][1], fast[-1][1]))
+
+
+def test_rate_of_another_model_is_refused() -> None:
+    from benchmarks.press import disagreement, make_load, make_vector_rate
+    from benchmarks.problem import CASES, models
+
+    if find_compiler() is None:
+        pytest.skip("the benchmarks compile C; no compiler is here")
+    case = next(c for c in CASES if c.key == "onesided")
+    model = models()[case.scene]
+    magnitude = np.array([1e-4] * 4 + [1.0] * 4)
+    right = make_vector_rate(np, make_load(math), 8, False)
+    assert disagreement(model, {}, right, magnitude) < 1e-12
+    seven_balls = make_vector_rate(np, make_load(math), 7, False)
+    other_law = make_vector_rate(np, make_load(math), 8, True)
+    assert disagreement(model, {}, seven_balls, magnitude) > 1e-3
+    assert disagreement(model, {}, other_law, magnitude) > 1e-3
