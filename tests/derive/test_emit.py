@@ -110,6 +110,15 @@ def test_a_wrong_number_leaves_the_folder_alone(tmp_path: Path, scene_text: Call
     assert not (tmp_path / "new").exists()
 
 
+def test_manifest_tells_where_each_applied_force_acts(tmp_path: Path, scene_text: Callable[..., str]) -> None:
+    window = 'window = { start = "237 deg", end = "267 deg" }'
+    always = '\n[mechanism.forces.pull]\nbody = "rod"\npoint = "B"\nforce = ["1 N", "2 N"]\n'
+    text = scene_text("punching_press", (window, window + always))
+    manifest = read_manifest(generate(scene_from_text(text, "press"), tmp_path / "press"))
+    assert manifest.mechanism is not None
+    assert manifest.mechanism.forces == (("punch", "slider", "C", "gate.punch"), ("pull", "rod", "B", ""))
+
+
 def test_manifest_prices_every_function(tmp_path: Path) -> None:
     manifest = read_manifest(generate(ROOT / "scenes/punching_press.toml", tmp_path / "press"))
     prices = {f.name: f.operations for f in manifest.functions}

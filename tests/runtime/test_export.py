@@ -15,10 +15,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from artefact import write_folder
+from typer.testing import CliRunner
 
 from raceway.derive import generate
 from raceway.derive.read import scene_from_text
 from raceway.runtime import ArtefactError, Model, RequestError, load
+from raceway.runtime.cli import app
 from raceway.runtime.export import default_magnitudes, export_c
 
 SCENES = ("punching_press", "punching_press_tangent", "four_bar", "offset_slider", "varying_compliance")
@@ -253,6 +255,27 @@ def test_exported_folder_knows_no_machine_and_repeats_byte_for_byte(
     assert {"Makefile", "README.md", "main.c", "scene.c", "constants.c", "kernels.h", "methods.h", "stepper.c"} <= {
         path.name for path in again.iterdir()
     }
+
+
+# command line
+
+
+def test_command_writes_the_folder_and_wants_a_format(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Path(__file__).resolve().parents[2] / "scenes" / "varying_compliance.toml"
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["export", str(scene), "--c"])
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout == "export/varying_compliance\n"
+    assert (tmp_path / "export" / "varying_compliance" / "main.c").is_file()
+    elsewhere = CliRunner().invoke(app, ["export", str(scene), "--c", "--out", "there"])
+    assert elsewhere.exit_code == 0
+    for path in sorted((tmp_path / "there").iterdir()):
+        assert path.read_bytes() == (tmp_path / "export" / "varying_compliance" / path.name).read_bytes()
+    without = CliRunner().invoke(app, ["export", str(scene)])
+    assert without.exit_code == 2
+    assert "--c" in without.stderr
+    taken = CliRunner().invoke(app, ["export", str(scene), "--c", "--out", str(scene)])
+    assert taken.exit_code == 2
 
 
 # messages

@@ -143,10 +143,25 @@ def make_members(model: Model, table: Table) -> Members:
                 "Geometry and elastic constants must be physical."
             )
         columns |= {info.name: c[:, k] for k, info in enumerate(manifest.constants)}
+    _check_knots(manifest, columns, refused)
     initial = np.ascontiguousarray(np.column_stack([columns[name] for name in manifest.initial]))
     members = Members(varied=varied, columns=columns, p=p, c=c, initial=initial, refused=refused)
     _check_assembly(model, members)
     return members
+
+
+def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused: dict[int, str]) -> None:
+    """Note members whose tables have times that do not increase."""
+    for item in manifest.inputs:
+        if item.kind != "table":
+            continue
+        wrong = np.any(np.diff([columns[name] for name in item.times], axis=0) <= 0.0, axis=0)
+        for member in np.flatnonzero(wrong).tolist():
+            values = {name: float(columns[name][member]) for name in (*item.times, *item.values)}
+            try:
+                clock.breakpoints((item,), values, 0.0, 1.0)
+            except RequestError as fault:
+                refused[member] = str(fault)
 
 
 def _check_assembly(model: Model, members: Members) -> None:

@@ -38,12 +38,23 @@ static inline __attribute__((always_inline)) double rw_explicit_step(const rw_ex
     /* all times of the step at once; the last stage and the end slope are both at its end */
     double w[RW_METHOD_STAGES][RW_NW];
     rw_stages(n, t, h, method->nodes + 1, stages - 1, w);
-    for (int i = 1; i < stages; i++) {
-        rw_combine(method->a[i], i, (const double(*)[RW_NX])work->k, h, x, work->y);
-        rw_rate(n, w[i - 1], work->y, work->k[i]);
+    /* the latest slope stays in registers and is added last: all else is ready before it is */
+    double last[RW_NX], y[RW_NX];
+    for (int k = 0; k < RW_NX; k++) last[k] = work->k[0][k];
+    for (int i = 1; i <= stages; i++) {
+        const double *restrict row = i < stages ? method->a[i] : method->weights;
+        const double latest = h * row[i - 1];
+        double base[RW_NX];
+        rw_combine(row, i - 1, (const double(*)[RW_NX])work->k, h, x, base);
+#pragma GCC unroll 16
+        for (int k = 0; k < RW_NX; k++) y[k] = base[k] + latest * last[k];
+        rw_rate(n, w[i < stages ? i - 1 : stages - 2], y, last);
+#pragma GCC unroll 16
+        for (int k = 0; k < RW_NX; k++) work->k[i][k] = last[k];
+        if (i == stages - 1)
+            for (int k = 0; k < RW_NX; k++) work->y[k] = y[k];
     }
-    rw_combine(method->weights, stages, (const double(*)[RW_NX])work->k, h, x, next);
-    rw_rate(n, w[stages - 2], next, work->k[stages]);
+    for (int k = 0; k < RW_NX; k++) next[k] = y[k];
     double first = 0.0, below = 0.0;
     for (int m = 0; m < method->estimates; m++) {
         double error[RW_NX];

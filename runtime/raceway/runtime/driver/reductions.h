@@ -3,7 +3,8 @@
    Channels are the states, then four quantities of the balls, each with its value of the most loaded ball at the moment: total force,
    elastic force, damping force, deflection.  Every step is looked at in its quarters, theta = 0, 1/4, 1/2, 3/4, 1.
 
-   Integrals are taken by Boole's rule, which is exact up to degree five.  Extremes: a parabola through the three best points says whether
+   Integrals are taken by Boole's rule, exact up to degree five: for states exact with all methods but DOP853, whose output is of degree
+   seven.  Extremes: a parabola through the three best points says whether
    and where there is a larger value between them; the channel is evaluated there from the dense output, and the parabola drawn anew.  So an
    extreme is always a value that the solution takes, never an extrapolation across a kink.  At a kink it is met to a part of a quarter
    step: the smallest value of the most loaded ball is such a place, for there two balls change rank.
@@ -34,7 +35,7 @@ enum {
     RW_REDUCTION = RW_SQUARE + RW_CHANNELS
 };
 
-enum { RW_REFINEMENTS = 3 }; /* parabolas drawn for an extreme */
+enum { RW_REFINEMENTS = 12 }; /* evaluations spent on an extreme at most; a smooth one takes two or three */
 
 /* Weights of Boole's rule. */
 static const double rw_boole[RW_POINTS] = {7.0 / 90.0, 32.0 / 90.0, 12.0 / 90.0, 32.0 / 90.0, 7.0 / 90.0};
@@ -151,9 +152,11 @@ static inline void rw_extreme(double *reduction, int value, int channel, double 
             else c = theta, vc = found;
         }
         if (!(vb >= va && vb >= vc)) return;
-        const double next = rw_top(a, va, b, vb, c, vc);
-        if (next == theta || next == b) return;
-        theta = next;
+        /* what the next parabola promises on top; beside a jump of the force parabolas creep, and every other place is the middle of the
+           larger part instead */
+        const double range = va < vc ? vb - va : vb - vc, next = rw_top(a, va, b, vb, c, vc), move = (next - b) / (next < b ? b - a : c - b);
+        if (!(range * move * move > 1e-9 * fabs(vb))) return;
+        theta = i % 2 == 0 ? next : b - a > c - b ? 0.5 * (a + b) : 0.5 * (b + c);
     }
 }
 

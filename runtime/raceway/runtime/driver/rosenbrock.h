@@ -91,15 +91,25 @@ static inline __attribute__((always_inline)) double rw_rosenbrock_step(const rw_
     double w[RW_METHOD_STAGES][RW_NW];
     rw_stages(n, t, h, method->nodes + 1, method->inner, w);
     rw_stage_rate(t + h, n->u, n->p, n->c, work->end_w, work->end_wt);
+    double last[RW_NX];
     for (int i = 0; i < stages; i++) {
         double y[RW_NX], dx[RW_NX], R[RW_NX], *restrict u = work->u[i];
         for (int k = 0; k < RW_NX; k++) y[k] = x[k];
         for (int k = 0; k < RW_NX; k++) R[k] = 0.0;
-        for (int j = 0; j < i; j++) {
+        for (int j = 0; j < i - 1; j++) {
             const double a = method->a[i][j], coupling = method->coupling[i][j];
             for (int k = 0; k < RW_NX; k++) {
                 y[k] += a * work->u[j][k];
                 R[k] += coupling * work->u[j][k];
+            }
+        }
+        if (i > 0) {
+            /* the latest stage last: all else is ready before it is */
+            const double a = method->a[i][i - 1], coupling = method->coupling[i][i - 1];
+#pragma GCC unroll 16
+            for (int k = 0; k < RW_NX; k++) {
+                y[k] += a * last[k];
+                R[k] += coupling * last[k];
             }
         }
         if (i == 0) {
@@ -114,10 +124,13 @@ static inline __attribute__((always_inline)) double rw_rosenbrock_step(const rw_
         for (int k = 0; k < RW_NQ; k++) kv[k] = 0.0;
         for (int j = 0; j < RW_NX; j++)
             for (int k = 0; k < RW_NQ; k++) kv[k] += matrix->solve[j][k] * R[j];
+#pragma GCC unroll 16
         for (int k = 0; k < RW_NQ; k++) {
-            u[RW_NQ + k] = kv[k];
-            u[k] = (R[k] + kv[k]) * inverse_s;
+            last[RW_NQ + k] = kv[k];
+            last[k] = (R[k] + kv[k]) * inverse_s;
         }
+#pragma GCC unroll 16
+        for (int k = 0; k < RW_NX; k++) u[k] = last[k];
     }
     double error[RW_NX];
     for (int k = 0; k < RW_NX; k++) {

@@ -1,0 +1,281 @@
+"""Claims about ensembles: members in lanes are single runs, whatever their neighbours, threads and misfortunes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from raceway.runtime import Model, RequestError, clock
+from raceway.runtime.ensemble import EnsembleResult
+from raceway.runtime.members import Span, inputs_of, make_members, member_arrays
+from raceway.runtime.simulate import model_scales
+
+ModelMaker = Callable[..., Model]
+LAW = 'law = "one-sided"\nratio = "0.25e-5 s*mm^0.5"'
+LAWS = {
+    "one-sided": LAW,
+    "stiff": 'law = "one-sided"\ncoefficient = "2.16e4 N*s/m"',
+    "one-sided-gated": 'law = "one-sided-gated"\ncoefficient = "683 N*s/m"',
+    "tangent": 'law = "tangent"\nratio = "0.25e-5 s"',
+}
+OBSERVABLES = (
+    *("max:ball.force", "peak_time:ball.force", "peak_ball:ball.force", "min:inner.y", "mean:ball.deflection"),
+    *("rms_inner_y", "range_inner_y", "end:inner.vx", "max:ball.damping_force"),
+)
+
+
+def press(make_model: ModelMaker, law: str = "one-sided") -> Model:
+    return make_model("punching_press", (LAW, LAWS[law]))
+
+
+def table(members: int) -> dict[str, np.ndarray]:
+    """Members that differ in load, clearance, timing and cage speed."""
+    random = np.random.default_rng(20_261_121)
+    return {
+        "bearing.clearance": 10e-6 * random.uniform(0.5, 2.0, members),
+        "mechanism.bodies.slider.mass": 16.8 * random.uniform(0.9, 1.1, members),
+        "mechanism.driver.speed": 52.36 * random.uniform(0.8, 1.2, members),
+        "mechanism.forces.punch.window.start": np.radians(random.uniform(225.0, 245.0, members)),
+        "bearing.ball_diameter": 7.9375e-3 * random.uniform(0.98, 1.02, members),
+    }
+
+
+def member(columns: dict[str, np.ndarray], k: int) -> dict[str, float]:
+    return {name: float(column[k]) for name, column in columns.items()}
+
+
+def same(a: EnsembleResult, b: EnsembleResult, rows: np.ndarray | slice = slice(None)) -> bool:
+    """Whether the observables are the same bits, `rows` of `a` against all of `b`."""
+    return all(np.array_equal(a[name][rows], b[name], equal_nan=True) for name in b)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("method", ["auto", "stepper-dp54", "stepper-rodas5p", "stepper-rodas4"])
+def test_members_equal_single_runs_within_the_tolerance(make_model: ModelMaker, law: str, method: str) -> None:
+    if (law, method) == ("stiff", "stepper-dp54"):
+        pytest.skip("an explicit method crawls on a stiff model; the others cover it")
+    model, columns = press(make_model, law), table(11)
+    result = model.simulate_many(columns, OBSERVABLES, cycles=1.5, transient=0.75, rtol=1e-8, method=method)
+    assert result.failures == ()
+    for k in range(11):
+        single = model.reduce(1.5, transient=0.75, rtol=1e-8, method=method, parameters=member(columns, k))
+        force, y = single["ball.force"], single["inner.y"]
+        # damping that jumps or turns steeply at contact costs order, and light damping lets one impact decide the next:
+        # single runs by two methods differ by as much
+        loose = {"one-sided": 1.0, "stiff": 20.0, "tangent": 500.0, "one-sided-gated": 50.0}[law]
+        expected = {
+            "max:ball.force": (force.maximum, 2e-6 * force.maximum),
+            "peak_time:ball.force": (force.maximum_time, 1e-7),
+            "min:inner.y": (y.minimum, 2e-6 * y.range),
+            "mean:ball.deflection": (single["ball.deflection"].mean, 2e-6 * single["ball.deflection"].range),
+            "rms_inner_y": (y.rms, 2e-6 * y.rms),
+            "range_inner_y": (y.range, 2e-6 * y.range),
+            "end:inner.vx": (single.end["inner.vx"], 2e-6 * single["inner.vy"].range),
+            "max:ball.damping_force": (single["ball.damping_force"].maximum, 2e-5 * force.maximum),
+        }
+        for name, (value, near) in expected.items():
+            assert result[name][k] == pytest.approx(value, rel=0.0, abs=loose * near), (name, k)
+        assert force.maximum_ball == result["peak_ball:ball.force"][k]
+
+
+def test_results_are_the_same_bits_for_any_number_of_threads(make_model: ModelMaker) -> None:
+    model, columns = press(make_model), table(150)
+    results = [
+        model.simulate_many(columns, OBSERVABLES, cycles=1, transient=0.5, threads=threads) for threads in (1, 2, 5)
+    ]
+    assert results[0].statistics.chunk < 150
+    assert same(results[0], results[1])
+    assert same(results[0], results[2])
+
+
+@pytest.mark.parametrize("law", ["one-sided", "stiff"])
+def test_a_member_does_not_depend_on_its_neighbours(make_model: ModelMaker, law: str) -> None:
+    model, columns = press(make_model, law), table(40)
+    whole = model.simulate_many(columns, OBSERVABLES, cycles=1, transient=0.5)
+    order = np.random.default_rng(7).permutation(40)[:13]
+    some = {name: column[order] for name, column in columns.items()}
+    assert same(whole, model.simulate_many(some, OBSERVABLES, cycles=1, transient=0.5), order)
+    alone = {name: column[:1] for name, column in columns.items()}
+    assert same(whole, model.simulate_many(alone, OBSERVABLES, cycles=1, transient=0.5), slice(1))
+
+
+def test_one_failing_member_is_reported_and_the_rest_is_untouched(make_model: ModelMaker) -> None:
+    model, columns = press(make_model), table(20)
+    columns["bearing.outer_ring.stiffness"] = np.full(20, 5e7)
+    good = model.simulate_many(columns, OBSERVABLES, cycles=1, transient=0.5)
+    columns["bearing.outer_ring.stiffness"][3] = -1e13  # pushes itself away
+    length = next(name for name in model.parameters if name.startswith("mechanism.bodies.rod.points.C"))
+    columns[length] = np.full(20, 0.1)
+    columns[length][7] = 0.004  # shorter than the crank
+    bad = model.simulate_many(columns, OBSERVABLES, cycles=1, transient=0.5)
+    assert [failure.member for failure in bad.failures] == [3, 7]
+    assert bad.failures[0].status in ("TOO_MANY_STEPS", "STEP_TOO_SMALL", "NOT_FINITE")
+    assert 0.0 < bad.failures[0].time < 0.12
+    assert bad.failures[1].status == "REFUSED"
+    assert "cannot be assembled" in bad.failures[1].message
+    for name in OBSERVABLES:
+        assert np.flatnonzero(np.isnan(bad[name])).tolist() == [3, 7]
+    rest = [k for k in range(20) if k not in (3, 7)]
+    assert all(np.array_equal(good[name][rest], bad[name][rest]) for name in OBSERVABLES)
+
+
+def test_an_interrupt_keeps_the_members_finished_by_then(make_model: ModelMaker) -> None:
+    model, columns = press(make_model), table(400)
+    whole = model.simulate_many(columns, ["max:ball.force"], cycles=1, transient=0)
+
+    def interrupt(fraction: float) -> None:
+        if fraction > 0.1:
+            raise KeyboardInterrupt
+
+    part = model.simulate_many(columns, ["max:ball.force"], cycles=1, transient=0, threads=1, progress=interrupt)
+    assert part.interrupted
+    lost = [failure.member for failure in part.failures]
+    assert {failure.status for failure in part.failures} == {"INTERRUPTED"}
+    kept = [k for k in range(400) if k not in lost]
+    assert 0 < len(kept) < 400
+    assert np.array_equal(part["max:ball.force"][kept], whole["max:ball.force"][kept])
+    assert np.all(np.isnan(part["max:ball.force"][lost]))
+
+
+def test_an_error_in_the_callers_progress_is_the_callers(make_model: ModelMaker) -> None:
+    def fail(_: float) -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        press(make_model).simulate_many(table(60), ["max:ball.force"], cycles=1, transient=0, progress=fail)
+
+
+def test_progress_ends_at_one(make_model: ModelMaker) -> None:
+    told: list[float] = []
+    press(make_model).simulate_many(table(60), ["max:ball.force"], cycles=1, transient=0, progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+
+
+def test_tables_of_three_forms_are_one_ensemble(make_model: ModelMaker) -> None:
+    model, columns = press(make_model), table(9)
+    a = model.simulate_many(columns, OBSERVABLES, cycles=1, transient=0)
+    b = model.simulate_many([member(columns, k) for k in range(9)], OBSERVABLES, cycles=1, transient=0)
+    fields = np.rec.fromarrays(list(columns.values()), dtype=[(name, float) for name in columns])
+    c = model.simulate_many(np.asarray(fields), OBSERVABLES, cycles=1, transient=0)
+    assert same(a, b)
+    assert same(a, c)
+    missing = [{"bearing.clearance": 9e-6}, {}]
+    d = model.simulate_many(missing, ["max:ball.force"], cycles=1, transient=0)
+    default = model.parameters["bearing.clearance"]
+    e = model.simulate_many({"bearing.clearance": [9e-6, default]}, ["max:ball.force"], cycles=1, transient=0)
+    assert same(d, e)
+
+
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        ({"bearing.clearence": [1e-5]}, "Did you mean 'bearing.clearance'"),
+        ({"bearing.clearance": [1e-5, math.nan, 1e-5]}, "member 1 has nan"),
+        ({"bearing.clearance": [1e-5, 2e-5], "bearing.ball_diameter": [8e-3]}, "of one length"),
+        ({"bearing.clearance": 1e-5}, "one number for each member"),
+        ({"bearing.clearance": ["thick"]}, "numbers are expected"),
+        ({"bearing.clearance": []}, "no members"),
+        ({}, "no parameter is named"),
+        ([], "list of mappings"),
+        (np.zeros(3), "named fields"),
+    ],
+)
+def test_wrong_tables_are_refused_before_anything_runs(
+    make_model: ModelMaker, columns: dict[str, list[float]], message: str
+) -> None:
+    with pytest.raises(RequestError, match=message):
+        press(make_model).simulate_many(columns, ["max:ball.force"], cycles=1, transient=0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"observables": ["max:ball.forces"]}, "Did you mean 'max:ball.force'"),
+        ({"observables": ["end:ball.force"]}, "no observable"),
+        ({"observables": "max:ball.force"}, "a list of names"),
+        ({"observables": []}, "a list of names"),
+        ({"threads": 0}, "threads"),
+        ({"transient": 1}, "nothing is left"),
+        ({"duration": 1.0}, "give one"),
+        ({"method": "cvodes"}, "stepper-dp54"),
+        ({"rtol": 1.0}, "rtol"),
+    ],
+)
+def test_wrong_requests_are_refused_with_a_remedy(
+    make_model: ModelMaker, changes: dict[str, object], message: str
+) -> None:
+    request: dict[str, object] = {"observables": ["max:ball.force"], "cycles": 1, "transient": 0, **changes}
+    with pytest.raises(RequestError, match=message):
+        press(make_model).simulate_many({"bearing.clearance": [1e-5]}, **request)  # type: ignore[arg-type]
+
+
+def test_the_dataset_carries_parameters_and_units(make_model: ModelMaker) -> None:
+    columns = table(5)
+    data = press(make_model).simulate_many(columns, OBSERVABLES, cycles=1, transient=0).to_xarray()
+    assert data["max:ball.force"].dims == ("member",)
+    assert data["max:ball.force"].attrs["units"] == "N"
+    assert data["peak_time:ball.force"].attrs["units"] == "s"
+    assert np.array_equal(data["bearing.clearance"], columns["bearing.clearance"])
+    assert data["bearing.clearance"].attrs["units"] == "m"
+
+
+def test_magnitudes_in_c_are_those_of_single_runs(make_model: ModelMaker) -> None:
+    for model in (press(make_model), make_model("varying_compliance"), make_model("offset_slider")):
+        count = 6
+        clearance = np.linspace(4e-6, 3e-5, count)
+        members = make_members(model, {"bearing.clearance": clearance})
+        numbers = [members.numbers(model, k) for k in range(count)]
+        turns = np.array([clock.period(model.manifest, n.values) for n in numbers])
+        span = Span(durations=2 * turns, turns=turns, starts=np.zeros(count))
+        arrays, (first, inputs, horizons) = member_arrays(model, members, span, np.arange(count))
+        found = model.ensemble_driver.magnitudes(arrays, members.initial, first, inputs, horizons)
+        expected = [
+            model_scales(model, n, start, 2 * turn, turn).magnitude
+            for n, start, turn in zip(numbers, members.initial, turns, strict=True)
+        ]
+        np.testing.assert_allclose(found, expected, rtol=1e-4)
+
+
+LOAD = 'type = "constant"                       # or "harmonic" (mean, amplitude, frequency, phase), or "table" (time, x, y)\n'
+TABLE = 'type = "table"\ntime = ["0 s", "0.02 s", "0.05 s"]\nx = ["0 N", "196 N", "100 N"]\ny = ["0 N", "0 N", "50 N"]\n'
+
+
+def test_loads_from_tables_run_in_ensembles(make_model: ModelMaker) -> None:
+    model = make_model("varying_compliance", (LOAD, TABLE), ('force = ["196 N", "0 N"] ', ""))
+    times = next(name for name in model.parameters if "time" in name and name.endswith("2"))
+    columns = {times: np.array([0.01, 0.02, 0.03]), "bearing.clearance": np.array([0.0, 1e-6, 2e-6])}
+    result = model.simulate_many(columns, ["rms:inner.x"], duration=0.1, transient=0, rtol=1e-9)
+    for k in range(3):
+        single = model.reduce(duration=0.1, transient=0, rtol=1e-9, parameters=member(columns, k))
+        assert result["rms:inner.x"][k] == pytest.approx(single["inner.x"].rms, rel=1e-6)
+    # knots that do not increase are one member's fault
+    columns[times][1] = 0.06
+    result = model.simulate_many(columns, ["rms:inner.x"], duration=0.1, transient=0, rtol=1e-9)
+    assert [failure.member for failure in result.failures] == [1]
+    assert "must increase" in result.failures[0].message
+
+
+def test_a_member_that_stands_still_is_refused_alone(make_model: ModelMaker) -> None:
+    model = press(make_model)
+    speeds = {"mechanism.driver.speed": [50.0, 0.0, -50.0]}
+    result = model.simulate_many(speeds, ["max:ball.force"], cycles=1, transient=0)
+    assert [failure.member for failure in result.failures] == [1]
+    assert "nothing turns" in result.failures[0].message
+    assert np.isfinite(result["max:ball.force"][[0, 2]]).all()
+
+
+def test_inputs_made_for_many_are_those_made_for_one(make_model: ModelMaker) -> None:
+    model, count = press(make_model), 5
+    columns = table(count) | {"mechanism.forces.punch.window.end": np.radians([267.0, 200.0, 267.0, 590.0, 700.0])}
+    members = make_members(model, columns)
+    random = np.random.default_rng(3)
+    owner = random.integers(0, count, 400)
+    times = random.uniform(0.0, 1.0, 400)
+    found = inputs_of(model.manifest.inputs, members.columns, owner, times, times + 1e-4)
+    for row, (k, time) in enumerate(zip(owner, times, strict=True)):
+        values = members.numbers(model, int(k)).values
+        assert np.array_equal(found[row], clock.inputs_at(model.manifest.inputs, values, time, time + 1e-4))
