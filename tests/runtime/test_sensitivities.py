@@ -121,7 +121,7 @@ def test_static_deflection_follows_the_two_thirds_power(make_model: Callable[...
 
 def test_a_jumping_law_is_refused(make_model: Callable[..., Model]) -> None:
     model = make_model("punching_press", ('law = "one-sided"', 'law = "two-sided-gated"'))
-    with pytest.raises(RequestError, match="discontinuous.*tangent"):
+    with pytest.raises(RequestError, match=r"discontinuous.*tangent"):
         model.sensitivities("bearing.clearance", cycles=1)
 
 

@@ -175,7 +175,11 @@ def run(
     ] = None,
     rtol: Annotated[float | None, typer.Option(metavar="R", help="Relative tolerance of the integrator.")] = None,
     method: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Integrator: auto, stepper, erk, rosenbrock or cvodes.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Integrator: auto, stepper (or stepper-rodas4, -rodas5p, -dp54, -dop853), erk, rosenbrock, cvodes.",
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the results; results/<scene> if not given.")

@@ -101,8 +101,8 @@ def compile_model(folder: str | Path, manifest: Manifest, compiler: str | None =
     if found is None:
         warnings.warn(
             "No C compiler was found ($CC, cc, gcc, clang, ziglang): the model runs in CasADi's virtual machine. "
-            "Results are the same; a simulation takes five to eight times as long. Install gcc or clang, or "
-            "`pip install raceway[compiler]` for a compiler from PyPI.",
+            "Results are the same within the tolerance; a simulation takes some ten times as long. Install gcc or "
+            "clang, or a compiler from PyPI: `pip install ziglang`.",
             NoCompilerWarning,
             stacklevel=3,
         )

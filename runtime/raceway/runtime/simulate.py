@@ -39,7 +39,10 @@ if TYPE_CHECKING:
 STIFF_RATIO = 3.0
 
 #: Segments that one call of the stepper takes: progress is shown, and an interrupt heard, between calls.
-SEGMENTS_A_CALL = 600
+SEGMENTS_A_CALL = 120
+
+#: Most numbers that the samples of a run may hold: 4 GiB.
+MAX_NUMBERS = 2**29
 
 #: Smallest and largest relative tolerance [1].
 TOLERANCES = (1e-13, 1e-1)
@@ -138,6 +141,12 @@ def simulate(
         magnitude = np.zeros(0)
         method, reason = "none", "the model has no states: its outputs follow from time alone"
 
+    columns = len(initial) + sum(info.size for info in model.manifest.outputs) + len(model.manifest.inputs)
+    if count * columns > MAX_NUMBERS:
+        raise RequestError(
+            f"{count} samples of {columns} numbers would not fit into memory. Take fewer samples a cycle or a shorter "
+            "run, or keep extremes and means only: `Model.reduce` runs any number of cycles without samples."
+        )
     times = duration * (np.arange(count + 1) / count)
     trajectory = start_trajectory(times, initial, len(model.manifest.inputs))
     failure = None
@@ -462,6 +471,13 @@ def choose_method(model: Model, asked: str, scales: Scales) -> tuple[str, str]:
         if available:
             return available[-1], f"{why}: {ratio}; the model was generated without {name}"
         raise RequestError("The model has no right-hand side to integrate. Generate it again with `raceway derive`.")
+    if asked in STEPPERS:
+        missing = (
+            "the generated folder has no kernels for it; write it again with `raceway derive`"
+            if model.compiled
+            else "it needs a C compiler, and none was found; install gcc or clang, or `pip install ziglang`"
+        )
+        raise RequestError(f"method {asked}: {missing}. Or take one of {', '.join(('auto', *available))}.")
     if asked not in available:
         raise RequestError(unknown_name("method", asked, ("auto", *model.methods)))
     return asked, "asked for"

@@ -27,7 +27,7 @@ HEADERS = ("kernels.h", "methods.h", "tangents.h")
 #: IEEE arithmetic throughout; what is given up is errno and traps, and what is gained are vectors of square roots.
 FLAGS = (
     *("-O3", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd"),
-    # fused multiply-add where the processor has it; packing scalars of the short dependent chains costs more than it saves
+    # fused multiply-add where the processor has it; packing scalars of short dependent chains costs more than it saves
     *("-ffp-contract=fast", "-fno-tree-slp-vectorize"),
 )
 
