@@ -10,7 +10,7 @@ VENV ?= .venv
 export PYTHON VENV
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint docs generated bench clean
+.PHONY: demo test lint docs generated bench bench-test clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.ready
@@ -37,6 +37,9 @@ BENCH_VENV := benchmarks/.venv
 
 bench: $(BENCH_VENV)/.ready
 	$(BENCH_VENV)/bin/python -m benchmarks $(if $(QUICK),--quick --out build/benchmarks/quick) $(if $(FRESH),--fresh)
+
+bench-test: $(VENV)/.ready-dev
+	$(BIN)/python -m pytest benchmarks
 
 $(BENCH_VENV)/.ready: pyproject.toml requirements.txt benchmarks/requirements.txt scripts/setup.sh
 	@VENV=$(BENCH_VENV) scripts/setup.sh

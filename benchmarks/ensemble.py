@@ -85,12 +85,8 @@ def _case(case: Case, model: Model, members: int, rounds: int) -> dict[str, Any]
     }
 
 
-def _ensemble(
-    model: Model, sets: list[dict[str, float]], kept: tuple[str, ...], threads: int
-) -> Callable[[], object]:
-    return lambda: model.simulate_many(
-        sets, kept, cycles=CYCLES, transient=TRANSIENT, rtol=RTOL, threads=threads
-    )
+def _ensemble(model: Model, sets: list[dict[str, float]], kept: tuple[str, ...], threads: int) -> Callable[[], object]:
+    return lambda: model.simulate_many(sets, kept, cycles=CYCLES, transient=TRANSIENT, rtol=RTOL, threads=threads)
 
 
 def _single_runs(model: Model, sets: list[dict[str, float]]) -> Callable[[], object]:

@@ -61,10 +61,10 @@ def work_precision(path: Path, words: str, curves: dict[str, Curve], labels: dic
     ----------
     curves : (error [1], time [s]) of each contender's tolerances, medians
     """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.5, 5.2), sharex=True)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11.5, 7.0), sharex=True)
     for axes, looks in ((left, _PEERS), (right, _FAMILIES)):
         for key, look in looks.items():
-            points = [(e, t) for e, t in curves.get(key, ()) if 1e-9 < e < 0.3]
+            points = [(e, t) for e, t in curves.get(key, ()) if 1e-10 < e < 0.3]
             if not points:
                 continue
             axes.plot(
@@ -93,7 +93,7 @@ def _finish(axes: Axes) -> None:
     for error in (1e-3, 1e-5, 1e-7):
         axes.axvline(error, color="#bbbbbb", linewidth=0.8, zorder=0)
     axes.grid(visible=True, which="major", color="#e5e5e5", linewidth=0.6)
-    axes.legend(fontsize=7.5, loc="upper left", framealpha=0.9)
+    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncol=2, frameon=False)
 
 
 def balls(path: Path, rows: Sequence[dict[str, Any]], fits: Sequence[dict[str, Any]]) -> None:

@@ -24,8 +24,8 @@ from raceway.runtime.compile import compile_sources, find_compiler
 from raceway.runtime.kernel import Kernel
 from raceway.runtime.stepper import METHODS, End, Family
 
-DECADES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
-HALVES = tuple(10.0**-k for k in np.arange(1.5, 9.6, 0.5))
+DECADES = tuple(10.0**-k for k in range(2, 11))
+HALVES = tuple(10.0**-k for k in np.arange(1.5, 11.1, 0.5))
 
 
 class Unavailable(Exception):

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from benchmarks.own import DECADES, HALVES, HAND_FLAGS, Contender, Kept, Unavailable, c_numbers
+from benchmarks.own import HALVES, HAND_FLAGS, Contender, Kept, Unavailable, c_numbers
 from benchmarks.press import Press, make_load, make_loop_rate, make_vector_rate
 from benchmarks.problem import ROOT, Member
 from raceway.runtime.compile import compile_sources, find_compiler
@@ -120,7 +120,6 @@ def _scipy(method: str, how: str) -> Contender:
         label=f"SciPy {method}, {words}",
         group=f"SciPy, {words}",
         solve=solve,
-        tolerances=DECADES if method == "LSODA" else DECADES[:-1],
         errors_like="" if how == "numba" else f"scipy-{method.lower()}-numba",
         ready=_needs("numba") if how == "numba" else lambda: None,
     )
@@ -363,7 +362,7 @@ def peers() -> list[Contender]:
             label="numbalsoda LSODA",
             group="numbalsoda",
             solve=_numbalsoda,
-            tolerances=HALVES[:-1],
+            tolerances=HALVES,
             ready=_needs("numba", "numbalsoda"),
         ),
         Contender(
@@ -371,7 +370,7 @@ def peers() -> list[Contender]:
             label="SUNDIALS CVODE, C",
             group="SUNDIALS",
             solve=_cvode,
-            tolerances=HALVES[:-1],
+            tolerances=HALVES,
             ready=_cvode_ready,
         ),
         Contender(

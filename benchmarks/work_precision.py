@@ -36,13 +36,15 @@ class Effort:
     members : size of the ensemble
     rounds : visits of each contender and tolerance
     error_budget, time_budget : time a contender may use at one tolerance, for errors and for times [s]
+    longest : a tolerance at which the errors took longer is the last that a contender tries [s]
     tolerances : every so many of the tolerances of a contender
     """
 
     members: int = 32
     rounds: int = 32
-    error_budget: float = 0.8
+    error_budget: float = 0.6
     time_budget: float = 0.4
+    longest: float = 4.0
     tolerances: int = 1
 
 
@@ -69,8 +71,13 @@ def measure(case: Case, model: Model, effort: Effort, say: Callable[[str], None]
     for contender in taking_part:
         tolerances = contender.tolerances[:: effort.tolerances]
         say(f"{case.key}: {contender.label}")
-        found[contender.key] = [_errors(contender, members, tol, effort) for tol in tolerances]
-        for k, tol in enumerate(tolerances):
+        found[contender.key] = []
+        for tol in tolerances:
+            begun = time.perf_counter()
+            found[contender.key].append(_errors(contender, members, tol, effort))
+            if time.perf_counter() - begun > effort.longest:
+                break  # tighter ones take longer still
+        for k, tol in enumerate(tolerances[: len(found[contender.key])]):
             if not found[contender.key][k].get("fault"):
                 timed.append((contender.key, k, Entry(call=_call(contender, members, tol))))
     say(f"{case.key}: times of {len(timed)} contenders and tolerances, in turn")

@@ -55,8 +55,6 @@ def same(a: EnsembleResult, b: EnsembleResult, rows: np.ndarray | slice = slice(
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("method", ["auto", "stepper-dp54", "stepper-rodas5p", "stepper-rodas4"])
 def test_members_equal_single_runs_within_the_tolerance(make_model: ModelMaker, law: str, method: str) -> None:
-    if (law, method) == ("stiff", "stepper-dp54"):
-        pytest.skip("an explicit method crawls on a stiff model; the others cover it")
     model, columns = press(make_model, law), table(11)
     result = model.simulate_many(columns, OBSERVABLES, cycles=1.5, transient=0.75, rtol=1e-8, method=method)
     assert result.failures == ()
@@ -65,7 +63,7 @@ def test_members_equal_single_runs_within_the_tolerance(make_model: ModelMaker, 
         force, y = single["ball.force"], single["inner.y"]
         # damping that jumps or turns steeply at contact costs order, and light damping lets one impact decide the next:
         # single runs by two methods differ by as much
-        loose = {"one-sided": 1.0, "stiff": 20.0, "tangent": 500.0, "one-sided-gated": 50.0}[law]
+        loose = {"one-sided": 5.0, "stiff": 20.0, "tangent": 500.0, "one-sided-gated": 50.0}[law]
         expected = {
             "max:ball.force": (force.maximum, 2e-6 * force.maximum),
             "peak_time:ball.force": (force.maximum_time, 1e-7),
@@ -240,8 +238,13 @@ def test_magnitudes_in_c_are_those_of_single_runs(make_model: ModelMaker) -> Non
         np.testing.assert_allclose(found, expected, rtol=1e-4)
 
 
-LOAD = 'type = "constant"                       # or "harmonic" (mean, amplitude, frequency, phase), or "table" (time, x, y)\n'
-TABLE = 'type = "table"\ntime = ["0 s", "0.02 s", "0.05 s"]\nx = ["0 N", "196 N", "100 N"]\ny = ["0 N", "0 N", "50 N"]\n'
+LOAD = (
+    'type = "constant"                       # or "harmonic" (mean, amplitude, frequency, phase), '
+    'or "table" (time, x, y)\n'
+)
+TABLE = (
+    'type = "table"\ntime = ["0 s", "0.02 s", "0.05 s"]\nx = ["0 N", "196 N", "100 N"]\ny = ["0 N", "0 N", "50 N"]\n'
+)
 
 
 def test_loads_from_tables_run_in_ensembles(make_model: ModelMaker) -> None:

@@ -3,8 +3,8 @@
 In: a model, a table of parameters, names of observables.  Out: an `EnsembleResult`.
 
 Members are cut into chunks whose size follows from their number alone; threads take chunks, and within a chunk several
-members advance together in SIMD lanes.  A member's arithmetic depends neither on its neighbours nor on the chunk, so the
-results are the same bits for any number of threads.
+members advance together in SIMD lanes.  A member's arithmetic depends neither on its neighbours nor on the chunk, so
+the results are the same bits for any number of threads.
 """
 
 from __future__ import annotations
@@ -243,9 +243,7 @@ def simulate_many(
     )
 
 
-def _run(
-    work: _Work, chunks: list[np.ndarray], threads: int, progress: Callable[[float], None] | None
-) -> bool:
+def _run(work: _Work, chunks: list[np.ndarray], threads: int, progress: Callable[[float], None] | None) -> bool:
     """Let threads work through the chunks; returns whether the user interrupted."""
     total = sum(len(chunk) for chunk in chunks)
     done = 0
@@ -305,9 +303,7 @@ def _chunk_in_lanes(work: _Work, chunk: np.ndarray) -> dict[str, int]:
             ending = STATUS_OF_END[End(int(told["status"]))]
             state = f", worst state {work.model.states[told['state']]}" if told["state"] >= 0 else ""
             status, message = ending.name, f"{ending.value} Step size {told['step']:.3g} s{state}."
-        work.results[member] = MemberFailure(
-            member=member, status=status, time=float(told["time"]), message=message
-        )
+        work.results[member] = MemberFailure(member=member, status=status, time=float(told["time"]), message=message)
     return {name: int(results[name].sum()) for name in work.counts}
 
 
@@ -368,9 +364,7 @@ def _chunk_size(members: int, lanes: int) -> int:
     return min(CHUNK, max(1, -(-wanted // lanes)) * lanes)
 
 
-def _span(
-    model: Model, members: Members, cycles: float | None, duration: float | None, transient: float
-) -> Span:
+def _span(model: Model, members: Members, cycles: float | None, duration: float | None, transient: float) -> Span:
     """Lengths of the members' runs; members for which there is none are refused."""
     run = model.manifest.run
     if cycles is not None and duration is not None:

@@ -60,6 +60,12 @@ class Members:
         parameters = Parameters(model.manifest.parameters, values)
         return Numbers(parameters=parameters, p=self.p[member], c=self.c[member], values=values)
 
+    def timing(self, model: Model, names: Sequence[str], member: int) -> Numbers:
+        """The same with only these of its values by name: all that edges of segments need."""
+        values = {name: float(self.columns[name][member]) for name in names}
+        parameters = Parameters((), {})
+        return Numbers(parameters=parameters, p=self.p[member], c=self.c[member], values=values)
+
 
 def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
     """Columns of a table of parameters, each of shape (members,).
@@ -166,15 +172,18 @@ def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused:
 
 def _check_assembly(model: Model, members: Members) -> None:
     """Note members whose linkage cannot be assembled; each distinct geometry is looked at once."""
-    mechanism = model.manifest.mechanism
+    manifest = model.manifest
+    mechanism = manifest.mechanism
     if mechanism is None or not mechanism.margins:
         return
     function = model.symbolic("assembly")
-    parts = []
+    # a turn shows every angle, whatever speed and start: only whether it turns at all matters of them
+    timing = [k for k, info in enumerate(manifest.parameters) if info.name in (mechanism.speed, mechanism.start_angle)]
+    parts = [members.columns[mechanism.speed][:, None] == 0.0]
     for name, rows in (("p", members.p), ("c", members.c)):
         if name in function.name_in() and rows.shape[1]:
-            used = sorted(set(function.jac_sparsity(0, function.name_in().index(name)).get_col()))
-            parts.append(rows[:, used])
+            used = set(function.jac_sparsity(0, function.name_in().index(name)).get_col())
+            parts.append(rows[:, sorted(used.difference(timing) if name == "p" else used)])
     for group in _groups(np.column_stack(parts)):
         member = int(group[0])
         if member in members.refused:
@@ -210,9 +219,7 @@ class Span:
     starts: np.ndarray
 
 
-def edge_windows(
-    model: Model, numbers: Numbers, duration: float, turn: float, start: float
-) -> Iterator[np.ndarray]:
+def edge_windows(model: Model, numbers: Numbers, duration: float, turn: float, start: float) -> Iterator[np.ndarray]:
     """Begin, breakpoints, whole turns, `start` and end of a run, some turns at a time, increasing [s].
 
     Memory does not grow with the run; each window begins with the last edge of the one before.
@@ -236,16 +243,17 @@ def member_arrays(
     """Segments of some members, and the moments of theirs: (first moment of each, inputs there, horizons)."""
     manifest = model.manifest
     edges: list[np.ndarray] = [np.zeros(0)] * len(which)
+    names = _timing(manifest.inputs)
     timing = np.column_stack(
         [
-            *(members.columns[name][which] for name in _timing(manifest.inputs)),
+            *(members.columns[name][which] for name in names),
             *(values[which] for values in (span.durations, span.turns, span.starts)),
         ]
     )
     for group in _groups(timing):
         member = int(which[group[0]])
         lengths = (float(values[member]) for values in (span.durations, span.turns, span.starts))
-        windows = list(edge_windows(model, members.numbers(model, member), *lengths))
+        windows = list(edge_windows(model, members.timing(model, names, member), *lengths))
         found = np.concatenate([windows[0], *(window[1:] for window in windows[1:])])
         for place in group:
             edges[place] = found
@@ -294,7 +302,7 @@ def _timing(inputs: Sequence[InputInfo]) -> list[str]:
         if item.kind == "gate":
             names += [item.offset, item.rate, *(name for window in item.windows for name in window)]
         elif item.kind in ("table", "table_rate"):
-            names += item.times
+            names += (*item.times, *item.values)
     return list(dict.fromkeys(names))
 
 
@@ -333,9 +341,7 @@ def inputs_of(
     return found
 
 
-def _covered(
-    angle: np.ndarray, item: InputInfo, columns: Mapping[str, np.ndarray], owner: np.ndarray
-) -> np.ndarray:
+def _covered(angle: np.ndarray, item: InputInfo, columns: Mapping[str, np.ndarray], owner: np.ndarray) -> np.ndarray:
     """1 where an angle lies in one of the windows, edges hit by rounding counted as exact; the rules of `clock`."""
     near = clock.ANGLE_RESOLUTION
     covered = np.zeros(len(angle), dtype=bool)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from raceway.runtime.model import Model
 
 
-#: Steps allowed in a turn, on the average, and in any run: a motion that grows without bound crawls before it overflows.
+#: Steps allowed in a turn, on average, and in any run: a motion that grows without bound crawls before it overflows.
 STEPS_A_TURN = 100_000
 STEPS_A_RUN = 1_000_000
 
@@ -184,7 +184,9 @@ def reduce_run(
     turn = clock.period(model.manifest, numbers.values)
     start = check_span(duration, turn, transient)
     family = choose_family(method)
-    tolerance = check_rtol(rtol) * model_scales(model, numbers, initial, min(duration, SCALED_TURNS * turn), turn).magnitude
+    tolerance = (
+        check_rtol(rtol) * model_scales(model, numbers, initial, min(duration, SCALED_TURNS * turn), turn).magnitude
+    )
     driver = model.ensemble_driver
     row = driver.reductions(1, start, balls=True)[0]
     state = initial.copy()
@@ -328,9 +330,12 @@ def observe(driver: EnsembleDriver, kind: str, channel: str, rows: np.ndarray, e
         return values
 
     duration = rows[:, HEAD.index("duration")]
+    found: np.ndarray
     if kind == "range":
-        return of("max") - of("min")
-    if kind in ("mean", "rms"):
+        found = of("max") - of("min")
+    elif kind in ("mean", "rms"):
         with np.errstate(invalid="ignore", divide="ignore"):  # a member that never started has no duration
-            return of("integral") / duration if kind == "mean" else np.sqrt(of("square") / duration)
-    return of({"peak_time": "max_time", "peak_ball": "max_ball"}.get(kind, kind)).copy()
+            found = of("integral") / duration if kind == "mean" else np.sqrt(of("square") / duration)
+    else:
+        found = of({"peak_time": "max_time", "peak_ball": "max_ball"}.get(kind, kind)).copy()
+    return found

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 STIFF_RATIO = 3.0
 
 #: Segments that one call of the stepper takes: progress is shown, and an interrupt heard, between calls.
-SEGMENTS_A_CALL = 120
+SEGMENTS_A_CALL = 600
 
 #: Most numbers that the samples of a run may hold: 4 GiB.
 MAX_NUMBERS = 2**29
