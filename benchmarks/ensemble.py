@@ -5,16 +5,19 @@ In: the press with its three dampings, every member with parameters of its own. 
 The single-run stepper is called member by member on segments made beforehand, so that nothing but its driver counts;
 the ensembles bring their own preparation (constants, assembly, segments, magnitudes).  How to read the table: the
 column "lanes" is what one core gains, in processor time, which a busy machine distorts least; "threads" is wall time of
-one thread over that of all, and says little unless the machine is otherwise idle.
+one thread over that of two, and "possible" the same for two threads that hash bytes and share nothing: on a machine
+that is busy otherwise, or that gives this process less than two processors, both are near one.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import math
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -55,6 +58,7 @@ def _case(case: Case, model: Model, members: int, rounds: int) -> dict[str, Any]
     for kind, kept in KEPT.items():
         for threads in (1, 2):
             calls[f"{kind}, {threads}"] = (members, _ensemble(model, sets, kept, threads))
+    calls |= {f"hash, {threads}": (1, _hashing(threads)) for threads in (1, 2)}
     cpu: dict[str, list[float]] = {name: [] for name in calls}
     wall: dict[str, list[float]] = {name: [] for name in calls}
 
@@ -82,11 +86,24 @@ def _case(case: Case, model: Model, members: int, rounds: int) -> dict[str, Any]
         },
         "lanes": digits(float(np.median(np.array(cpu["single"][:rounds]) / np.array(cpu["end, 1"][:rounds])))),
         "threads": digits(float(np.median(np.array(wall["end, 1"][:rounds]) / np.array(wall["end, 2"][:rounds])))),
+        "possible": digits(float(np.median(np.array(wall["hash, 1"][:rounds]) / np.array(wall["hash, 2"][:rounds])))),
     }
 
 
 def _ensemble(model: Model, sets: list[dict[str, float]], kept: tuple[str, ...], threads: int) -> Callable[[], object]:
     return lambda: model.simulate_many(sets, kept, cycles=CYCLES, transient=TRANSIENT, rtol=RTOL, threads=threads)
+
+
+def _hashing(threads: int) -> Callable[[], object]:
+    """A fixed amount of work without the interpreter's lock, shared by threads."""
+    data = bytes(100_000_000)
+
+    def run() -> None:
+        with ThreadPoolExecutor(max_workers=threads) as pool:
+            for done in [pool.submit(hashlib.sha256, data) for _ in range(2)]:
+                done.result()
+
+    return run
 
 
 def _single_runs(model: Model, sets: list[dict[str, float]]) -> Callable[[], object]:
@@ -126,13 +143,22 @@ def lines(result: dict[str, Any]) -> list[str]:
     head = (
         "damping",
         *("single run, µs", "lanes, µs", "with states, µs", "with balls, µs"),
-        *("lanes", "members·cycles/s, 1 thread", "2 threads", "threads"),
+        *("lanes", "members·cycles/s, 1 thread", "2 threads", "threads", "possible"),
     )
     rows = []
     for case in result["cases"]:
         micro = [f"{1e6 * case['rows'][name]['cpu_a_cycle']:.3g}" for name in ("single", *(f"{k}, 1" for k in KEPT))]
         rates = [f"{case['rows'][f'end, {n}']['per_second']:.4g}" for n in (1, 2)]
-        rows.append((case["words"], *micro, f"{case['lanes']:.2f}×", *rates, f"{case['threads']:.2f}×"))
+        rows.append(
+            (
+                case["words"],
+                *micro,
+                f"{case['lanes']:.2f}×",
+                *rates,
+                f"{case['threads']:.2f}×",
+                f"{case['possible']:.2f}×",
+            )
+        )
     return table(head, rows)
 
 

@@ -43,8 +43,8 @@ class Effort:
     members: int = 32
     rounds: int = 32
     error_budget: float = 0.6
-    time_budget: float = 0.4
-    longest: float = 4.0
+    time_budget: float = 0.3
+    longest: float = 3.0
     tolerances: int = 1
 
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from raceway.runtime import clock
-from raceway.runtime.ensemble_driver import BALL_CHANNELS, LANE_FAMILIES, STOPPED, EnsembleDriver
+from raceway.runtime.ensemble_driver import LANE_FAMILIES, STOPPED, EnsembleDriver
 from raceway.runtime.errors import RequestError
 from raceway.runtime.manifest import Manifest
 from raceway.runtime.members import Members, Span, Table, make_members, member_arrays
@@ -164,6 +164,7 @@ class _Work:
     family: Family
     rtol: float
     lanes: bool
+    reducing: bool
     end: np.ndarray
     rows: np.ndarray
     results: dict[int, MemberFailure]
@@ -198,7 +199,7 @@ def simulate_many(
     skipped = manifest.run.transient_cycles if transient is None else float(transient)
     span = _span(model, members, cycles, duration, skipped)
     in_lanes = lanes and family in LANE_FAMILIES
-    balls = any(channel in BALL_CHANNELS for _, channel in chosen.values())
+    reduced = {channel for kind, channel in chosen.values() if kind != "end"}
     work = _Work(
         model=model,
         driver=driver,
@@ -207,8 +208,9 @@ def simulate_many(
         family=family,
         rtol=tolerance,
         lanes=in_lanes,
+        reducing=bool(reduced),
         end=members.initial.copy(),
-        rows=driver.reductions(len(members), span.starts, balls=balls),
+        rows=driver.reductions(len(members), span.starts, reduced),
         results={
             member: MemberFailure(member=member, status="REFUSED", time=0.0, message=message)
             for member, message in members.refused.items()
@@ -290,11 +292,12 @@ def _chunk_in_lanes(work: _Work, chunk: np.ndarray) -> dict[str, int]:
     arrays, (first, inputs, horizons) = member_arrays(work.model, work.members, work.span, chunk)
     x = work.members.initial[chunk]
     tolerance = work.rtol * work.driver.magnitudes(arrays, x, first, inputs, horizons)
-    rows = work.rows[chunk]
+    rows = work.rows[chunk] if work.reducing else None
     limit = max(map(step_limit, work.span.durations.tolist(), work.span.turns.tolist()))
     results = work.driver.run(work.family, arrays, x, tolerance, rows, work.stop, max_steps=limit)
     work.end[chunk] = x
-    work.rows[chunk] = rows
+    if rows is not None:
+        work.rows[chunk] = rows
     for place in np.flatnonzero(results["status"] != End.DONE):
         member, told = int(chunk[place]), results[place]
         if told["status"] == STOPPED:

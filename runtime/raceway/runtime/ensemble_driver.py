@@ -7,6 +7,7 @@ The library also holds the driver of single runs, there with reductions; plain r
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,7 +25,7 @@ ENSEMBLE_HEADERS = (*HEADERS, "ensemble_kernels.h")
 STOPPED = 5
 
 #: Head of a reduction, and what follows for every channel; the layout of driver/reductions.h.
-HEAD = ("from", "balls", "duration")
+HEAD = ("from", "wanted", "duration")
 ROWS = ("max", "max_time", "max_ball", "min", "min_time", "min_ball", "integral", "square")
 
 #: Channels behind those of the states: values of the most loaded ball.
@@ -131,11 +132,11 @@ class EnsembleDriver:
         code.raceway_ensemble_work.restype = ctypes.c_long
         code.raceway_ensemble.restype = ctypes.c_int
 
-    def reductions(self, members: int, start: np.ndarray | float, *, balls: bool) -> np.ndarray:
-        """Empty rows of reductions that count from `start` on [s], shape (members, row)."""
+    def reductions(self, members: int, start: np.ndarray | float, channels: Collection[str]) -> np.ndarray:
+        """Empty rows of reductions of these channels that count from `start` on [s], shape (members, row)."""
         rows = np.zeros((members, self.row))
         rows[:, 0] = start
-        rows[:, 1] = float(balls)
+        rows[:, 1] = sum(2**k for k, name in enumerate(self.channels) if name in channels)
         return rows
 
     def run(

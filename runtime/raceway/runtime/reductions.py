@@ -188,7 +188,7 @@ def reduce_run(
         check_rtol(rtol) * model_scales(model, numbers, initial, min(duration, SCALED_TURNS * turn), turn).magnitude
     )
     driver = model.ensemble_driver
-    row = driver.reductions(1, start, balls=True)[0]
+    row = driver.reductions(1, start, channel_names(model.manifest))[0]
     state = initial.copy()
     steps, rejected = integrate_reduced(
         model, driver, numbers, family, tolerance, state, row, (duration, turn, start), progress=progress

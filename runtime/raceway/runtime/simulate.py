@@ -398,14 +398,17 @@ def _segment(
 
 def segment_edges(model: Model, numbers: Numbers, begin: float, end: float, turn: float) -> np.ndarray:
     """Begin, breakpoints, whole turns and end, increasing, none twice [s]."""
-    cuts = list(clock.breakpoints(model.manifest.inputs, numbers.values, begin, end))
+    cuts = clock.breakpoints(model.manifest.inputs, numbers.values, begin, end)
     if math.isfinite(turn):
         near = clock.TIME_RESOLUTION * max(abs(begin), abs(end), turn)
-        for k in range(math.floor(begin / turn) + 1, math.ceil(end / turn)):
-            whole = k * turn
-            if begin + near < whole < end - near and all(abs(whole - cut) > near for cut in cuts):
-                cuts.append(whole)
-    return np.array([begin, *sorted(cuts), end])
+        whole = turn * np.arange(math.floor(begin / turn) + 1, math.ceil(end / turn))
+        whole = whole[(begin + near < whole) & (whole < end - near)]
+        # a turn that meets a breakpoint is that breakpoint
+        fenced = np.concatenate([[-math.inf], cuts, [math.inf]])
+        right = np.searchsorted(fenced, whole)
+        free = (fenced[right] - whole > near) & (whole - fenced[right - 1] > near)
+        cuts = np.sort(np.concatenate([cuts, whole[free]]))
+    return np.concatenate([[begin], cuts, [end]])
 
 
 def evaluate_outputs(model: Model, numbers: Numbers, trajectory: Trajectory) -> dict[str, np.ndarray]:

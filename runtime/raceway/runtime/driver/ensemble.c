@@ -55,7 +55,7 @@ typedef struct {
     double start[RW_L] RW_ALIGNED, resolution[RW_L] RW_ALIGNED; /* of the segment, and of time within it [s] */
     int linearly;       /* which family this pass advances */
     int balls;          /* whether channels of the balls are reduced */
-    int any_reducing;
+    unsigned long wanted; /* channels reduced, a bit each; all members have the same */
     rw_lane_numbers numbers;
 } rw_block;
 
@@ -219,7 +219,6 @@ static double lane_channel(const void *from, int channel, double theta, int *bal
 /* Reductions of the lanes whose step was accepted; the same rules as rw_reduce. */
 static void reduce(const rw_job *job, rw_block *b)
 {
-    const int channels = b->balls ? RW_CHANNELS : RW_NX;
     double add[RW_L] RW_ALIGNED;
     RW_EACH_LANE add[lane] = b->accepted[lane] * b->reducing[lane];
     if (b->linearly) rw_lane_linear_dense(&b->linear, b->dense);
@@ -227,18 +226,23 @@ static void reduce(const rw_job *job, rw_block *b)
     for (int q = 1; q < RW_POINTS; q++) {
         const double theta = (double)q / (RW_POINTS - 1);
         double *restrict y = b->sampled[q], time[RW_L] RW_ALIGNED;
-        if (q == RW_POINTS - 1) {
-            for (int i = 0; i < RW_NX * RW_L; i++) y[i] = b->next[i];
-        } else if (b->linearly) {
-            for (int i = 0; i < RW_NX * RW_L; i++) y[i] = rw_linear_entry(b->dense[0] + i, RW_NX * RW_L, b->x[i], b->next[i], theta);
-        } else {
-            for (int i = 0; i < RW_NX * RW_L; i++) y[i] = rw_explicit_entry(b->dense[0] + i, RW_NX * RW_L, b->x[i], b->next[i], theta);
+        for (int k = 0; k < RW_NX; k++) {
+            if (!b->balls && !(b->wanted >> k & 1)) continue;
+            const int row = k * RW_L;
+            if (q == RW_POINTS - 1) {
+                RW_EACH_LANE y[row + lane] = b->next[row + lane];
+            } else if (b->linearly) {
+                RW_EACH_LANE y[row + lane] = rw_linear_entry(b->dense[0] + row + lane, RW_NX * RW_L, b->x[row + lane], b->next[row + lane], theta);
+            } else {
+                RW_EACH_LANE y[row + lane] = rw_explicit_entry(b->dense[0] + row + lane, RW_NX * RW_L, b->x[row + lane], b->next[row + lane], theta);
+            }
         }
         if (!b->balls) continue;
         RW_EACH_LANE time[lane] = b->t[lane] + theta * b->h[lane];
         rw_lane_ball_channels(&b->numbers, time, y, y + RW_NX * RW_L);
     }
-    for (int k = 0; k < channels; k++) {
+    for (int k = 0; k < RW_CHANNELS; k++) {
+        if (!(b->wanted >> k & 1)) continue;
         double news[RW_L] RW_ALIGNED, any = 0.0;
         const int row = k * RW_L;
         RW_EACH_LANE {
@@ -273,7 +277,7 @@ static void reduce(const rw_job *job, rw_block *b)
     }
     for (int lane = 0; lane < RW_L; lane++)
         if (add[lane] != 0.0) job->reductions[b->who[lane] * RW_REDUCTION + RW_DURATION] += b->h[lane];
-    for (int k = 0; k < channels; k++)
+    for (int k = 0; k < RW_CHANNELS; k++)
         RW_EACH_LANE {
             const int i = k * RW_L + lane;
             b->sampled[0][i] = add[lane] != 0.0 ? b->sampled[RW_POINTS - 1][i] : b->sampled[0][i];
@@ -462,7 +466,8 @@ static int pass(const rw_job *job, rw_block *b, int linearly)
     if (waiting < 0) return 1;
     memset(b, 0, sizeof *b);
     b->linearly = linearly;
-    b->balls = job->reductions != NULL && job->reductions[RW_BALLS] != 0.0;
+    b->wanted = job->reductions != NULL ? rw_wanted(job->reductions) : 0;
+    b->balls = job->reductions != NULL && rw_balls_wanted(job->reductions);
     b->numbers.u = b->u;
     b->numbers.p = b->p;
     b->numbers.c = b->c;

@@ -21,7 +21,7 @@ enum { RW_POINTS = 5, RW_BALL_CHANNELS = 4, RW_CHANNELS = RW_NX + RW_BALL_CHANNE
 /* Places in a reduction: the head, then RW_CHANNELS entries of each kind. */
 enum {
     RW_FROM = 0,     /* nothing is reduced in segments that start before this time [s]; given by the caller */
-    RW_BALLS = 1,    /* whether the channels of the balls are wanted; given by the caller */
+    RW_WANTED = 1,   /* sum of 2^k over the channels k that are wanted; given by the caller */
     RW_DURATION = 2, /* time reduced so far [s] */
     RW_HEAD = 3,
     RW_MAX = RW_HEAD,
@@ -36,6 +36,10 @@ enum {
 };
 
 enum { RW_REFINEMENTS = 12 }; /* evaluations spent on an extreme at most; a smooth one takes two or three */
+
+/* Channels wanted, a bit each; whether those of the balls are among them. */
+static inline unsigned long rw_wanted(const double *reduction) { return (unsigned long)reduction[RW_WANTED]; }
+static inline int rw_balls_wanted(const double *reduction) { return rw_wanted(reduction) >> RW_NX != 0; }
 
 /* Weights of Boole's rule. */
 static const double rw_boole[RW_POINTS] = {7.0 / 90.0, 32.0 / 90.0, 12.0 / 90.0, 32.0 / 90.0, 7.0 / 90.0};
@@ -164,8 +168,9 @@ static inline void rw_extreme(double *reduction, int value, int channel, double 
 static inline void rw_reduce(double *reduction, const double v[RW_POINTS][RW_CHANNELS], double time, double h, rw_channel_at at,
                              const void *source)
 {
-    const int channels = reduction[RW_BALLS] != 0.0 ? RW_CHANNELS : RW_NX;
-    for (int k = 0; k < channels; k++) {
+    const unsigned long wanted = rw_wanted(reduction);
+    for (int k = 0; k < RW_CHANNELS; k++) {
+        if (!(wanted >> k & 1)) continue;
         double sum = 0.0, square = 0.0;
         for (int i = 0; i < RW_POINTS; i++) {
             sum += rw_boole[i] * v[i][k];

@@ -233,7 +233,7 @@ static void reduce_start(rw_run *run, double start)
 {
     run->reduction = run->options->reduction;
     if (run->reduction == NULL || start < run->reduction[RW_FROM]) run->reduction = NULL;
-    else rw_channels(&run->numbers, 0.0, run->x, run->reduction[RW_BALLS] != 0.0, run->sampled[0]);
+    else rw_channels(&run->numbers, 0.0, run->x, rw_balls_wanted(run->reduction), run->sampled[0]);
 }
 
 static void reduce_step(rw_run *run, double start, double t, double h)
@@ -248,7 +248,7 @@ static void reduce_step(rw_run *run, double start, double t, double h)
         double y[RW_NX];
         if (i < RW_POINTS - 1) state_at(run, theta, y);
         else memcpy(y, run->next, sizeof y);
-        rw_channels(&run->numbers, t + theta * h, y, run->reduction[RW_BALLS] != 0.0, run->sampled[i]);
+        rw_channels(&run->numbers, t + theta * h, y, rw_balls_wanted(run->reduction), run->sampled[i]);
     }
     const rw_step_taken step = {run, t, h};
     rw_reduce(run->reduction, (const double(*)[RW_CHANNELS])run->sampled, start + t, h, channel_at, &step);
