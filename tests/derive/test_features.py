@@ -1,0 +1,120 @@
+"""A scene pays only for what it names: operations and bytes of scenes with and without a feature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from raceway.derive import generate, read_scene
+from raceway.derive.features import cost, count_operations, features
+from raceway.derive.read import scene_from_text
+from raceway.derive.scene import Scene
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
+MODEL = ("model.c", "model.h", "kernels.h", "tangents.h", "ensemble_kernels.h", "methods.h", "model.casadi")
+
+
+def press(scene_text: Callable[..., str], *changes: tuple[str, str]) -> Scene:
+    return scene_from_text(scene_text("punching_press", *changes), "punching_press")
+
+
+OUTER = """[bearing.outer_ring]
+support = "elastic"
+mass = "0.555 kg"
+stiffness = "5e7 N/m"
+damping = "500 N*s/m"
+"""
+
+
+def test_a_feature_left_out_costs_exactly_what_a_scene_that_never_had_it_costs(scene_text: Callable[..., str]) -> None:
+    """The variants that `features` makes in memory against scene files written without the feature."""
+    text = scene_text("punching_press")
+    given = {f.name: f for f in features(press(scene_text))}
+    gravity = next(line for line in text.splitlines() if line.startswith("gravity"))
+    plain = press(scene_text, (gravity + "\n", ""))
+    without = given["gravity"].without
+    assert without is not None
+    assert count_operations(without) == count_operations(plain)
+    assert count_operations(plain)["rhs"] < count_operations(press(scene_text))["rhs"]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_feature_adds_operations_where_it_acts_and_none_where_it_does_not(name: str) -> None:
+    scene = read_scene(ROOT / "scenes" / f"{name}.toml")
+    counted = cost(scene)
+    assert counted.functions == count_operations(scene)
+    for feature, added in counted.added.items():
+        if feature != "load":  # a constant load is a number: it costs nothing
+            assert added["rhs"] > 0, feature
+        if feature in ("contact damping",):
+            assert added["kernel.law"] > 0
+            assert added["kernel.stage"] == 0
+        if feature == "mechanism" or feature.startswith(("force", "torque", "gravity")):
+            # loads depend on time only: the contact law of a ball, called for each ball, is not touched
+            assert added["kernel.law"] == added["kernel.law_slopes"] == 0
+            assert added["kernel.stage"] > 0
+
+
+def test_a_ball_more_costs_nothing_in_the_steppers_text() -> None:
+    scene = read_scene(ROOT / "scenes/punching_press.toml")
+    assert scene.bearing is not None
+    few, many = (
+        {
+            k: v
+            for k, v in count_operations(replace(scene, bearing=replace(scene.bearing, balls=z))).items()
+            if k.startswith("kernel")
+        }
+        for z in (9, 41)
+    )
+    assert few == many
+
+
+def test_features_of_one_scene_change_no_byte_of_another(tmp_path: Path) -> None:
+    """Nothing is remembered from scene to scene: a plain scene generated behind a rich one is the same plain scene."""
+    plain, rich = ROOT / "scenes/varying_compliance.toml", ROOT / "scenes/offset_slider.toml"
+    first = generate(plain, tmp_path / "first")
+    generate(rich, tmp_path / "rich")
+    second = generate(plain, tmp_path / "second")
+    for path in sorted(first.iterdir()):
+        assert path.read_bytes() == (second / path.name).read_bytes(), path.name
+
+
+def test_unrequested_outputs_vanish(tmp_path: Path) -> None:
+    """From the step altogether (no output is in it), and from the outputs' function."""
+    scene = read_scene(ROOT / "scenes/punching_press.toml")
+    bare = replace(scene, outputs=("inner.x",))
+    assert count_operations(bare)["outputs"] == 0
+    many, few = generate(scene, tmp_path / "many"), generate(bare, tmp_path / "few")
+    for name in ("kernels.h", "tangents.h", "methods.h"):
+        assert (many / name).read_bytes() == (few / name).read_bytes(), name
+    assert (few / "model.c").stat().st_size < (many / "model.c").stat().st_size
+
+
+def test_a_moment_nobody_asked_for_is_not_solved_for() -> None:
+    """The guide's moment is one unknown of Eq. (1) more; it is there where an output names it."""
+    scene = replace(read_scene(ROOT / "scenes/offset_slider.toml"), outputs=("inner.*",))
+    asked = replace(scene, outputs=("inner.*", "reaction.D.moment"))
+    assert count_operations(asked)["reaction_system"] > count_operations(scene)["reaction_system"]
+    assert count_operations(asked)["rhs"] == count_operations(scene)["rhs"]
+
+
+#: Operations of the right-hand side, of one ball's force in the step, and of what depends on time only in it.  They
+#: grow when someone makes a scene pay for a feature that it does not name, and shrink when a derivation gets leaner:
+#: then this table follows.
+PLAIN = {
+    "punching_press": (360, 9, 109),
+    "punching_press_tangent": (371, 8, 109),
+    "offset_slider": (379, 8, 116),
+    "four_bar": (406, 8, 142),
+    "varying_compliance": (149, 5, 4),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_shipped_scenes_cost_what_they_cost(name: str) -> None:
+    counts = count_operations(read_scene(ROOT / "scenes" / f"{name}.toml"))
+    assert (counts["rhs"], counts["kernel.law"], counts["kernel.stage"]) == PLAIN[name]
