@@ -10,25 +10,29 @@ import contextlib
 import json
 import math
 import os
-import sys
 import tempfile
-import time
-import warnings
-from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from raceway.runtime.errors import RacewayError, RequestError
+from raceway.runtime.commands_shared import (
+    SceneFile,
+    Stages,
+    check_folder,
+    complain,
+    faults_of,
+    load_model,
+    read_with_settings,
+    reported,
+    warnings_shown,
+)
+from raceway.runtime.errors import RequestError
 
 if TYPE_CHECKING:
     from raceway.derive import Scene
-    from raceway.derive.errors import Fault
     from raceway.runtime.model import Model
     from raceway.runtime.solution import Solution
 
@@ -41,106 +45,6 @@ app = typer.Typer(
     epilog="Results go to stdout, messages and progress to stderr. Exit codes: 0 done, 1 the computation failed, 2 the "
     "request was wrong.",
 )
-_err = Console(stderr=True)
-
-SceneFile = Annotated[
-    Path,
-    typer.Argument(help="Scene file (TOML). The folder scenes/ has some to copy.", show_default=False),
-]
-
-#: Names of the stages as they are announced.
-_STAGES = {
-    "read": "reading the scene",
-    "derive": "deriving equations",
-    "lower": "building functions",
-    "emit": "generating C",
-    "check": "deriving to compare",
-    "compile": "compiling",
-    "export": "writing the C program",
-    "simulate": "simulating",
-    "draw": "drawing figures",
-    "write": "writing results",
-}
-
-
-@contextlib.contextmanager
-def _reported() -> Iterator[None]:
-    """Turn errors raised on purpose into a message and an exit code; everything else is a defect and shows itself."""
-    try:
-        yield
-    except RacewayError as error:
-        _complain(str(error))
-        raise typer.Exit(2 if isinstance(error, ValueError) else 1) from None
-    except BrokenPipeError:  # the reader has seen enough, as in `raceway equations SCENE | head`
-        raise
-    except OSError as error:
-        where = f" {os.fspath(error.filename)!r}" if error.filename else ""
-        why = error.strerror or str(error)
-        _complain(f"cannot read or write{where}: {why}. Check the path, its permissions and the free space.")
-        raise typer.Exit(2) from None
-    except KeyboardInterrupt:
-        _complain("interrupted. Whatever files are there are whole.")
-        raise typer.Exit(130) from None
-
-
-def _complain(message: str) -> None:
-    _err.print(f"[bold red]error[/]: {escape(message)}", soft_wrap=True, highlight=False)
-
-
-def _warn(message: Warning | str, *_: Any, **__: Any) -> None:
-    _err.print(f"[bold yellow]warning[/]: {escape(str(message))}", soft_wrap=True, highlight=False)
-
-
-@contextlib.contextmanager
-def _warnings_shown() -> Iterator[None]:
-    with warnings.catch_warnings():
-        warnings.showwarning = _warn
-        yield
-
-
-class _Stages:
-    """Progress on stderr: on a terminal bars that move, elsewhere one line when a stage begins."""
-
-    def __init__(self) -> None:
-        # rich's own answer is yes under FORCE_COLOR, also for a file
-        self._moving = sys.stderr.isatty() and _err.is_interactive
-        self._progress = Progress(
-            SpinnerColumn(),
-            TextColumn("{task.description:<20}"),
-            BarColumn(bar_width=30),
-            TimeElapsedColumn(),
-            console=_err,
-            disable=not self._moving,
-        )
-        self._begin = time.perf_counter()
-        self._task: Any = None
-
-    def __enter__(self) -> _Stages:
-        self._progress.__enter__()
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        if error[0] is None:
-            self._finish()
-        elif self._task is not None:
-            self._progress.stop_task(self._task)
-        self._progress.__exit__(*error)
-
-    def _finish(self) -> None:
-        if self._task is not None:
-            self._progress.update(self._task, total=1.0, completed=1.0)
-
-    def __call__(self, name: str) -> None:
-        self._finish()
-        words = _STAGES.get(name, name)
-        if self._moving:
-            self._task = self._progress.add_task(words, total=None)
-        else:
-            _err.print(f"{time.perf_counter() - self._begin:7.1f} s  {words}", highlight=False, soft_wrap=True)
-
-    def fraction(self, done: float) -> None:
-        if self._moving:
-            self._progress.update(self._task, total=1.0, completed=done)
 
 
 def _print_version(asked: bool) -> None:
@@ -191,14 +95,14 @@ def run(
 
     Derives and compiles what is stale in generated/<scene>. What is not given here is as the scene's run table says.
     """
-    with _reported(), _warnings_shown(), _Stages() as stages:
+    with reported(), warnings_shown(), Stages() as stages:
         stages("read")
-        read, asked, overrides = _read(scene, set_ or [])
+        read, asked, overrides = read_with_settings(scene, set_ or [])
         _check_request(asked, cycles, transient, rtol, method)
         folder = out if out is not None else Path("results") / read.name
-        _check_folder(folder)
-        with _faults_of(scene):
-            model = _model(read, stages, method or read.run.method)
+        check_folder(folder)
+        with faults_of(scene):
+            model = load_model(read, stages, method or read.run.method)
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,
@@ -232,7 +136,7 @@ def derive(
     """Derive the equations of a scene and generate its C, functions, manifest and EQUATIONS.md."""
     from raceway import derive as deriving
 
-    with _reported(), _warnings_shown(), _Stages() as stages, _faults_of(scene):
+    with reported(), warnings_shown(), Stages() as stages, faults_of(scene):
         if check:
             stages("check")
             result = deriving.check(scene, out)
@@ -243,7 +147,7 @@ def derive(
     elif result.stale:
         state = f"is stale: {', '.join(result.stale)}" if result.folder.is_dir() else "does not exist"
         command = f"raceway derive {scene}" + (f" --out {out}" if out is not None else "")
-        _complain(f"{result.folder} {state}. Run: {command}")
+        complain(f"{result.folder} {state}. Run: {command}")
         raise typer.Exit(1)
     else:
         typer.echo(f"{result.folder} is up to date")
@@ -254,7 +158,7 @@ def equations(scene: SceneFile) -> None:
     """Print the derived equations of a scene as Markdown with LaTeX."""
     from raceway import derive as deriving
 
-    with _reported(), _faults_of(scene):
+    with reported(), faults_of(scene):
         text = deriving.equations(deriving.derive(deriving.read_scene(scene)))
     typer.echo(text, nl=False)
 
@@ -272,14 +176,14 @@ def export(
     """Write a scene as a program that runs without Python: make, and it prints the motion as CSV."""
     from raceway.derive import generate, read_scene
 
-    with _reported(), _warnings_shown():
+    with reported(), warnings_shown():
         if not c:
             raise RequestError("export: no format was given. Allowed: --c, a program in C99.")
-        with _Stages() as stages, _faults_of(scene):
+        with Stages() as stages, faults_of(scene):
             stages("read")
             read = read_scene(scene)
             folder = out if out is not None else Path("export") / read.name
-            _check_folder(folder)
+            check_folder(folder)
             generated = generate(read, progress=stages)
             stages("export")
             # here, for it brings CasADi
@@ -287,50 +191,6 @@ def export(
 
             export_c(generated, folder)
     typer.echo(str(folder))
-
-
-@contextlib.contextmanager
-def _faults_of(source: Path | str) -> Iterator[None]:
-    """Say whose faults they are, where a later stage than reading finds them."""
-    from raceway.derive import SceneError
-
-    try:
-        yield
-    except SceneError as error:
-        if error.source is not None:
-            raise
-        raise SceneError(error.faults, source=source) from None
-
-
-def _read(path: Path, settings: list[str]) -> tuple[Scene, Scene, dict[str, float]]:
-    """The scene as the file has it, the scene as asked for, and the overrides in SI; checked as if in the file."""
-    from raceway.derive import SceneError, read_scene
-    from raceway.derive.linkage import check_assembly, derive_linkage
-    from raceway.derive.read import parse_override, with_values
-    from raceway.derive.system import DRIVER_ANGLE
-    from raceway.derive.terms import symbol_of
-
-    read = read_scene(path)
-    faults: list[Fault] = []
-    overrides: dict[str, float] = {}
-    for text in settings:
-        try:
-            name, value = parse_override(read, text)
-        except SceneError as error:
-            faults += error.faults
-        else:
-            overrides[name] = value
-    if faults:
-        raise SceneError(faults, source="--set")
-    if not overrides:
-        return read, read, {}
-    with _faults_of("--set"):
-        asked = with_values(read, overrides)
-        if asked.mechanism is not None:
-            # here, so that nothing is written for a linkage that locks
-            linkage = derive_linkage(asked.mechanism, DRIVER_ANGLE, symbol_of(asked.mechanism.driver.speed))
-            check_assembly(linkage, {quantity.path: quantity.value for quantity in asked.quantities})
-    return read, asked, overrides
 
 
 def _check_request(
@@ -375,38 +235,8 @@ def _check_request(
         )
 
 
-def _check_folder(folder: Path) -> None:
-    """Refuse a folder of results that cannot be made or written, before the simulation instead of behind it."""
-    place = folder.absolute()
-    while not os.path.lexists(place):
-        place = place.parent
-    why = None
-    if not place.is_dir():
-        why = f"{place} is no folder"
-    elif not os.access(place, os.W_OK | os.X_OK):
-        why = f"{place} may not be written"
-    if why is not None:
-        raise RequestError(
-            f"The folder of the results, {folder}, cannot be written: {why}. Allowed: a folder that you may write, or "
-            "one that can be made. Give another: --out DIR."
-        )
-
-
-def _model(scene: Scene, stages: _Stages, method: str) -> Model:
-    from raceway.derive import generate
-    from raceway.runtime.model import load
-    from raceway.runtime.stepper import METHODS as STEPPERS
-
-    folder = generate(scene, progress=stages)
-    stages("compile")
-    model = load(folder)
-    if model.has_stepper and method in ("auto", *STEPPERS):
-        _ = model.stepper  # compiled here, where it is announced
-    return model
-
-
 def _write_results(
-    model: Model, solution: Solution, folder: Path, stages: _Stages, *, figures: bool
+    model: Model, solution: Solution, folder: Path, stages: Stages, *, figures: bool
 ) -> tuple[dict[str, Any], list[str]]:
     """Write into a folder beside the target and move file by file: what is there is whole.
 
