@@ -1,7 +1,8 @@
-"""Measure, then write the page: ``python -m benchmarks [--quick] [--fresh] [--only PART ...] [--out FOLDER]``.
+"""Measure, then write the page: ``python -m benchmarks [PART ...] [--quick] [--fresh] [--out FOLDER]``.
 
 Results go to benchmarks/results/*.json, one file a part, as soon as it is done.  A part whose file was measured on
-the same code and machine is kept: an interrupted run goes on where it stopped.  ``--fresh`` measures again.
+the same code and machine is kept: an interrupted run goes on where it stopped.  ``--fresh`` measures again.  A name
+stands for all parts that begin with it: ``work_precision``, ``sensitivity``.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import costs, regeneration, report, work_precision
-from benchmarks.machine import machine
+from benchmarks import costs, ensemble, regeneration, report, sensitivity_cost, sensitivity_error, work_precision
+from benchmarks.machine import load, machine
 from benchmarks.problem import ROOT
 
 RESULTS = ROOT / "benchmarks" / "results"
@@ -38,23 +39,42 @@ def main(arguments: list[str] | None = None) -> int:
     light, model_of_light = cases[-1]
     parts["one_step"] = lambda: costs.one_step(light, model_of_light, rounds)
     parts["balls"] = lambda: costs.balls(rounds, costs.BALLS[:2] if options.quick else costs.BALLS)
+    parts["sensitivity_cost"] = lambda: (
+        sensitivity_cost.sensitivity_cost(2, (1, 5), (1,))
+        if options.quick
+        else sensitivity_cost.sensitivity_cost(rounds)
+    )
+    parts["sensitivity_error"] = lambda: (
+        sensitivity_error.sensitivity_error(2, _say, (1e-4, 1e-6))
+        if options.quick
+        else sensitivity_error.sensitivity_error(24, _say)
+    )
+    parts["ensemble"] = lambda: ensemble.throughput(*((32, 2) if options.quick else (10_000, 3)))
     parts["regeneration"] = lambda: regeneration.regeneration(1 if options.quick else 5)
+    unknown = [wanted for wanted in options.parts if not any(name.startswith(wanted) for name in parts)]
+    if unknown:
+        _say(f"no part begins with {', '.join(unknown)}; there are {', '.join(parts)}")
+        return 2
 
     for name, part in parts.items():
         path = folder / f"{name}.json"
-        if options.only and not any(name.startswith(wanted) for wanted in options.only):
+        if options.parts and not any(name.startswith(wanted) for wanted in options.parts):
             continue
         if not options.fresh and _kept(path, key):
             _say(f"{name}: measured before on this code and machine, kept")
             continue
         begun = time.perf_counter()
         result = {"key": key, "quick": options.quick, "machine": machine(), **part()}
+        result["machine"]["load_after"] = load()
         result["seconds"] = round(time.perf_counter() - begun, 1)
         temporary = path.with_suffix(".tmp")
         temporary.write_text(_compact(result), encoding="utf-8")
         temporary.replace(path)
         _say(f"{name}: {result['seconds']} s")
     page = (options.out or ROOT / "docs") / "benchmarks.md"
+    if not any(folder.glob("work_precision_*.json")):
+        _say("no page is written: it needs a part work_precision")
+        return 0
     report.write(folder, page)
     print(page if options.out else page.relative_to(ROOT))
     return 0
@@ -66,7 +86,7 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
         "--quick", action="store_true", help="a minute instead of a quarter of an hour; numbers mean little"
     )
     parser.add_argument("--fresh", action="store_true", help="measure again what is there")
-    parser.add_argument("--only", nargs="+", default=[], metavar="PART", help="parts whose names start so")
+    parser.add_argument("parts", nargs="*", metavar="PART", help="only the parts whose names begin so")
     parser.add_argument("--out", type=Path, help="folder for results and page, instead of benchmarks/results and docs")
     return parser.parse_args(arguments)
 

@@ -23,13 +23,16 @@ from typing import Any
 import numpy as np
 
 from benchmarks.problem import CASES, Case, models, parameter_sets
-from benchmarks.report import table
+from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave
 from raceway.runtime.members import Span, make_members, member_arrays
 from raceway.runtime.model import Model
 from raceway.runtime.stepper import Family, Segments
 
-CYCLES, TRANSIENT, RTOL = 4, 2, 1e-6
+CYCLES, TRANSIENT, RTOL = 2, 1, 1e-6
+
+#: Ways on one thread, in the order of the table.
+_ONE_THREAD = ("single", "one by one, 1", "end, 1", "states, 1", "balls, 1")
 
 #: Observables of the kinds that cost: only the end, reductions of states, reductions of balls.
 KEPT = {
@@ -55,8 +58,9 @@ def _case(case: Case, model: Model, members: int, rounds: int) -> dict[str, Any]
     # a quarter is enough for the slow one
     few = max(8, members // 4)
     calls: dict[str, tuple[int, Callable[[], object]]] = {"single": (few, _single_runs(model, sets[:few]))}
+    calls["one by one, 1"] = (few, _ensemble(model, sets[:few], KEPT["end"], 1, lanes=False))
     for kind, kept in KEPT.items():
-        for threads in (1, 2):
+        for threads in (1, 2) if kind == "end" else (1,):
             calls[f"{kind}, {threads}"] = (members, _ensemble(model, sets, kept, threads))
     calls |= {f"hash, {threads}": (1, _hashing(threads)) for threads in (1, 2)}
     cpu: dict[str, list[float]] = {name: [] for name in calls}
@@ -90,8 +94,12 @@ def _case(case: Case, model: Model, members: int, rounds: int) -> dict[str, Any]
     }
 
 
-def _ensemble(model: Model, sets: list[dict[str, float]], kept: tuple[str, ...], threads: int) -> Callable[[], object]:
-    return lambda: model.simulate_many(sets, kept, cycles=CYCLES, transient=TRANSIENT, rtol=RTOL, threads=threads)
+def _ensemble(
+    model: Model, sets: list[dict[str, float]], kept: tuple[str, ...], threads: int, *, lanes: bool = True
+) -> Callable[[], object]:
+    return lambda: model.simulate_many(
+        sets, kept, cycles=CYCLES, transient=TRANSIENT, rtol=RTOL, threads=threads, lanes=lanes
+    )
 
 
 def _hashing(threads: int) -> Callable[[], object]:
@@ -142,12 +150,12 @@ def lines(result: dict[str, Any]) -> list[str]:
     """The table in Markdown."""
     head = (
         "damping",
-        *("single run, µs", "lanes, µs", "with states, µs", "with balls, µs"),
+        *("single run, µs", "one by one, µs", "lanes, µs", "with states, µs", "with balls, µs"),
         *("lanes", "members·cycles/s, 1 thread", "2 threads", "threads", "possible"),
     )
     rows = []
     for case in result["cases"]:
-        micro = [f"{1e6 * case['rows'][name]['cpu_a_cycle']:.3g}" for name in ("single", *(f"{k}, 1" for k in KEPT))]
+        micro = [f"{1e6 * case['rows'][name]['cpu_a_cycle']:.3g}" for name in _ONE_THREAD]
         rates = [f"{case['rows'][f'end, {n}']['per_second']:.4g}" for n in (1, 2)]
         rows.append(
             (
@@ -166,7 +174,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Measure and print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.ensemble", description=__doc__)
     parser.add_argument("--members", type=int, default=1024)
-    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--rounds", type=int, default=3)
     options = parser.parse_args(arguments)
     print("\n".join(lines(throughput(options.members, options.rounds))))
     return 0

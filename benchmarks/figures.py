@@ -121,6 +121,79 @@ def balls(path: Path, rows: Sequence[dict[str, Any]], fits: Sequence[dict[str, A
     _save(figure, path)
 
 
+def sensitivity_errors(path: Path, cases: Sequence[dict[str, Any]]) -> None:
+    """Errors of states and derivatives against tolerance, with and without control; 10th to 90th percentile."""
+    panels = plt.subplots(1, len(cases), figsize=(5.6 * len(cases), 4.4), sharey=True, squeeze=False)
+    figure, row_of_axes = panels[0], panels[1][0]
+    looks = (
+        ("states alone", "state", Look(color="#666666", marker="s", line="--")),
+        ("states alone", "derivative", Look(color="#990000", marker="^", line="--")),
+        ("with derivatives", "state", Look(color="black", marker="s", line="-")),
+        ("with derivatives", "derivative", Look(color="#0b5394", marker="^", line="-", width=2.0)),
+    )
+    for axes, case in zip(row_of_axes, cases, strict=True):
+        tolerances = [row["tolerance"] for row in case["rows"]]
+        for kind, what, look in looks:
+            spreads = [row[kind][what] for row in case["rows"]]
+            axes.fill_between(
+                tolerances,
+                [one["p10"] for one in spreads],
+                [one["p90"] for one in spreads],
+                color=look.color,
+                alpha=0.12,
+                linewidth=0.0,
+            )
+            axes.plot(
+                tolerances,
+                [one["median"] for one in spreads],
+                color=look.color,
+                marker=look.marker,
+                linestyle=look.line,
+                linewidth=look.width,
+                markersize=4.5,
+                label=f"{what}; steps follow {'states and derivatives' if kind != 'states alone' else kind}",
+            )
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.invert_xaxis()
+        axes.set_title(case["words"], fontsize=10)
+        axes.set_xlabel("tolerance [1]")
+        axes.grid(visible=True, which="major", color="#e5e5e5", linewidth=0.6)
+        axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
+    row_of_axes[0].set_ylabel("largest relative error [1]")
+    _save(figure, path)
+
+
+def sensitivity_costs(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Time of a run with derivatives over that of the plain run, against the number of parameters."""
+    figure, axes = plt.subplots(figsize=(6.6, 4.4))
+    looks = (
+        ("stepper, 2000 points", "stepper", Look(color="black", marker="o", line="-", width=2.0)),
+        ("CasADi erk, C", "CasADi erk, C", Look(color="#990000", marker="^", line="-")),
+        ("CasADi rosenbrock, C", "CasADi rosenbrock, C", Look(color="#990000", marker="v", line="--")),
+        ("central differences", "central differences", Look(color="#666666", marker="x", line=":")),
+    )
+    for way, label, look in looks:
+        some = [row for row in rows if row["way"] == way and row["case"] == "onesided" and row.get("parameters")]
+        if not some:
+            continue
+        axes.plot(
+            [row["parameters"] for row in some],
+            [row["times_plain"]["median"] for row in some],
+            color=look.color,
+            marker=look.marker,
+            linestyle=look.line,
+            linewidth=look.width,
+            label=label,
+        )
+    axes.set_xlabel("parameters")
+    axes.set_ylabel("time over that of the plain run of the same method [1]")
+    axes.set_yscale("log")
+    axes.grid(visible=True, which="both", color="#e5e5e5", linewidth=0.6)
+    axes.legend(fontsize=8)
+    _save(figure, path)
+
+
 def _save(figure: Any, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.tight_layout()

@@ -23,8 +23,13 @@ def machine() -> dict[str, object]:
         "compiler": _compiler(),
         "python": platform.python_version(),
         "packages": {name: _version(name) for name in PACKAGES},
-        "load": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None,
+        "load": load(),
     }
+
+
+def load() -> float | None:
+    """Programs that wanted a processor during the last minute, ours included; None where the system does not tell."""
+    return round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None
 
 
 def _lines() -> list[str]:

@@ -236,7 +236,7 @@ class CasadiIntegrators:
         return self.made[scene]
 
     def _compile(self, member: Member, grids: list[list[float]]) -> list[Kernel]:
-        functions = [_integrator(member, self.plugin, k, grid, self.how == "jit") for k, grid in enumerate(grids)]
+        functions = [integrator(member, self.plugin, k, grid, self.how == "jit") for k, grid in enumerate(grids)]
         if self.how != "C":
             return [Kernel(f) for f in functions]
         folder = BUILD / "casadi"
@@ -267,7 +267,7 @@ class CasadiIntegrators:
         return np.concatenate(rows)
 
 
-def _integrator(member: Member, plugin: str, segment: int, grid: list[float], jit: bool) -> casadi.Function:
+def integrator(member: Member, plugin: str, segment: int, grid: list[float], jit: bool) -> casadi.Function:
     """An integrator of the scaled states over a normalised segment, as in raceway.runtime.integrators."""
     model, rhs = member.model, member.model.symbolic("rhs")
     manifest = model.manifest

@@ -20,7 +20,8 @@ from benchmarks.press import Press, press_numbers
 from raceway.derive import generate
 from raceway.runtime import load
 from raceway.runtime.model import Model
-from raceway.runtime.simulate import Numbers, segment_edges
+from raceway.runtime.parameters import Numbers
+from raceway.runtime.segments import segment_edges
 from raceway.runtime.stepper import Segments
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -11,9 +11,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import figures
+from benchmarks import ensemble, figures, sensitivity_cost, sensitivity_error
 from benchmarks.curves import LEVELS, curve, lower, time_at
 from benchmarks.problem import SPREAD
+from benchmarks.tables import milliseconds, table
 from benchmarks.targets import targets
 
 Result = dict[str, Any]
@@ -40,9 +41,11 @@ def write(folder: Path, page: Path) -> None:
     text = TEMPLATE.read_text(encoding="utf-8").format(
         note="**Measured with `QUICK=1`: these numbers only show that the scripts run.**\n\n" if quick else "",
         machine="\n".join(_machine(results)),
+        summary="\n".join(_summary(cases)),
+        level=f"{LEVELS[0]:.0e}",
         spread=f"{100 * SPREAD:g} %",
         cases="\n".join(line for case in cases for line in _case(case, images)),
-        targets="\n".join(targets(cases, results.get("regeneration"), results.get("balls"))),
+        targets="\n".join(targets(cases, results)),
         sections="\n".join(sections),
         **_conditions(cases),
     )
@@ -50,35 +53,57 @@ def write(folder: Path, page: Path) -> None:
     page.write_text(text.rstrip() + "\n", encoding="utf-8")
 
 
+#: A load below this is that of the benchmarks alone.
+QUIET = 1.5
+
 _ORDER = ("stiff", "onesided", "tangent")
-
-
-def milliseconds(seconds: float | None) -> str:
-    """Three digits, or a dash."""
-    return "–" if seconds is None else f"{1e3 * seconds:.3g}"
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Markdown table, numbers to the right."""
-    marks = ["---", *("---:" for _ in head[1:])]
-    return [f"| {' | '.join(cells)} |" for cells in (head, marks, *rows)]
 
 
 def _machine(results: dict[str, Result]) -> list[str]:
     newest = next(iter(results.values()))["machine"]
     packages = ", ".join(f"{name} {version}" for name, version in newest["packages"].items())
-    loads = [result["machine"]["load"] for result in results.values() if result["machine"]["load"] is not None]
     lines = [
         f"Machine: {newest['processor']}, {newest['cores']} cores, {newest['vectors'] or 'no wide vectors'}; "
         f"{newest['system']}; {newest['compiler']}; Python {newest['python']}; {packages}."
     ]
-    if loads and max(loads) > 1.5:
+    begun, after = (
+        [result["machine"][when] for result in results.values() if result["machine"].get(when) is not None]
+        for when in ("load", "load_after")
+    )
+    if begun:
+        quiet = max(begun) < QUIET
         lines += [
             "",
-            f"The machine was not quiet: its load was {min(loads):.1f} to {max(loads):.1f} when parts began. Times may "
-            "be long, ratios less so.",
+            f"Load of the machine (programs that wanted a processor, these included): {min(begun):.1f} to "
+            f"{max(begun):.1f} when parts began"
+            + (f", {min(after):.1f} to {max(after):.1f} when they ended. " if after else ". ")
+            + ("It was quiet otherwise." if quiet else "It was not quiet: times may be long, ratios less so."),
         ]
     return lines
+
+
+def _summary(cases: Sequence[Result]) -> list[str]:
+    """What to take from the page first: time of a cycle, and what each peer takes at the loosest error compared."""
+    curves = {case["case"]: {c["key"]: curve(c) for c in case["contenders"]} for case in cases}
+    labels = {c["key"]: c["label"] for case in cases for c in case["contenders"]}
+    for each in curves.values():
+        each["hand-best"] = lower([points for key, points in each.items() if key.startswith("hand-")])
+        each["numpy-best"] = lower(
+            [points for key, points in each.items() if key.startswith("scipy-") and key.endswith("-numpy")]
+        )
+    labels |= {"hand-best": "by hand in C, best method", "numpy-best": "best of SciPy with NumPy"}
+    own = {name: time_at(each["stepper"], LEVELS[0]) for name, each in curves.items()}
+    keys = [
+        key for key in labels if not key.startswith(("stepper", "hand-", "simulate")) and not key.endswith("-numpy")
+    ]
+    rows = [["**raceway**, ms a cycle", *(f"**{milliseconds(own[case['case']])}**" for case in cases)]]
+    for key in ("hand-best", *keys, "numpy-best"):
+        cells = []
+        for case in cases:
+            taken, mine = time_at(curves[case["case"]].get(key, ()), LEVELS[0]), own[case["case"]]
+            cells.append("–" if taken is None or mine is None else f"{taken / mine:.2g}×")
+        rows.append([labels[key], *cells])
+    return table(["", *(case["words"] for case in cases)], rows)
 
 
 def _conditions(cases: Sequence[Result]) -> dict[str, object]:
@@ -218,10 +243,74 @@ def _regeneration(result: Result, _: Path) -> list[str]:
     ]
 
 
+def _sensitivity_cost(result: Result, images: Path) -> list[str]:
+    figures.sensitivity_costs(images / "bench_sensitivity_cost.png", result["rows"])
+    fits = [
+        f"- {fit['way']}, `{fit['case']}`: {fit['without']:.3g} plain runs, and {fit['a_block']:.3g} for every eight "
+        f"parameters begun; every point within {100 * fit['largest_deviation']:.0f} % of this line."
+        for fit in result["fits"]
+    ]
+    agreement = [row["agreement"] for row in result["rows"] if "agreement" in row]
+    return [
+        "## Number of parameters",
+        "",
+        "Derivatives of the cycle's states by parameters: time over that of the plain run of the same method, measured "
+        f"side by side, medians, tolerance {result['tolerance']:.0e}. Rows of the stepper are its driver alone; "
+        "`model.simulate` is what a user types, against `model.sensitivities`, with checks, outputs and 2 000 points. "
+        "CasADi's and the differences give derivatives at the end of the cycle only."
+        + (f" Those of CasADi agree with the stepper's within {max(agreement):.0e}." if agreement else ""),
+        "",
+        "![Cost of derivatives against the number of parameters](images/bench_sensitivity_cost.png)",
+        "",
+        *sensitivity_cost.lines(result),
+        "",
+        *fits,
+    ]
+
+
+def _sensitivity_error(result: Result, images: Path) -> list[str]:
+    sensitivity_error.figure(images / "bench_sensitivity_error.png", result)
+    names = ", ".join(f"`{name}`" for name in result["names"])
+    return [
+        "## Errors of derivatives",
+        "",
+        f"Over {result['members']} parameter sets: the largest error of any state, and of any state's derivative by "
+        f"{names}, at 100 points of the cycle, over the largest value of each. Left columns: step sizes follow the "
+        "states alone, and the derivatives are those of the steps taken. Right columns: the derivatives take part "
+        "(`sensitivity_rtol`), with the same tolerance; the last column says how many more steps that takes.",
+        "",
+        "![Errors of states and derivatives against tolerance](images/bench_sensitivity_error.png)",
+        "",
+        *sensitivity_error.lines(result),
+        "Without control, derivatives can be worthless while the states are right: an explicit method whose steps are "
+        "held near the limit of stability keeps the states still and lets a derivative grow; and where a contact "
+        "opens, the rate of a derivative jumps (one-sided damping) or has no bound (tangent damping), which the "
+        "states' error does not show.",
+    ]
+
+
+def _ensemble(result: Result, _: Path) -> list[str]:
+    return [
+        "## Ensembles",
+        "",
+        f"{result['members']:,} parameter sets".replace(",", " ")
+        + f", {result['cycles']} cycles each, rtol {result['rtol']:.0e}. Processor time for a member and cycle: the "
+        "driver of single runs alone on prepared arrays; `simulate_many` without lanes and with them, preparation "
+        "included; with reductions of states (`rms:`, `range:`), and of balls as well (`max:ball.force`). *Lanes*: "
+        "single run over lanes. *Threads*: wall time on one thread over that on two; *possible*: the same for two "
+        "threads that only hash bytes, which is what the machine lets two threads gain.",
+        "",
+        *ensemble.lines(result),
+    ]
+
+
 #: Name of a file of results, and what makes lines of it.
 SECTIONS: tuple[tuple[str, Callable[[Result, Path], list[str]]], ...] = (
     ("one_step", _one_step),
     ("balls", _balls),
+    ("sensitivity_cost", _sensitivity_cost),
+    ("sensitivity_error", _sensitivity_error),
+    ("ensemble", _ensemble),
     ("regeneration", _regeneration),
 )
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.curves import LEVELS, curve, lower, time_at, tolerance_at
 
 Result = dict[str, Any]
+
+#: Target, damping, what was measured, verdict.
+Row = tuple[str, str, str, str]
 
 #: (rival: keys that count as one, words, level, factor, whether the stepper may take `factor` times the rival's time)
 _AT_1E3 = (
@@ -22,35 +25,78 @@ _AT_1E3 = (
 _NOT_PEERS = ("stepper", "simulate", "hand-")
 
 
-def targets(cases: Sequence[Result], regeneration: Result | None, balls: Result | None) -> list[str]:
-    """The section on targets."""
-    rows: list[tuple[str, str, str, str]] = []
+def targets(cases: Sequence[Result], results: Mapping[str, Result]) -> list[str]:
+    """The section on targets, from the cases of part 1 and the results of the other parts that are there."""
+    rows: list[Row] = []
     reasons: list[str] = []
     for case in cases:
         _speed(case, rows, reasons)
-    if balls:
-        worst = max(fit["largest_deviation"] for fit in balls["fits"])
-        rows.append(("cost linear in the balls", "", f"within {100 * worst:.0f} % of a line", _met(worst < 0.15)))
-    if regeneration:
-        cold, warm = (regeneration["stages"][how] for how in ("cold", "warm"))
-        derive = sum(v["median"] for k, v in cold.items() if not k.startswith(("C compiler", "first", "load")))
-        rows.append(("cold, without the C compiler ≤ 3 s", "", f"{derive:.2f} s", _met(derive <= 3.0)))
-        load = warm["load"]["median"]
-        rows.append(("warm load ≤ 50 ms", "", f"{1e3 * load:.0f} ms, imports not counted", _met(load <= 0.05)))
-        rows.append(
-            (
-                "changed number: nothing compiled",
-                "",
-                "compiled" if regeneration["compiled_again"] else "nothing",
-                _met(not regeneration["compiled_again"]),
-            )
-        )
+    for name, judge in _JUDGES:
+        if name in results:
+            rows += judge(results[name])
     lines = ["## Targets", "", "Ratios are of times at equal error; `stepper` with its own choice of method.", ""]
     lines += ["| target | damping | measured | |", "| --- | --- | ---: | --- |"]
     lines += [f"| {' | '.join(row)} |" for row in rows]
     if reasons:
         lines += ["", "Where a case falls short, and why:", "", *(f"- {reason}" for reason in reasons)]
     return [*lines, ""]
+
+
+def _balls(result: Result) -> list[Row]:
+    worst = max(fit["largest_deviation"] for fit in result["fits"])
+    return [("cost linear in the balls", "", f"within {100 * worst:.0f} % of a line", _met(worst < 0.15))]
+
+
+def _sensitivity_cost(result: Result) -> list[Row]:
+    rows: list[Row] = []
+    limits = ((5, 4.0), (20, 12.0))
+    for way in ("model.simulate", "stepper, 2000 points"):
+        for row in result["rows"]:
+            for count, limit in limits:
+                if row["way"] != way or row.get("parameters") != count:
+                    continue
+                ratio = row["times_plain"]["median"]
+                text = f"{count} sensitivities: at most {limit:g}× the plain run ({way})"
+                rows.append((text, row["case"], f"{ratio:.3g}×", _met(ratio <= limit)))
+    deviations = [fit["largest_deviation"] for fit in result["fits"]]
+    if deviations:
+        worst = max(deviations)
+        measured = f"within {100 * worst:.0f} % of a line"
+        rows.append(("cost linear in the parameters, eight at a time", "", measured, _met(worst < 0.15)))
+    return rows
+
+
+def _ensemble(result: Result) -> list[Row]:
+    rows: list[Row] = []
+    for case in result["cases"]:
+        lanes, threads, possible = case["lanes"], case["threads"], case["possible"]
+        rows.append(("ensemble: lanes at least 2.5× a core", case["words"], f"{lanes:.2f}×", _met(lanes >= 2.5)))
+        measured = f"{threads:.2f}× (two threads that hash: {possible:.2f}×)"
+        # the machine's own limit is not the project's
+        verdict = _met(threads >= 1.8) if threads >= 1.8 or possible >= 1.8 else "the machine gives no more"
+        rows.append(("ensemble: at least 1.8× from the second thread", case["words"], measured, verdict))
+    return rows
+
+
+def _regeneration(result: Result) -> list[Row]:
+    cold, warm = (result["stages"][how] for how in ("cold", "warm"))
+    derive = sum(v["median"] for k, v in cold.items() if not k.startswith(("C compiler", "first", "load")))
+    load = warm["load"]["median"]
+    changed = "compiled" if result["compiled_again"] else "nothing"
+    return [
+        ("cold, without the C compiler ≤ 3 s", "", f"{derive:.2f} s", _met(derive <= 3.0)),
+        ("warm load ≤ 50 ms", "", f"{1e3 * load:.0f} ms, imports not counted", _met(load <= 0.05)),
+        ("changed number: nothing compiled", "", changed, _met(not result["compiled_again"])),
+    ]
+
+
+#: Name of a file of results, and what makes rows of it.
+_JUDGES: tuple[tuple[str, Callable[[Result], list[Row]]], ...] = (
+    ("balls", _balls),
+    ("sensitivity_cost", _sensitivity_cost),
+    ("ensemble", _ensemble),
+    ("regeneration", _regeneration),
+)
 
 
 def _met(reached: bool) -> str:

@@ -125,42 +125,6 @@ int rhs_jac_t_work_bytes(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *sz_
 #define rhs_jac_t_SZ_RES 1
 #define rhs_jac_t_SZ_IW 0
 #define rhs_jac_t_SZ_W 0
-int rhs_jac_p(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem);
-int rhs_jac_p_checkout(void);
-void rhs_jac_p_release(int mem);
-void rhs_jac_p_incref(void);
-void rhs_jac_p_decref(void);
-casadi_int rhs_jac_p_n_in(void);
-casadi_int rhs_jac_p_n_out(void);
-casadi_real rhs_jac_p_default_in(casadi_int i);
-const char* rhs_jac_p_name_in(casadi_int i);
-const char* rhs_jac_p_name_out(casadi_int i);
-const casadi_int* rhs_jac_p_sparsity_in(casadi_int i);
-const casadi_int* rhs_jac_p_sparsity_out(casadi_int i);
-int rhs_jac_p_work(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *sz_iw, casadi_int *sz_w);
-int rhs_jac_p_work_bytes(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *sz_iw, casadi_int *sz_w);
-#define rhs_jac_p_SZ_ARG 5
-#define rhs_jac_p_SZ_RES 1
-#define rhs_jac_p_SZ_IW 0
-#define rhs_jac_p_SZ_W 0
-int rhs_jac_c(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem);
-int rhs_jac_c_checkout(void);
-void rhs_jac_c_release(int mem);
-void rhs_jac_c_incref(void);
-void rhs_jac_c_decref(void);
-casadi_int rhs_jac_c_n_in(void);
-casadi_int rhs_jac_c_n_out(void);
-casadi_real rhs_jac_c_default_in(casadi_int i);
-const char* rhs_jac_c_name_in(casadi_int i);
-const char* rhs_jac_c_name_out(casadi_int i);
-const casadi_int* rhs_jac_c_sparsity_in(casadi_int i);
-const casadi_int* rhs_jac_c_sparsity_out(casadi_int i);
-int rhs_jac_c_work(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *sz_iw, casadi_int *sz_w);
-int rhs_jac_c_work_bytes(casadi_int *sz_arg, casadi_int* sz_res, casadi_int *sz_iw, casadi_int *sz_w);
-#define rhs_jac_c_SZ_ARG 5
-#define rhs_jac_c_SZ_RES 1
-#define rhs_jac_c_SZ_IW 0
-#define rhs_jac_c_SZ_W 0
 int outputs(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem);
 int outputs_checkout(void);
 void outputs_release(int mem);

@@ -466,8 +466,9 @@ end = "30 m"
         ("a = " + "9" * 5000, "not TOML", 1),
         ("\x00", "not TOML", 1),
         ("# one line to TOML: \u2028\x85\nb = = 2\n", "not TOML", 2),
-        ("bearing.clearance" + ".a" * 5000 + " = 1", "is missing", None),
-        ("bearing.clearance" + ".a" * 5000 + " = 1", "a table instead of a length", 1),
+        ("bearing.clearance" + ".a" * 60 + " = 1", "is missing", None),
+        ("bearing.clearance" + ".a" * 60 + " = 1", "a table instead of a length", 1),
+        ("bearing.clearance" + ".a" * 5000 + " = 1", "a key with more than 64 dots", 1),
     ],
 )
 def test_a_text_that_is_no_scene_is_refused(text: str, problem: str, line: int | None) -> None:

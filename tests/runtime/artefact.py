@@ -93,7 +93,7 @@ def functions(*, extra_term: float = 0.0, states: bool = True) -> list[ca.Functi
     made.append(ca.Function("outputs", arguments, outputs, names, ["body_x", "push_power", "ball_force"]))
     if states:
         made.append(ca.Function("rhs", arguments, [xdot], names, ["xdot"]))
-        for name, along in (("x", x), ("t", t), ("p", p), ("c", c)):
+        for name, along in (("x", x), ("t", t), ("u", u), ("p", p), ("c", c)):
             made.append(ca.Function(f"rhs_jac_{name}", arguments, [ca.jacobian(xdot, along)], names, [f"xdot_{name}"]))
     # the crank lifts a pin: the dyad closes while the pin stays below 0.7 + 0.1 weight, smallest at 90 degrees
     margin = ca.vertcat(0.7 + 0.1 * value["body.weight"] - ca.sin(angle))

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from raceway.runtime import Model, clock
-from raceway.runtime.simulate import Numbers, segment_edges
+from raceway.runtime.parameters import Numbers
+from raceway.runtime.segments import segment_edges
 from raceway.runtime.stepper import Family, Outcome, Segments
 
 #: The four methods a user can name, by order of convergence and order of their dense output.

@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from raceway.runtime import Model, RequestError, clock
+from raceway.runtime import Model, RequestError, SimulationError, clock
 from raceway.runtime.ensemble import EnsembleResult
 from raceway.runtime.members import Span, inputs_of, make_members, member_arrays
-from raceway.runtime.simulate import model_scales
+from raceway.runtime.magnitudes import model_scales
 
 ModelMaker = Callable[..., Model]
 LAW = 'law = "one-sided"\nratio = "0.25e-5 s*mm^0.5"'
@@ -118,6 +118,33 @@ def test_one_failing_member_is_reported_and_the_rest_is_untouched(make_model: Mo
         assert np.flatnonzero(np.isnan(bad[name])).tolist() == [3, 7]
     rest = [k for k in range(20) if k not in (3, 7)]
     assert all(np.array_equal(good[name][rest], bad[name][rest]) for name in OBSERVABLES)
+
+
+@pytest.mark.parametrize(
+    "absurd",
+    [
+        {"bearing.initial.inner_velocity.y": 1e200},
+        {"bearing.outer_ring.damping": -1e5},
+        {"bearing.outer_ring.stiffness": -1e13},
+    ],
+    ids=["fast", "driven", "pushed"],
+)
+@pytest.mark.parametrize("method", ["auto", "stepper-dp54", "stepper-rodas5p"])
+def test_an_absurd_member_ends_soon_and_as_a_single_run_does(
+    make_model: ModelMaker, absurd: dict[str, float], method: str
+) -> None:
+    """What grows without bound ends where the tolerance falls below rounding, after as many steps as by itself."""
+    model = press(make_model)
+    good = {name: model.parameters[name] for name in absurd}
+    result = model.simulate_many([good, absurd, good], ["end:inner.y"], cycles=1, transient=0, method=method)
+    (failure,) = result.failures
+    with pytest.raises(SimulationError) as single:
+        model.reduce(cycles=1, transient=0, method=method, parameters=absurd)
+    assert failure.member == 1
+    assert failure.status == single.value.status.name
+    assert failure.time == pytest.approx(single.value.time, rel=0.02, abs=1e-9)
+    assert result.statistics.steps < 200_000
+    assert np.isfinite(result["end:inner.y"][[0, 2]]).all()
 
 
 def test_an_interrupt_keeps_the_members_finished_by_then(make_model: ModelMaker) -> None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from raceway.runtime import Model, RequestError, clock
+from raceway.runtime.direction_scales import direction_scales
 from raceway.runtime.sensitivity import Directions
-from raceway.runtime.stepper import End, Family, Segments
+from raceway.runtime.stepper import End, Family, Outcome, Segments
 
 # preload: every ball stays in contact, and the motion is smooth in every parameter
 SMOOTH = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.2, "bearing.initial.inner.y": 2e-6}
@@ -105,6 +107,119 @@ def test_derivatives_by_moving_edges_of_a_load(make_model: Callable[..., Model])
         assert np.max(error) < 1e-6 * np.max(np.abs(difference)), name
 
 
+@pytest.mark.parametrize("method", ["stepper-dp54", "stepper-dop853", "stepper-rodas4", "stepper-rodas5p"])
+def test_errors_of_derivatives_fall_with_their_own_tolerance(make_model: Callable[..., Model], method: str) -> None:
+    """Contact opens and closes, where the derivative's rate jumps: the states' own error control does not see it."""
+    model = make_model("punching_press")
+    names = ["bearing.clearance", "mechanism.driver.speed", "mechanism.forces.punch.force.y", "bearing.damping.ratio"]
+    parameters = {"mechanism.driver.start_angle": 4.0}  # the punch strikes and leaves
+
+    def run(rtol: float, sensitivity_rtol: float | None, by: str = method) -> tuple[np.ndarray, np.ndarray]:
+        found = model.sensitivities(
+            names,
+            cycles=0.2,
+            samples_per_cycle=200,
+            parameters=parameters,
+            method=by,
+            rtol=rtol,
+            sensitivity_rtol=sensitivity_rtol,
+        )
+        return found.solution.x, found.x
+
+    x, derivatives = run(1e-11, 1e-9, "stepper-dop853")
+
+    def other(change: float) -> np.ndarray:
+        moved = {**parameters, names[0]: model.parameters[names[0]] + change}
+        return model.simulate(
+            cycles=0.2, samples_per_cycle=200, parameters=moved, method="stepper-rodas5p", rtol=1e-11
+        ).x
+
+    # the reference itself: against differences of another method's runs
+    moved = extrapolated(other, 2e-9)
+    assert np.max(np.abs(moved - derivatives[:, :, 0]) / np.max(np.abs(moved), axis=0)) < 2e-4
+    size, extent = np.max(np.abs(derivatives), axis=0), np.max(np.abs(x), axis=0)
+
+    def errors(rtol: float, sensitivity_rtol: float | None) -> tuple[float, float]:
+        states, found = run(rtol, sensitivity_rtol)
+        return float(np.max(np.abs(states - x) / extent)), float(np.max(np.abs(found - derivatives) / size))
+
+    free = errors(1e-4, None)
+    controlled = [errors(1e-4, tolerance) for tolerance in (1e-3, 1e-5, 1e-7)]
+    assert controlled[0][1] > 5.0 * controlled[1][1]
+    assert controlled[1][1] > 5.0 * controlled[2][1]
+    assert free[1] > 10.0 * controlled[1][1]
+    assert controlled[1][0] < free[0]
+    assert controlled[2][0] < 1e-5
+
+
+@pytest.mark.parametrize("family", FAMILIES, ids=lambda f: f.name.lower())
+def test_a_rejected_step_leaves_no_trace_in_the_derivatives(make_model: Callable[..., Model], family: Family) -> None:
+    """Derivatives alone reject here (the states' tolerance is huge): state and derivatives stay the same bits, and the
+    next accepted step is that of a run which begins there."""
+    model = make_model("punching_press")
+    numbers = model.numbers()
+    inputs = model.manifest.inputs
+    names = ["bearing.clearance", "mechanism.driver.speed", "bearing.initial.inner.y"]
+    magnitude = np.repeat([1e-5, 0.1], 4)
+
+    def run(
+        begin: float, x: np.ndarray, derivatives: np.ndarray | None, tries: int, first: float, rtol: float
+    ) -> tuple[Outcome, np.ndarray, np.ndarray]:
+        segments = Segments(
+            times=np.array([begin, 0.05]),
+            inputs=clock.inputs_at(inputs, numbers.values, begin)[None, :],
+            restarts=np.array([True]),
+        )
+        directions = Directions(model, numbers, names, 0)
+        directions.control(rtol, magnitude)
+        tangents = directions.tangents(segments, 0, 0)
+        if derivatives is not None:
+            tangents = replace(tangents, x=derivatives.copy())
+        state = x.copy()
+        outcome = model.differentiating_stepper.run(
+            family=family,
+            tolerance=1e3 * magnitude,
+            p=numbers.p,
+            c=numbers.c,
+            x=state,
+            segments=segments,
+            output_times=np.zeros(0),
+            output_states=None,
+            tangents=tangents,
+            first_step=first,
+            max_steps=tries,
+        )
+        return outcome, state, tangents.x
+
+    start = model.initial()
+    ends = [run(0.0, start, None, tries, 2e-4, 1e-5) for tries in range(1, 120)]
+    followed = 0
+    for (before, x, derivatives), (after, tried, found) in zip(ends[:-1], ends[1:], strict=True):
+        if after.rejected > before.rejected:
+            assert np.array_equal(x, tried)
+            assert np.array_equal(derivatives, found)
+        elif before.rejected and before.time < after.time:
+            step = after.time - before.time
+            _, fresh, made = run(before.time, x, derivatives, 1, step, 1e3)
+            np.testing.assert_allclose(fresh, tried, rtol=1e-9, atol=1e-12 * magnitude.max())
+            scale = np.max(np.abs(found), axis=(0, 2), keepdims=True)
+            assert np.max(np.abs(made - found) / scale) < 1e-8
+            followed += 1
+    assert ends[-1][0].rejected >= 3
+    assert followed >= 10
+
+
+def test_scales_of_directions(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press")
+    magnitude = np.repeat([1e-5, 0.1], 4)
+    values = {**model.parameters, "mechanism.driver.start_angle": 1e-9, "mechanism.forces.punch.force.x": 0.0}
+    names = ["bearing.clearance", "mechanism.driver.start_angle", "mechanism.forces.punch.force.x"]
+    names += ["bearing.initial.inner.x", "bearing.initial.inner_velocity.x"]
+    forces = [abs(values[info.name]) for info in model.manifest.parameters if info.unit == "N"]
+    expected = [values["bearing.clearance"], 1.0, max(forces), 1e-5, 0.1]
+    np.testing.assert_array_equal(direction_scales(model.manifest, values, names, magnitude), expected)
+
+
 def test_static_deflection_follows_the_two_thirds_power(make_model: Callable[..., Model]) -> None:
     """At rest with zero clearance delta = const (F/k)^(2/3), so d(delta)/dF = 2 delta/(3 F), d/dk = -2 delta/(3 k)."""
     model = make_model("varying_compliance")
@@ -133,6 +248,8 @@ def test_wrong_requests_are_refused(make_model: Callable[..., Model]) -> None:
         model.sensitivities("bearing.clearance", cycles=1, method="cvodes")
     with pytest.raises(RequestError, match="no parameter"):
         model.sensitivities([], cycles=1)
+    with pytest.raises(RequestError, match=r"sensitivity_rtol.*1e-13 to 0\.1"):
+        model.sensitivities("bearing.clearance", cycles=1, sensitivity_rtol=0.0)
 
 
 def test_two_loads_that_switch_together_have_no_derivative(

@@ -211,8 +211,9 @@ def test_run_of_too_many_steps_tells_and_keeps_its_samples(
     press: Model, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
     whole = press.simulate(1, method=method, samples_per_cycle=400)
-    limited(monkeypatch, max_steps=600)
-    with pytest.raises(IntegrationError) as caught:
+    monkeypatch.setattr("raceway.runtime.stepping.STEPS_A_CALL", 600)
+    monkeypatch.setattr("raceway.runtime.stepping.step_limit", lambda *_: 600)
+    with pytest.raises(IntegrationError, match="600 steps for the last") as caught:
         press.simulate(1, method=method, samples_per_cycle=400)
     assert caught.value.status is Status.TOO_MANY_STEPS
     check_message(caught.value, 401)
@@ -279,6 +280,12 @@ def test_faulty_calls_are_refused(rotor: Model) -> None:
         found = run(rotor, numbers, segments, family=Family.DP54, tolerance=1e-9)
         assert found.outcome.end is End.BAD_ARGUMENT
         assert np.array_equal(found.end, rotor.initial())
+    for nothing in (0.0, -1e-9, np.nan, 1e-320):
+        tolerance = np.array([1e-9, 1e-9, nothing, 1e-9])
+        for family in (Family.AUTO, *ORDERS):
+            found = run(rotor, numbers, good, family=family, tolerance=tolerance)
+            assert found.outcome.end is End.BAD_ARGUMENT
+            assert np.array_equal(found.end, rotor.initial())
     with pytest.raises(RequestError, match="stepper-rodas4"):
         rotor.simulate(1, method="stepper-euler")
     with pytest.raises(TypeError, match="float64"):

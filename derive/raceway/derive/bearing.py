@@ -205,9 +205,10 @@ def derive_bearing(
     )
     ball, gradient = _ball(bearing, coordinates, cage_phase)
     mass, forcing = _lagrange(bearing, coordinates, gradient, ball, load)
-    smoothness = [("elastic", laws.ELASTIC_SMOOTHNESS)]
+    smoothed = bearing.contact.smoothing is not None
+    smoothness = [("elastic", Smoothness.TWICE_SMOOTH if smoothed else laws.ELASTIC_SMOOTHNESS)]
     if damping.law != "none":
-        smoothness.append(("damping", laws.DAMPING[damping.law].smoothness))
+        smoothness.append(("damping", _damping(bearing, ball.deflection, ball.deflection_rate).smoothness))
     return BearingModel(
         constants=tuple(constants),
         coordinates=coordinates,
@@ -215,6 +216,20 @@ def derive_bearing(
         mass=mass,
         forcing=forcing,
         smoothness=tuple(smoothness),
+    )
+
+
+def _damping(bearing: Bearing, delta: sp.Expr, rate: sp.Expr) -> laws.SmoothedDamping:
+    """The scene's damping law over deflection and rate."""
+    contact, damping = bearing.contact, bearing.damping
+    return laws.smoothed_damping(
+        damping.law,
+        delta,
+        rate,
+        STIFFNESS,
+        DAMPING_COEFFICIENT,
+        width=symbol_of(contact.smoothing) if contact.smoothing is not None else None,
+        rate_width=symbol_of(damping.smoothing) if damping.smoothing is not None else None,
     )
 
 
@@ -237,6 +252,7 @@ def _ball(bearing: Bearing, coordinates: tuple[Coordinate, ...], cage_phase: sp.
     geometry, rate = geometry.subs(direction), rate.subs(direction)
     gradient = [sp.diff(geometry, c.position) for c in coordinates]
 
+    width = symbol_of(bearing.contact.smoothing) if bearing.contact.smoothing is not None else None
     delta, delta_rate = _real("ball.deflection"), _real("ball.deflection_rate")
     elastic, damping, force = _real("ball.elastic_force"), _real("ball.damping_force"), _real("ball.force")
     definitions = [
@@ -245,7 +261,9 @@ def _ball(bearing: Bearing, coordinates: tuple[Coordinate, ...], cage_phase: sp.
         ),
         Definition(
             symbol=elastic,
-            expression=laws.elastic_force(delta, STIFFNESS),
+            expression=laws.elastic_force(delta, STIFFNESS)
+            if width is None
+            else laws.smoothed_elastic_force(delta, STIFFNESS, width),
             unit="N",
             description="Elastic force of ball j, Eq. (4)",
             latex="F_{rj}",
@@ -264,7 +282,7 @@ def _ball(bearing: Bearing, coordinates: tuple[Coordinate, ...], cage_phase: sp.
             ),
             Definition(
                 symbol=damping,
-                expression=laws.DAMPING[law].force(delta, delta_rate, STIFFNESS, DAMPING_COEFFICIENT),
+                expression=_damping(bearing, delta, delta_rate).force,
                 unit="N",
                 description=f"Damping force of ball j, law {law}",
                 latex="F_{cj}",

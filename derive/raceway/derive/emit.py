@@ -8,6 +8,7 @@ tangents.h         derivatives of these along several directions at once, for se
 ensemble_kernels.h the kernels for several members of an ensemble at once, and what reductions need
 methods.h          the stepper's methods
 model.casadi       the same functions serialised, for machines without a compiler
+jacobians.c, .casadi  derivatives of the right-hand side and of all quantities, compiled when first asked for
 EQUATIONS.md       the derivation for people
 manifest.json      the contract with the runtime, written last
 
@@ -21,9 +22,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -33,11 +33,13 @@ import casadi as ca
 from raceway.derive.emit_ensemble import ensemble_header
 from raceway.derive.emit_stepper import kernels_header, methods_header, tangents_header
 from raceway.derive.equations import equations
+from raceway.derive.jacobians import Described
 from raceway.derive.linkage import check_assembly
 from raceway.derive.lower import Functions, lower, operations
 from raceway.derive.read import read_scene
+from raceway.derive.replace_folder import refuse_foreign, replace_folder
 from raceway.derive.scene import Scene
-from raceway.derive.system import System, derive
+from raceway.derive.system import Output, System, derive
 from raceway.runtime import manifest as mf
 from raceway.runtime.errors import ArtefactError
 
@@ -73,7 +75,9 @@ def generate(
     Raises
     ------
     SceneError
-        Nothing is written then.
+        The scene is wrong.  Nothing is written then.
+    RequestError
+        The folder holds files, but none that this function wrote.  Nothing is written then.
     """
     say = progress or (lambda _: None)
     read = scene if isinstance(scene, Scene) else read_scene(scene)
@@ -82,12 +86,10 @@ def generate(
     if present is not None:
         _refresh(folder, present, read)
         return folder
+    refuse_foreign(folder)
     system, functions = _derive_and_lower(read, say)
     say("emit")
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{read.name}-", dir=folder.parent) as made:
-        _write(Path(made), system, functions)
-        _move(Path(made), folder)
+    replace_folder(folder, read.name, lambda made: _write(made, system, functions))
     return folder
 
 
@@ -167,7 +169,8 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene) -> None:
 
 
 def _write(folder: Path, system: System, functions: Functions) -> None:
-    _write_c(folder, functions)
+    _write_c(folder, "model", (*functions.functions, *functions.integrators))
+    _write_c(folder, "jacobians", functions.jacobians)
     if functions.kernels is not None:
         header = kernels_header(system, functions, functions.kernels)
         (folder / "kernels.h").write_text(header, encoding="utf-8", newline="\n")
@@ -176,32 +179,26 @@ def _write(folder: Path, system: System, functions: Functions) -> None:
         (folder / "ensemble_kernels.h").write_text(lanes, encoding="utf-8", newline="\n")
         tangents = tangents_header(functions.kernels)
         (folder / "tangents.h").write_text(tangents, encoding="utf-8", newline="\n")
-    pack = ca.FileSerializer(str(folder / "model.casadi"))
-    pack.pack(len(functions.functions))
-    for function, _ in functions.functions:
-        pack.pack(function)
-    del pack  # closes the file
+    _pack(folder / "model.casadi", functions.functions)
+    _pack(folder / "jacobians.casadi", functions.jacobians)
     (folder / "EQUATIONS.md").write_text(equations(system), encoding="utf-8", newline="\n")
     files = tuple((p.name, _digest(p)) for p in sorted(folder.iterdir()))
     mf.write(folder, _manifest(system, functions, files))
 
 
-def _write_c(folder: Path, functions: Functions) -> None:
-    generator = ca.CodeGenerator("model.c", {"with_header": True})
-    for function, _ in (*functions.functions, *functions.integrators):
+def _pack(path: Path, functions: Sequence[Described]) -> None:
+    pack = ca.FileSerializer(str(path))
+    pack.pack(len(functions))
+    for function, _ in functions:
+        pack.pack(function)
+    del pack  # closes the file
+
+
+def _write_c(folder: Path, name: str, functions: Sequence[Described]) -> None:
+    generator = ca.CodeGenerator(f"{name}.c", {"with_header": True})
+    for function, _ in functions:
         generator.add(function)
     generator.generate(f"{folder}{os.sep}")
-
-
-def _move(made: Path, folder: Path) -> None:
-    """Replace the folder's files one by one, the manifest last: a break in between leaves digests that do not match."""
-    folder.mkdir(exist_ok=True)
-    names = sorted(_files(made), key=lambda name: (name == mf.FILE_NAME, name))
-    for name in sorted(_files(folder) - set(names)):
-        path = folder / name
-        shutil.rmtree(path) if path.is_dir() else path.unlink()
-    for name in names:
-        os.replace(made / name, folder / name)
 
 
 def _run(scene: Scene) -> mf.RunInfo:
@@ -252,9 +249,14 @@ def _manifest(system: System, functions: Functions, files: tuple[tuple[str, str]
                 name=o.name,
                 unit=o.unit,
                 description=o.description,
-                size=system.bearing.ball.count if o.per_ball and system.bearing else 1,
+                size=_size(system, o),
             )
             for o in system.outputs
+        ),
+        quantities=tuple(
+            mf.QuantityInfo(name=o.name, unit=o.unit, description=o.description, size=_size(system, o), group=g.name)
+            for g in functions.groups
+            for o in g.outputs
         ),
         functions=tuple(
             mf.FunctionInfo(
@@ -263,8 +265,13 @@ def _manifest(system: System, functions: Functions, files: tuple[tuple[str, str]
                 outputs=tuple((f.name_out(k), f.size1_out(k)) for k in range(f.n_out())),
                 operations=operations(f) if f.is_a("SXFunction") else 0,
                 description=words,
+                library=library,
             )
-            for f, words in (*functions.functions, *functions.integrators)
+            for library, group in (
+                (mf.MODEL, (*functions.functions, *functions.integrators)),
+                (mf.JACOBIANS, functions.jacobians),
+            )
+            for f, words in group
         ),
         smoothness=tuple((name, s.value) for name, s in system.smoothness),
         mechanism=_mechanism(system),
@@ -272,6 +279,10 @@ def _manifest(system: System, functions: Functions, files: tuple[tuple[str, str]
         run=_run(scene),
         files=files,
     )
+
+
+def _size(system: System, output: Output) -> int:
+    return system.bearing.ball.count if output.per_ball and system.bearing else 1
 
 
 def _mechanism(system: System) -> mf.MechanismInfo | None:

@@ -11,6 +11,7 @@ import sympy as sp
 
 from raceway.derive.bearing import COS, SIN, Ball
 from raceway.derive.hertz import ellipticity
+from raceway.derive.load_harmonics import LoadSeries
 from raceway.derive.system import Input, Parameter, State, System
 from raceway.derive.terms import TIME, Definition
 
@@ -24,6 +25,8 @@ class _Printer:
         names: dict[sp.Symbol, str] = {TIME: "t", COS: r"\cos\theta_j", SIN: r"\sin\theta_j"}
         named: tuple[Parameter | Input | State, ...] = (*system.parameters, *system.inputs, *system.states)
         names |= {n.symbol: n.latex for n in named}
+        series = system.load_series
+        names |= {k.symbol: k.latex for k in (series.coefficients if series else ())}
         definitions = [*system.constants, *system.definitions]
         if system.bearing is not None:
             definitions += [*system.bearing.ball.definitions, *system.bearing.ball.sums]
@@ -63,6 +66,8 @@ def equations(system: System) -> str:
         )
     if system.constants:
         parts += ["## Derived constants", "Evaluated once a run.", *_definitions(tex, system.constants)]
+    if system.load_series is not None:
+        parts += _series(tex, system.load_series)
     if system.linkage is not None and system.reactions is not None:
         parts += [
             "## Linkage",
@@ -82,6 +87,24 @@ def equations(system: System) -> str:
     if system.bearing is not None:
         parts += _bearing(tex, system, system.bearing.ball)
     return "\n\n".join(parts) + "\n"
+
+
+def _series(tex: _Printer, series: LoadSeries) -> list[str]:
+    angle = tex(series.angle)
+    return [
+        "## Load by its harmonics",
+        f"Mean and {series.count} harmonics of the load over a turn take its place; their coefficients are evaluated "
+        "once a run, each window of a load apart, so that no integral meets a jump.",
+        *(
+            _equation(rf"F_{axis} \approx {tex(force)},\qquad F_{axis} = {tex(load)}")
+            for axis, force, load in zip("xy", series.force, series.load, strict=True)
+        ),
+        _equation(
+            rf"\bar F = \frac{{1}}{{2\pi}} \oint F\,\mathrm{{d}}{angle},\quad "
+            rf"a_k = \frac{{1}}{{\pi}} \oint F \cos k{angle}\,\mathrm{{d}}{angle},\quad "
+            rf"b_k = \frac{{1}}{{\pi}} \oint F \sin k{angle}\,\mathrm{{d}}{angle}"
+        ),
+    ]
 
 
 def _bearing(tex: _Printer, system: System, ball: Ball) -> list[str]:

@@ -12,6 +12,12 @@ from pathlib import Path
 
 from raceway.runtime.errors import RacewayError
 
+#: Most characters of a key that a message shows.
+LONGEST_KEY = 400
+
+#: Most faults that a message lists.
+MOST_FAULTS = 100
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
@@ -36,7 +42,10 @@ class Fault:
 
     def render(self) -> str:
         """Text of the fault: a headline, then one indented line for each of given, allowed and remedy."""
-        place = self.key if self.line is None else f"{self.key} (line {self.line})".lstrip()
+        # a key of the file may be any text: of any length, with escape sequences for the terminal
+        key = "".join(letter if letter.isprintable() else "?" for letter in self.key)
+        key = key if len(key) <= LONGEST_KEY else f"{key[:LONGEST_KEY]}..."
+        place = key if self.line is None else f"{key} (line {self.line})".lstrip()
         headline = f"{place}: {self.problem}" if place else self.problem
         details = (("given", self.given), ("allowed", self.allowed), ("remedy", self.remedy))
         return "\n".join([headline, *(f"  {word}: {text}" for word, text in details if text)])
@@ -58,7 +67,10 @@ class SceneError(RacewayError, ValueError):
             raise TypeError("an error of a scene needs at least one fault")
         count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
         head = f"{self.source or 'the scene'}: {count}"
-        super().__init__("\n".join([head, *(fault.render() for fault in self.faults)]))
+        listed = [fault.render() for fault in self.faults[:MOST_FAULTS]]
+        if len(self.faults) > MOST_FAULTS:
+            listed.append(f"... and {len(self.faults) - MOST_FAULTS} more; mend these first")
+        super().__init__("\n".join([head, *listed]))
 
 
 class LinkageError(SceneError):

@@ -10,15 +10,17 @@ the subexpressions the visitor found.  Derivatives are CasADi's.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 import sympy as sp
 
 from raceway.derive.bearing import Ball
+from raceway.derive.jacobians import Described, Group, group_functions, partials, tangent
 from raceway.derive.kernels import KernelBuilder, Kernels
-from raceway.derive.system import System
+from raceway.derive.load_harmonics import coefficients_of
+from raceway.derive.system import Output, System
 from raceway.derive.terms import TIME
 from raceway.derive.visitor import Visitor
 
@@ -43,15 +45,19 @@ class Functions:
     """Named functions in the order they are written, with a line for people each.
 
     `integrators` are kept apart: they go to C only; a machine without compiler makes them from ``rhs``.
+    `jacobians` go to files of their own, read and compiled when a derivative is first asked for; `groups` says which
+    quantities they differentiate.
     """
 
     constants: tuple[Constant, ...]
-    functions: tuple[tuple[ca.Function, str], ...]
-    integrators: tuple[tuple[ca.Function, str], ...]
+    functions: tuple[Described, ...]
+    integrators: tuple[Described, ...]
+    jacobians: tuple[Described, ...]
+    groups: tuple[Group, ...]
     kernels: Kernels | None
 
     def __getitem__(self, name: str) -> ca.Function:
-        for function, _ in (*self.functions, *self.integrators):
+        for function, _ in (*self.functions, *self.integrators, *self.jacobians):
             if function.name() == name:
                 return function
         raise KeyError(name)
@@ -90,10 +96,14 @@ class _Lowering:
         self._named = [ca.SX.sym(d.symbol.name) for d in system.constants]
         self._hoisted: dict[sp.Basic, ca.SX] = {}
         parameters = {p.symbol: self.p[k] for k, p in enumerate(system.parameters)}
-        constants = dict(zip((d.symbol for d in system.constants), self._named, strict=True))
+        series = system.load_series
+        self._coefficients = {k.symbol: ca.SX.sym(k.symbol.name) for k in series.coefficients} if series else {}
+        constants = dict(zip((d.symbol for d in system.constants), self._named, strict=True)) | self._coefficients
         definitions = {d.symbol: d.expression for d in system.definitions}
         # evaluates constants: parameters are free, constants are definitions, nothing is hoisted
-        self.once = Visitor(parameters, definitions | {d.symbol: d.expression for d in system.constants})
+        self.once = Visitor(
+            parameters | self._coefficients, definitions | {d.symbol: d.expression for d in system.constants}
+        )
         self._values = (
             {TIME: self.t}
             | {s.symbol: self.x[k] for k, s in enumerate(system.states)}
@@ -115,7 +125,7 @@ class _Lowering:
     def functions(self, extra: Mapping[str, Mapping[str, sp.Expr]]) -> Functions:
         system = self.system
         bodies: list[tuple[str, dict[str, ca.SX], str]] = []
-        balls = self._balls(system.bearing.ball) if system.bearing else None
+        balls = self._balls(system.bearing.ball, self.visit) if system.bearing else None
         if system.states:
             bodies.append(("rhs", {"xdot": self._rhs(balls)}, "time derivative of the states"))
         if system.outputs:
@@ -144,10 +154,10 @@ class _Lowering:
         builder = self._kernel_builder() if system.states else None
         c, once = self._constants()
         arguments = {"t": self.t, "x": self.x, "u": self.u, "p": self.p, "c": c}
-        made: list[tuple[ca.Function, str]] = [
-            (ca.Function("constants", [self.p], [once], ["p"], ["c"]), "derived constants, once a run"),
+        made: list[Described] = [
+            (self._function_of_p("constants", once, "c"), "derived constants, once a run"),
             (
-                ca.Function("constants_jac", [self.p], [ca.jacobian(once, self.p)], ["p"], ["c_p"]),
+                self._function_of_p("constants_jac", once, "c_p", differentiated=True),
                 "derivative of the constants by the parameters",
             ),
         ]
@@ -156,32 +166,22 @@ class _Lowering:
         for name, results, words in bodies:
             takes = {k: v for k, v in arguments.items() if k in ("u", "p", "c") or _uses(results, v)}
             made.append((ca.Function(name, [*takes.values()], [*results.values()], [*takes], [*results]), words))
-            if name == "rhs":
-                rhs = results["xdot"]
-                for k, words in (
-                    ("x", "states"),
-                    ("t", "time"),
-                    ("p", "parameters, constants held"),
-                    ("c", "constants"),
-                ):
-                    jacobian = ca.Function(
-                        f"rhs_jac_{k}",
-                        [*arguments.values()],
-                        [ca.cse(ca.jacobian(rhs, arguments[k]))],
-                        [*arguments],
-                        [f"xdot_{k}"],
-                    )
-                    made.append((jacobian, f"derivative of rhs by the {words}"))
-        integrators = self._integrators(bodies[0][1]["xdot"], arguments) if system.states else []
+            if name == "rhs":  # the integrators need these two
+                made += partials(name, "xdot", results["xdot"], arguments, "xt")
+        rhs = bodies[0][1]["xdot"] if system.states else None
+        integrators = self._integrators(rhs, arguments) if rhs is not None else []
+        groups, jacobians = self._jacobians(rhs, arguments)
         named = [
             Constant(name=d.symbol.name, unit=d.unit, description=d.description, latex=d.latex)
             for d in system.constants
         ]
         found = [Constant(name=f"h{k + 1}", unit="", description=str(e), latex="") for k, e in enumerate(self._hoisted)]
         return Functions(
-            constants=(*named, *found),
+            constants=(*named, *found, *self._series_constants()),
             functions=tuple(made),
             integrators=tuple(integrators),
+            jacobians=tuple(jacobians),
+            groups=tuple(groups),
             kernels=builder.kernels(c) if builder else None,
         )
 
@@ -197,24 +197,88 @@ class _Lowering:
 
     def _constants(self) -> tuple[ca.SX, ca.SX]:
         """The vector c of symbols, and its value as an expression of p."""
-        symbols = ca.vertcat(*self._named, *self._hoisted.values())
+        symbols = ca.vertcat(*self._named, *self._hoisted.values(), *self._coefficients.values())
         values = ca.vertcat(
-            *(self.once(d.symbol) for d in self.system.constants), *(self.once(e) for e in self._hoisted)
+            *(self.once(d.symbol) for d in self.system.constants),
+            *(self.once(e) for e in self._hoisted),
+            *self._coefficients.values(),
         )
         return ca.SX(symbols), ca.SX(values)
 
-    def _balls(self, ball: Ball) -> list[Visitor]:
-        """A visitor for each ball: one sine and cosine of the cage's angle, angle addition for the rest."""
-        cage = self.visit(ball.cage_angle)
+    def _function_of_p(self, name: str, once: ca.SX, result: str, *, differentiated: bool = False) -> ca.Function:
+        """The constants, or their derivative, by the parameters; a load series' coefficients by loops of their own."""
+        series = self.system.load_series
+        if series is None:
+            value = ca.jacobian(once, self.p) if differentiated else once
+            return ca.Function(name, [self.p], [value], ["p"], [result])
+        parameters = {p.symbol: self.p[k] for k, p in enumerate(self.system.parameters)}
+        given = self._definitions | {d.symbol: d.expression for d in self.system.constants}
+        del given[series.angle]
+        coefficients = coefficients_of(series, parameters, self.p, given, differentiated=False)
+        k, p = ca.vertcat(*self._coefficients.values()), ca.MX.sym("p", self.p.numel())
+        if not differentiated:
+            rest = ca.Function("constants_of", [self.p, k], [once])
+            return ca.Function(name, [p], [rest(p, coefficients(p))], ["p"], [result])
+        slopes = coefficients_of(series, parameters, self.p, given, differentiated=True)
+        parts = ca.Function("constants_by", [self.p, k], [ca.jacobian(once, self.p), ca.jacobian(once, k)])
+        by_p, by_k = parts(p, coefficients(p))
+        return ca.Function(name, [p], [by_p + ca.mtimes(by_k, slopes(p))], ["p"], [result])
+
+    def _series_constants(self) -> list[Constant]:
+        series = self.system.load_series
+        return [
+            Constant(name=k.symbol.name, unit="N", description=k.description, latex=k.latex)
+            for k in (series.coefficients if series else ())
+        ]
+
+    def _jacobians(self, rhs: ca.SX | None, arguments: Mapping[str, ca.SX]) -> tuple[list[Group], list[Described]]:
+        """Derivatives of the right-hand side and of every quantity, also of those that no run reports.
+
+        They use the constants there are and add none: what they alone would hoist is computed in place.
+        """
+        system = self.system
+        plain = Visitor(self._values, self._definitions)
+        visit = Visitor(
+            self._values,
+            self._definitions,
+            constant=self._fixed,
+            hoist=lambda e: self._hoisted[e] if e in self._hoisted else plain(e),
+        )
+        balls = self._balls(system.bearing.ball, visit) if system.bearing else None
+        made: list[Described] = []
+        if rhs is not None:
+            made += [*partials("rhs", "xdot", rhs, arguments, "upc"), tangent("rhs", "xdot", rhs, arguments)]
+        values = [*zip(system.quantities, self._values_of(system.quantities, balls, visit), strict=True)]
+        groups = []
+        for name, moving in (("ring_quantities", True), ("load_quantities", False)):
+            chosen = [(q, v) for q, v in values if _uses({q.name: v}, self.x) == moving]
+            if chosen:
+                groups.append(Group(name=name, outputs=tuple(q for q, _ in chosen)))
+                made += group_functions(name, [v for _, v in chosen], arguments)
+        if system.bearing is not None:
+            made += group_functions("static_forces", self._static_forces(system.bearing.ball, visit), arguments)
+        return groups, made
+
+    def _static_forces(self, ball: Ball, visit: Visitor) -> list[ca.SX]:
+        """Net force along each coordinate with everything at rest: no damping force, no velocities."""
+        balls = self._balls(ball, visit, {ball.force: ball.elastic_force})
+        net = visit.child(self._sums(balls), {})
+        at_rest = {state.symbol: sp.S.Zero for state in self.system.states[self.system.coordinates :]}
+        return [net(force.subs(at_rest)) for force in self.system.forcing]
+
+    def _balls(self, ball: Ball, visit: Visitor, instead: Mapping[sp.Symbol, sp.Expr] | None = None) -> list[Visitor]:
+        """A visitor for each ball: one sine and cosine of the cage's angle, angle addition for the rest.
+
+        `instead` replaces definitions of the ball.
+        """
+        cage = visit(ball.cage_angle)
         sine, cosine = ca.sin(cage), ca.cos(cage)
-        definitions = {d.symbol: d.expression for d in ball.definitions}
+        definitions = {d.symbol: d.expression for d in ball.definitions} | dict(instead or {})
         out = []
         for j in range(ball.count):
             spacing = sp.Rational(2 * j, ball.count) * sp.pi
             c, s = float(sp.cos(spacing)), float(sp.sin(spacing))
-            out.append(
-                self.visit.child({ball.cos: c * cosine - s * sine, ball.sin: s * cosine + c * sine}, definitions)
-            )
+            out.append(visit.child({ball.cos: c * cosine - s * sine, ball.sin: s * cosine + c * sine}, definitions))
         return out
 
     def _sums(self, balls: list[Visitor]) -> dict[sp.Symbol, ca.SX]:
@@ -241,14 +305,20 @@ class _Lowering:
         return ca.vertcat(self.x[n:], *accelerations)
 
     def _outputs(self, balls: list[Visitor] | None) -> dict[str, ca.SX]:
-        visit = self.visit.child(self._sums(balls), {}) if balls else self.visit
-        out = {}
-        for output in self.system.outputs:
+        outputs = self.system.outputs
+        names = (output_field(output.name) for output in outputs)
+        return dict(zip(names, self._values_of(outputs, balls, self.visit), strict=True))
+
+    def _values_of(self, outputs: Sequence[Output], balls: list[Visitor] | None, visit: Visitor) -> list[ca.SX]:
+        """A number or a column with a row for each ball, for each output."""
+        visit = visit.child(self._sums(balls), {}) if balls else visit
+        out = []
+        for output in outputs:
             if output.per_ball:
                 assert balls is not None
-                out[output_field(output.name)] = ca.vertcat(*(ball(output.expression) for ball in balls))
+                out.append(ca.vertcat(*(ball(output.expression) for ball in balls)))
             else:
-                out[output_field(output.name)] = visit(output.expression)
+                out.append(visit(output.expression))
         return out
 
     def _contact(self, c: ca.SX) -> ca.Function:

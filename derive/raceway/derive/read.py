@@ -20,7 +20,7 @@ from raceway.derive.read_bearing import read_bearing, read_load, read_shaft
 from raceway.derive.read_mechanism import read_mechanism
 from raceway.derive.scene import Run, Scene
 from raceway.derive.schema import Collector, Table, listing
-from raceway.derive.toml_lines import index_lines
+from raceway.derive.toml_lines import deep_key, index_lines
 from raceway.derive.units import show
 from raceway.derive.values import parse_override, quantities_of, value_faults, with_values
 
@@ -120,6 +120,17 @@ def _scene(text: str, name: str, source: str | None) -> Scene:
 
 
 def _parse(text: str, source: str | None) -> dict[str, Any]:
+    deep = deep_key(text)
+    if deep is not None:
+        fault = Fault(
+            key="",
+            problem="a key with more than 64 dots",
+            given=show(text.split("\n")[deep - 1].strip()),
+            allowed="keys of a few parts, as in mechanism.bodies.crank",
+            remedy="check whether this is a scene file (TOML)",
+            line=deep,
+        )
+        raise SceneError([fault], source=source)
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:

@@ -33,6 +33,7 @@ from raceway.derive.units import show
 
 _HERTZ_KEYS = ("inner_groove_radius", "outer_groove_radius", "young_modulus", "poisson_ratio")
 FEWEST_BALLS, MOST_BALLS = 3, 200
+MOST_HARMONICS = 32
 
 
 def read_shaft(table: Table) -> Shaft:
@@ -110,12 +111,13 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None) 
     """
     with table:
         table.know("joint", "share", "balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle", "contact")
-        table.know("damping", "inner_ring", "outer_ring", "initial")
+        table.know("damping", "inner_ring", "outer_ring", "initial", "load_harmonics")
         joint, share = _read_place(table, mechanism, driven)
         support = _read_outer_ring(table)
         return Bearing(
             joint=joint,
             share=share,
+            load_harmonics=_read_load_harmonics(table, mechanism),
             balls=table.integer("balls", FEWEST_BALLS, MOST_BALLS, example="8"),
             ball_diameter=table.quantity("ball_diameter", "m", "Ball diameter", "D_w", example="7.9375 mm"),
             pitch_diameter=table.quantity(
@@ -136,6 +138,22 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None) 
             outer=support,
             initial=_read_initial(table, moving_outer=support is not None),
         )
+
+
+def _read_load_harmonics(table: Table, mechanism: Mechanism | None) -> int | None:
+    """How many harmonics of the mechanism's load are kept; None for all of it."""
+    if not table.has("load_harmonics"):
+        return None
+    if mechanism is None:
+        table.fault(
+            "load_harmonics",
+            "there is no mechanism whose load could be cut to harmonics",
+            given=show(table.data["load_harmonics"]),
+            allowed="this key beside a [mechanism] only",
+            remedy='delete it; a harmonic load is [load] with type = "harmonic"',
+        )
+        return None
+    return table.integer("load_harmonics", 1, MOST_HARMONICS, example="8")
 
 
 def _read_place(table: Table, mechanism: Mechanism | None, driven: str | None) -> tuple[str | None, Quantity | None]:
@@ -195,7 +213,8 @@ def _read_contact(table: Table) -> HertzContact | GivenContact:
                     "Contact stiffness of a ball between both raceways",
                     "k_b",
                     example="8.6e9 N/m^1.5",
-                )
+                ),
+                smoothing=_read_smoothing(contact),
             )
         if not contact.missing and not any(key in contact.data for key in _HERTZ_KEYS):
             contact.know(*_HERTZ_KEYS, "ball_material")
@@ -224,7 +243,12 @@ def _read_contact(table: Table) -> HertzContact | GivenContact:
             ),
             ring=_read_material(contact, "rings", "E", r"\nu"),
             ball=_read_ball_material(contact),
+            smoothing=_read_smoothing(contact),
         )
+
+
+def _read_smoothing(contact: Table) -> Quantity | None:
+    return contact.optional_quantity("smoothing", "m", "Half width of the smoothed contact onset", r"w_\delta")
 
 
 def _read_ball_material(contact: Table) -> Material | None:
@@ -244,9 +268,21 @@ def _read_material(table: Table, part: str, young: str, poisson: str) -> Materia
 def _read_damping(table: Table) -> Damping:
     with table.table("damping", "law and ratio") as damping:
         law = damping.choice("law", DAMPING_LAWS)
-        damping.know("coefficient", "ratio")
+        damping.know("coefficient", "ratio", "smoothing")
         present = [key for key in ("coefficient", "ratio") if key in damping.data]
-        coefficient = ratio = None
+        coefficient = ratio = smoothing = None
+        if law in ("one-sided", "one-sided-gated"):
+            smoothing = damping.optional_quantity(
+                "smoothing", "m/s", "Half width of the smoothed kink of the damping at rest", "w_v"
+            )
+        elif law is not None and "smoothing" in damping.data:
+            damping.fault(
+                "smoothing",
+                f'the law "{law}" has no kink at rest',
+                given=show(damping.data["smoothing"]),
+                allowed='smoothing with the laws "one-sided" and "one-sided-gated"',
+                remedy="delete the key; smoothing in [bearing.contact] smooths what happens at contact",
+            )
         if law == "none":
             for key in present:
                 damping.fault(
@@ -297,7 +333,7 @@ def _read_damping(table: Table) -> Damping:
                     wrong_dimension=f'the law "{law}" multiplies k_b [N/m^1.5]: write the paper\'s number as '
                     '"0.25e-5 s*mm^0.5"; for a time, as in "0.25e-5 s", name the law "tangent"',
                 )
-    return Damping(law=law or "none", coefficient=coefficient, ratio=ratio)
+    return Damping(law=law or "none", coefficient=coefficient, ratio=ratio, smoothing=smoothing)
 
 
 def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:

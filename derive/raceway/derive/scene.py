@@ -222,19 +222,24 @@ class Material:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HertzContact:
-    """Contact stiffness from geometry: groove radii [m] and materials; `ball` None means as the rings."""
+    """Contact stiffness from geometry: groove radii [m] and materials; `ball` None means as the rings.
+
+    `smoothing` is the half width [m] of the smoothed contact onset; None for Hertz's law itself.
+    """
 
     inner_groove_radius: Quantity
     outer_groove_radius: Quantity
     ring: Material
     ball: Material | None
+    smoothing: Quantity | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GivenContact:
-    """Contact stiffness of one ball between both raceways, k_b [N/m^1.5], as a number."""
+    """Contact stiffness of one ball between both raceways, k_b [N/m^1.5], as a number; `smoothing` as above."""
 
     stiffness: Quantity
+    smoothing: Quantity | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -243,11 +248,13 @@ class Damping:
 
     One of `coefficient` c_b [N*s/m] and `ratio`; neither for the law ``none``.  `ratio` times k_b is c_b: [s*m^0.5] for
     the laws with a constant coefficient; for ``tangent`` it is the time constant beta [s] and the only form allowed.
+    `smoothing` is the half width [m/s] of the smoothed kink of one-sided laws at rest, or None.
     """
 
     law: DampingLaw
     coefficient: Quantity | None
     ratio: Quantity | None
+    smoothing: Quantity | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -290,12 +297,14 @@ class Bearing:
 
     `joint` names the revolute joint whose reaction loads it (None without mechanism), `share` the part of the
     reaction it
-    takes.  `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
+    takes; `load_harmonics` puts its mean and so many harmonics of the driver's angle in its place (None: all of it).
+    `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
     `outer` is None for a fixed outer ring.
     """
 
     joint: str | None
     share: Quantity | None
+    load_harmonics: int | None = None
     balls: int
     ball_diameter: Quantity
     pitch_diameter: Quantity

@@ -91,7 +91,7 @@ def suggest(given: object, known: Sequence[str], otherwise: str) -> str:
 
 def listing(names: Sequence[str]) -> str:
     """Names as people read them: "a", "b"."""
-    return ", ".join(f'"{name}"' for name in names) if names else "none"
+    return ", ".join(show(name) for name in names) if names else "none"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,7 +153,7 @@ class Table:
                 self.fault(
                     key,
                     "unknown key",
-                    given=key,
+                    given=show(key),
                     allowed=listing(self._known),
                     remedy=suggest(key, absent, "delete it, or move it to the table it belongs to"),
                 )

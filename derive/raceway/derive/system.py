@@ -17,6 +17,7 @@ import sympy as sp
 from raceway.derive.bearing import BearingModel, derive_bearing, equivalent_mass
 from raceway.derive.errors import Fault, SceneError
 from raceway.derive.linkage import Linkage, derive_linkage
+from raceway.derive.load_harmonics import GatedPart, LoadSeries, load_series
 from raceway.derive.reactions import Reactions, derive_reactions
 from raceway.derive.scene import (
     FRAME,
@@ -90,7 +91,9 @@ class System:
     """The model as mathematics; every stage after this one needs nothing else.
 
     `constants` are the derived constants (functions of the parameters only).  `definitions` is the ordered rest.
-    `mass * d(velocities)/dt = forcing`; both empty without a bearing.
+    `mass * d(velocities)/dt = forcing`; both empty without a bearing.  `quantities` is all that the model can report,
+    `outputs` what the scene asks for.  `load_series` is there where harmonics take the load's place; its coefficients
+    are constants, too.
     """
 
     scene: Scene
@@ -105,8 +108,10 @@ class System:
     linkage: Linkage | None
     reactions: Reactions | None
     bearing: BearingModel | None
+    quantities: tuple[Output, ...]
     outputs: tuple[Output, ...]
     smoothness: tuple[tuple[str, Smoothness], ...]
+    load_series: LoadSeries | None = None
 
     @property
     def coordinates(self) -> int:
@@ -154,9 +159,10 @@ def derive(scene: Scene) -> System:
     bearing: BearingModel | None = None
     constants: tuple[Definition, ...] = ()
     load: tuple[sp.Expr, sp.Expr] = (sp.S.Zero, sp.S.Zero)
+    series: LoadSeries | None = None
     if scene.bearing is not None:
         inner_load = _inner_load(scene, reactions)
-        load = inner_load.force
+        load, series = inner_load.force, inner_load.series
         inputs += inner_load.inputs
         definitions += inner_load.definitions
         shaft = mechanism.driver.speed if mechanism is not None else scene.shaft.speed if scene.shaft else None
@@ -181,7 +187,7 @@ def derive(scene: Scene) -> System:
         )
         constants = bearing.constants + inner_load.constants
 
-    outputs = _select(_available(scene, linkage, reactions, bearing, load), scene.outputs)
+    quantities = _available(scene, linkage, reactions, bearing, load)
     return System(
         scene=scene,
         parameters=tuple(
@@ -200,8 +206,10 @@ def derive(scene: Scene) -> System:
         linkage=linkage,
         reactions=reactions,
         bearing=bearing,
-        outputs=outputs,
+        quantities=tuple(quantities),
+        outputs=_select(quantities, scene.outputs),
         smoothness=bearing.smoothness if bearing else (),
+        load_series=series,
     )
 
 
@@ -247,6 +255,7 @@ class _InnerLoad:
     inputs: tuple[Input, ...] = ()
     constants: tuple[Definition, ...] = ()
     definitions: tuple[Definition, ...] = ()
+    series: LoadSeries | None = None
 
 
 def _inner_load(scene: Scene, reactions: Reactions | None) -> _InnerLoad:
@@ -261,13 +270,29 @@ def _inner_load(scene: Scene, reactions: Reactions | None) -> _InnerLoad:
         fx, fy = reactions.joint_force[bearing.joint]
         share = symbol_of(bearing.share)
         sign = 1 if mechanism.joint(bearing.joint).bodies[0] == FRAME else -1
-        return _InnerLoad(force=(sign * share * fx, sign * share * fy))
+        force = (sign * share * fx, sign * share * fy)
+        if bearing.load_harmonics is None:
+            return _InnerLoad(force=force)
+        series = load_series(bearing.load_harmonics, DRIVER_ANGLE, force, _gated_parts(mechanism))
+        return _InnerLoad(force=series.force, definitions=series.waves, series=series)
     assert load is not None  # the reader requires a load where there is no mechanism
     if isinstance(load, ConstantLoad):
         return _InnerLoad(force=components(load.force))
     if isinstance(load, HarmonicLoad):
         return _harmonic(load)
     return _table(load)
+
+
+def _gated_parts(mechanism: Mechanism) -> tuple[GatedPart, ...]:
+    loads: tuple[AppliedForce | AppliedTorque, ...] = (*mechanism.forces, *mechanism.torques)
+    return tuple(
+        GatedPart(
+            gate=sp.Symbol(f"gate.{load.name}", real=True),
+            windows=tuple((symbol_of(w.start), symbol_of(w.end)) for w in load.windows),
+        )
+        for load in loads
+        if load.windows
+    )
 
 
 def _harmonic(load: HarmonicLoad) -> _InnerLoad:

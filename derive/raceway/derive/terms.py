@@ -21,6 +21,7 @@ TIME = sp.Symbol("t", real=True)
 class Smoothness(Enum):
     """How often a law may be differentiated along its arguments."""
 
+    TWICE_SMOOTH = "twice smooth"  # twice continuously differentiable: second derivatives exist
     SMOOTH = "smooth"  # continuously differentiable
     KINKED = "kinked"  # continuous; the derivative jumps or is unbounded at one point
     DISCONTINUOUS = "discontinuous"  # the value jumps

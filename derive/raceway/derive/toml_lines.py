@@ -14,6 +14,11 @@ _HEADER = re.compile(r"\s*(\[\[?)([^\[\]]*?)\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"""\s*((?:"[^"]*"|'[^']*'|[A-Za-z0-9_-]+)(?:\s*\.\s*(?:"[^"]*"|'[^']*'|[A-Za-z0-9_-]+))*)\s*=""")
 #: Keys of a dotted path that are indexed; no key of a scene lies deeper.
 _DEEPEST = 16
+#: A key of more parts than that, anywhere in a text.  The lookbehind lets a search begin at whole parts only, so that
+#: it takes linear time.
+_TOO_DEEP = re.compile(
+    r"""(?<![A-Za-z0-9_"'-])(?:(?:"[^"\n]{0,80}"|'[^'\n]{0,80}'|[A-Za-z0-9_-]++)[ \t]*+\.[ \t]*+){64}"""
+)
 _PART = re.compile(r""""([^"]*)"|'([^']*)'|([A-Za-z0-9_-]+)""")
 
 
@@ -29,6 +34,15 @@ class LineIndex:
             if path[:length] in self.lines:
                 return self.lines[path[:length]]
         return None
+
+
+def deep_key(text: str) -> int | None:
+    """Line of the first key with more than 64 dots, None where there is none.
+
+    The time `tomllib` takes for a key grows with the square of its parts: a file of one key would keep it for hours.
+    """
+    found = _TOO_DEEP.search(text)
+    return None if found is None else text.count("\n", 0, found.start()) + 1
 
 
 def index_lines(text: str) -> LineIndex:

@@ -25,7 +25,7 @@ from raceway.derive.scene import (
     Vector,
     Window,
 )
-from raceway.derive.units import QuantityError, parse_quantity
+from raceway.derive.units import QuantityError, parse_quantity, show
 
 #: What stands in the file beside quantities, for the message where somebody asks to override it.
 _STRUCTURE = (
@@ -125,7 +125,7 @@ def parse_override(scene: Scene, text: str) -> tuple[str, float]:
                 Fault(
                     key=path,
                     problem="an override without a value",
-                    given=f'"{text}"',
+                    given=show(text),
                     allowed="PATH=VALUE",
                     remedy='write the value with its unit behind "=", as in "bearing.clearance=20 um"',
                 )
@@ -146,7 +146,7 @@ def _unknown_path(path: str, known: Sequence[str]) -> Fault:
         return Fault(
             key=path,
             problem="this is no number of the model",
-            given=path,
+            given=show(path),
             allowed="paths of quantities",
             remedy="change it in the scene file" + ("" if path.startswith("run.") else " and derive the model again"),
         )
@@ -156,7 +156,7 @@ def _unknown_path(path: str, known: Sequence[str]) -> Fault:
     return Fault(
         key=path,
         problem="the scene has no quantity of this path",
-        given=path,
+        given=show(path),
         allowed=", ".join(near) if near else f"one of {len(known)} paths, such as {', '.join(known[:5])}",
         remedy=f'did you mean "{near[0]}"?' if near else "write the path as its keys stand in the scene file",
     )
@@ -281,6 +281,9 @@ def _check_bearing(checker: _Checker, bearing: Bearing) -> None:
         _check_hertz(checker, bearing.contact, bearing.ball_diameter)
     else:
         checker.positive(bearing.contact.stiffness)
+    for width in (bearing.contact.smoothing, bearing.damping.smoothing):
+        if width is not None:
+            checker.positive(width, "give a small width, or delete the key for the law itself")
     checker.not_negative(bearing.damping.coefficient)
     checker.not_negative(bearing.damping.ratio)
     if isinstance(bearing.inner.mass, EquivalentMass):

@@ -10,28 +10,50 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from raceway.runtime.compile import CacheWarning, NoCompilerWarning
+    from raceway.runtime.ensemble import EnsembleResult, EnsembleStatistics, MemberFailure
     from raceway.runtime.errors import ArtefactError, CompileError, RacewayError, RequestError, SimulationError
+    from raceway.runtime.explain import Explanation
+    from raceway.runtime.jacobian_function import JacobianFunction
+    from raceway.runtime.linearize import KinkWarning, Linearization, Mode
     from raceway.runtime.manifest import Manifest, read_manifest
     from raceway.runtime.model import Model, load
     from raceway.runtime.parameters import Parameters
     from raceway.runtime.peaks import Peak
+    from raceway.runtime.reductions import Reduction, Reductions
+    from raceway.runtime.sensitivity import Sensitivities
+    from raceway.runtime.sensitivity_query import SensitivityReport
     from raceway.runtime.solution import Solution, Statistics, load_solution
+    from raceway.runtime.statics import FreeRingWarning, StaticEquilibrium
     from raceway.runtime.status import IntegrationError, Status
 
 __all__ = [
     "ArtefactError",
     "CacheWarning",
     "CompileError",
+    "EnsembleResult",
+    "EnsembleStatistics",
+    "Explanation",
+    "FreeRingWarning",
     "IntegrationError",
+    "JacobianFunction",
+    "KinkWarning",
+    "Linearization",
     "Manifest",
+    "MemberFailure",
+    "Mode",
     "Model",
     "NoCompilerWarning",
     "Parameters",
     "Peak",
     "RacewayError",
+    "Reduction",
+    "Reductions",
     "RequestError",
+    "Sensitivities",
+    "SensitivityReport",
     "SimulationError",
     "Solution",
+    "StaticEquilibrium",
     "Statistics",
     "Status",
     "load",
@@ -42,20 +64,34 @@ __all__ = [
 _HOME = {
     "CacheWarning": "compile",
     "NoCompilerWarning": "compile",
+    "EnsembleResult": "ensemble",
+    "EnsembleStatistics": "ensemble",
+    "MemberFailure": "ensemble",
     "ArtefactError": "errors",
     "CompileError": "errors",
     "RacewayError": "errors",
     "RequestError": "errors",
     "SimulationError": "errors",
+    "Explanation": "explain",
+    "JacobianFunction": "jacobian_function",
+    "KinkWarning": "linearize",
+    "Linearization": "linearize",
+    "Mode": "linearize",
     "Manifest": "manifest",
     "read_manifest": "manifest",
     "Model": "model",
     "load": "model",
     "Parameters": "parameters",
     "Peak": "peaks",
+    "Reduction": "reductions",
+    "Reductions": "reductions",
+    "Sensitivities": "sensitivity",
+    "SensitivityReport": "sensitivity_query",
     "Solution": "solution",
     "Statistics": "solution",
     "load_solution": "solution",
+    "FreeRingWarning": "statics",
+    "StaticEquilibrium": "statics",
     "IntegrationError": "status",
     "Status": "status",
 }

@@ -9,14 +9,16 @@ import numpy as np
 
 from raceway.runtime import clock
 from raceway.runtime.errors import RequestError
-from raceway.runtime.kernel import Kernel
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
-    from raceway.runtime.simulate import Numbers
+    from raceway.runtime.parameters import Numbers
 
 #: Angles looked at in a turn; between them minima are refined.
 ANGLES = 720
+
+#: Sweeps around the smallest sample, each so many times finer than the one before.
+SWEEPS, FINE = 3, 128
 
 
 def check_assembly(model: Model, numbers: Numbers) -> None:
@@ -32,17 +34,13 @@ def check_assembly(model: Model, numbers: Numbers) -> None:
         return
     turn = clock.period(model.manifest, numbers.values)
     times = turn * np.arange(ANGLES) / ANGLES if math.isfinite(turn) else np.zeros(1)
-    fixed = {"u": clock.inputs_at(model.manifest.inputs, numbers.values, 0.0), "p": numbers.p, "c": numbers.c}
-    (margins,) = model.loop("assembly", ("t",))(len(times), {"t": times, **fixed}).values()
-    kernel = model.kernel("assembly")
+    margins = _margins(model, numbers, times)
     faults = []
     for row, info in enumerate(mechanism.margins):
-        # no number is no assembly
-        samples = np.where(np.isnan(margins[:, row]), -np.inf, margins[:, row])
-        k = int(np.argmin(samples))
-        time, worst = float(times[k]), float(samples[k])
+        k = int(np.argmin(margins[:, row]))
+        time, worst = float(times[k]), float(margins[k, row])
         if worst > 0.0 and len(times) > 1:
-            time, worst = _refine(kernel, fixed, row, time, turn / ANGLES, worst)
+            time, worst = _refine(model, numbers, row, time, turn / ANGLES)
         if worst <= 0.0:
             angle = math.degrees(clock.crank_angle(model.manifest, numbers.values, time))
             faults.append(
@@ -53,28 +51,18 @@ def check_assembly(model: Model, numbers: Numbers) -> None:
         raise RequestError("\n".join(faults) + "\nChange the lengths of the bodies that meet at the joint.")
 
 
-def _refine(
-    kernel: Kernel, fixed: dict[str, np.ndarray], row: int, time: float, reach: float, value: float
-) -> tuple[float, float]:
-    """Minimum of a margin within `reach` of a sample, by golden section."""
-    ratio = 0.5 * (math.sqrt(5.0) - 1.0)
+def _margins(model: Model, numbers: Numbers, times: np.ndarray) -> np.ndarray:
+    """Margins at times counted from t = 0, shape (times, margins); no number is no assembly."""
+    fixed = {"u": clock.inputs_at(model.manifest.inputs, numbers.values, 0.0), "p": numbers.p, "c": numbers.c}
+    (found,) = model.loop("assembly", ("t",))(len(times), {"t": times, **fixed}).values()
+    return np.where(np.isnan(found), -np.inf, found)
 
-    def margin(t: float) -> float:
-        found = float(kernel({**fixed, "t": t})[row])
-        return -math.inf if math.isnan(found) else found
 
-    low, high = time - reach, time + reach
-    best = (value, time)
-    inner = [high - ratio * (high - low), low + ratio * (high - low)]
-    heights = [margin(t) for t in inner]
-    for _ in range(30):
-        best = min(best, *zip(heights, inner, strict=True))
-        if heights[0] < heights[1]:
-            high, inner[1], heights[1] = inner[1], inner[0], heights[0]
-            inner[0] = high - ratio * (high - low)
-            heights[0] = margin(inner[0])
-        else:
-            low, inner[0], heights[0] = inner[0], inner[1], heights[1]
-            inner[1] = low + ratio * (high - low)
-            heights[1] = margin(inner[1])
-    return best[1], best[0]
+def _refine(model: Model, numbers: Numbers, row: int, time: float, reach: float) -> tuple[float, float]:
+    """Time and value of the minimum of a margin within `reach` of a sample."""
+    for _ in range(SWEEPS):
+        times = time + reach * np.linspace(-1.0, 1.0, 2 * FINE + 1)
+        heights = _margins(model, numbers, times)[:, row]
+        k = int(np.argmin(heights))
+        time, worst, reach = float(times[k]), float(heights[k]), reach / FINE
+    return time, worst

@@ -10,15 +10,22 @@ import contextlib
 import json
 import math
 import os
+import signal
+import sys
 import tempfile
 from importlib.metadata import version
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 
+from raceway.runtime.commands_explain import explain
+from raceway.runtime.commands_jacobian import jacobian, linearize
+from raceway.runtime.commands_sensitivity import sensitivity
 from raceway.runtime.commands_shared import (
+    INTERRUPTED,
     SceneFile,
     Stages,
     check_folder,
@@ -29,6 +36,7 @@ from raceway.runtime.commands_shared import (
     reported,
     warnings_shown,
 )
+from raceway.runtime.commands_trade import trade
 from raceway.runtime.errors import RequestError
 
 if TYPE_CHECKING:
@@ -193,13 +201,20 @@ def export(
     typer.echo(str(folder))
 
 
+app.command()(explain)
+app.command()(jacobian)
+app.command()(linearize)
+app.command()(sensitivity)
+app.command()(trade)
+
+
 def _check_request(
     scene: Scene, cycles: float | None, transient: float | None, rtol: float | None, method: str | None
 ) -> None:
     """Refuse options that no model can follow, before anything is derived or written."""
     from raceway.runtime.integrators import METHODS
     from raceway.runtime.parameters import unknown_name
-    from raceway.runtime.simulate import TOLERANCES
+    from raceway.runtime.request import TOLERANCES
     from raceway.runtime.stepper import METHODS as STEPPERS
 
     faults = []
@@ -292,5 +307,23 @@ def _drop_figures(folder: Path, kept: list[str]) -> None:
 
 
 def main() -> None:
-    """Entry point of the ``raceway`` command."""
-    app()
+    """Entry point of the ``raceway`` command.
+
+    An interrupt (Ctrl-C) ends it with exit code 130 wherever it arrives: within a command, between two, or while a
+    module is imported, where Python may turn it into another exception.
+    """
+    heard: list[int] = []
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        heard.append(number)
+        signal.default_int_handler(number, frame)
+
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else somebody wants it ignored, as nohup does
+        signal.signal(signal.SIGINT, hear)
+    try:
+        app()
+    except (Exception, KeyboardInterrupt):  # whatever an interrupt became; all else shows itself
+        if not heard:
+            raise
+        complain(INTERRUPTED)
+        sys.exit(130)

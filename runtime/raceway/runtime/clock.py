@@ -62,8 +62,30 @@ def inputs_at(inputs: Sequence[InputInfo], values: Values, t: float, inside: flo
     -------
     array, shape (inputs,)
     """
-    inside = t if inside is None else inside
-    return np.array([_input(item, values, t, inside) for item in inputs], dtype=float)
+    (found,) = inputs_over(inputs, values, np.array([t]), np.array([t if inside is None else inside]))
+    return np.asarray(found)
+
+
+def inputs_over(inputs: Sequence[InputInfo], values: Values, t: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """`inputs_at` for many reference times and times within the intervals they start, each of shape (n,) [s].
+
+    Returns
+    -------
+    array, shape (n, inputs)
+    """
+    found = np.empty((len(t), len(inputs)))
+    for k, item in enumerate(inputs):
+        if item.kind == "phase":
+            found[:, k] = (values[item.offset] + values[item.rate] * t) % TURN
+        elif item.kind == "gate":
+            angle = values[item.offset] + values[item.rate] * inside
+            covered = np.zeros(len(t), dtype=bool)
+            for start, width in _windows(item, values):
+                covered |= _covers(angle, start, width)
+            found[:, k] = covered
+        else:
+            found[:, k] = _table(item, values, t, inside)
+    return found
 
 
 def breakpoints(inputs: Sequence[InputInfo], values: Values, t0: float, t1: float) -> np.ndarray:
@@ -75,23 +97,26 @@ def breakpoints(inputs: Sequence[InputInfo], values: Values, t0: float, t1: floa
     -------
     array, shape (breakpoints,), increasing [s]
     """
-    found: list[float] = []
+    found: list[np.ndarray] = [np.zeros(0)]
     for item in inputs:
         if item.kind == "gate":
             offset, rate = values[item.offset], values[item.rate]
             if rate != 0.0:
                 for start, width in _windows(item, values):
                     if 0.0 < width < TURN:
-                        found += _passages(start, offset, rate, t0, t1)
-                        found += _passages(start + width, offset, rate, t0, t1)
+                        found += [_passages(edge, offset, rate, t0, t1) for edge in (start, start + width)]
         elif item.kind in ("table", "table_rate"):
-            found += list(_knots(item, values)[0])
+            found.append(_knots(item, values)[0])
     near = TIME_RESOLUTION * max(abs(t0), abs(t1))
-    times: list[float] = []
-    for time in sorted(found):
-        if t0 + near < time < t1 - near and (not times or time - times[-1] > near):
-            times.append(time)
-    return np.array(times, dtype=float)
+    times = np.sort(np.concatenate(found))
+    times = times[(t0 + near < times) & (times < t1 - near)]
+    if np.all(np.diff(times) > near):
+        return times
+    apart: list[float] = []
+    for time in times.tolist():
+        if not apart or time - apart[-1] > near:
+            apart.append(time)
+    return np.array(apart)
 
 
 def input_derivatives(inputs: Sequence[InputInfo], values: Values, t: float) -> list[tuple[int, str, float]]:
@@ -152,18 +177,17 @@ def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float)
     return [pair for entry in found for pair in entry]
 
 
-def _input(item: InputInfo, values: Values, t: float, inside: float) -> float:
-    if item.kind == "phase":
-        return (values[item.offset] + values[item.rate] * t) % TURN
-    if item.kind == "gate":
-        angle = values[item.offset] + values[item.rate] * inside
-        return 1.0 if any(_covers(angle, start, width) for start, width in _windows(item, values)) else 0.0
+def _table(item: InputInfo, values: Values, t: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Value at `t`, or slope, of the piece of a table that holds at `inside`."""
     times, heights = _knots(item, values)
-    k = int(np.searchsorted(times, inside, side="right"))
-    if k in (0, len(times)):
-        return 0.0 if item.kind == "table_rate" else float(heights[0 if k == 0 else -1])
-    slope = (heights[k] - heights[k - 1]) / (times[k] - times[k - 1])
-    return float(slope) if item.kind == "table_rate" else float(heights[k - 1] + slope * (t - times[k - 1]))
+    k = np.searchsorted(times, inside, side="right")
+    within = (k > 0) & (k < len(times))
+    # pieces before the first knot and behind the last are flat
+    slopes = np.concatenate([[0.0], np.diff(heights) / np.diff(times), [0.0]])[k]
+    if item.kind == "table_rate":
+        return np.asarray(slopes)
+    left = np.clip(k - 1, 0, len(times) - 1)
+    return np.where(within, heights[left] + slopes * (t - times[left]), heights[left])
 
 
 def _windows(item: InputInfo, values: Values) -> list[tuple[float, float]]:
@@ -182,21 +206,20 @@ def _windows(item: InputInfo, values: Values) -> list[tuple[float, float]]:
     return windows
 
 
-def _covers(angle: float, start: float, width: float) -> bool:
-    """Whether `angle` lies in [start, start + width), with edges hit by rounding counted as exact."""
+def _covers(angle: np.ndarray, start: float, width: float) -> np.ndarray:
+    """Whether each angle lies in [start, start + width), with edges hit by rounding counted as exact."""
     if width <= 0.0 or width >= TURN:
-        return width >= TURN
+        return np.full(len(angle), width >= TURN)
     past = (angle - start) % TURN
-    if TURN - past < ANGLE_RESOLUTION:
-        past = 0.0
-    return past < width - ANGLE_RESOLUTION
+    past[TURN - past < ANGLE_RESOLUTION] = 0.0
+    return np.asarray(past < width - ANGLE_RESOLUTION)
 
 
-def _passages(edge: float, offset: float, rate: float, t0: float, t1: float) -> list[float]:
+def _passages(edge: float, offset: float, rate: float, t0: float, t1: float) -> np.ndarray:
     """Times in [t0, t1] at which ``offset + rate t`` passes `edge` modulo a turn [s]."""
     turns = sorted(((offset + rate * t0 - edge) / TURN, (offset + rate * t1 - edge) / TURN))
     first, last = math.ceil(turns[0] - 1e-9), math.floor(turns[1] + 1e-9)
-    return [(edge - offset + TURN * turn) / rate for turn in range(first, last + 1)]
+    return np.asarray((edge - offset + TURN * np.arange(first, last + 1)) / rate)
 
 
 def _knots(item: InputInfo, values: Values) -> tuple[np.ndarray, np.ndarray]:

@@ -35,6 +35,9 @@ SceneFile = Annotated[
     typer.Argument(help="Scene file (TOML). The folder scenes/ has some to copy.", show_default=False),
 ]
 
+#: What an interrupted command says.
+INTERRUPTED = "interrupted. Whatever files are there are whole."
+
 #: Names of the stages as they are announced.
 STAGES = {
     "read": "reading the scene",
@@ -66,7 +69,7 @@ def reported() -> Iterator[None]:
         complain(f"cannot read or write{where}: {why}. Check the path, its permissions and the free space.")
         raise typer.Exit(2) from None
     except KeyboardInterrupt:
-        complain("interrupted. Whatever files are there are whole.")
+        complain(INTERRUPTED)
         raise typer.Exit(130) from None
 
 

@@ -1,14 +1,17 @@
 """From generated C to a shared library in the user's cache.
 
 In: C sources.  Out: a `CompiledLibrary` whose file name carries the key of everything that made it: content of the
-sources, compiler, flags, versions, processor.  A library is compiled under a temporary name and moved into place, so
-that a second process sees the whole file or none.  CasADi keeps the code of a path it has opened: a changed source gets
-another key, hence another path.
+sources, compiler, flags, versions, processor; and, behind it, the digest of the library itself.  A library is compiled
+under a temporary name and moved into place, so that a second process sees the whole file or none.  One that is not what
+its name says (cut short, overwritten) is compiled anew: mapping half a library would end the process.  CasADi keeps the
+code of a path it has opened: a changed source gets another key, hence another path.
 """
 
 from __future__ import annotations
 
 import atexit
+import contextlib
+import ctypes
 import hashlib
 import importlib.metadata
 import importlib.util
@@ -16,6 +19,7 @@ import os
 import platform
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -43,13 +47,26 @@ FLAGS = ("-O2", "-fPIC", "-shared", "-std=c99", "-ffp-contract=off")
 #: Longest a compiler may take [s]; a generated file takes about one second, ten with a cold ziglang.
 TIMEOUT = 300.0
 
+#: Longest a compiler may take to tell its version [s].
+ANSWER_TIMEOUT = 30.0
+
+#: Time a compiler has to end, and to delete its temporary files, once it is told to [s].
+GRACE = 2.0
+
+#: Temporary files of this age were left by a process that was killed [s].
+LEFT_BEHIND = 86_400.0
+
+#: Libraries that this process has opened, by path: they stay open, so that their functions can be had even where
+#: somebody empties the cache meanwhile.
+_opened: dict[Path, ctypes.CDLL] = {}
+
 
 class NoCompilerWarning(UserWarning):
     """No C compiler was found: the functions run in CasADi's virtual machine."""
 
 
 class CacheWarning(UserWarning):
-    """The cache cannot be written: libraries are compiled anew in every process."""
+    """The cache cannot be written, or a library in it was damaged: libraries are compiled anew."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,11 +139,24 @@ def find_compiler(command: str | None = None) -> Compiler | None:
     ------
     RequestError
         `command`, or $CC, names no program.
+    CompileError
+        The compiler does not answer when it is asked for its version.
     """
     origin = "compiler" if command else "the environment variable CC"
     asked = command or os.environ.get("CC", "").strip()
     if asked:
-        words = shlex.split(asked)
+        try:
+            words = shlex.split(asked)
+        except ValueError as fault:
+            raise RequestError(
+                f"{origin} names {asked!r}, which is no command ({str(fault).lower()}). Give the command of a C "
+                "compiler (gcc, clang), or leave it unset."
+            ) from None
+        if not words:
+            raise RequestError(
+                f"{origin} names {asked!r}, which is no command. Give the command of a C compiler (gcc, clang), or "
+                "leave it unset."
+            )
         path = shutil.which(words[0])
         if path is None:
             raise RequestError(
@@ -175,26 +205,88 @@ def compile_sources(
     """
     compiler = replace(compiler, flags=(*compiler.flags, *flags))
     key = library_key((*sources, *headers), compiler)
-    name = f"{_file_name(label)}-{key[:32]}{_suffix()}"
-    ready = _cache_folder() / name
-    if ready.exists():
+    name = f"{_file_name(label)}-{key[:32]}"
+    ready = _find(_cache_folder(), name)
+    if ready is not None:
         return CompiledLibrary(path=ready, key=key, compiler=compiler.identity, cached=True, seconds=0.0)
     folder = _writable_cache_folder()
-    target = folder / name
+    _clear(folder)
     descriptor, temporary = tempfile.mkstemp(dir=folder, prefix=f".{name}-", suffix=".tmp")
     os.close(descriptor)
     started = time.perf_counter()
     try:
         places = (f"-I{path}" for path in include)
         names = (str(path) for path in sources)
-        _run((*compiler.command, *compiler.flags, *places, *names, "-o", temporary, "-lm"), folder)
+        command = (*compiler.command, *compiler.flags, *places, *names, "-o", temporary, "-lm")
+        _run(command, folder)
+        target = folder / f"{name}-{_digest(Path(temporary))}{_suffix()}"
         os.chmod(temporary, 0o755)
-        os.replace(temporary, target)
+        _place(Path(temporary), target)
+        _open(target, command)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
     seconds = time.perf_counter() - started
     return CompiledLibrary(path=target, key=key, compiler=compiler.identity, cached=False, seconds=seconds)
+
+
+def _find(folder: Path, name: str) -> Path | None:
+    """The library of this name in the cache, opened; None, with a warning, where it is not what was written."""
+    for path in sorted(folder.glob(f"{name}-*{_suffix()}")):
+        if path in _opened:  # its code is in this process, whatever has become of the file
+            return path
+        try:
+            whole = path.name == f"{name}-{_digest(path)}{_suffix()}"
+            if whole:
+                _opened[path] = ctypes.CDLL(str(path))
+                return path
+            why = "it is not the file that was written"
+        except OSError as fault:
+            why = str(fault)
+        warnings.warn(
+            f"The library {path} in the cache is damaged ({why}): the model is compiled anew. Nothing is lost.",
+            CacheWarning,
+            stacklevel=5,
+        )
+        with contextlib.suppress(OSError):  # a folder, or not ours to delete: another name is taken then
+            path.unlink()
+    places = (folder, _private_folder()) if _private_folder.cache_info().currsize else (folder,)
+    return next((path for path in _opened if path.parent in places and path.name.startswith(f"{name}-")), None)
+
+
+def _place(temporary: Path, target: Path) -> None:
+    try:
+        os.replace(temporary, target)
+    except IsADirectoryError:
+        raise CompileError(
+            f"The folder {target} is in the way of a compiled library. Delete it, or set {CACHE_VARIABLE} to another "
+            "folder."
+        ) from None
+
+
+def _open(path: Path, command: Sequence[str]) -> None:
+    """Open a library just compiled; it stays open."""
+    try:
+        _opened[path] = ctypes.CDLL(str(path))
+    except OSError as fault:
+        path.unlink(missing_ok=True)
+        raise CompileError(
+            f"The C compiler ended well, but what it wrote cannot be loaded ({fault}).\n  {shlex.join(command)}\n"
+            "Nothing is kept. Take a compiler that makes shared libraries for this machine: set CC."
+        ) from fault
+
+
+def _digest(path: Path) -> str:
+    """Digest of a file in the name of a library: 16 hexadecimal figures of its sha256."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+def _clear(folder: Path) -> None:
+    """Delete what processes that were killed while compiling left in the cache long ago."""
+    for path in folder.glob(".*.tmp"):
+        with contextlib.suppress(OSError):  # gone meanwhile, or of somebody else
+            if time.time() - path.stat().st_mtime > LEFT_BEHIND:
+                path.unlink()
 
 
 def library_key(sources: Sequence[Path], compiler: Compiler) -> str:
@@ -233,31 +325,76 @@ def _describe(command: tuple[str, ...]) -> Compiler:
 def _ask(command: tuple[str, ...]) -> subprocess.CompletedProcess[str] | None:
     """Answer of a short command, None where it cannot run: a broken compiler fails, loudly, when it compiles."""
     try:
-        return subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=60.0, check=False)
-    except (OSError, subprocess.TimeoutExpired):
+        return _finish(command, None, ANSWER_TIMEOUT)
+    except OSError:
         return None
+    except subprocess.TimeoutExpired as fault:
+        raise CompileError(
+            f"The C compiler did not answer within {ANSWER_TIMEOUT:g} s.\n  {shlex.join(command)}\n"
+            "Nothing was written. Try another compiler: set CC."
+        ) from fault
 
 
 def _run(command: tuple[str, ...], folder: Path) -> None:
     shown = shlex.join(command)
     try:
-        done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=TIMEOUT, check=False
-        )
+        done = _finish(command, folder, TIMEOUT)
     except subprocess.TimeoutExpired as fault:
         raise CompileError(
-            f"The C compiler did not finish within {TIMEOUT:g} s.\n  {shown}\nTry another compiler: set CC."
+            f"The C compiler did not finish within {TIMEOUT:g} s.\n  {shown}\nNothing was written. Try another "
+            "compiler: set CC."
         ) from fault
     except OSError as fault:
         raise CompileError(
-            f"The C compiler cannot be run ({fault}).\n  {shown}\nTry another compiler: set CC."
+            f"The C compiler cannot be run ({fault}).\n  {shown}\nNothing was written. Try another compiler: set CC."
         ) from fault
     if done.returncode != 0:
         output = "\n".join(text for text in (done.stdout.strip(), done.stderr.strip()) if text) or "(no output)"
         raise CompileError(
             f"The C compiler failed with exit code {done.returncode}.\n  {shown}\n{output}\n"
-            "Nothing was written. Check the compiler's installation, or set CC to another one."
+            "Nothing was written. Check the compiler's installation, the free space of the cache and of the folder for "
+            "temporary files, or set CC to another one."
         )
+
+
+def _finish(command: tuple[str, ...], folder: Path | None, timeout: float) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end; at a timeout or an interrupt it ends with all its children.
+
+    A compiler is a driver that starts the real one: ending the driver alone leaves a child that holds the pipes, and
+    reading them would wait for it.
+    """
+    process = subprocess.Popen(
+        command,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+    )
+    with process:
+        try:
+            stdout, stderr = process.communicate(timeout=timeout)
+        except BaseException:
+            _end(process)
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a process and its children; politely first, so that they delete their temporary files."""
+    if os.name != "posix":
+        process.kill()
+        return
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        with contextlib.suppress(ProcessLookupError):  # all have ended
+            os.killpg(process.pid, number)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(GRACE)
+    for stream in (process.stdout, process.stderr):
+        if stream is not None:
+            stream.close()
 
 
 def _cache_folder() -> Path:
@@ -272,13 +409,21 @@ def _writable_cache_folder() -> Path:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as fault:
+        try:
+            private = _private_folder()
+        except OSError as second:
+            raise RequestError(
+                f"Neither the cache {folder} ({fault.strerror}) nor a temporary folder ({second.strerror or second}) "
+                f"can be written, and compiled models need one. Set {CACHE_VARIABLE} to a folder you may write, "
+                "or free some space."
+            ) from fault
         warnings.warn(
-            f"The cache {folder} cannot be written ({fault.strerror}): the model is compiled anew in every process. "
-            f"Set {CACHE_VARIABLE} to a folder you may write.",
+            f"The cache {folder} cannot be written ({fault.strerror}): the model is compiled anew in every process, "
+            f"this time into {private}, which is deleted at the end. Set {CACHE_VARIABLE} to a folder you may write.",
             CacheWarning,
             stacklevel=5,
         )
-        return _private_folder()
+        return private
     return folder
 
 

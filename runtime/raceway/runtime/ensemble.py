@@ -10,6 +10,7 @@ the results are the same bits for any number of threads.
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import time as clocks
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,7 +25,7 @@ from raceway.runtime.ensemble_driver import LANE_FAMILIES, STOPPED, EnsembleDriv
 from raceway.runtime.errors import RequestError
 from raceway.runtime.manifest import Manifest
 from raceway.runtime.members import Members, Span, Table, make_members, member_arrays
-from raceway.runtime.parameters import unknown_name
+from raceway.runtime.parameters import real, unknown_name
 from raceway.runtime.reductions import (
     RunFailed,
     channel_names,
@@ -36,8 +37,8 @@ from raceway.runtime.reductions import (
     observe,
     step_limit,
 )
-from raceway.runtime.simulate import STATUS_OF_END
 from raceway.runtime.stepper import End, Family
+from raceway.runtime.stepping import STATUS_OF_END
 
 if TYPE_CHECKING:
     import xarray
@@ -192,11 +193,11 @@ def simulate_many(
     aliases = observable_aliases(channel_names(manifest))
     chosen = _observables(observables, aliases)
     family = choose_family(method or manifest.run.method)
-    tolerance = check_rtol(manifest.run.rtol if rtol is None else float(rtol))
+    tolerance = check_rtol(manifest.run.rtol if rtol is None else rtol)
     workers = _threads(threads)
     driver = model.ensemble_driver
     members = make_members(model, table)
-    skipped = manifest.run.transient_cycles if transient is None else float(transient)
+    skipped = manifest.run.transient_cycles if transient is None else real(transient)
     span = _span(model, members, cycles, duration, skipped)
     in_lanes = lanes and family in LANE_FAMILIES
     reduced = {channel for kind, channel in chosen.values() if kind != "end"}
@@ -356,7 +357,7 @@ def _threads(given: int | None) -> int:
     if given is None:
         # processors that this process may use, where the system tells
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if isinstance(given, bool) or int(given) != given or given < 1:
+    if not (1.0 <= real(given) < math.inf and int(given) == given):
         raise RequestError(f"threads: a whole number from 1 on is expected, not {given!r}.")
     return int(given)
 

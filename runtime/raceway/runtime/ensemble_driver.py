@@ -200,10 +200,10 @@ class EnsembleDriver:
         horizons : a turn, or the run, of each member [s]
         """
         found = np.empty_like(initial)
-        self._code.raceway_ensemble_magnitudes(
-            ctypes.c_long(len(initial)),
-            *(_pointer(a) for a in (members.p, members.c, initial, first, self._padded(inputs), horizons, found)),
-        )
+        # named, for a pointer does not keep alive what it points to
+        arrays = (members.p, members.c, initial, first, self._padded(inputs), horizons, found)
+        pointers = [_pointer(array) for array in arrays]
+        self._code.raceway_ensemble_magnitudes(ctypes.c_long(len(initial)), *pointers)
         return found
 
     def _padded(self, inputs: np.ndarray) -> np.ndarray:

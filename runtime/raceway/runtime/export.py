@@ -21,9 +21,9 @@ import numpy as np
 from raceway.runtime import clock
 from raceway.runtime.compile import FLAGS as BASE_FLAGS
 from raceway.runtime.errors import ArtefactError, RequestError
-from raceway.runtime.manifest import InputInfo, Manifest, check_files, read_manifest
+from raceway.runtime.magnitudes import default_magnitudes as run_magnitudes
+from raceway.runtime.manifest import InputInfo, Manifest, read_artefact
 from raceway.runtime.model import Model
-from raceway.runtime.simulate import model_scales
 from raceway.runtime.stepper import DRIVER, FLAGS
 from raceway.runtime.stepper import METHODS as STEPPERS
 
@@ -63,8 +63,7 @@ def export_c(folder: str | Path, out: str | Path) -> Path:
         The model has no states, so that there is nothing to integrate.
     """
     place, target = Path(folder).absolute(), Path(out)
-    manifest = read_manifest(place)
-    check_files(place, manifest)
+    manifest = read_artefact(place)
     if not manifest.states:
         raise RequestError(
             f"{manifest.scene}: the model has no states, so there is nothing to integrate in C. Its functions are in "
@@ -110,7 +109,7 @@ def default_magnitudes(model: Model) -> np.ndarray:
             "The scene's run is given in cycles, but nothing turns in it (its speed is zero). Give its [run] a "
             "duration."
         )
-    return model_scales(model, numbers, model.initial(), duration, turn).magnitude
+    return run_magnitudes(model, numbers, model.initial(), duration, turn)
 
 
 def _with_includes(source: Path, places: Sequence[Path], known: Iterable[str]) -> dict[str, str]:
@@ -284,40 +283,47 @@ void scene_constants(const double *p, double *c)
 def _makefile(manifest: Manifest, sources: Sequence[str], headers: Sequence[str]) -> str:
     flags = (*FLAGS[:1], *(flag for flag in BASE_FLAGS if flag not in _LIBRARY_ONLY), *FLAGS[1:])
     objects = " ".join(source.removesuffix(".c") + ".o" for source in sources)
-    return f"""# Written by raceway export.  make builds {manifest.scene}; make run writes out.csv
+    program = _program(manifest)
+    return f"""# Written by raceway export.  make builds {program}; make run writes out.csv
 
 CC ?= cc
 # code for the processor at hand, where the compiler knows how
 NATIVE := $(shell $(CC) -march=native -x c -E /dev/null > /dev/null 2>&1 && echo -march=native)
 CFLAGS ?= {" ".join(flags)} $(NATIVE)
 
-{manifest.scene}: {objects}
+{program}: {objects}
 	$(CC) $(CFLAGS) $(LDFLAGS) -o $@ $^ -lm
 
 %.o: %.c {" ".join(headers)}
 	$(CC) $(CFLAGS) -c -o $@ $<
 
-run: {manifest.scene}
-	./{manifest.scene} > out.csv
+run: {program}
+	./{program} > out.csv
 
 clean:
-	rm -f *.o {manifest.scene} out.csv
+	rm -f *.o {program} out.csv
 
 .PHONY: run clean
 """
 
 
+def _program(manifest: Manifest) -> str:
+    """Name of the program: the scene's, unless that is a file or a target of the Makefile."""
+    taken = ("all", "clean", "makefile", "run")
+    return f"{manifest.scene}_program" if manifest.scene.lower() in taken else manifest.scene
+
+
 def _readme(manifest: Manifest) -> str:
-    example = manifest.parameters[0]
+    example, program = manifest.parameters[0], _program(manifest)
     return f"""# {manifest.title}
 
 A simulation in C99, written by `raceway export`. It needs a C compiler and nothing else.
 
 ```console
 $ make
-$ ./{manifest.scene} > out.csv
-$ ./{manifest.scene} --cycles 2 --rtol 1e-8 --samples 500 {example.name}={example.default!r} > out.csv
-$ ./{manifest.scene} --list
+$ ./{program} > out.csv
+$ ./{program} --cycles 2 --rtol 1e-8 --samples 500 {example.name}={example.default!r} > out.csv
+$ ./{program} --list
 ```
 
 The columns of the CSV are the time [s] and the states in SI units: {", ".join(s.name for s in manifest.states)}.

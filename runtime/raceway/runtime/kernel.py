@@ -122,7 +122,9 @@ class Loop:
             if memory.size:
                 self._buffer.set_res(k, memory.reshape(-1).data)
 
-    def __call__(self, count: int, values: Mapping[str, Any]) -> dict[str, Array]:
+    def __call__(
+        self, count: int, values: Mapping[str, Any], wanted: Collection[str] | None = None
+    ) -> dict[str, Array]:
         """Outputs at `count` points.
 
         Parameters
@@ -130,12 +132,17 @@ class Loop:
         count : number of points
         values : inputs by name; those that vary of shape (count,) or (count, rows), the others of shape (rows,);
             further keys are ignored
+        wanted : names of outputs.  Default: all
 
         Returns
         -------
         dict from output name to array, shape (count, rows)
         """
-        results = {name: np.empty((count, memory.shape[1])) for name, memory in self._outputs.items()}
+        results = {
+            name: np.empty((count, memory.shape[1]))
+            for name, memory in self._outputs.items()
+            if wanted is None or name in wanted
+        }
         for name, memory in self._inputs.items():
             if name not in self._varying:
                 memory[0] = values[name]
@@ -147,8 +154,8 @@ class Loop:
             self._evaluate()  # of the last block, also points left over from earlier ones: they are dropped
             if self._buffer.ret():
                 raise EvaluationError(f"{self.function.name()} reported failure")
-            for name, memory in self._outputs.items():
-                results[name][first : first + size] = memory[:size]
+            for name, samples in results.items():
+                samples[first : first + size] = self._outputs[name][:size]
         return results
 
 

@@ -17,20 +17,32 @@ c   derived constants in the order of `Manifest.constants`, from ``constants(p)`
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import json
 import math
 import os
+import re
 import tempfile
 import types
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from raceway.runtime.errors import ArtefactError
 
-SCHEMA = 1
+SCHEMA = 2
 FILE_NAME = "manifest.json"
+
+#: Last key of the file: sha256 of its text without this key.
+DIGEST = "digest"
+
+#: Names of scenes, which become names of files, of make targets and of programs.
+_SCENE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+
+#: Where a generated function lives: ``<library>.c`` and, serialised, ``<library>.casadi``.
+MODEL, JACOBIANS = "model", "jacobians"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +71,21 @@ class VariableInfo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class QuantityInfo:
+    """Something the model can report and differentiate, whether a run reports it or not.
+
+    `group` is the function of ``jacobians.c`` that computes it; the quantities of a group stand one below the other,
+    in the order of `Manifest.quantities`, each with `size` rows.
+    """
+
+    name: str
+    unit: str
+    description: str
+    size: int
+    group: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class InputInfo:
     """A quantity the driver holds constant between breakpoints.
 
@@ -81,13 +108,17 @@ class InputInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FunctionInfo:
-    """Signature and cost of a generated function: names with sizes (rows), and the number of SX operations."""
+    """Signature and cost of a generated function: names with sizes (rows), and the number of SX operations.
+
+    `library` is the generated file that holds it: `MODEL`, or `JACOBIANS`, compiled when first asked for.
+    """
 
     name: str
     inputs: tuple[tuple[str, int], ...]
     outputs: tuple[tuple[str, int], ...]
     operations: int
     description: str
+    library: str = MODEL
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,6 +197,7 @@ class Manifest:
     mechanism: MechanismInfo | None
     bearing: BearingInfo | None
     run: RunInfo
+    quantities: tuple[QuantityInfo, ...] = ()
     files: tuple[tuple[str, str], ...] = field(default=())  # file name -> sha256
 
     def function(self, name: str) -> FunctionInfo:
@@ -175,29 +207,35 @@ class Manifest:
         raise KeyError(name)
 
     def to_json(self) -> str:
-        """Deterministic text: the fields in the order of the records, one per line, ending in a newline."""
-        return json.dumps(asdict(self), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        """Deterministic text: the fields in the order of the records, one per line, ending in a newline.
+
+        The last key is the digest of the text without it: who edits a number there by hand is told.
+        """
+        document = asdict(self)
+        return _text({**document, DIGEST: _text_digest(document)})
 
     @classmethod
-    def from_json(cls, text: str, *, source: str = FILE_NAME) -> Manifest:
+    def from_json(cls, text: str, *, source: str = FILE_NAME, verify: bool = True) -> Manifest:
         """Manifest from its JSON text; all faults are raised together.
 
         Parameters
         ----------
         text : what `to_json` wrote
         source : name of the text in messages
+        verify : refuse a text that was edited after it was written
 
         Raises
         ------
         ArtefactError
-            Not JSON, another schema, or unknown keys, missing keys, values of a wrong type, each with its place.
+            Not JSON, another schema, edited, or unknown or missing keys or values of a wrong type, each with its place.
         """
         try:
             document = json.loads(text)
-        except json.JSONDecodeError as fault:
+        except (ValueError, RecursionError) as fault:  # no JSON, integers of thousands of digits, deep nesting
             raise ArtefactError(
-                f"{source}: not JSON ({fault}). Write the folder again with `raceway derive`."
-            ) from fault
+                f"{source}: not JSON ({str(fault) or type(fault).__name__}). Write the folder again with "
+                "`raceway derive`."
+            ) from None
         if not isinstance(document, Mapping):
             raise ArtefactError(f"{source}: a JSON object is expected, not {_kind(document)}.")
         schema = document.get("schema")
@@ -206,6 +244,8 @@ class Manifest:
                 f"{source}: schema {schema!r} was given, this version of raceway reads schema {SCHEMA}. "
                 "Write the folder again with this version's `raceway derive`."
             )
+        document = dict(document)
+        digest = document.pop(DIGEST, None)
         faults: list[str] = []
         manifest = _read(cls, document, "", faults)
         if not faults:
@@ -217,11 +257,65 @@ class Manifest:
                 + "\nThe file is generated: write the folder again with `raceway derive` instead of editing it."
             )
         assert isinstance(manifest, cls)
+        if verify and digest != _text_digest(document):
+            raise ArtefactError(
+                f"{source}: the digest in it, {digest!r:.20}, is not that of its content: edited or cut short. "
+                "Write the folder again with `raceway derive`, or load it with verify=False if the edit is meant."
+            )
         return manifest
 
 
-def read_manifest(folder: str | Path) -> Manifest:
+def _text(document: Mapping[str, Any]) -> str:
+    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _text_digest(document: Mapping[str, Any]) -> str:
+    return hashlib.sha256(_text(document).encode()).hexdigest()
+
+
+def read_artefact(folder: str | Path, *, verify: bool = True) -> Manifest:
+    """Manifest of a generated folder whose files are those it describes.
+
+    Parameters
+    ----------
+    verify : False takes edited files as they are
+
+    Raises
+    ------
+    ArtefactError
+        See `read_manifest` and `check_files`; or the folder was written with another version of CasADi.
+    """
+    manifest = read_manifest(folder, verify=verify)
+    if not verify:
+        return manifest
+    try:
+        check_files(folder, manifest)
+    except ArtefactError:
+        # another process may have put a new folder in place between the two looks
+        again = read_manifest(folder)
+        if again == manifest:
+            raise
+        check_files(folder, again)
+        manifest = again
+    _check_version(folder, manifest)
+    return manifest
+
+
+def _check_version(folder: str | Path, manifest: Manifest) -> None:
+    written, here = dict(manifest.versions).get("casadi", "none"), importlib.metadata.version("casadi")
+    if written.split(".")[:2] != here.split(".")[:2]:
+        raise ArtefactError(
+            f"{folder}: written with CasADi {written}, while {here} is installed: its functions may mean something "
+            "else there. Write the folder again with `raceway derive`, or load it with verify=False to try."
+        )
+
+
+def read_manifest(folder: str | Path, *, verify: bool = True) -> Manifest:
     """Read ``manifest.json`` of a generated folder.
+
+    Parameters
+    ----------
+    verify : refuse a manifest that was edited after it was written
 
     Raises
     ------
@@ -236,9 +330,12 @@ def read_manifest(folder: str | Path) -> Manifest:
         raise ArtefactError(
             f"{folder}: {what} {FILE_NAME}. A generated folder is expected; `raceway derive SCENE` writes one."
         ) from fault
-    except (OSError, UnicodeDecodeError) as fault:
-        raise ArtefactError(f"{path}: cannot be read ({fault}).") from fault
-    return Manifest.from_json(text, source=str(path))
+    except (OSError, ValueError) as fault:  # no text in UTF-8, no path
+        raise ArtefactError(
+            f"{path}: cannot be read ({fault}). A folder that `raceway derive` wrote, and that you may read, "
+            "is expected."
+        ) from fault
+    return Manifest.from_json(text, source=str(path), verify=verify)
 
 
 def write(folder: str | Path, manifest: Manifest) -> Path:
@@ -296,6 +393,10 @@ def _kind(value: object) -> str:
     return names.get(type(value), f"the number {value!r}")
 
 
+#: Types of a record's fields, found once: there are hundreds of records in a manifest, and few kinds.
+_hints = cache(get_type_hints)
+
+
 def _read(hint: Any, value: Any, place: str, faults: list[str]) -> Any:
     """`value` from JSON as the type `hint`; what does not fit goes to `faults` with its place."""
 
@@ -305,7 +406,7 @@ def _read(hint: Any, value: Any, place: str, faults: list[str]) -> Any:
     if is_dataclass(hint):
         if not isinstance(value, Mapping):
             return refuse("an object")
-        hints = get_type_hints(hint)
+        hints = _hints(hint)
         known = {item.name: item for item in fields(hint)}
         prefix = f"{place}." if place else ""
         for key in value:
@@ -354,7 +455,12 @@ def _read(hint: Any, value: Any, place: str, faults: list[str]) -> Any:
 def _contradictions(manifest: Manifest) -> list[str]:
     """Faults between the parts: names used twice, names that do not exist, sizes that disagree."""
     faults = []
-    for group in ("parameters", "constants", "states", "inputs", "outputs", "functions"):
+    if not _SCENE_NAME.fullmatch(manifest.scene):
+        faults.append(f"scene: a letter, then letters, digits and _, is expected, not {manifest.scene[:80]!r}")
+    for name, _ in manifest.files:
+        if name in ("", ".", "..") or re.search(r"[/\\\0]", name):
+            faults.append(f"files: {name[:80]!r} is no name of a file in the folder")
+    for group in ("parameters", "constants", "states", "inputs", "outputs", "functions", "quantities"):
         names = [item.name for item in getattr(manifest, group)]
         for name in dict.fromkeys(name for name in names if names.count(name) > 1):
             faults.append(f"{group}: the name {name!r} occurs {names.count(name)} times")

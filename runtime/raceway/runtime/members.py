@@ -18,9 +18,10 @@ from raceway.runtime import clock
 from raceway.runtime.assembly import check_assembly
 from raceway.runtime.ensemble_driver import MemberArrays
 from raceway.runtime.errors import RequestError
+from raceway.runtime.magnitudes import MOMENTS
 from raceway.runtime.manifest import InputInfo, Manifest
-from raceway.runtime.parameters import Parameters, unknown_name
-from raceway.runtime.simulate import MOMENTS, Numbers, segment_edges
+from raceway.runtime.parameters import Numbers, Parameters, scalar, unknown_name
+from raceway.runtime.segments import segment_edges
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -109,7 +110,11 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
             continue
         try:
             column = np.array(given, dtype=float)
-        except (TypeError, ValueError):
+            # NumPy takes truth values and texts for numbers
+            plain = _plain(given)
+        except (TypeError, ValueError, OverflowError):
+            plain = False
+        if not plain:
             faults.append(f"{name}: numbers are expected, not {given!r:.80}")
             continue
         if column.ndim != 1:
@@ -129,6 +134,13 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
     if faults:
         raise RequestError("\n".join(faults))
     return columns
+
+
+def _plain(given: object) -> bool:
+    """Whether these are numbers: NumPy takes truth values and texts for some."""
+    if isinstance(given, list | tuple):
+        return all(scalar(item) is not None or isinstance(item, list | tuple | np.ndarray) for item in given)
+    return np.asarray(given).dtype.kind in "iufO"
 
 
 def make_members(model: Model, table: Table) -> Members:
@@ -281,7 +293,7 @@ def member_arrays(
 def _moments(
     manifest: Manifest, members: Members, span: Span, which: np.ndarray, edges: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The moments that `raceway.runtime.simulate.model_scales` looks at, for each member."""
+    """The moments that `raceway.runtime.magnitudes` looks at, for each member."""
     horizons = np.minimum(span.durations, span.turns)[which]
     even = (np.arange(MOMENTS) + 0.5) / MOMENTS
     times = []

@@ -5,34 +5,45 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import casadi
 import numpy as np
 
 from raceway.runtime import clock
 from raceway.runtime.assembly import check_assembly
-from raceway.runtime.compile import CompiledLibrary, Compiler, compile_model, find_compiler
+from raceway.runtime.compile import CompiledLibrary, compile_model
+from raceway.runtime.drivers import Drivers
 from raceway.runtime.ensemble import EnsembleResult, simulate_many
-from raceway.runtime.ensemble_driver import EnsembleDriver, compile_ensemble
-from raceway.runtime.errors import ArtefactError, CompileError, RequestError
-from raceway.runtime.integrators import available_methods, make_integrator
-from raceway.runtime.kernel import Kernel, Loop
-from raceway.runtime.manifest import Manifest, check_files, read_manifest
+from raceway.runtime.ensemble_driver import EnsembleDriver
+from raceway.runtime.errors import RequestError
+from raceway.runtime.evaluate import checked_time, evaluate_point
+from raceway.runtime.explain import Explanation, explain
+from raceway.runtime.functions import Functions
+from raceway.runtime.integrators import available_methods
+from raceway.runtime.jacobian import jacobian
+from raceway.runtime.jacobian_function import JacobianFunction
+from raceway.runtime.kernel import Array, Kernel
+from raceway.runtime.loops import PointLoop
+from raceway.runtime.manifest import Manifest, read_artefact
 from raceway.runtime.members import Table
-from raceway.runtime.parameters import Parameters, resolve_parameters, unknown_name
+from raceway.runtime.parameters import Numbers, Parameters, real, resolve_parameters, vector
 from raceway.runtime.peaks import Peak, refine_peak
+from raceway.runtime.quasi_static import NAME as QUASI_STATIC
+from raceway.runtime.quasi_static import QuasiStatic
 from raceway.runtime.reductions import Reductions, reduce_run
+from raceway.runtime.request import Request, run_length, start_state
+from raceway.runtime.second_derivatives import hessian
 from raceway.runtime.sensitivity import Sensitivities, sensitivities
-from raceway.runtime.simulate import Numbers, Request, run_length, simulate, start_state
-from raceway.runtime.stepper import HEADERS, Stepper, compile_stepper
+from raceway.runtime.simulate import simulate
 from raceway.runtime.stepper import METHODS as STEPPERS
+from raceway.runtime.stepper import Stepper
 
 if TYPE_CHECKING:
+    from raceway.runtime.linearize import Linearization
+    from raceway.runtime.sensitivity_query import SensitivityReport
     from raceway.runtime.solution import Solution
-
-#: Name of the file with the serialised functions in a generated folder.
-FUNCTIONS = "model.casadi"
+    from raceway.runtime.statics import StaticEquilibrium
 
 
 def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True) -> Model:
@@ -56,9 +67,7 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     CompileError
         The compiler failed.
     """
-    manifest = read_manifest(folder)
-    if verify:
-        check_files(folder, manifest)
+    manifest = read_artefact(folder, verify=verify)
     # absolute: the compiler runs in the cache folder, and functions may be read after the process has moved elsewhere
     place = Path(folder).absolute()
     return Model(place, manifest, compile_model(place, manifest, compiler), compiler=compiler)
@@ -67,7 +76,8 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
 class Model:
     """Functions of one scene with their names, units and defaults.  All numbers are SI.
 
-    Not for several threads at once: evaluations share memory.  Processes may each load their own.
+    For any number of threads at once, with the bits of calls one after the other.  What `kernel` and `loop` give
+    belongs to the thread that asked for it, and so does what `jacobian_function` gives.
 
     Attributes
     ----------
@@ -80,15 +90,9 @@ class Model:
     ) -> None:
         self.manifest = manifest
         self.library = library
-        self._folder = folder
-        self._functions: dict[str, casadi.Function] = {}
-        self._kernels: dict[str, Kernel] = {}
-        self._loops: dict[tuple[str, tuple[str, ...]], Loop] = {}
-        self._symbolic: dict[str, casadi.Function] = {}
-        self._compiler = compiler
-        self._stepper: Stepper | None = None
-        self._ensemble: EnsembleDriver | None = None
-        self._differentiating: Stepper | None = None
+        self._functions = Functions(folder, manifest, library, compiler)
+        self._drivers = Drivers(folder, manifest, compiler, compiled=library is not None)
+        self._assembled = b""  # parameters whose linkage was looked at last
 
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "in CasADi's virtual machine"
@@ -120,12 +124,12 @@ class Model:
     @property
     def methods(self) -> tuple[str, ...]:
         """Integration methods of this model, besides ``auto``."""
-        return (*(STEPPERS if self.has_stepper else ()), *available_methods(self))
+        return (*((*STEPPERS, QUASI_STATIC) if self.has_stepper else ()), *available_methods(self))
 
     @property
     def has_stepper(self) -> bool:
         """Whether the folder brings the kernels of the project's own stepper, and a compiler made code of the rest."""
-        return self.compiled and all((self._folder / name).is_file() for name in HEADERS)
+        return self._drivers.available
 
     @property
     def stepper(self) -> Stepper:
@@ -138,42 +142,26 @@ class Model:
         CompileError
             The compiler failed.
         """
-        if self._stepper is None:
-            self._stepper = self._make_stepper(sensitivities=False)
-        return self._stepper
+        return self._drivers.stepper
 
     @property
     def differentiating_stepper(self) -> Stepper:
         """The stepper with the derivatives of its steps, compiled when first asked for; errors as for `stepper`."""
-        if self._differentiating is None:
-            self._differentiating = self._make_stepper(sensitivities=True)
-        return self._differentiating
+        return self._drivers.differentiating_stepper
 
     @property
     def ensemble_driver(self) -> EnsembleDriver:
         """The driver of ensembles and reductions, compiled when first asked for; errors as for `stepper`."""
-        if self._ensemble is None:
-            library = compile_ensemble(self._folder, self.manifest, self._stepper_compiler())
-            self._ensemble = EnsembleDriver(library, self.manifest)
-        return self._ensemble
+        return self._drivers.ensemble
 
-    def _stepper_compiler(self) -> Compiler:
-        compiler = find_compiler(self._compiler) if self.has_stepper else None
-        if compiler is None:
-            raise RequestError(
-                "method stepper: it needs a C compiler and the kernels in the generated folder. Install gcc or "
-                "clang, write the folder again, or take another method."
-            )
-        return compiler
-
-    def _make_stepper(self, *, sensitivities: bool) -> Stepper:
-        compiler = self._stepper_compiler()
-        library = compile_stepper(self._folder, self.manifest, compiler, sensitivities=sensitivities)
-        return Stepper(library, self.manifest)
+    @property
+    def quasi_static(self) -> QuasiStatic:
+        """The driver of the quasi-static model, compiled when first asked for; errors as for `stepper`."""
+        return self._drivers.quasi_static
 
     def has(self, name: str) -> bool:
         """Whether the model has a function of that name."""
-        return any(info.name == name for info in self.manifest.functions)
+        return self._functions.has(name)
 
     def function(self, name: str) -> casadi.Function:
         """CasADi function by name, compiled if possible.
@@ -183,40 +171,33 @@ class Model:
         RequestError
             The model has no such function.
         """
-        if name not in self._functions:
-            self._functions[name] = self._external(name) if self.compiled else self.symbolic(name)
-        return self._functions[name]
+        return self._functions.function(name)
 
     def kernel(self, name: str) -> Kernel:
         """Function by name on memory of its own: ``kernel({"t": 0.0, "x": x, ...})`` costs microseconds."""
-        if name not in self._kernels:
-            self._kernels[name] = Kernel(self.function(name))
-        return self._kernels[name]
+        return self._functions.kernel(name)
 
-    def loop(self, name: str, varying: tuple[str, ...]) -> Loop:
+    def derived_kernel(self, name: str, expression: str, of: str) -> Kernel:
+        """Kernel of a derivative that is not generated (see `raceway.runtime.functions`)."""
+        return self._functions.derived_kernel(name, expression, of)
+
+    def loop(self, name: str, varying: tuple[str, ...]) -> PointLoop:
         """Function by name for many points at once; `varying` names the inputs that change between them."""
-        if (name, varying) not in self._loops:
-            self._loops[name, varying] = Loop(self.function(name), varying)
-        return self._loops[name, varying]
+        return self._functions.loop(name, varying)
+
+    def sample_outputs(
+        self, count: int, values: Mapping[str, Any], names: Sequence[str], *, lean: bool
+    ) -> dict[str, Array]:
+        """Outputs at many points (see `raceway.runtime.functions`)."""
+        return self._functions.sample_outputs(count, values, names, lean=lean)
 
     def symbolic(self, name: str) -> casadi.Function:
         """CasADi function by name as an expression graph, which can be differentiated further."""
-        self._require(name)
-        if not self._symbolic:
-            self._symbolic = _read_functions(self._folder / FUNCTIONS)
-        if name not in self._symbolic:
-            plugin, _, intervals = name.rpartition("_")
-            if name == "rhs" or not intervals.isdecimal():
-                raise ArtefactError(f"{self._folder / FUNCTIONS}: has no function {name!r}. Write the folder again.")
-            # the integrators are generated to C only; here they are made from the right-hand side
-            self._symbolic[name] = self.virtual_integrator(plugin, int(intervals))
-        return self._symbolic[name]
+        return self._functions.symbolic(name)
 
     def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function:
         """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `integrators`)."""
-        manifest = self.manifest
-        sizes = {"u": len(manifest.inputs), "p": len(manifest.parameters), "c": len(manifest.constants)}
-        return make_integrator(self.symbolic("rhs"), sizes, plugin, intervals)
+        return self._functions.virtual_integrator(plugin, intervals)
 
     def numbers(self, parameters: Mapping[str, float] | None = None) -> Numbers:
         """Parameters with overrides, checked, and the derived constants that follow."""
@@ -239,6 +220,15 @@ class Model:
         values.update((info.name, float(value)) for info, value in zip(self.manifest.constants, c, strict=True))
         return Numbers(parameters=resolved, p=p, c=c, values=values)
 
+    def _runnable(self, parameters: Mapping[str, float] | None) -> Numbers:
+        """Numbers of a run whose linkage can be assembled; what was looked at last is not looked at again."""
+        numbers = self.numbers(parameters)
+        looked_at = numbers.p.tobytes()
+        if looked_at != self._assembled:
+            check_assembly(self, numbers)
+            self._assembled = looked_at
+        return numbers
+
     def constants(self, parameters: Mapping[str, float] | None = None) -> dict[str, float]:
         """Derived constants (stiffness, cage ratio, ...) by name, for the defaults with `parameters` put in."""
         values = self.numbers(parameters).values
@@ -256,7 +246,7 @@ class Model:
 
     def inputs_at(self, t: float, parameters: Mapping[str, float] | None = None) -> np.ndarray:
         """Inputs ``u`` at time `t`, for functions that are then called with ``t = 0``; shape (inputs,)."""
-        return clock.inputs_at(self.manifest.inputs, self.numbers(parameters).values, _time(t))
+        return clock.inputs_at(self.manifest.inputs, self.numbers(parameters).values, checked_time(t))
 
     def initial(self, parameters: Mapping[str, float] | None = None) -> np.ndarray:
         """State at the start, shape (states,)."""
@@ -283,21 +273,7 @@ class Model:
         -------
         dict from name to number, or to array of shape (balls,)
         """
-        wanted = list(self.outputs) if outputs is None else list(outputs)
-        for name in wanted:
-            if name not in self.outputs:
-                hint = unknown_name("output", name, self.outputs)
-                raise RequestError(f"{hint} The scene's run.outputs says which are computed.")
-        if not wanted:
-            return {}
-        kernel = self.kernel("outputs")
-        kernel.run(self._point(self.numbers(parameters), _time(t), x))
-        results: dict[str, float | np.ndarray] = {}
-        for info, output in zip(self.manifest.outputs, kernel.function.name_out(), strict=True):
-            if info.name in wanted:
-                value = kernel.output(output)
-                results[info.name] = value if info.size > 1 else float(value[0])
-        return results
+        return evaluate_point(self, self.numbers(parameters), t, x, outputs)
 
     def simulate(
         self,
@@ -308,6 +284,8 @@ class Model:
         method: str | None = None,
         rtol: float | None = None,
         samples_per_cycle: int | None = None,
+        times: Sequence[float] | np.ndarray | None = None,
+        outputs: Sequence[str] | None = None,
         initial: Sequence[float] | np.ndarray | None = None,
         transient: float | None = None,
         progress: Callable[[float], None] | None = None,
@@ -322,6 +300,11 @@ class Model:
             ``rosenbrock`` for a stiff model and ``erk`` for others
         rtol : error allowed per step, relative to the magnitudes of the states (`raceway.runtime.scales`)
         samples_per_cycle : samples in a turn; in the whole run where nothing turns
+        times : times of the samples instead, increasing, within the run; where neither cycles nor duration is given,
+            the run ends at the last one.  The stepper takes the same steps however a run of one length is sampled; the
+            other methods go from sample to sample [s]
+        outputs : names of the outputs to evaluate, none of them for ``[]``; the others cost nothing.  Default: all of
+            the scene.  A new choice is compiled when first asked for, in a fraction of a second
         initial : state at the start, shape (states,)
         transient : turns at the start that `Solution.steady` leaves out
         progress : called with the finished fraction
@@ -333,15 +316,16 @@ class Model:
         IntegrationError
             The computation failed; ``.partial`` holds what was computed.
         """
-        numbers = self.numbers(parameters)
-        check_assembly(self, numbers)
+        numbers = self._runnable(parameters)
         request = Request(
             cycles=cycles,
             duration=duration,
             method=method,
             rtol=rtol,
             samples_per_cycle=samples_per_cycle,
-            initial=None if initial is None else np.asarray(initial, dtype=float),
+            times=times,
+            outputs=outputs,
+            initial=None if initial is None else vector(initial),
             transient_cycles=transient,
             progress=progress,
         )
@@ -356,6 +340,7 @@ class Model:
         parameters: Mapping[str, float] | None = None,
         method: str | None = None,
         rtol: float | None = None,
+        sensitivity_rtol: float | None = None,
         samples_per_cycle: int | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Sensitivities:
@@ -364,6 +349,9 @@ class Model:
         Parameters
         ----------
         wrt : names of parameters; any number in one pass
+        sensitivity_rtol : error allowed per step in the derivatives, which then take part in the choice of step sizes,
+            relative to the states' magnitudes over the parameters' scales (`raceway.runtime.direction_scales`) or to
+            the derivative itself where it is larger; None: the states alone choose the steps
         others : as for `simulate`
 
         Raises
@@ -373,17 +361,77 @@ class Model:
         IntegrationError
             The computation failed.
         """
-        numbers = self.numbers(parameters)
-        check_assembly(self, numbers)
+        numbers = self._runnable(parameters)
         request = Request(
             cycles=cycles,
             duration=duration,
             method=method,
             rtol=rtol,
+            sensitivity_rtol=sensitivity_rtol,
             samples_per_cycle=samples_per_cycle,
             progress=progress,
         )
         return sensitivities(self, numbers, request, [wrt] if isinstance(wrt, str) else list(wrt))
+
+    def sensitivity(
+        self,
+        of: str | Sequence[str] | None = None,
+        wrt: str | Sequence[str] | None = None,
+        cycles: float | None = None,
+        *,
+        duration: float | None = None,
+        transient: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        method: str = "auto",
+        direction: Literal["forward", "adjoint"] = "forward",
+        check: bool | Literal["differences", "erk", "adjoint"] = True,
+        rtol: float | None = None,
+        sensitivity_rtol: float | None = None,
+        samples_per_cycle: int | None = None,
+        agreement: float | None = None,
+        progress: Callable[[str, float], None] | None = None,
+    ) -> SensitivityReport:
+        """Derivatives of quantities of interest by parameters, each with a certificate (see `certificate`).
+
+        Parameters
+        ----------
+        of : quantities (see `raceway.runtime.quantities`).  Default: peak ball force and motion of the rings
+        wrt : parameters.  Default: all
+        cycles, duration, transient, parameters : as for `simulate`
+        method : of the derivatives: ``auto``, one of the stepper's, or ``erk``
+        direction : of ``erk``
+        check : the second route: True (differences), "erk", "adjoint", or False for none
+        rtol, sensitivity_rtol : tolerances of states and derivatives; tight ones by default
+        samples_per_cycle : nodes of quadratures in a turn
+        agreement : relative disagreement of both routes that is allowed
+        progress : called with words and a finished fraction
+
+        Raises
+        ------
+        RequestError
+            A wrong request, unknown names, or a law whose force jumps.
+        SimulationError
+            The computation failed.
+        """
+        from raceway.runtime.sensitivity_query import answer, make_query  # SciPy takes longer to read than a run
+
+        query = make_query(
+            self.manifest,
+            of=of,
+            wrt=wrt,
+            cycles=cycles,
+            duration=duration,
+            transient=transient,
+            method=method,
+            direction=direction,
+            check=check,
+            rtol=rtol,
+            sensitivity_rtol=sensitivity_rtol,
+            samples_per_cycle=samples_per_cycle,
+            agreement=agreement,
+            progress=progress,
+        )
+        return answer(self, self._runnable(parameters), query)
 
     def reduce(
         self,
@@ -408,20 +456,17 @@ class Model:
         SimulationError
             The computation failed.
         """
-        numbers = self.numbers(parameters)
-        check_assembly(self, numbers)
+        numbers = self._runnable(parameters)
         run = self.manifest.run
-        request = Request(
-            cycles=cycles, duration=duration, initial=None if initial is None else np.asarray(initial, dtype=float)
-        )
+        request = Request(cycles=cycles, duration=duration, initial=None if initial is None else vector(initial))
         return reduce_run(
             self,
             numbers,
             initial=start_state(self, numbers, request.initial),
             duration=run_length(self, request, clock.period(self.manifest, numbers.values)),
-            transient=run.transient_cycles if transient is None else float(transient),
+            transient=run.transient_cycles if transient is None else real(transient),
             method=method or run.method,
-            rtol=run.rtol if rtol is None else float(rtol),
+            rtol=run.rtol if rtol is None else rtol,
             progress=progress,
         )
 
@@ -492,130 +537,128 @@ class Model:
 
     def jacobian(
         self,
-        of: str,
+        of: str | Sequence[str],
         wrt: str | Sequence[str] = "states",
         *,
         t: float = 0.0,
         x: Sequence[float] | np.ndarray | None = None,
         parameters: Mapping[str, float] | None = None,
     ) -> np.ndarray:
-        """Derivative of the right-hand side at one time and state.
+        """Derivative of the right-hand side or of quantities at one time and state, from generated code.
 
         Parameters
         ----------
-        of : "rhs"
-        wrt : "states", "time", the name of a parameter, or several names.  Derivatives along parameters are total:
-            through the derived constants, the phases and the tables as well.  Gates are flat (they jump at edges).
+        of : "rhs", or names or patterns of quantities ("ball.force", "reaction.A.*"), whether a run reports them or
+            not; `manifest.quantities` lists them
+        wrt : "states", "time", "crank_angle" (time over speed: everything moves on but the rings), names of states or
+            parameters, or several of these.  Derivatives along parameters are total: through the derived constants,
+            the phases and the tables as well, at fixed state.  Gates are flat (they jump at edges).
         t : time [s]
         x : state.  Default: the initial one
         parameters : overrides, SI
 
         Returns
         -------
-        array, shape (states, states), (states,) for one name, (states, names) for several
+        array, shape (rows, columns); a single number as `of` has no rows, a single name as `wrt` no columns
+
+        Raises
+        ------
+        RequestError
+            Unknown names, with the nearest ones.
         """
-        if of != "rhs" or not self.has("rhs"):
-            known = ("rhs",) if self.has("rhs") else ()
-            raise RequestError(unknown_name("function to differentiate", of, known))
+        return jacobian(self, self.numbers(parameters), of, wrt, t=t, x=x)
+
+    def jacobian_function(
+        self,
+        of: str | Sequence[str],
+        wrt: str | Sequence[str] = "states",
+        *,
+        t: float = 0.0,
+        parameters: Mapping[str, float] | None = None,
+    ) -> JacobianFunction:
+        """The same, sparse and prepared for many states: ``J = model.jacobian_function("ball.force"); J(x)``."""
+        return JacobianFunction(self, self.numbers(parameters), of, wrt, t=t)
+
+    def hessian(
+        self,
+        of: str | Sequence[str],
+        wrt: tuple[str, str],
+        *,
+        t: float = 0.0,
+        x: Sequence[float] | np.ndarray | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> np.ndarray:
+        """Second derivatives by a pair of names at one time and state, shape (rows,), as for `jacobian`.
+
+        Raises
+        ------
+        RequestError
+            Unknown names, or laws without a bounded second derivative: Hertz's at contact onset.
+        """
+        return hessian(self, self.numbers(parameters), of, wrt, t=t, x=x)
+
+    def explain(self, parameters: Mapping[str, float] | None = None) -> Explanation:
+        """Breakpoints, smoothness and time scales, and the method they speak for (see `raceway.runtime.explain`)."""
+        return explain(self, parameters)
+
+    def static_equilibrium(
+        self,
+        t: float | None = None,
+        *,
+        crank_angle: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        load: tuple[float, float] | None = None,
+    ) -> StaticEquilibrium:
+        """Positions at which the rings rest under the load of one instant, everything at rest, no damping force.
+
+        Parameters
+        ----------
+        t, crank_angle : the instant: time [s], default 0, or angle of crank or shaft in the first turn [rad]
+        parameters : overrides, SI
+        load : on the inner ring, x and y [N], instead of the scene's
+
+        Warns
+        -----
+        FreeRingWarning
+            The rings can move without force along some direction: the place is one of many.
+
+        Raises
+        ------
+        RequestError
+            No bearing, or an unloaded ring in a clearance.
+        SimulationError
+            Nothing holds the rings.
+        """
+        from raceway.runtime.statics import instant, static_equilibrium  # with SciPy
+
         numbers = self.numbers(parameters)
-        time = _time(t)
-        point = self._point(numbers, time, x)
-        count = len(self.states)
-        if wrt == "states":
-            return self.kernel("rhs_jac_x")(point).reshape(count, count)
-        if wrt == "time":
-            return self.kernel("rhs_jac_t")(point).reshape(count)
-        names = [wrt] if isinstance(wrt, str) else list(wrt)
-        for name in names:
-            if name not in numbers.parameters:
-                hint = unknown_name("parameter", name, numbers.parameters)
-                raise RequestError(f"{hint} Besides parameters, wrt takes 'states' and 'time'.")
-        total = self._parameter_jacobian(numbers, time, point)
-        columns = [list(numbers.parameters).index(name) for name in names]
-        return total[:, columns[0]] if isinstance(wrt, str) else total[:, columns]
+        return static_equilibrium(self, numbers, t=instant(self, numbers, t, crank_angle), load=load)
 
-    def _parameter_jacobian(self, numbers: Numbers, time: float, point: Mapping[str, object]) -> np.ndarray:
-        """Total derivative of the right-hand side along all parameters, shape (states, parameters)."""
-        states, parameters, constants = len(self.states), len(numbers.p), len(numbers.c)
-        total = self.kernel("rhs_jac_p")(point).reshape(states, parameters)
-        along_constants = np.zeros((constants, parameters))
-        if constants:
-            along_constants = self.kernel("constants_jac")(point).reshape(constants, parameters)
-            total = total + self.kernel("rhs_jac_c")(point).reshape(states, constants) @ along_constants
-        entries = clock.input_derivatives(self.manifest.inputs, numbers.values, time)
-        if entries:
-            rows = {name: row for row, name in enumerate(numbers.parameters)}
-            chain = np.zeros((len(self.manifest.inputs), parameters))
-            for row, name, slope in entries:
-                if name in rows:
-                    chain[row, rows[name]] += slope
-                else:
-                    chain[row] += slope * along_constants[[info.name for info in self.manifest.constants].index(name)]
-            total = total + self._input_kernel()(point).reshape(states, -1) @ chain
-        return total
+    def linearize(
+        self,
+        t: float | None = None,
+        *,
+        crank_angle: float | None = None,
+        x: Sequence[float] | np.ndarray | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> Linearization:
+        """Mass, damping and stiffness matrices, natural frequencies and modes about a state.
 
-    def _input_kernel(self) -> Kernel:
-        """Derivative of the right-hand side along the inputs, made from its expression graph."""
-        if "rhs_jac_u" not in self._kernels:
-            rhs = self.symbolic("rhs")
-            name = f"jac:{rhs.name_out(0)}:u"
-            self._kernels["rhs_jac_u"] = Kernel(rhs.factory("rhs_jac_u", rhs.name_in(), [name]))
-        return self._kernels["rhs_jac_u"]
+        Parameters
+        ----------
+        t, crank_angle : the instant: time [s], default 0, or angle of crank or shaft in the first turn [rad]
+        x : state, shape (states,).  Default: static equilibrium under the load of that instant
+        parameters : overrides, SI
 
-    def _point(self, numbers: Numbers, t: float, x: Sequence[float] | np.ndarray | None) -> dict[str, object]:
-        state = (
-            np.array([numbers.values[name] for name in self.manifest.initial])
-            if x is None
-            else np.asarray(x, dtype=float)
-        )
-        if state.shape != (len(self.states),):
-            raise RequestError(
-                f"x: shape ({len(self.states)},) is expected ({', '.join(self.states)}), not {state.shape}."
-            )
-        u = clock.inputs_at(self.manifest.inputs, numbers.values, t)
-        return {"t": 0.0, "x": state, "u": u, "p": numbers.p, "c": numbers.c}
+        Warns
+        -----
+        KinkWarning
+            The damping law has no derivative at this state; the warning says which side is given.
+        """
+        from raceway.runtime.linearize import linearize  # with SciPy
+        from raceway.runtime.statics import instant, static_equilibrium
 
-    def _require(self, name: str) -> None:
-        if not self.has(name):
-            raise RequestError(unknown_name("function", name, [info.name for info in self.manifest.functions]))
-
-    def _external(self, name: str) -> casadi.Function:
-        self._require(name)
-        assert self.library is not None
-        try:
-            function = casadi.external(name, str(self.library.path))
-        except RuntimeError as fault:
-            raise CompileError(
-                f"{self.library.path}: function {name!r} cannot be loaded. "
-                f"Delete this file, and it is compiled anew.\n{fault}"
-            ) from fault
-        _check_signature(function, self.manifest)
-        return function
-
-
-def _read_functions(path: Path) -> dict[str, casadi.Function]:
-    try:
-        stored = casadi.FileDeserializer(str(path))
-        functions = [stored.unpack() for _ in range(int(stored.unpack()))]
-    except (RuntimeError, SystemError) as fault:
-        raise ArtefactError(f"{path}: no functions can be read from it. Write the folder again.\n{fault}") from fault
-    return {function.name(): function for function in functions}
-
-
-def _check_signature(function: casadi.Function, manifest: Manifest) -> None:
-    """Refuse a function whose arguments are not those of the manifest."""
-    info = manifest.function(function.name())
-    names = function.name_in()
-    for name, rows in info.inputs:
-        if name not in names or function.size1_in(name) != rows:
-            raise ArtefactError(
-                f"{function.name()}: the manifest has the argument {name} with {rows} rows, the compiled code has "
-                f"{', '.join(f'{n} ({function.size1_in(n)})' for n in names)}. Write the folder again."
-            )
-
-
-def _time(t: float) -> float:
-    value = float(t)
-    if not math.isfinite(value):
-        raise RequestError(f"t: a finite time [s] is expected, not {t!r}.")
-    return value
+        numbers = self.numbers(parameters)
+        time = instant(self, numbers, t, crank_angle)
+        state = static_equilibrium(self, numbers, t=time).x if x is None else x
+        return linearize(self, numbers, t=time, x=state, at_equilibrium=x is None)

@@ -5,10 +5,16 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from numbers import Real
+
+import numpy as np
 
 from raceway.runtime.errors import RequestError
 from raceway.runtime.manifest import Manifest, ParameterInfo
+
+#: Most characters of an unknown name that a message shows.
+LONGEST_NAME = 100
 
 
 class Parameters(Mapping[str, float]):
@@ -51,6 +57,16 @@ class Parameters(Mapping[str, float]):
         return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Numbers:
+    """The numbers of one run: parameters and constants, as vectors and by name."""
+
+    parameters: Parameters
+    p: np.ndarray
+    c: np.ndarray
+    values: dict[str, float]
+
+
 def resolve_parameters(manifest: Manifest, overrides: Mapping[str, float] | None) -> Parameters:
     """Defaults with `overrides` put in.
 
@@ -75,7 +91,8 @@ def resolve_parameters(manifest: Manifest, overrides: Mapping[str, float] | None
             continue
         number = scalar(value)
         if number is None:
-            faults.append(f"{name}: one number in {units[name]} is expected, not {value!r} ({type(value).__name__})")
+            what = f"{value!r:.200} ({type(value).__name__})"
+            faults.append(f"{name}: one number in {units[name]} is expected, not {what}")
         elif not math.isfinite(number):
             faults.append(f"{name}: a finite number in {units[name]} is expected, not {number!r}")
         else:
@@ -90,13 +107,31 @@ def scalar(value: object) -> float | None:
     if getattr(value, "shape", None) == () and hasattr(value, "item"):
         value = value.item()
     if isinstance(value, Real) and not isinstance(value, bool):
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError:  # an integer of more than 308 digits
+            return math.inf if value > 0 else -math.inf
     return None
+
+
+def real(value: object) -> float:
+    """`value` as float when it is one real number, else NaN, which lies within no bounds."""
+    number = scalar(value)
+    return math.nan if number is None else number
+
+
+def vector(value: object) -> np.ndarray:
+    """`value` as an array of numbers; one of NaN where it is none."""
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        return np.array([math.nan])
 
 
 def unknown_name(what: str, name: object, known: Iterable[str]) -> str:
     """One line: the name is unknown, the nearest ones, or all where they are few."""
     names = list(known)
+    name = name if not isinstance(name, str) or len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     near = difflib.get_close_matches(str(name), names, n=4, cutoff=0.5)
     if not near:
         # a remembered last part of the path is the commonest near miss that the ratio of difflib does not see

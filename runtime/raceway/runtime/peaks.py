@@ -14,7 +14,11 @@ import numpy as np
 from raceway.runtime import clock
 from raceway.runtime.errors import RequestError
 from raceway.runtime.integrators import GRID
-from raceway.runtime.simulate import Cost, Interrupted, Numbers, evaluate_outputs, fill, start_trajectory
+from raceway.runtime.parameters import Numbers
+from raceway.runtime.quasi_static import NAME as QUASI_STATIC
+from raceway.runtime.simulate import fill
+from raceway.runtime.stepping import Cost
+from raceway.runtime.trajectory import Interrupted, evaluate_outputs, start_trajectory
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -99,17 +103,19 @@ def _closely(
     begin, end = float(solution.t[low]), float(solution.t[high])
     count = GRID * (high - low)
     times = begin + (end - begin) * (np.arange(count + 1) / count)
-    trajectory = start_trajectory(times, solution.x[low], len(model.manifest.inputs))
+    turn = clock.period(model.manifest, numbers.values)
+    trajectory = start_trajectory(model, numbers, times, solution.x[low], (begin, end), turn, even=True)
     statistics = solution.statistics
     tolerance = statistics.rtol * np.array(statistics.magnitudes)
-    turn = clock.period(model.manifest, numbers.values)
     try:
-        fill(model, numbers, statistics.method, tolerance, trajectory, turn, Cost())
+        fill(model, numbers, statistics.method, tolerance, trajectory, Cost())
     except Interrupted as end_of_run:
         raise RequestError(
             f"The peak of {name!r} near t = {begin:g} s cannot be refined: {end_of_run.status.value} "
             "Is the solution one of this model?"
         ) from end_of_run
-    fine = sign * evaluate_outputs(model, numbers, trajectory)[name].reshape(count + 1, -1)
+    at_rest = statistics.method == QUASI_STATIC
+    found = evaluate_outputs(model, numbers, trajectory, (name,), lean=False, at_rest=at_rest)
+    fine = sign * found[name].reshape(count + 1, -1)
     row, column = divmod(int(np.argmax(fine)), fine.shape[1])
     return float(fine[row, column]), float(times[row]), column

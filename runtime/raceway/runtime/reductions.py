@@ -22,19 +22,26 @@ import numpy as np
 from raceway.runtime import clock
 from raceway.runtime.ensemble_driver import BALL_CHANNELS, HEAD, ROWS, EnsembleDriver
 from raceway.runtime.errors import RequestError, SimulationError
+from raceway.runtime.magnitudes import stepper_magnitudes
 from raceway.runtime.manifest import Manifest
 from raceway.runtime.members import edge_windows
-from raceway.runtime.parameters import unknown_name
-from raceway.runtime.simulate import STATUS_OF_END, TOLERANCES, Numbers, model_scales
+from raceway.runtime.parameters import Numbers, unknown_name
+from raceway.runtime.quasi_static import NAME as QUASI_STATIC
+from raceway.runtime.quasi_static_runs import reduce_quasi_static
+from raceway.runtime.request import tolerance
 from raceway.runtime.stepper import METHODS as STEPPERS
 from raceway.runtime.stepper import End, Family, Segments
+from raceway.runtime.stepping import STATUS_OF_END
+from raceway.runtime.whereabouts import Whereabouts, whereabouts
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
 
 
 #: Steps allowed in a turn, on average, and in any run: a motion that grows without bound crawls before it overflows.
+#: Less than a single run with samples may take (`limits`): an ensemble has many members.
 STEPS_A_TURN = 100_000
+STEPS_A_SECOND = 1_000_000
 STEPS_A_RUN = 1_000_000
 
 #: Turns of a run that are looked at for the magnitudes of its states.
@@ -138,9 +145,7 @@ def check_span(duration: float, turn: float, transient: float) -> float:
 
 def check_rtol(rtol: float) -> float:
     """A tolerance that the methods can keep."""
-    if not TOLERANCES[0] <= rtol <= TOLERANCES[1]:
-        raise RequestError(f"rtol: a number from {TOLERANCES[0]:g} to {TOLERANCES[1]:g} is expected, not {rtol!r}.")
-    return rtol
+    return tolerance("rtol", rtol)
 
 
 def choose_family(asked: str) -> Family:
@@ -183,16 +188,18 @@ def reduce_run(
     """
     turn = clock.period(model.manifest, numbers.values)
     start = check_span(duration, turn, transient)
-    family = choose_family(method)
-    tolerance = (
-        check_rtol(rtol) * model_scales(model, numbers, initial, min(duration, SCALED_TURNS * turn), turn).magnitude
-    )
+    family = choose_family(method) if method != QUASI_STATIC else None
     driver = model.ensemble_driver
+    looked_at = min(duration, SCALED_TURNS * turn)
+    tolerance = check_rtol(rtol) * stepper_magnitudes(model, driver.stepper, numbers, initial, looked_at, turn)
     row = driver.reductions(1, start, channel_names(model.manifest))[0]
     state = initial.copy()
-    steps, rejected = integrate_reduced(
-        model, driver, numbers, family, tolerance, state, row, (duration, turn, start), progress=progress
-    )
+    if family is None:
+        steps, rejected = reduce_quasi_static(model, numbers, tolerance, state, row, (duration, turn, start))
+    else:
+        steps, rejected = integrate_reduced(
+            model, driver, numbers, family, tolerance, state, row, (duration, turn, start), progress=progress
+        )
     names = channel_names(model.manifest)
     return Reductions(
         channels={name: _reduction(driver, row, name) for name in names},
@@ -258,7 +265,8 @@ def integrate_reduced(
         steps += outcome.steps
         rejected += outcome.rejected
         if outcome.end is not End.DONE:
-            raise RunFailed(outcome.end, outcome.time, outcome.step)
+            place = whereabouts(model.manifest, numbers, outcome.time, state)
+            raise RunFailed(outcome.end, outcome.time, outcome.step, place)
         if progress is not None:
             progress(float(edges[-1]) / duration)
         if stop is not None and stop.value:
@@ -268,16 +276,18 @@ def integrate_reduced(
 
 def step_limit(duration: float, turn: float) -> int:
     """Most steps of a run, accepted and rejected."""
-    return STEPS_A_RUN + STEPS_A_TURN * math.ceil(duration / turn)
+    return STEPS_A_RUN + STEPS_A_TURN * math.ceil(duration / turn) + math.ceil(min(STEPS_A_SECOND * duration, 1e15))
 
 
 class RunFailed(SimulationError):
     """The driver could not reach the end of a run."""
 
-    def __init__(self, end: End, time: float, step: float) -> None:
-        self.end, self.time, self.step = end, time, step
+    def __init__(self, end: End, time: float, step: float, place: Whereabouts | None = None) -> None:
+        self.end, self.time, self.step, self.place = end, time, step, place
         self.status = STATUS_OF_END[end]
-        super().__init__(f"{self.status.value}\nt = {time:.9g} s, step size {step:.3g} s.")
+        angle = f", crank angle {math.degrees(place.crank_angle):.4f} deg" if place is not None else ""
+        words = f" {place.words}" if place is not None else ""
+        super().__init__(f"{self.status.value}\nt = {time:.9g} s{angle}, step size {step:.3g} s.{words}".rstrip())
 
 
 def _reduction(driver: EnsembleDriver, row: np.ndarray, channel: str) -> Reduction:

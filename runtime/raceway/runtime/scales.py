@@ -8,10 +8,15 @@ moments that load it most:
 2. At each, the positions of static equilibrium are found by pseudo-transient continuation,
    ``q += (I / tau - J)^-1 a(q)`` with tau growing while the residual falls.  Where nothing touches (J = 0) this is a
    walk along the force, and where something does it is Newton's method.  (Kelley and Keyes, SIAM J. Numer. Anal. 35
-   (1998) 508, doi:10.1137/S0036142996304796.)
+   (1998) 508, doi:10.1137/S0036142996304796.)  What has to fall is the residual of the accelerations; where that
+   gets stuck, that of the forces: a ring of a milligramme has enormous accelerations on the way.  The walk ends where
+   both rings have gone too far for the distance between them to be told: nothing holds them, but the balls between
+   them have found their deflection.
 3. Position magnitude: the largest coordinate among these equilibria and the initial state; for a bearing, half the
-   clearance and the deflection.  Velocity magnitude: ``sqrt(acceleration x position)``, the speed gained on falling
-   through that distance; for a linear oscillator, amplitude times natural frequency.
+   clearance and the deflection.  At most `SOFT` times the largest distance of the two rings' centres: in a soft
+   housing both move far, and the balls feel the small difference.  Velocity magnitude: ``sqrt(acceleration x
+   position)``, the speed gained on falling through that distance; for a linear oscillator, amplitude times natural
+   frequency.
 4. Stiffness: eigenvalues of the Jacobian at those equilibria, at rest and moving in each direction (laws that damp
    one way only show their damping only then).
 """
@@ -29,6 +34,12 @@ LOADED_MOMENTS = 3
 
 #: Most iterations of the continuation for one equilibrium.
 ITERATIONS = 80
+
+#: Largest coordinate over the distance between the rings' centres at which that distance still has digits [1].
+FAR = 1e9
+
+#: Most that a position's magnitude may be of the distance between the rings' centres [1].
+SOFT = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +70,12 @@ Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def find_scales(
-    rhs: Field, jacobian: Field, inputs: Sequence[np.ndarray], initial: np.ndarray, horizon: float
+    rhs: Field,
+    jacobian: Field,
+    inputs: Sequence[np.ndarray],
+    initial: np.ndarray,
+    horizon: float,
+    masses: Sequence[float] | None = None,
 ) -> Scales:
     """Magnitudes and stiffness of a model of positions followed by velocities.
 
@@ -69,19 +85,44 @@ def find_scales(
     inputs : inputs at moments spread over the run
     initial : state at the start, shape (states,)
     horizon : a turn, or the run [s]; bounds the travel of a body that nothing holds
+    masses : of the coordinates [kg].  Default: equal ones
     """
+    # numbers that overflow end a search or a run further down, with words
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _find_scales(rhs, jacobian, inputs, initial, horizon, masses)
+
+
+def _find_scales(
+    rhs: Field,
+    jacobian: Field,
+    inputs: Sequence[np.ndarray],
+    initial: np.ndarray,
+    horizon: float,
+    masses: Sequence[float] | None,
+) -> Scales:
     half = len(initial) // 2
     rest = np.concatenate([initial[:half], np.zeros(half)])
     accelerations = np.array([np.max(np.abs(rhs(u, rest)[half:])) for u in inputs])
     accelerations[~np.isfinite(accelerations)] = 0.0
     order = np.argsort(-accelerations, kind="stable")[:LOADED_MOMENTS]
     acceleration = float(accelerations[order[0]])
-    loaded = [(inputs[k], _equilibrium(rhs, jacobian, inputs[k], rest)) for k in order]
+    # what a body travels in the time at hand where nothing holds it
+    reach = acceleration * (horizon / (2.0 * math.pi)) ** 2
+    weights = np.ones(half) if masses is None else np.array(masses, dtype=float)
+    loaded = []
+    for k in order:
+        end = _equilibrium(rhs, jacobian, inputs[k], rest, np.ones(half))
+        if end is None:
+            end = _equilibrium(rhs, jacobian, inputs[k], rest, weights)
+        loaded.append((inputs[k], *(end or (rest, False))))
 
-    travel = [float(np.max(np.abs(x[:half]))) for _, x in loaded if x is not None]
-    if not travel and acceleration > 0.0:  # nothing holds the body: what it travels in the time at hand
-        travel = [acceleration * (horizon / (2.0 * math.pi)) ** 2]
+    travel = [float(np.max(np.abs(x[:half]))) for _, x, held in loaded if held]
+    if not travel and acceleration > 0.0:
+        travel = [reach]
     position = max([*travel, float(np.max(np.abs(initial[:half])))])
+    apart = max(_apart(x) for x in (initial, *(x for _, x, _ in loaded)))
+    if apart > 0.0:
+        position = min(position, SOFT * apart)
     speed = max(math.sqrt(acceleration * position), float(np.max(np.abs(initial[half:]))))
     # a model at rest without load: any magnitude will do
     position = position or speed * horizon / (2.0 * math.pi) or 1.0
@@ -89,8 +130,7 @@ def find_scales(
     magnitude = np.concatenate([np.full(half, position), np.full(half, speed)])
 
     decay = frequency = 0.0
-    for u, x in loaded:
-        base = rest if x is None else x
+    for u, base, _ in loaded:
         for kick in (np.zeros(half), *(sign * speed * unit for unit in np.eye(half) for sign in (1.0, -1.0))):
             matrix = jacobian(u, base + np.concatenate([np.zeros(half), kick]))
             if not np.all(np.isfinite(matrix)):
@@ -101,28 +141,43 @@ def find_scales(
     return Scales(magnitude=magnitude, decay=decay, frequency=frequency)
 
 
-def _equilibrium(rhs: Field, jacobian: Field, u: np.ndarray, start: np.ndarray) -> np.ndarray | None:
-    """State at rest with vanishing acceleration, or None when the continuation finds none."""
+def _apart(x: np.ndarray) -> float:
+    """Distance between the centres of the rings, the larger component; of one ring to the fixed other [m]."""
+    return float(np.max(np.abs(x[:2] - x[2:4]))) if len(x) == 8 else float(np.max(np.abs(x[: len(x) // 2])))
+
+
+def _equilibrium(
+    rhs: Field, jacobian: Field, u: np.ndarray, start: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, bool] | None:
+    """State at rest with vanishing acceleration, True; or where both rings got to as nothing holds them, False.
+
+    None when the continuation gets nowhere.
+    """
     half = len(start) // 2
     x = start.copy()
     force = rhs(u, x)[half:]
-    size = first = float(np.linalg.norm(force))
+    size = first = float(np.linalg.norm(weights * force))
     if size == 0.0:
-        return x
+        return x, True
     # the first step moves by a nanometre (or a nano of what else is moved): well inside any clearance
-    tau = 1e-9 * (1.0 + float(np.max(np.abs(x[:half])))) / size
+    tau = 1e-9 * (1.0 + float(np.max(np.abs(x[:half])))) / float(np.linalg.norm(force))
     for _ in range(ITERATIONS):
         stiffness = jacobian(u, x)[half:, :half]
         trial = x.copy()
-        trial[:half] += np.linalg.solve(np.eye(half) / tau - stiffness, force)
+        try:
+            trial[:half] += np.linalg.solve(np.eye(half) / tau - stiffness, force)
+        except np.linalg.LinAlgError:
+            return None
         force_there = rhs(u, trial)[half:]
-        size_there = float(np.linalg.norm(force_there))
+        size_there = float(np.linalg.norm(weights * force_there))
         if not math.isfinite(size_there) or size_there > 1.5 * size:
             tau /= 8.0
             continue
+        if float(np.max(np.abs(trial[:half]))) > FAR * _apart(trial):
+            return x, False
         x, force = trial, force_there
         tau *= 4.0 * min(max(size / size_there if size_there else 1.0, 1.0), 16.0)
         size = size_there
         if size <= 1e-6 * first:
-            return x
+            return x, True
     return None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 import os
 import tempfile
@@ -22,6 +24,12 @@ if TYPE_CHECKING:
 
 #: Number of the layout of saved files.
 FILE_SCHEMA = 1
+
+#: What stands behind the data of a saved file, which HDF5 does not look at: the digest of all bytes before it.  The
+#: HDF5 library may end the process, or give other numbers, where bytes of a file have changed; so they are checked
+#: first.
+_SEAL = b"\nraceway sha256 "
+_SEAL_LENGTH = len(_SEAL) + 64 + 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +67,7 @@ class Solution:
 
     Attributes
     ----------
-    t : times, shape (samples,) [s]
+    t : times, increasing, not always evenly spaced, shape (samples,) [s]
     x : states, shape (samples, states), in the order of the manifest
     outputs : output name to samples; at a breakpoint, the value behind it
     parameters, constants : numbers of the run by name
@@ -94,7 +102,9 @@ class Solution:
         if name in names:
             return self.x[:, names.index(name)]
         hint = unknown_name("output or state", name, dict.fromkeys((*self.outputs, *names)))
-        raise RequestError(f"{hint} The scene's run.outputs says which outputs are computed.")
+        raise RequestError(
+            f"{hint} The scene's run.outputs says which outputs there are, and simulate(outputs=...) which are kept."
+        )
 
     def __contains__(self, name: object) -> bool:
         return name in self.outputs or name in self.states
@@ -173,7 +183,7 @@ class Solution:
         Raises
         ------
         RequestError
-            The folder does not exist or cannot be written.
+            The folder does not exist or cannot be written, or the disk is full.
         """
         target = Path(path)
         try:
@@ -184,11 +194,21 @@ class Solution:
             ) from fault
         os.close(descriptor)
         try:
-            self.to_xarray().to_netcdf(temporary, engine="h5netcdf")
+            # in memory first: a disk that is full fails in one plain write, not somewhere within HDF5
+            content = bytes(self.to_xarray().to_netcdf(engine="h5netcdf"))
+            with open(temporary, "wb") as stream:
+                stream.write(content)
+                stream.write(_SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n")
             mask = os.umask(0)
             os.umask(mask)
             os.chmod(temporary, 0o666 & ~mask)
             os.replace(temporary, target)
+        except OSError as fault:
+            Path(temporary).unlink(missing_ok=True)
+            raise RequestError(
+                f"{target}: cannot be written ({fault.strerror or fault}); a file that was there is as it was. Free "
+                "some space, or give another folder."
+            ) from fault
         except BaseException:
             Path(temporary).unlink(missing_ok=True)
             raise
@@ -201,22 +221,39 @@ def load_solution(path: str | Path) -> Solution:
     Raises
     ------
     RequestError
-        There is no such file, or it is none of ours.
+        There is no such file, it is none of ours, or it was cut short or edited.
     """
+    try:
+        content = Path(path).read_bytes()
+    except FileNotFoundError:
+        raise RequestError(f"{path}: there is no such file. `Solution.save` and `raceway run` write one.") from None
+    except (OSError, ValueError) as fault:  # a folder, no permission; no path
+        raise RequestError(
+            f"{path}: cannot be read ({getattr(fault, 'strerror', None) or fault}). A file that `Solution.save` or "
+            "`raceway run` wrote is expected."
+        ) from None
+    inner, seal = content[:-_SEAL_LENGTH], content[-_SEAL_LENGTH:]
+    if seal != _SEAL + hashlib.sha256(inner).hexdigest().encode() + b"\n":
+        ours = content.startswith(b"\x89HDF")
+        what = "the digest at its end does not fit its content" if ours else "not a NetCDF-4 file"
+        raise RequestError(
+            f"{path}: {what}: cut short, edited, or written by something else than `Solution.save` of this version. "
+            "Give a file that it wrote, or run the scene again."
+        )
+    return _read(path, inner)
+
+
+def _read(path: str | Path, content: bytes) -> Solution:
+    """Solution from the bytes of a file that nobody has touched."""
     import xarray
 
-    if not Path(path).is_file():
-        raise RequestError(f"{path}: there is no such file. `Solution.save` and `raceway run` write one.")
-    try:
-        with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as stored:
-            dataset = stored.load()
-    except (OSError, ValueError) as fault:
-        raise RequestError(f"{path}: not a NetCDF-4 file ({fault}).") from fault
+    with xarray.open_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False) as stored:
+        dataset = stored.load()
     facts = dataset.attrs
     schema = facts.get("raceway_schema")
     if schema is None or int(schema) != FILE_SCHEMA:
         raise RequestError(
-            f"{path}: layout {schema!r} was found, this version reads layout {FILE_SCHEMA} written by `Solution.save`."
+            f"{path}: layout {schema!r} was found, this version reads layout {FILE_SCHEMA}. Run the scene again."
         )
     manifest = Manifest.from_json(facts["raceway_manifest"], source=f"{path}, manifest")
     statistics = json.loads(facts["raceway_statistics"])

@@ -32,6 +32,15 @@ class Status(Enum):
         "The integrator could not go on: the tolerance asks for steps too small or too many. "
         'Try method="rosenbrock" for a stiff model, a looser rtol, or check initial state and parameters.'
     )
+    NO_EQUILIBRIUM = (
+        "The quasi-static model finds no position of the rings that balances the load at this instant. Check load, "
+        "stiffness and clearance, or take the model with inertia: method stepper."
+    )
+    FREE_RING = (
+        "The quasi-static model has no single answer at this instant: nothing holds a ring in some direction, because "
+        "the load vanishes or a single ball carries it. Inertia decides there: take method stepper; or preload the "
+        "bearing (a negative clearance), or move bearing.ball_angle off the load line."
+    )
 
 
 class IntegrationError(SimulationError):
@@ -42,11 +51,20 @@ class IntegrationError(SimulationError):
     status : why
     time : how far it came [s]
     crank_angle : angle of driver or shaft at that time [rad]
+    ball : the ball with the largest deflection then, counted from 1; None where there is none
     partial : the samples up to that time
     """
 
     def __init__(
-        self, status: Status, *, time: float, crank_angle: float, method: str, detail: str, partial: Solution
+        self,
+        status: Status,
+        *,
+        time: float,
+        crank_angle: float,
+        method: str,
+        detail: str,
+        partial: Solution,
+        ball: int | None = None,
     ) -> None:
         degrees = crank_angle * 57.29577951308232
         super().__init__(
@@ -56,4 +74,5 @@ class IntegrationError(SimulationError):
         self.status = status
         self.time = time
         self.crank_angle = crank_angle
+        self.ball = ball
         self.partial = partial

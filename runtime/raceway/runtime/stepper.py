@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
@@ -29,8 +28,9 @@ HEADERS = ("kernels.h", "methods.h", "tangents.h")
 #: Packing scalars of short dependent chains costs more than it saves.
 FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd", "-fno-tree-slp-vectorize")
 
-#: Most steps of a run, accepted and rejected.
-MAX_STEPS = 1_000_000_000
+#: Most steps of a call, accepted and rejected, unless the caller says otherwise: some seconds, during which the
+#: interpreter is deaf to an interrupt.
+MAX_STEPS = 20_000_000
 
 
 class Family(IntEnum):
@@ -70,21 +70,16 @@ class _Options(ctypes.Structure):
         ("first_step", ctypes.c_double),
         ("smallest_step", ctypes.c_double),
         ("largest_step", ctypes.c_double),
-        ("tolerance", ctypes.POINTER(ctypes.c_double)),
-        ("reduction", ctypes.POINTER(ctypes.c_double)),
+        ("tolerance", ctypes.c_void_p),
+        ("reduction", ctypes.c_void_p),
     )
 
 
 class _Tangents(ctypes.Structure):
     _fields_ = (
         ("blocks", ctypes.c_long),
-        ("p", ctypes.POINTER(ctypes.c_double)),
-        ("c", ctypes.POINTER(ctypes.c_double)),
-        ("u", ctypes.POINTER(ctypes.c_double)),
-        ("shift", ctypes.POINTER(ctypes.c_double)),
-        ("x", ctypes.POINTER(ctypes.c_double)),
-        ("outputs", ctypes.POINTER(ctypes.c_double)),
-        ("work", ctypes.c_void_p),
+        *((name, ctypes.c_void_p) for name in ("p", "c", "u", "shift", "x", "outputs", "work", "weight")),
+        ("rtol", ctypes.c_double),
     )
 
 
@@ -163,6 +158,9 @@ class Tangents:
     shift : of the time at which each segment starts, shape (segments, blocks, lanes) [s]
     x : of the states at the start, on return at the end, shape (blocks, states, lanes)
     outputs : filled with those at the output times, shape (outputs, blocks, states, lanes)
+    weight, rtol : where the derivatives take part in the choice of step sizes, 1 / error allowed in a step, shape
+        (blocks, states, lanes), zero for directions that do not count, and the relative tolerance that is in it; a
+        derivative that outgrows 1 / (rtol weight) is followed relative to its size
     """
 
     p: np.ndarray
@@ -171,6 +169,8 @@ class Tangents:
     shift: np.ndarray
     x: np.ndarray
     outputs: np.ndarray
+    weight: np.ndarray | None = None
+    rtol: float = 0.0
 
 
 def compile_stepper(
@@ -222,11 +222,15 @@ class Stepper:
         self._code = code
         self._run = code.raceway_run
         self._run.restype = ctypes.c_int
-        real, long = ctypes.POINTER(ctypes.c_double), ctypes.c_long
+        # addresses as numbers: making typed pointers would take as long as a hundred steps
+        address, long = ctypes.c_void_p, ctypes.c_long
         self._run.argtypes = (
-            *(ctypes.POINTER(_Options), real, real, real, long, real, real, ctypes.POINTER(ctypes.c_ubyte)),
-            *(long, real, real, ctypes.POINTER(_Result)),
+            *(ctypes.POINTER(_Options), address, address, address, long, address, address, address),
+            *(long, address, address, ctypes.POINTER(_Result)),
         )
+        self._magnitudes = code.raceway_magnitudes
+        self._magnitudes.restype = None
+        self._magnitudes.argtypes = (address, address, address, long, address, ctypes.c_double, address)
 
     def run(
         self,
@@ -259,32 +263,24 @@ class Stepper:
         reduction : row of on-line reductions to add to; the library must have been compiled with reductions
         """
         inputs = segments.inputs if segments.inputs.shape[1] else np.zeros((len(segments.inputs), self._inputs))
-        arrays = {
-            "tolerance": tolerance,
-            "p": p,
-            "c": c,
-            "x": x,
-            "times": segments.times,
-            "inputs": inputs,
-            "output_times": output_times,
-        }
-        pointers = {name: _pointer(name, array) for name, array in arrays.items()}
         restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
         reduced = None if reduction is None else _pointer("reduction", reduction)
-        options = _Options(family, max_steps, first_step, smallest_step, largest_step, pointers["tolerance"], reduced)
+        options = _Options(
+            *(family, max_steps, first_step, smallest_step, largest_step, _pointer("tolerance", tolerance), reduced)
+        )
         result = _Result()
         call = self._run if tangents is None else self._differentiated(tangents)
         call(
             ctypes.byref(options),
-            pointers["p"],
-            pointers["c"],
-            pointers["x"],
+            _pointer("p", p),
+            _pointer("c", c),
+            _pointer("x", x),
             len(restarts),
-            pointers["times"],
-            pointers["inputs"],
-            restarts.ctypes.data_as(ctypes.POINTER(ctypes.c_ubyte)),
+            _pointer("times", segments.times),
+            _pointer("inputs", inputs),
+            restarts.ctypes.data,
             len(output_times),
-            pointers["output_times"],
+            _pointer("output_times", output_times),
             None if output_states is None else _pointer("output_states", output_states),
             ctypes.byref(result),
         )
@@ -303,6 +299,29 @@ class Stepper:
             step=result.step,
         )
 
+    def magnitudes(
+        self, p: np.ndarray, c: np.ndarray, initial: np.ndarray, inputs: np.ndarray, horizon: float
+    ) -> np.ndarray:
+        """Magnitudes of the states of a run (see `raceway.runtime.scales`), shape (states,).
+
+        Parameters
+        ----------
+        initial : state at the start, shape (states,)
+        inputs : inputs at moments spread over the run, shape (moments, inputs)
+        horizon : a turn, or the run [s]
+        """
+        # C knows no arrays without entries
+        padded = inputs if inputs.shape[1] else np.zeros((len(inputs), self._inputs))
+        found = np.empty_like(initial)
+        self._magnitudes(
+            *(_pointer(name, array) for name, array in (("p", p), ("c", c), ("initial", initial))),
+            len(padded),
+            _pointer("inputs", padded),
+            horizon,
+            _pointer("found", found),
+        )
+        return found
+
     def _differentiated(self, tangents: Tangents) -> Callable[..., int]:
         """The driver's call with derivatives, the directions bound."""
         fields = ("p", "c", "u", "shift", "x", "outputs")
@@ -310,24 +329,24 @@ class Stepper:
         blocks = len(tangents.x)
         self._code.raceway_tangent_work.restype = ctypes.c_long
         work = np.empty(self._code.raceway_tangent_work(ctypes.c_long(blocks)) // 8 + 8)
-        bound = _Tangents(blocks=blocks, work=work.ctypes.data, **pointers)
+        weight = None if tangents.weight is None else _pointer("weight", tangents.weight)
+        bound = _Tangents(blocks=blocks, work=work.ctypes.data, weight=weight, rtol=tangents.rtol, **pointers)
         run = self._code.raceway_run_tangents
         run.restype = ctypes.c_int
+        run.argtypes = (*self._run.argtypes[:-1], ctypes.POINTER(_Tangents), self._run.argtypes[-1])
 
         def call(*arguments: object) -> int:
             *given, result = arguments
-            options, p, c, x, segments, times, inputs, restarts, outputs, output_times, output_states = given
-            done: int = run(
-                *(options, p, c, x, ctypes.c_long(cast("int", segments)), times, inputs, restarts),
-                *(ctypes.c_long(cast("int", outputs)), output_times, output_states, ctypes.byref(bound), result),
-            )
+            done: int = run(*given, ctypes.byref(bound), result)
             assert work.size  # the driver's memory lives until here
             return done
 
         return call
 
 
-def _pointer(name: str, array: np.ndarray) -> ctypes._Pointer[ctypes.c_double]:
+def _pointer(name: str, array: np.ndarray) -> int:
+    """Address of an array's numbers; the array must outlive its use."""
     if array.dtype != np.float64 or not array.flags.c_contiguous:
         raise TypeError(f"{name}: a C-contiguous array of float64 is expected, not {array.dtype}, {array.flags}")
-    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+    address: int = array.ctypes.data
+    return address

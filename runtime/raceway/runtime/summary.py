@@ -20,6 +20,7 @@ from rich import box
 from rich.table import Table
 
 from raceway.runtime.clock import breakpoints
+from raceway.runtime.conditioning import conditioning, has_reactions
 from raceway.runtime.errors import SimulationError
 from raceway.runtime.observables import drive_work, kinematic_frequencies, statistics, turns
 
@@ -52,6 +53,9 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
         ``{"min": , "max": , "unit": }``
     ``drive_work``
         work of the drive in a turn, mean over the steady turns: ``{"value": , "unit": "J"}``
+    ``reaction_condition``
+        largest condition number of the matrix of Eq. (1) in a turn (see `raceway.runtime.conditioning`):
+        ``{"unscaled": , "scaled": , "unit": "1"}``; beside them ``crank_angle`` with the same two keys and a unit
     ``peak_ball_force``
         highest force of any ball, also between samples: ``{"elastic": , "total": , "unit": "N"}``; beside them, with
         the same two keys and a unit each, ``time`` and ``ball`` of the peak (balls are counted from 1), and
@@ -89,6 +93,7 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
         summary["cycle_length"] = _value(steady.cycle_length, "s", "cycle_length")
         summary["steady_cycles"] = _value((steady.t[-1] - steady.t[0]) / steady.cycle_length, "1", "steady_cycles")
     summary |= _forces(model, steady)
+    summary |= _conditioning(model, steady)
     summary |= _balls(model, steady)
     summary |= _motions(steady)
     summary |= _constants(steady)
@@ -100,7 +105,7 @@ def _forces(model: Model, sol: Solution) -> dict[str, Any]:
     """Extremes of reactions, load and drive torque; the work of the drive."""
     found: dict[str, Any] = {}
     for info in sol.manifest.outputs:
-        if info.name.startswith(("reaction.", "load.")) or info.name == "drive_torque":
+        if info.name in sol.outputs and (info.name.startswith(("reaction.", "load.")) or info.name == "drive_torque"):
             found[info.name] = {
                 "min": _extreme(model, sol, info.name, "min"),
                 "max": _extreme(model, sol, info.name, "max"),
@@ -119,6 +124,16 @@ def _forces(model: Model, sol: Solution) -> dict[str, Any]:
         )
         found["drive_work"] = _value(np.mean(work), "J", "drive_torque")
     return found
+
+
+def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:
+    """Condition numbers of Eq. (1) over a turn; warns where they pass a bound."""
+    if not has_reactions(model):
+        return {}
+    found = conditioning(model, model.numbers(sol.parameters))
+    angles = {"unscaled": found.unscaled_angle, "scaled": found.scaled_angle, "unit": "rad"}
+    conditions = {"unscaled": found.unscaled, "scaled": found.scaled, "unit": "1", "crank_angle": angles}
+    return {"reaction_condition": conditions}
 
 
 def _extreme(model: Model, sol: Solution, name: str, kind: Literal["min", "max"]) -> float:
@@ -146,7 +161,7 @@ def _motions(sol: Solution) -> dict[str, Any]:
     units = {info.name: info.unit for info in (*sol.manifest.states, *sol.manifest.outputs)}
     found: dict[str, Any] = {}
     for name in _MOTIONS:
-        if name in units:
+        if name in sol:
             values = statistics(sol.t, sol[name])
             found[name] = {
                 "min": _finite(values.minimum, name),

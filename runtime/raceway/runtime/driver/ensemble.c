@@ -81,8 +81,11 @@ static rw_numbers member_numbers(const rw_job *job, long m)
 static double member_end(const rw_job *job, long m) { return job->times[job->first[m] + m + job->results[m].segment + 1]; }
 static double member_start(const rw_job *job, long m) { return job->times[job->first[m] + m + job->results[m].segment]; }
 
+/* Of time within the member's segment [s]: see run_segment in stepper.c. */
+static double member_resolution(const rw_job *job, long m) { return DBL_EPSILON * fmax(fabs(member_start(job, m)), fabs(member_end(job, m))); }
+
 /* Decide method and step size where a segment begins. */
-static void begin_segment(const rw_job *job, long m)
+static void choose_start(const rw_job *job, long m)
 {
     rw_member *at = job->member + m;
     raceway_result *result = job->results + m;
@@ -107,6 +110,14 @@ static void begin_segment(const rw_job *job, long m)
     result->evaluations += 2;
 }
 
+/* The same, with a step that moves the time: slopes that overflow give an estimate of zero, or none. */
+static void begin_segment(const rw_job *job, long m)
+{
+    choose_start(job, m);
+    const double least = 2.0 * member_resolution(job, m);
+    if (!(job->member[m].step > least)) job->member[m].step = least;
+}
+
 /* Put a member whose segment has begun into a lane, all that depends on the segment included. */
 static void enter_segment(const rw_job *job, rw_block *b, int lane)
 {
@@ -118,7 +129,7 @@ static void enter_segment(const rw_job *job, rw_block *b, int lane)
     put(b->u, lane, n.u, RW_NU);
     b->start[lane] = member_start(job, m);
     b->length[lane] = member_end(job, m) - b->start[lane];
-    b->resolution[lane] = DBL_EPSILON * fmax(fabs(b->start[lane]), fabs(member_end(job, m)));
+    b->resolution[lane] = member_resolution(job, m);
     b->t[lane] = at->t;
     b->step[lane] = at->step;
     b->log_error[lane] = at->log_error;
@@ -299,13 +310,16 @@ static void judge(rw_block *b, int changeable)
 {
     const double exponent = 1.0 / (b->linearly ? rw_rodas5p.error_exponent : rw_dp54.error_exponent);
     const double log_least = -23.025850929940457; /* of 1e-10 */
-    double finite[RW_L] RW_ALIGNED, fine[RW_L] RW_ALIGNED, bounded[RW_L] RW_ALIGNED, log_error[RW_L] RW_ALIGNED;
+    double beyond[RW_L] RW_ALIGNED, fine[RW_L] RW_ALIGNED, bounded[RW_L] RW_ALIGNED, log_error[RW_L] RW_ALIGNED;
     double grow[RW_L] RW_ALIGNED, shrink[RW_L] RW_ALIGNED, log_grow[RW_L] RW_ALIGNED, log_shrink[RW_L] RW_ALIGNED;
-    RW_EACH_LANE finite[lane] = 0.0;
-    for (int k = 0; k < RW_NX; k++) RW_EACH_LANE finite[lane] += b->next[k * RW_L + lane] * 0.0;
+    /* states beyond reach: no number, or so large that the tolerance is below their rounding (within_reach in stepper.c).  A comparison
+       with what is no number is false */
+    RW_EACH_LANE beyond[lane] = 0.0;
+    for (int k = 0; k < RW_NX; k++)
+        RW_EACH_LANE beyond[lane] += fabs(b->next[k * RW_L + lane]) * b->weight[k * RW_L + lane] <= 1.0 / DBL_EPSILON ? 0.0 : 1.0;
     RW_EACH_LANE {
-        /* a comparison with what is no number is false */
-        fine[lane] = b->error[lane] <= DBL_MAX && finite[lane] == 0.0 ? 1.0 : 0.0;
+        /* whether the error says by how much to shrink */
+        fine[lane] = b->error[lane] > 1.0 && b->error[lane] <= DBL_MAX ? 1.0 : 0.0;
         const double least = b->error[lane] > 1e-10 ? b->error[lane] : 1e-10;
         bounded[lane] = least <= DBL_MAX ? least : 1.0;
     }
@@ -319,7 +333,7 @@ static void judge(rw_block *b, int changeable)
     rw_lane_exp(log_shrink, shrink);
     RW_EACH_LANE {
         double accepted = b->error[lane] <= 1.0 ? b->active[lane] : 0.0;
-        accepted = finite[lane] == 0.0 ? accepted : 0.0;
+        accepted = beyond[lane] == 0.0 ? accepted : 0.0;
         double up = 0.9 * grow[lane];
         up = up > 6.0 ? 6.0 : up;
         up = up < 0.2 ? 0.2 : up;
@@ -339,7 +353,10 @@ static void judge(rw_block *b, int changeable)
         b->rejected_last[lane] = 1.0 - accepted;
         b->steps[lane] += accepted;
         b->rejected[lane] += b->active[lane] - accepted;
-        b->small[lane] = b->step[lane] <= b->resolution[lane] ? b->active[lane] - accepted : 0.0;
+        /* accepted steps may shrink as well: they would no longer move the time, unless the next is the last */
+        const double ahead = b->length[lane] - (b->t[lane] + b->h[lane]);
+        const double lasting = b->step[lane] * 1.0001 >= ahead ? b->active[lane] - accepted : b->active[lane];
+        b->small[lane] = b->step[lane] <= b->resolution[lane] ? lasting : 0.0;
     }
     if (changeable && !b->linearly) {
         double reach[RW_L] RW_ALIGNED;
@@ -429,7 +446,7 @@ static int settle(const rw_job *job, rw_block *b, int lane)
         leave_lane(job, b, lane, RACEWAY_DONE);
         return 1;
     }
-    if (b->stiff[lane] >= RW_STIFF_STEPS) {
+    if (b->stiff[lane] >= (double)RW_STIFF_STEPS) {
         at->method = RACEWAY_RODAS5P;
         result->switches++;
         leave_lane(job, b, lane, RACEWAY_DONE);

@@ -129,7 +129,7 @@ RW_INLINE void rw_lane_norm(const double *restrict error, const double *restrict
             const double e = error[k * RW_L + lane] * weight[k * RW_L + lane];
             norm[lane] += e * e;
         }
-    RW_EACH_LANE norm[lane] = sqrt(norm[lane] / RW_NX);
+    RW_EACH_LANE norm[lane] = sqrt(norm[lane] / (double)RW_NX);
 }
 
 /* y = x + h sum of row[j] k[j]. */

@@ -4,10 +4,14 @@
    not depend on the direction (slopes of the law, the small inverse) is computed once for all.  Where a load switches at a time that
    depends on the parameters, the derivative jumps by (rate before - rate behind) d(time)/d(parameter).
 
+   Where the caller gives tolerances for the derivatives, their embedded error takes part in the choice of the step size.  A step is
+   differentiated before it is judged; the derivatives of the state change only when it is accepted, so that a rejected one leaves no trace.
+
    Compiled in only where RACEWAY_SENSITIVITIES is defined. */
 #ifndef RACEWAY_SENSITIVITY_H
 #define RACEWAY_SENSITIVITY_H
 
+#include <float.h>
 #include <string.h>
 
 #include "explicit.h"
@@ -18,13 +22,16 @@
 /* An entry for each direction of a block. */
 typedef double rw_lanes[RW_LANES];
 
+/* The same as one value (a vector of gcc and clang), for sums that should stay in registers. */
+typedef double rw_vector __attribute__((vector_size(RW_LANES * sizeof(double)), aligned(8), may_alias));
+
 /* Work of one block of directions; the caller brings raceway_tangent_work(blocks) bytes. */
 typedef struct {
     rw_lanes k[RW_METHOD_STAGES][RW_NX]; /* derivatives of slopes or stages */
     rw_lanes next[RW_NX];
     rw_lanes dense[RW_DENSE_ROWS][RW_NX];
     rw_lanes w[RW_NW], wt[RW_NW];
-    rw_lanes A[RW_NQ * RW_NQ], B[RW_NQ * RW_NQ], at[RW_NQ], first[RW_NX];
+    rw_lanes A[RW_NQ * RW_NQ], B[RW_NQ * RW_NQ], at[RW_NQ];
 } rw_tangent_block;
 
 /* What the directions share at one state and time. */
@@ -53,27 +60,49 @@ static inline void rw_point_at(rw_point *restrict at, const rw_numbers *n, const
     at->x = x;
     at->w = w;
     rw_relative(x, n->u, n->p, n->c, w, at->r);
-    const double *restrict r = at->r, cage_cos = w[0], cage_sin = w[1];
+    const double *restrict r = at->r, *restrict p = n->p, *restrict c = n->c, cage_cos = w[0], cage_sin = w[1];
+#pragma omp simd
     for (int j = 0; j < RW_NB; j++) {
         at->co[j] = rw_cos[j] * cage_cos - rw_sin[j] * cage_sin;
         at->si[j] = rw_sin[j] * cage_cos + rw_cos[j] * cage_sin;
         at->delta[j] = r[0] + r[1] * at->co[j] + r[2] * at->si[j];
         at->rate[j] = r[3] * at->co[j] + r[4] * at->si[j];
-        rw_law_slopes(at->delta[j], at->rate[j], n->p, n->c, &at->force[j], &at->by_delta[j], &at->by_rate[j]);
+        double force, by_delta, by_rate;
+        rw_law_slopes(at->delta[j], at->rate[j], p, c, &force, &by_delta, &by_rate);
+        at->force[j] = force;
+        at->by_delta[j] = by_delta;
+        at->by_rate[j] = by_rate;
     }
-    for (int k = 0; k < 2; k++) at->S[k] = 0.0;
-    for (int k = 0; k < 6; k++) at->G[k] = 0.0;
+    double sx = 0.0, sy = 0.0;
+#pragma omp simd reduction(+ : sx, sy)
+    for (int j = 0; j < RW_NB; j++) {
+        sx += at->force[j] * at->co[j];
+        sy += at->force[j] * at->si[j];
+    }
+    at->S[0] = sx;
+    at->S[1] = sy;
+}
+
+/* Sums of the slopes at a point, which only the linearization of a step's start asks for. */
+static inline void rw_point_slopes(rw_point *restrict at)
+{
+    double d0 = 0.0, d1 = 0.0, d2 = 0.0, v0 = 0.0, v1 = 0.0, v2 = 0.0;
+#pragma omp simd reduction(+ : d0, d1, d2, v0, v1, v2)
     for (int j = 0; j < RW_NB; j++) {
         const double co = at->co[j], si = at->si[j];
-        at->S[0] += at->force[j] * co;
-        at->S[1] += at->force[j] * si;
-        at->G[0] += at->by_delta[j] * co * co;
-        at->G[1] += at->by_delta[j] * co * si;
-        at->G[2] += at->by_delta[j] * si * si;
-        at->G[3] += at->by_rate[j] * co * co;
-        at->G[4] += at->by_rate[j] * co * si;
-        at->G[5] += at->by_rate[j] * si * si;
+        d0 += at->by_delta[j] * co * co;
+        d1 += at->by_delta[j] * co * si;
+        d2 += at->by_delta[j] * si * si;
+        v0 += at->by_rate[j] * co * co;
+        v1 += at->by_rate[j] * co * si;
+        v2 += at->by_rate[j] * si * si;
     }
+    at->G[0] = d0;
+    at->G[1] = d1;
+    at->G[2] = d2;
+    at->G[3] = v0;
+    at->G[4] = v1;
+    at->G[5] = v2;
 }
 
 /* Derivatives of deflection and rate of ball j, and of its direction. */
@@ -149,15 +178,20 @@ static inline void rw_linearize_tangent(const rw_point *restrict at, const rw_nu
 static inline void rw_combine_lanes(const double *restrict row, int count, rw_lanes k[][RW_NX], double factor,
                                     const double *restrict x, double *restrict y)
 {
-    double sum[RW_NX * RW_LANES];
-    for (int i = 0; i < RW_NX * RW_LANES; i++) sum[i] = 0.0;
+    rw_vector sum[RW_NX];
+#pragma GCC unroll 16
+    for (int i = 0; i < RW_NX; i++) sum[i] = (rw_vector){0.0};
     for (int j = 0; j < count; j++) {
         const double a = row[j];
         if (a == 0.0) continue;
-        const double *restrict slope = &k[j][0][0];
-        for (int i = 0; i < RW_NX * RW_LANES; i++) sum[i] += a * slope[i];
+        const rw_vector *slope = (const rw_vector *)&k[j][0][0];
+#pragma GCC unroll 16
+        for (int i = 0; i < RW_NX; i++) sum[i] += a * slope[i];
     }
-    for (int i = 0; i < RW_NX * RW_LANES; i++) y[i] = x[i] + factor * sum[i];
+    const rw_vector *from = (const rw_vector *)x;
+    rw_vector *to = (rw_vector *)y;
+#pragma GCC unroll 16
+    for (int i = 0; i < RW_NX; i++) to[i] = from[i] + factor * sum[i];
 }
 
 static inline double *rw_tangent_state(const raceway_tangents *tangents, long block) { return tangents->x + block * (RW_NX * RW_LANES); }
@@ -177,30 +211,86 @@ static inline void rw_explicit_tangent_start(const raceway_tangents *tangents, r
     }
 }
 
-/* Differentiate an accepted explicit step; `plain` still holds its slopes. */
-static inline void rw_explicit_tangent_step(const rw_explicit_method *restrict method, const raceway_tangents *tangents,
-                                            rw_tangent_block *restrict work, const rw_explicit *restrict plain, const rw_numbers *n,
-                                            long segment, double t, const double *restrict x, double h, const double *restrict next)
+/* What the directions share at all stages of a step. */
+typedef struct {
+    double w[RW_METHOD_STAGES][RW_NW], y[RW_METHOD_STAGES][RW_NX];
+    rw_point at[RW_METHOD_STAGES];
+} rw_step_points;
+
+/* Differentiate an explicit step that was tried; `plain` still holds its slopes.  Block after block, so that one block's numbers stay near
+   the processor; what the blocks share is made beforehand. */
+static inline __attribute__((always_inline)) void rw_explicit_tangent_step(const rw_explicit_method *restrict method, const int stages,
+                                                                            const raceway_tangents *tangents,
+                                                                            rw_tangent_block *restrict work,
+                                                                            const rw_explicit *restrict plain, const rw_numbers *n,
+                                                                            long segment, double t, const double *restrict x, double h,
+                                                                            const double *restrict next)
 {
-    for (int i = 1; i <= method->stages; i++) {
-        const int end = i == method->stages;
-        const double time = t + (end ? 1.0 : method->nodes[i]) * h;
-        const double *row = end ? method->weights : method->a[i];
-        double w[RW_NW], y[RW_NX];
-        rw_point at;
-        rw_stage(time, n->u, n->p, n->c, w);
-        if (end) memcpy(y, next, sizeof y);
-        else rw_combine(row, i, (const double(*)[RW_NX])plain->k, h, x, y);
-        rw_point_at(&at, n, w, y);
-        for (long b = 0; b < tangents->blocks; b++) {
-            const rw_direction d = rw_direction_of(tangents, segment, b);
+    rw_step_points points;
+    rw_stages(n, t, h, method->nodes + 1, stages - 1, points.w);
+    for (int i = 1; i <= stages; i++) {
+        const int end = i == stages;
+        double *restrict y = points.y[i];
+        if (end) memcpy(y, next, sizeof points.y[i]);
+        else rw_combine(method->a[i], i, (const double(*)[RW_NX])plain->k, h, x, y);
+        rw_point_at(&points.at[i], n, points.w[end ? stages - 2 : i - 1], y); /* the last stage is at the step's end as well */
+    }
+    for (long b = 0; b < tangents->blocks; b++) {
+        const rw_direction d = rw_direction_of(tangents, segment, b);
+        rw_tangent_block *restrict own = &work[b];
+        for (int i = 1; i <= stages; i++) {
+            const int end = i == stages;
             double moved[RW_NX * RW_LANES];
-            rw_stage_tangent_lanes(time, n->u, n->p, n->c, d.u, d.p, d.c, &work[b].w[0][0]);
-            rw_combine_lanes(row, i, work[b].k, h, rw_tangent_state(tangents, b), moved);
-            rw_rate_tangent(&at, n, &d, &work[b].w[0][0], moved, &work[b].k[i][0][0]);
-            if (end) memcpy(work[b].next, moved, sizeof moved);
+            if (!end) rw_stage_tangent_lanes(t + method->nodes[i] * h, n->u, n->p, n->c, d.u, d.p, d.c, &own->w[0][0]);
+            rw_combine_lanes(end ? method->weights : method->a[i], i, own->k, h, rw_tangent_state(tangents, b), moved);
+            rw_rate_tangent(&points.at[i], n, &d, &own->w[0][0], moved, &own->k[i][0][0]);
+            if (end) memcpy(own->next, moved, sizeof moved);
         }
     }
+}
+
+/* Largest error over its tolerance of the directions' derivatives, each the root mean square over the states as in rw_norm.  `estimates`
+   and `share` as in rw_explicit_step; not a number where one is none.
+
+   The tolerance grows with the derivative: one that the motion multiplies a thousandfold is followed relative to its size. */
+static inline double rw_tangent_error(const raceway_tangents *tangents, const rw_tangent_block *restrict work, const double *weights[],
+                                      int estimates, const double *share, int count, double factor)
+{
+    double worst = 0.0;
+    for (long b = 0; b < tangents->blocks; b++) {
+        const double *restrict weight = tangents->weight + b * (RW_NX * RW_LANES), *restrict xd = rw_tangent_state(tangents, b);
+        double size[RW_LANES] = {0.0}, first[RW_LANES] = {0.0}, below[RW_LANES] = {0.0};
+        for (int k = 0; k < RW_NX; k++)
+            for (int l = 0; l < RW_LANES; l++) {
+                const double scaled = xd[k * RW_LANES + l] * weight[k * RW_LANES + l] * tangents->rtol;
+                size[l] += scaled * scaled / (double)RW_NX;
+            }
+        for (int m = 0; m < estimates; m++) {
+            double error[RW_NX * RW_LANES] = {0.0}, square[RW_LANES] = {0.0};
+            for (int j = 0; j < count; j++) {
+                const double e = factor * weights[m][j];
+                if (e == 0.0) continue;
+                const double *restrict slope = &work[b].k[j][0][0];
+                for (int i = 0; i < RW_NX * RW_LANES; i++) error[i] += e * slope[i];
+            }
+            for (int k = 0; k < RW_NX; k++)
+                for (int l = 0; l < RW_LANES; l++) {
+                    const double e = error[k * RW_LANES + l] * weight[k * RW_LANES + l];
+                    square[l] += e * e / (double)RW_NX;
+                }
+            for (int l = 0; l < RW_LANES; l++) {
+                if (m == 0) first[l] = square[l];
+                below[l] += share[m] * square[l];
+            }
+        }
+        for (int l = 0; l < RW_LANES; l++) {
+            const double square = below[l] > 0.0 ? first[l] * first[l] / below[l] : first[l];
+            const double relative = square / (size[l] > 1.0 ? size[l] : 1.0);
+            if (!(relative <= worst)) worst = relative; /* also where it is no number */
+            if (!(worst <= DBL_MAX)) return NAN;
+        }
+    }
+    return sqrt(worst);
 }
 
 /* Terms of the dense output of the derivatives; the same combinations as for the states. */
@@ -255,46 +345,39 @@ static inline void rw_explicit_tangent_at(const rw_explicit_method *restrict met
     }
 }
 
-/* Differentiate an accepted linearly implicit step: E u = R gives E u' = R' + J' u. */
-static inline void rw_rosenbrock_tangent_step(const rw_rosenbrock_method *restrict method, const raceway_tangents *tangents,
-                                              rw_tangent_block *restrict work, const rw_rosenbrock *restrict plain,
-                                              const rw_matrix *restrict matrix, const rw_numbers *n, long segment, double t,
-                                              const double *restrict x, double h)
+/* Differentiate a linearly implicit step that was tried: E u = R gives E u' = R' + J' u. */
+static inline __attribute__((always_inline)) void rw_rosenbrock_tangent_step(const rw_rosenbrock_method *restrict method, const int stages,
+                                                                              const raceway_tangents *tangents,
+                                                                              rw_tangent_block *restrict work,
+                                                                              const rw_rosenbrock *restrict plain,
+                                                                              const rw_matrix *restrict matrix, const rw_numbers *n,
+                                                                              long segment, double t, const double *restrict x, double h)
 {
     const double inverse_s = h * method->gamma, inverse_h = 1.0 / h;
-    rw_point start;
-    rw_point_at(&start, n, plain->w, x);
+    rw_step_points points;
+    rw_stages(n, t, h, method->nodes + 1, stages - 1, points.w);
+    rw_point_at(&points.at[0], n, plain->w, x);
+    rw_point_slopes(&points.at[0]);
+    for (int i = 1; i < stages; i++) {
+        double *restrict y = points.y[i];
+        for (int k = 0; k < RW_NX; k++) y[k] = x[k];
+        for (int j = 0; j < i; j++)
+            for (int k = 0; k < RW_NX; k++) y[k] += method->a[i][j] * plain->u[j][k];
+        rw_point_at(&points.at[i], n, points.w[i - 1], y);
+    }
     for (long b = 0; b < tangents->blocks; b++) {
         const rw_direction d = rw_direction_of(tangents, segment, b);
         rw_tangent_block *restrict own = &work[b];
         const double *restrict xd = rw_tangent_state(tangents, b);
         rw_stage_rate_tangent_lanes(t, n->u, n->p, n->c, d.u, d.p, d.c, &own->w[0][0], &own->wt[0][0]);
-        rw_linearize_tangent(&start, n, &d, plain->wt, &own->w[0][0], &own->wt[0][0], xd, &own->A[0][0], &own->B[0][0], &own->at[0][0]);
-        rw_rate_tangent(&start, n, &d, &own->w[0][0], xd, &own->first[0][0]);
-    }
-    for (int i = 0; i < method->stages; i++) {
-        const double time = t + method->nodes[i] * h;
-        double w[RW_NW], y[RW_NX];
-        rw_point at;
-        if (i > 0) {
-            rw_stage(time, n->u, n->p, n->c, w);
-            for (int k = 0; k < RW_NX; k++) y[k] = x[k];
-            for (int j = 0; j < i; j++)
-                for (int k = 0; k < RW_NX; k++) y[k] += method->a[i][j] * plain->u[j][k];
-            rw_point_at(&at, n, w, y);
-        }
-        for (long b = 0; b < tangents->blocks; b++) {
-            const rw_direction d = rw_direction_of(tangents, segment, b);
-            rw_tangent_block *restrict own = &work[b];
+        rw_linearize_tangent(&points.at[0], n, &d, plain->wt, &own->w[0][0], &own->wt[0][0], xd, &own->A[0][0], &own->B[0][0],
+                             &own->at[0][0]);
+        for (int i = 0; i < stages; i++) {
             double R[RW_NX * RW_LANES], moved[RW_NX * RW_LANES], rate[RW_NX * RW_LANES], zero[RW_NX * RW_LANES] = {0.0};
-            if (i == 0) {
-                memcpy(rate, own->first, sizeof rate);
-            } else {
-                if (i == 1 || method->nodes[i] != method->nodes[i - 1])
-                    rw_stage_tangent_lanes(time, n->u, n->p, n->c, d.u, d.p, d.c, &own->w[0][0]);
-                rw_combine_lanes(method->a[i], i, own->k, 1.0, rw_tangent_state(tangents, b), moved);
-                rw_rate_tangent(&at, n, &d, &own->w[0][0], moved, rate);
-            }
+            if (i == 1 || (i > 1 && method->nodes[i] != method->nodes[i - 1]))
+                rw_stage_tangent_lanes(t + method->nodes[i] * h, n->u, n->p, n->c, d.u, d.p, d.c, &own->w[0][0]);
+            if (i > 0) rw_combine_lanes(method->a[i], i, own->k, 1.0, xd, moved);
+            rw_rate_tangent(&points.at[i], n, &d, &own->w[0][0], i > 0 ? moved : xd, rate);
             rw_combine_lanes(method->coupling[i], i, own->k, inverse_h, zero, R);
             const double hd = h * method->time_weights[i];
             for (int k = 0; k < RW_NX * RW_LANES; k++) R[k] += rate[k];
@@ -319,9 +402,8 @@ static inline void rw_rosenbrock_tangent_step(const rw_rosenbrock_method *restri
                 }
             }
         }
+        rw_combine_lanes(method->weights, stages, own->k, 1.0, xd, &own->next[0][0]);
     }
-    for (long b = 0; b < tangents->blocks; b++)
-        rw_combine_lanes(method->weights, method->stages, work[b].k, 1.0, rw_tangent_state(tangents, b), &work[b].next[0][0]);
 }
 
 static inline void rw_rosenbrock_tangent_dense(const rw_rosenbrock_method *restrict method, const raceway_tangents *tangents,

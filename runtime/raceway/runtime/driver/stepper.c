@@ -7,6 +7,7 @@
 #include "control.h"
 #include "explicit.h"
 #include "rosenbrock.h"
+#include "scales.h"
 #ifdef RACEWAY_SENSITIVITIES
 #include "sensitivity.h"
 #endif
@@ -92,24 +93,41 @@ static void tangent_start(rw_run *run, double t)
         rw_explicit_tangent_start(run->tangents, run->blocks, &run->numbers, run->result->segment, t, run->x);
 }
 
-static void tangent_step(rw_run *run, double t, double h)
+/* Differentiate the step tried; returns its error, with that of the derivatives where they are controlled. */
+static double tangent_step(rw_run *run, double t, double h, double error)
 {
     const raceway_tangents *tangents = run->tangents;
     const long segment = run->result->segment;
-    if (!tangents) return;
+    if (!tangents) return error;
     switch (run->method) {
     case RACEWAY_DP54:
-        rw_explicit_tangent_step(&rw_dp54, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h, run->next);
+        rw_explicit_tangent_step(&rw_dp54, RW_DP54_STAGES, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h,
+                                 run->next);
         break;
     case RACEWAY_DOP853:
-        rw_explicit_tangent_step(&rw_dop853, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h, run->next);
+        rw_explicit_tangent_step(&rw_dop853, RW_DOP853_STAGES, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h,
+                                 run->next);
         break;
     case RACEWAY_RODAS4:
-        rw_rosenbrock_tangent_step(&rw_rodas4, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers, segment, t, run->x, h);
+        rw_rosenbrock_tangent_step(&rw_rodas4, RW_RODAS4_STAGES, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers, segment,
+                                   t, run->x, h);
         break;
     default:
-        rw_rosenbrock_tangent_step(&rw_rodas5p, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers, segment, t, run->x, h);
+        rw_rosenbrock_tangent_step(&rw_rodas5p, RW_RODAS5P_STAGES, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers,
+                                   segment, t, run->x, h);
     }
+    if (!tangents->weight) return error;
+    double theirs;
+    if (is_explicit(run->method)) {
+        const rw_explicit_method *method = run->method == RACEWAY_DP54 ? &rw_dp54 : &rw_dop853;
+        const double *weights[2] = {method->error[0], method->error[1]};
+        theirs = rw_tangent_error(tangents, run->blocks, weights, method->estimates, method->error_share, method->stages + 1, h);
+    } else {
+        const rw_rosenbrock_method *method = run->method == RACEWAY_RODAS4 ? &rw_rodas4 : &rw_rodas5p;
+        const double *weights[1] = {method->error_weights}, none[1] = {0.0};
+        theirs = rw_tangent_error(tangents, run->blocks, weights, 1, none, method->stages, 1.0);
+    }
+    return theirs <= error ? error : theirs;
 }
 
 /* Take over the derivatives of an accepted step. */
@@ -164,7 +182,7 @@ static void tangent_jump(rw_run *run)
 }
 #else
 #define tangent_start(run, t) ((void)0)
-#define tangent_step(run, t, h) ((void)0)
+#define tangent_step(run, t, h, error) (error)
 #define tangent_accept(run) ((void)0)
 #define tangent_output(run, t, h, theta, prepared) ((void)(prepared))
 #define tangent_jump(run) ((void)0)
@@ -365,8 +383,9 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
             result->state = worst_state(run);
             return RACEWAY_STEP_TOO_SMALL;
         }
-        const double error = try_step(run, t, h);
+        double error = try_step(run, t, h);
         const double q = error_exponent(run->method);
+        if (error >= 0.0 && error <= 1.0 && within_reach(run)) error = tangent_step(run, t, h, error);
         if (error >= 0.0 && error <= 1.0 && within_reach(run)) {
             /* PI controller (Hairer & Wanner II, section IV.2) */
             const double log_error = log(error > 1e-10 ? error : 1e-10);
@@ -375,7 +394,6 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
             if (rejected_last && factor > 1.0) factor = 1.0;
             run->last_error = log_error > RW_LOG_SMALL_ERROR ? log_error : RW_LOG_SMALL_ERROR;
             result->steps++;
-            tangent_step(run, t, h);
             write_outputs(run, start, t, h, last ? end : start + (t + h));
             reduce_step(run, start, t, h);
             if (changeable && is_explicit(run->method)) {
@@ -441,7 +459,11 @@ static int run_all(rw_run *run, const raceway_options *options, const double *p,
     run->numbers.c = c;
     const int changeable = options->method == RACEWAY_AUTO;
     if (options->method < RACEWAY_AUTO || options->method > RACEWAY_DOP853) return result->status = RACEWAY_BAD_ARGUMENT;
-    for (int k = 0; k < RW_NX; k++) run->weight[k] = 1.0 / options->tolerance[k];
+    for (int k = 0; k < RW_NX; k++) {
+        run->weight[k] = 1.0 / options->tolerance[k];
+        /* zero, below it, not a number, or so small that its inverse is none */
+        if (!(options->tolerance[k] > 0.0 && run->weight[k] <= DBL_MAX)) return result->status = RACEWAY_BAD_ARGUMENT;
+    }
     for (long i = 1; i <= segments; i++)
         if (!(times[i] >= times[i - 1])) return result->status = RACEWAY_BAD_ARGUMENT;
     if (!is_finite(x)) return result->status = RACEWAY_NOT_FINITE;
@@ -492,6 +514,12 @@ int raceway_run_tangents(const raceway_options *options, const double *p, const 
 
 long raceway_tangent_work(long blocks) { return blocks * (long)sizeof(rw_tangent_block); }
 #endif
+
+void raceway_magnitudes(const double *p, const double *c, const double *initial, long moments, const double *inputs, double horizon,
+                        double *magnitude)
+{
+    rw_magnitudes(p, c, initial, moments, inputs, horizon, magnitude);
+}
 
 void raceway_sizes(int *sizes)
 {

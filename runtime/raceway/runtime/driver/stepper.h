@@ -26,7 +26,7 @@ enum raceway_status {
     RACEWAY_TOO_MANY_STEPS = 1, /* max_steps reached */
     RACEWAY_STEP_TOO_SMALL = 2, /* the error test fails at the smallest step */
     RACEWAY_NOT_FINITE = 3,     /* the state or its rate is not a number even for the smallest step */
-    RACEWAY_BAD_ARGUMENT = 4    /* method unknown, times out of order */
+    RACEWAY_BAD_ARGUMENT = 4    /* method unknown, times out of order, a tolerance that is not positive */
 };
 
 typedef struct {
@@ -80,6 +80,11 @@ typedef struct {
     double *x;           /* of the states, [blocks][RW_NX][RW_LANES]: at the start, on return at the end */
     double *outputs;     /* at the output times, [outputs][blocks][RW_NX][RW_LANES], or NULL */
     void *work;          /* raceway_tangent_work(blocks) bytes, aligned for double */
+    /* Where the derivatives take part in the choice of the step size: 1 / error allowed in a step, [blocks][RW_NX][RW_LANES], zero for
+       directions that do not count, and the relative tolerance in it, for derivatives that have grown beyond 1 / (rtol weight).
+       Else NULL. */
+    const double *weight;
+    double rtol;
 } raceway_tangents;
 
 #ifdef RACEWAY_SENSITIVITIES
@@ -90,6 +95,13 @@ RACEWAY_EXPORT int raceway_run_tangents(const raceway_options *options, const do
                                         raceway_result *result);
 RACEWAY_EXPORT long raceway_tangent_work(long blocks);
 #endif
+
+/* Magnitudes of the states of a run, which tolerances are relative to (scales.h).
+
+   inputs       u at so many moments spread over the run, row after row
+   horizon      a turn, or the run: bounds the travel of a body that nothing holds [s] */
+RACEWAY_EXPORT void raceway_magnitudes(const double *p, const double *c, const double *initial, long moments, const double *inputs,
+                                       double horizon, double *magnitude);
 
 /* Sizes the library was compiled for: states, inputs, parameters, constants, balls, lanes. */
 RACEWAY_EXPORT void raceway_sizes(int *sizes);

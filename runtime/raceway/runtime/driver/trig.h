@@ -22,8 +22,10 @@ static inline void rw_sincos(double x, double *restrict sine, double *restrict c
     const double quadrant = n - 4.0 * floor(0.25 * n);
     const int odd = quadrant == 1.0 || quadrant == 3.0;
     const double a = odd ? c : s, b = odd ? s : c;
-    *sine = quadrant >= 2.0 ? -a : a;
-    *cosine = quadrant == 1.0 || quadrant == 2.0 ? -b : b;
+    /* signs as factors: a choice that all lanes share would keep loops over directions out of lanes (gcc sinks the negation) */
+    const double centred = quadrant - 1.5;
+    *sine = a * (1.0 - 2.0 * floor(0.5 * quadrant));
+    *cosine = b * (centred * centred - 1.25);
 }
 
 static inline double rw_sin1(double x)

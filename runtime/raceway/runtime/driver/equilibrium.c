@@ -1,0 +1,209 @@
+/* The quasi-static model: follows the rings' equilibrium, see equilibrium.h.
+
+   Between two instants positions are the cubic Hermite polynomial through positions and velocities at both.  Its middle is compared with the
+   equilibrium there; the difference, over the tolerance, controls how far the instants lie apart.  Where a ball leaves or takes the load the
+   equilibrium can jump: the instants close in on the jump until they are as near as time resolves, and the next instant lies behind it. */
+#include "equilibrium.h"
+
+#include "reductions.h"
+#include "rest.h"
+
+/* Shortest distance of two instants, as a part of the segment: there a jump is passed. */
+static const double RW_RESOLUTION = 1e-9;
+
+/* Newton's method converges quadratically: what it leaves is far smaller than the last correction it makes. */
+static const double RW_NEWTON_SHARE = 1e-3;
+
+/* An instant, with its clock in the segment. */
+typedef struct {
+    double t, q[RW_NQ], v[RW_NQ];
+} rw_instant;
+
+typedef struct {
+    const raceway_equilibrium_options *options;
+    raceway_equilibrium_result *result;
+    rw_numbers numbers;
+    double allowed[RW_NQ], weight[RW_NQ];
+    rw_instant left, middle, right; /* of the step under way */
+    int status;                     /* of a search within the step */
+} rw_follower;
+
+/* Hermite polynomial at the part theta of the way between two instants. */
+static inline void hermite(const rw_instant *a, const rw_instant *b, double theta, double *q)
+{
+    const double h = b->t - a->t, rest = 1.0 - theta;
+    for (int k = 0; k < RW_NQ; k++)
+        q[k] = rest * rest * ((1.0 + 2.0 * theta) * a->q[k] + theta * h * a->v[k]) +
+               theta * theta * ((1.0 + 2.0 * rest) * b->q[k] - rest * h * b->v[k]);
+}
+
+/* Equilibrium at instant->t, sought from instant->q. */
+static int seek(rw_follower *f, rw_instant *instant)
+{
+    int is_free;
+    if (rw_rest(&f->numbers, instant->t, f->allowed, instant->q, instant->v, &is_free, &f->result->iterations)) return 1;
+    f->status = is_free ? RACEWAY_EQUILIBRIUM_FREE : RACEWAY_EQUILIBRIUM_NONE;
+    return 0;
+}
+
+static inline void state_of(const rw_instant *instant, double *x)
+{
+    memcpy(x, instant->q, RW_NQ * sizeof *x);
+    memcpy(x + RW_NQ, instant->v, RW_NQ * sizeof *x);
+}
+
+/* State whose balls carry the forces that balance the load: those with the rings at rest. */
+static inline void resting_state_of(const rw_instant *instant, double *x)
+{
+    memcpy(x, instant->q, RW_NQ * sizeof *x);
+    for (int k = RW_NQ; k < RW_NX; k++) x[k] = 0.0;
+}
+
+/* Equilibrium within the step, sought from the polynomials through its middle. */
+static int within(rw_follower *f, double t, rw_instant *found)
+{
+    const int late = t >= f->middle.t;
+    const rw_instant *a = late ? &f->middle : &f->left, *b = late ? &f->right : &f->middle;
+    found->t = t;
+    hermite(a, b, (t - a->t) / (b->t - a->t), found->q);
+    return seek(f, found);
+}
+
+/* A channel of the reductions within the step; where no equilibrium is found the run ends, and what is returned does not count. */
+static double channel_at(const void *source, int channel, double theta, int *ball)
+{
+    rw_follower *f = (rw_follower *)source;
+    rw_instant found;
+    double x[RW_NX];
+    *ball = 0;
+    if (!within(f, f->left.t + theta * (f->right.t - f->left.t), &found)) return -DBL_MAX;
+    if (channel < RW_NX) state_of(&found, x);
+    else resting_state_of(&found, x);
+    return rw_channel(&f->numbers, found.t, x, channel, ball);
+}
+
+static int reduce(rw_follower *f, double begin)
+{
+    double *reduction = f->options->reduction, v[RW_POINTS][RW_CHANNELS];
+    const double h = f->right.t - f->left.t;
+    for (int i = 0; i < RW_POINTS; i++) {
+        rw_instant found;
+        double x[RW_NX];
+        if (i == 0) found = f->left;
+        else if (i == RW_POINTS / 2) found = f->middle;
+        else if (i == RW_POINTS - 1) found = f->right;
+        else if (!within(f, f->left.t + h * i / (RW_POINTS - 1), &found)) return 0;
+        resting_state_of(&found, x);
+        rw_channels(&f->numbers, found.t, x, rw_balls_wanted(reduction), v[i]);
+        state_of(&found, v[i]);
+    }
+    rw_reduce(reduction, (const double(*)[RW_CHANNELS])v, begin + f->left.t, h, channel_at, f);
+    return f->status == RACEWAY_EQUILIBRIUM_DONE;
+}
+
+/* Difference of the polynomial's middle from the equilibrium there, over the tolerance. */
+static double misfit(const rw_follower *f, const double *guess)
+{
+    double sum = 0.0;
+    for (int k = 0; k < RW_NQ; k++) {
+        const double e = (f->middle.q[k] - guess[k]) * f->weight[k];
+        sum += e * e;
+    }
+    return sqrt(sum / RW_NQ);
+}
+
+/* Follow one segment of that length from f->left, whose clock is zero.  An output at its end belongs to the next one, where there is one:
+   loads may jump there.  Returns 0 when it could not. */
+static int follow(rw_follower *f, double begin, double length, int is_final, double *step, long outputs, const double *output_times,
+                  double *output_states)
+{
+    raceway_equilibrium_result *result = f->result;
+    const double shortest = RW_RESOLUTION * length;
+    double *reduction = f->options->reduction;
+    const int reduced = reduction && begin >= reduction[RW_FROM];
+    double h = *step < length ? *step : length;
+    while (f->left.t < length) {
+        if (result->steps + result->rejected >= f->options->max_steps) {
+            f->status = RACEWAY_EQUILIBRIUM_TOO_MANY_STEPS;
+            return 0;
+        }
+        const int last = f->left.t + h >= length - shortest;
+        double guess[RW_NQ];
+        f->right.t = last ? length : f->left.t + h;
+        h = f->right.t - f->left.t;
+        for (int k = 0; k < RW_NQ; k++) f->right.q[k] = f->left.q[k] + h * f->left.v[k];
+        if (!seek(f, &f->right)) return 0;
+        hermite(&f->left, &f->right, 0.5, guess);
+        f->middle.t = f->left.t + 0.5 * h;
+        memcpy(f->middle.q, guess, sizeof guess);
+        if (!seek(f, &f->middle)) return 0;
+        const double error = misfit(f, guess);
+        const int passed = error > 1.0 && h <= 2.0 * shortest;
+        /* the misfit of a smooth equilibrium goes like the fourth power of the step */
+        double factor = error > 0.0 ? 0.9 * sqrt(sqrt(1.0 / error)) : 4.0;
+        if (error > 1.0 && !passed) {
+            result->rejected++;
+            factor = factor > 0.1 ? factor : 0.1;
+            h = h * factor > shortest ? h * factor : shortest;
+            continue;
+        }
+        result->steps++;
+        result->jumps += passed;
+        if (reduced && !passed && !reduce(f, begin)) return 0;
+        for (; result->written < outputs; result->written++) {
+            const double wanted = output_times[result->written] - begin;
+            rw_instant found;
+            if (wanted > f->right.t || (last && !is_final && wanted >= length)) break;
+            if (!within(f, wanted, &found)) return 0;
+            if (output_states) state_of(&found, output_states + result->written * RW_NX);
+        }
+        /* behind a jump the step before it says more than the tiny one across */
+        h = passed ? 1e3 * h : h * (factor < 4.0 ? factor : 4.0);
+        f->left = f->right;
+        result->time = begin + f->left.t;
+        if (!last) *step = h;
+    }
+    return 1;
+}
+
+int raceway_equilibria(const raceway_equilibrium_options *options, const double *p, const double *c, double *x, long segments,
+                       const double *times, const double *inputs, long outputs, const double *output_times, double *output_states,
+                       raceway_equilibrium_result *result)
+{
+    rw_follower f = {options, result, {inputs, p, c}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}, RACEWAY_EQUILIBRIUM_DONE};
+    memset(result, 0, sizeof *result);
+    result->time = segments > 0 ? times[0] : 0.0;
+    for (long i = 1; i <= segments; i++)
+        if (!(times[i] >= times[i - 1])) return result->status = RACEWAY_EQUILIBRIUM_BAD_ARGUMENT;
+    for (int k = 0; k < RW_NQ; k++) {
+        if (!(fabs(x[k]) <= DBL_MAX && options->tolerance[k] > 0.0)) return result->status = RACEWAY_EQUILIBRIUM_BAD_ARGUMENT;
+        f.allowed[k] = RW_NEWTON_SHARE * options->tolerance[k];
+        f.weight[k] = 1.0 / options->tolerance[k];
+    }
+    memcpy(f.left.q, x, sizeof f.left.q);
+    double step = segments > 0 ? (times[segments] - times[0]) / 64.0 : 0.0;
+    for (long i = 0; i < segments; i++) {
+        result->segment = i;
+        result->time = times[i];
+        f.numbers.u = inputs + i * RW_NU;
+        /* the load may have jumped */
+        f.left.t = 0.0;
+        const double length = times[i + 1] - times[i];
+        if (!seek(&f, &f.left) ||
+            !follow(&f, times[i], length, i == segments - 1, &step, outputs, output_times, output_states)) {
+            result->status = f.status;
+            break;
+        }
+    }
+    state_of(&f.left, x);
+    return result->status;
+}
+
+void raceway_equilibrium_sizes(int *sizes)
+{
+    sizes[0] = RW_NX;
+    sizes[1] = RW_NU;
+    sizes[2] = RW_NP;
+    sizes[3] = RW_NC;
+    sizes[4] = RW_REDUCTION;
+}

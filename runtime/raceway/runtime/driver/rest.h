@@ -1,0 +1,154 @@
+/* One equilibrium of the rings: Newton's method with the generated Jacobian, and where it fails pseudo-transient continuation. */
+#ifndef RACEWAY_REST_H
+#define RACEWAY_REST_H
+
+#include <float.h>
+#include <string.h>
+
+#include "model.h"
+
+enum { RW_NEWTON_ITERATIONS = 16, RW_CONTINUATION_ITERATIONS = 400 };
+
+/* Pivots smaller than this part of their row's largest entry are rounding: nothing holds a ring in that direction.  A ball that has just
+   touched holds it with a slope that is the square root of its deflection: 1e-6 of the others' where it is 1e-12 of theirs. */
+static const double RW_SINGULAR = 1e-12;
+
+/* The model about a state at rest at time t: accelerations a, slopes A = da/dq, time derivative at. */
+typedef struct {
+    double a[RW_NQ], A[RW_NQ * RW_NQ], at[RW_NQ];
+} rw_balance;
+
+static inline void rw_balance_at(const rw_numbers *n, double t, const double *q, rw_balance *b)
+{
+    double w[RW_NW], wt[RW_NW], x[RW_NX] = {0.0}, dx[RW_NX], B[RW_NQ * RW_NQ];
+    memcpy(x, q, RW_NQ * sizeof *x);
+    rw_stage_rate(t, n->u, n->p, n->c, w, wt);
+    rw_linearize(n, w, wt, x, dx, b->A, B, b->at);
+    memcpy(b->a, dx + RW_NQ, RW_NQ * sizeof *b->a);
+}
+
+static inline double rw_length(const double *v)
+{
+    double sum = 0.0;
+    for (int k = 0; k < RW_NQ; k++) sum += v[k] * v[k];
+    return sqrt(sum);
+}
+
+/* Solve (shift I - A) d = r by elimination with pivoting; returns 0 where it is singular. */
+static inline int rw_eliminate(const double *A, double shift, const double *r, double *d)
+{
+    double rows[RW_NQ][RW_NQ + 1];
+    for (int i = 0; i < RW_NQ; i++) {
+        /* rows are scaled, so that a light and a heavy ring count alike */
+        double most = 0.0;
+        for (int j = 0; j < RW_NQ; j++) {
+            rows[i][j] = (i == j ? shift : 0.0) - A[i * RW_NQ + j];
+            most = fabs(rows[i][j]) > most ? fabs(rows[i][j]) : most;
+        }
+        if (!(most > 0.0 && most <= DBL_MAX)) return 0;
+        for (int j = 0; j < RW_NQ; j++) rows[i][j] /= most;
+        rows[i][RW_NQ] = r[i] / most;
+    }
+    for (int k = 0; k < RW_NQ; k++) {
+        int best = k;
+        for (int i = k + 1; i < RW_NQ; i++)
+            if (fabs(rows[i][k]) > fabs(rows[best][k])) best = i;
+        if (!(fabs(rows[best][k]) > RW_SINGULAR)) return 0;
+        for (int j = 0; j <= RW_NQ; j++) {
+            const double swap = rows[k][j];
+            rows[k][j] = rows[best][j];
+            rows[best][j] = swap;
+        }
+        for (int i = k + 1; i < RW_NQ; i++) {
+            const double factor = rows[i][k] / rows[k][k];
+            for (int j = k; j <= RW_NQ; j++) rows[i][j] -= factor * rows[k][j];
+        }
+    }
+    for (int i = RW_NQ - 1; i >= 0; i--) {
+        d[i] = rows[i][RW_NQ];
+        for (int j = i + 1; j < RW_NQ; j++) d[i] -= rows[i][j] * d[j];
+        d[i] /= rows[i][i];
+    }
+    return 1;
+}
+
+/* Whether a correction is within what is allowed; a NaN is not. */
+static inline int rw_is_small(const double *d, const double *allowed)
+{
+    for (int k = 0; k < RW_NQ; k++)
+        if (!(fabs(d[k]) <= allowed[k])) return 0;
+    return 1;
+}
+
+/* Newton's method; the balance found with it is that of the position before the last, small correction is applied again. */
+static inline int rw_newton(const rw_numbers *n, double t, const double *allowed, double *q, rw_balance *b, long *iterations)
+{
+    double size = DBL_MAX;
+    for (int i = 0; i < RW_NEWTON_ITERATIONS; i++) {
+        double d[RW_NQ];
+        rw_balance_at(n, t, q, b);
+        ++*iterations;
+        const double reached = rw_length(b->a);
+        if (!(reached <= 2.0 * size)) return 0;
+        size = reached;
+        if (!rw_eliminate(b->A, 0.0, b->a, d)) return 0;
+        const int small = rw_is_small(d, allowed);
+        for (int k = 0; k < RW_NQ; k++) q[k] += d[k];
+        if (small) return 1;
+    }
+    return 0;
+}
+
+/* Position at time t whose acceleration vanishes, sought from q.  Returns 1 when found, with the velocity v of the equilibrium; else 0, with
+   *is_free telling whether the load is balanced by a position that nothing holds.
+
+   The continuation follows q' = a(q) with growing steps: where nothing touches it walks along the force, and where something does it
+   becomes Newton's method (Kelley and Keyes, doi:10.1137/S0036142996304796). */
+static inline int rw_rest(const rw_numbers *n, double t, const double *allowed, double *q, double *v, int *is_free, long *iterations)
+{
+    double start[RW_NQ];
+    rw_balance b, there;
+    *is_free = 0;
+    memcpy(start, q, sizeof start);
+    if (rw_newton(n, t, allowed, q, &b, iterations)) return rw_eliminate(b.A, 0.0, b.at, v);
+    memcpy(q, start, sizeof start);
+    rw_balance_at(n, t, q, &b);
+    double size = rw_length(b.a), most = 0.0;
+    for (int k = 0; k < RW_NQ; k++) most = fabs(q[k]) > most ? fabs(q[k]) : most;
+    if (size == 0.0) {
+        *is_free = 1;
+        return 0;
+    }
+    const double first = size;
+    /* the first step moves by a nanometre: well inside any clearance */
+    double tau = 1e-9 * (1.0 + most) / size;
+    for (int i = 0; i < RW_CONTINUATION_ITERATIONS; i++) {
+        double d[RW_NQ], trial[RW_NQ];
+        if (!rw_eliminate(b.A, 1.0 / tau, b.a, d)) return 0;
+        for (int k = 0; k < RW_NQ; k++) trial[k] = q[k] + d[k];
+        rw_balance_at(n, t, trial, &there);
+        ++*iterations;
+        const double reached = rw_length(there.a);
+        if (!(reached <= DBL_MAX) || reached > 1.5 * size) {
+            tau /= 8.0;
+            continue;
+        }
+        memcpy(q, trial, sizeof trial);
+        b = there;
+        double gain = reached > 0.0 ? size / reached : 16.0;
+        gain = gain < 1.0 ? 1.0 : gain > 16.0 ? 16.0 : gain;
+        tau *= 4.0 * gain;
+        size = reached;
+        if (size <= 1e-4 * first) {
+            memcpy(start, q, sizeof start);
+            if (rw_newton(n, t, allowed, q, &b, iterations)) return rw_eliminate(b.A, 0.0, b.at, v);
+            memcpy(q, start, sizeof start);
+            rw_balance_at(n, t, q, &b);
+            if (size <= 1e-12 * first) break;
+        }
+    }
+    *is_free = !rw_eliminate(b.A, 0.0, b.a, v) && size <= 1e-6 * first;
+    return 0;
+}
+
+#endif

@@ -1,0 +1,107 @@
+"""The figure of a trade: error against time, both logarithmic, and the front that no configuration beats."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from raceway.runtime.figures.canvas import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
+from raceway.runtime.quasi_static import NAME as QUASI_STATIC
+from raceway.runtime.trade import FULL, Measured, Trade
+
+#: Marker, colour and edge of each method; shapes tell them apart in grey as well.
+_METHODS: dict[str, tuple[str, str]] = {
+    "stepper": ("o", INK),
+    "stepper-rodas4": ("s", SIGNAL),
+    "stepper-rodas5p": ("D", SIGNAL),
+    "stepper-dp54": ("p", INK),
+    "stepper-dop853": ("^", INK),
+    QUASI_STATIC: ("*", SAND),
+    "rosenbrock": ("x", GREY),
+    "erk": ("+", GREY),
+    "cvodes": ("v", GREY),
+}
+
+#: Markers of simpler models and of the switch.
+_OTHERS = ("P", "X", "h", "8", "d")
+
+
+@styled
+def draw_trade(trade: Trade, quantity: str | None = None) -> Figure:
+    """Error (95 % point over the members) against time a cycle; `quantity` None takes the worst of all."""
+    figure = new_figure(5.4)
+    axes = figure.add_subplot()
+    groups: dict[str, list[Measured]] = {}
+    for one in trade.measured:
+        if math.isfinite(one.time) and math.isfinite(trade.error(one, quantity)) and trade.error(one, quantity) > 0.0:
+            groups.setdefault(_group(one), []).append(one)
+    others = iter(_OTHERS)
+    for name, ones in groups.items():
+        ones.sort(key=lambda m: -m.configuration.rtol)
+        if name in _METHODS:
+            marker, colour = _METHODS[name]
+            looks: dict[str, Any] = {"markersize": 10 if name == QUASI_STATIC else 6}
+        else:
+            marker, colour, looks = next(others, "."), SAND, {"markersize": 7}
+        axes.plot(
+            [1e3 * m.time for m in ones],
+            [100.0 * trade.error(m, quantity) for m in ones],
+            marker=marker,
+            color=colour,
+            markeredgecolor=colour if marker in "x+" else INK,
+            markeredgewidth=1.2 if marker in "x+" else 0.6,
+            linestyle=":" if name in _METHODS else "none",
+            linewidth=0.7,
+            label=name,
+            zorder=3,
+            **looks,
+        )
+    front = trade.front(quantity)
+    axes.plot(
+        [1e3 * m.time for m in front],
+        [100.0 * trade.error(m, quantity) for m in front],
+        color=INK,
+        linewidth=5.0,
+        alpha=0.18,
+        solid_capstyle="round",
+        zorder=2,
+        label="best of all",
+    )
+    floor = 100.0 * (max(trade.uncertainty.values()) if quantity is None else trade.uncertainty[quantity])
+    _axes(axes, floor)
+    name = "the worst of all quantities" if quantity is None else quantity
+    caption(
+        figure,
+        f"{trade.title}: what accuracy costs",
+        f"Relative error of {name}, 95 % point over {trade.members} parameter sets within {100 * trade.spread:g} % of "
+        f"the scene's, against the time of the integration, {trade.cycles:g} cycles a run. A line joins the tolerances "
+        f"of a method. In the shaded part nothing is known: the reference is uncertain by {floor:.1g} %.",
+    )
+    return figure
+
+
+def _axes(axes: Axes, floor: float) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("time a cycle [ms]")
+    axes.set_ylabel("relative error [%]")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(10.0, numticks=20))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, min(high, 1e3))
+    if floor > low:
+        axes.axhspan(low, floor, color=PALE, zorder=0)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+
+
+def _group(one: Measured) -> str:
+    c = one.configuration
+    if c.switch:
+        return c.switch
+    return c.method if c.model == FULL else c.model

@@ -1,0 +1,100 @@
+"""Where a trajectory touches a kink of a law instead of crossing it: there a derivative says least.
+
+In: deflections of the balls along a run.  Out: `Grazing` records.
+
+A ball that crosses into contact does so at a moment that moves smoothly with every parameter.  One whose deflection has
+an extreme near zero may touch or not after the smallest change: derivatives exist on either side, grow without bound
+towards it, and differ.  The same holds for the rate of deflection under a law that damps one way only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: An extreme counts as grazing within this share of the largest deflection, or rate.
+TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grazing:
+    """An extreme near a kink.
+
+    Attributes
+    ----------
+    ball : counted from 1
+    time : [s]
+    crank_angle : of the driver or shaft, in [0, 2 pi) [rad]
+    depth : deflection [m] or rate of deflection [m/s] at its extreme; negative before the kink is reached
+    kink : "contact" or "rate"
+    """
+
+    ball: int
+    time: float
+    crank_angle: float
+    depth: float
+    kink: str
+
+    def __str__(self) -> str:
+        unit = "m" if self.kink == "contact" else "m/s"
+        what = "contact" if self.kink == "contact" else "the kink of one-sided damping"
+        return (
+            f"ball {self.ball} grazes {what} at t = {self.time:.6g} s, crank angle {np.degrees(self.crank_angle):.4g} "
+            f"deg, with {self.depth:.2e} {unit}"
+        )
+
+
+def find_grazing(
+    t: Array,
+    segment: NDArray[np.int_],
+    deflection: Array,
+    angles: Array,
+    *,
+    one_sided: bool,
+    tolerance: float = TOLERANCE,
+) -> tuple[Grazing, ...]:
+    """Extremes of deflection near zero, and of its rate where the law is one-sided, in order of time.
+
+    Parameters
+    ----------
+    t : increasing times, shape (n,) [s]
+    segment : part of the run between load switches that each belongs to, shape (n,)
+    deflection : shape (n, balls) [m]
+    angles : crank angle at each time, shape (n,) [rad]
+    one_sided : whether the damping law has a kink at rate zero, in contact or not
+    tolerance : share of the largest deflection (rate) that counts as zero [1]
+    """
+    found: list[Grazing] = []
+    for k in np.unique(segment).tolist():
+        rows = np.flatnonzero(segment == k)
+        rows = rows[np.concatenate([[True], np.diff(t[rows]) > 0.0])]
+        if len(rows) < 5:
+            continue
+        time, part = t[rows], deflection[rows]
+        found += _near_zero(time, part, angles[rows], "contact", tolerance * float(np.max(np.abs(deflection))))
+        if one_sided:
+            rate = np.gradient(part, time, axis=0)
+            found += _near_zero(time, rate, angles[rows], "rate", tolerance * float(np.max(np.abs(rate))))
+    return tuple(sorted(found, key=lambda item: (item.time, item.kink, item.ball)))
+
+
+def _near_zero(t: Array, signal: Array, angles: Array, kink: str, width: float) -> list[Grazing]:
+    """Extremes within `width` of zero that touch zero rather than cross it, by parabolas through three neighbours."""
+    before, here, behind = signal[:-2], signal[1:-1], signal[2:]
+    top = (here > before) & (here >= behind) & (here <= 2.0 * width)
+    bottom = (here < before) & (here <= behind) & (here >= -2.0 * width)
+    found: list[Grazing] = []
+    for row, ball in np.argwhere(top | bottom).tolist():
+        fit = np.polynomial.Polynomial.fit(t[row : row + 3], signal[row : row + 3, ball], 2)
+        places = fit.deriv().roots()
+        time = float(np.real(places[0])) if len(places) else float(t[row + 1])
+        time = min(max(time, float(t[row])), float(t[row + 2]))
+        depth = float(fit(time))
+        if abs(depth) <= width:
+            angle = float(angles[row + 1])
+            found.append(Grazing(ball=ball + 1, time=time, crank_angle=angle, depth=depth, kink=kink))
+    return found

@@ -1,0 +1,146 @@
+"""Moments at which an output has a kink, so that integrals over it are taken piece by piece.
+
+In: deflections of the balls and other signals along a run.  Out: `Kink` records; and how they move with parameters.
+
+Where a ball comes into contact, its force starts like a power of time, under the tangent law with infinite slope; where
+a law damps one way only, it has a corner; where two balls change rank, the force of the most loaded one has.  At such a
+moment the derivative of the force by a parameter jumps or is unbounded.  A quadrature that runs across it converges
+slowly; one whose panels end there, and move with it, does not notice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Kinks nearer to each other, or to an edge, than this share of the time that counts are one [1].
+APART = 1e-9
+
+#: Halvings that locate a kink on the cubic through four nodes.
+HALVINGS = 45
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kink:
+    """A zero of a signal.
+
+    Attributes
+    ----------
+    time : [s]
+    kind : "contact" (deflection), "rate" (its rate) or "rank" (difference of two balls' values)
+    channel : of which two balls change rank
+    ball, other : columns, counted from 0
+    """
+
+    time: float
+    kind: str
+    channel: str = ""
+    ball: int = 0
+    other: int = 0
+
+
+def crossings(t: Array, segment: NDArray[np.int_], signal: Array) -> Array:
+    """Times at which a signal changes sign within a segment, increasing.
+
+    Parameters
+    ----------
+    t : times that increase within each segment, shape (n,) [s]
+    segment : shape (n,)
+    signal : shape (n,)
+    """
+    same = (np.diff(segment) == 0) & (np.diff(t) > 0.0)
+    found = np.flatnonzero(same & (signal[:-1] * signal[1:] < 0.0))
+    if not len(found):
+        return np.zeros(0)
+    # four nodes around, all of the same segment; where there are too few, those at its end twice removed
+    first = np.clip(found - 1, 0, len(t) - 4)
+    rows = first[:, None] + np.arange(4)
+    whole = np.all(segment[rows] == segment[found][:, None], axis=1) & np.all(np.diff(t[rows], axis=1) > 0.0, axis=1)
+    low, high = t[found].copy(), t[found + 1].copy()
+    start = np.sign(signal[found])
+    nodes, values = t[rows], signal[rows]
+    line = np.stack([t[found], t[found + 1]], axis=1)
+    ends = np.stack([signal[found], signal[found + 1]], axis=1)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        straight = ends[:, 0] + (ends[:, 1] - ends[:, 0]) * (middle - line[:, 0]) / (line[:, 1] - line[:, 0])
+        height = np.where(whole, _cubic(nodes, values, middle), straight)
+        left = np.sign(height) == start
+        low, high = np.where(left, middle, low), np.where(left, high, middle)
+    return np.asarray(0.5 * (low + high))
+
+
+def _cubic(nodes: Array, values: Array, at: Array) -> Array:
+    """Cubics through four nodes each (Lagrange), one value each; equal nodes give numbers that are not used."""
+    total = np.zeros(len(at))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for i in range(4):
+            term = values[:, i].copy()
+            for j in range(4):
+                if j != i:
+                    term = term * (at - nodes[:, j]) / (nodes[:, i] - nodes[:, j])
+            total += term
+    return total
+
+
+def rate_of(t: Array, segment: NDArray[np.int_], signal: Array) -> Array:
+    """Time derivative of signals along nodes by differences within each segment, shape of `signal`."""
+    rate = np.zeros_like(signal)
+    for k in np.unique(segment).tolist():
+        rows = np.flatnonzero(segment == k)
+        kept = rows[np.concatenate([[True], np.diff(t[rows]) > 0.0])]
+        if len(kept) >= 3:
+            found = np.gradient(signal[kept], t[kept], axis=0)
+            rate[rows] = found[np.searchsorted(t[kept], t[rows], side="right") - 1]
+    return rate
+
+
+def find_kinks(
+    t: Array,
+    segment: NDArray[np.int_],
+    deflection: Array,
+    ranked: dict[str, Array],
+    *,
+    one_sided: bool,
+    length: float,
+    edges: Array,
+) -> tuple[Kink, ...]:
+    """Kinks of outputs of the balls, in order of time, apart from each other and from the edges.
+
+    Parameters
+    ----------
+    t, segment : nodes in order, shape (n,)
+    deflection : shape (n, balls); no columns where the scene does not compute it
+    ranked : channels of which the most loaded ball is followed, each of shape (n, balls)
+    one_sided : whether the damping law has a corner at rate zero
+    length : of the time that counts [s]
+    edges : times that are edges already [s]
+    """
+    found: list[Kink] = []
+    for ball in range(deflection.shape[1]):
+        times = crossings(t, segment, deflection[:, ball])
+        found += [Kink(time=float(time), kind="contact", ball=ball) for time in times]
+    if one_sided and deflection.shape[1]:
+        rate = rate_of(t, segment, deflection)
+        for ball in range(deflection.shape[1]):
+            times = crossings(t, segment, rate[:, ball])
+            found += [Kink(time=float(time), kind="rate", ball=ball) for time in times]
+    for channel, values in ranked.items():
+        best = np.argmax(values, axis=1)
+        for k in np.flatnonzero((np.diff(best) != 0) & (np.diff(segment) == 0)).tolist():
+            a, b = int(best[k]), int(best[k + 1])
+            part = slice(max(k - 2, 0), k + 4)
+            times = crossings(t[part], segment[part], values[part, a] - values[part, b])
+            near = times[(times >= t[k]) & (times <= t[k + 1])]
+            found += [Kink(time=float(time), kind="rank", channel=channel, ball=a, other=b) for time in near]
+    found.sort(key=lambda kink: (kink.time, kink.kind, kink.ball))
+    kept: list[Kink] = []
+    for kink in found:
+        last = kept[-1].time if kept else -np.inf
+        if kink.time - last > APART * length and np.min(np.abs(edges - kink.time)) > APART * length:
+            kept.append(kink)
+    return tuple(kept)

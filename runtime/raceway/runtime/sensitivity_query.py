@@ -1,0 +1,557 @@
+"""Sensitivities of quantities of interest, each with its certificate.
+
+In: a model, names of quantities and parameters.  Out: a `SensitivityReport`.
+
+Derivatives are those of the stepper's own steps, with their error in the choice of step sizes; a looser run beside it
+says how well they are known.  The certificate compares each with a second route (`raceway.runtime.certificate`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from raceway.runtime import clock
+from raceway.runtime.assembly import check_assembly
+from raceway.runtime.certificate import AGREEMENT, FLOOR, UNCHECKED, Check, Second, Verdict, by_differences, compare
+from raceway.runtime.direction_scales import ANGLE
+from raceway.runtime.errors import RequestError, SimulationError
+from raceway.runtime.grazing import TOLERANCE, Grazing, find_grazing
+from raceway.runtime.magnitudes import model_scales
+from raceway.runtime.manifest import Manifest
+from raceway.runtime.parameters import Numbers, real, unknown_name
+from raceway.runtime.quantities import default_quantities, parse_quantity
+from raceway.runtime.request import TOLERANCES
+from raceway.runtime.simulate import STIFF_RATIO
+from raceway.runtime.stepper import METHODS, Family
+from raceway.runtime.study import Course, Span, Study
+from raceway.runtime.track import Outlook, Stepping
+
+if TYPE_CHECKING:
+    from raceway.runtime.model import Model
+    from raceway.runtime.scales import Scales
+
+Array = NDArray[np.float64]
+
+#: Tolerance of the states in a run with derivatives, and that of the derivatives themselves.
+RTOL, SENSITIVITY_RTOL = 1e-11, 1e-9
+
+#: The derivatives' tolerance is loosened tenfold, down to this, where steps would fall below the resolution of time:
+#: under laws whose slope is infinite at contact onset derivatives have singular rates there.
+LOOSEST = 1e-6
+
+#: Tolerance of the states in runs for difference quotients.
+DIFFERENCE_RTOL = 1e-13
+
+#: Nodes in a turn per sample of an ordinary run: where a law has a kink, derivatives of outputs jump, and their
+#: quadrature is of first order there.
+FINER = 4
+
+#: A change of the start by this share of the motion is a large one: it stays near, so that its effect is linear.
+START_SHARE = 1e-2
+
+#: Ways to check.
+CHECKS = ("differences", "erk", "adjoint")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuantityValue:
+    """A quantity's value: name, number, unit; time and ball of an extreme; what to mind."""
+
+    name: str
+    value: float
+    unit: str
+    time: float | None
+    ball: int | None
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensitivity:
+    """Derivative of one quantity by one parameter.
+
+    Attributes
+    ----------
+    quantity, parameter : names
+    value, parameter_value : numbers
+    derivative, unit : dQ/dp
+    dimensionless : (p/Q) dQ/dp; NaN where Q is zero
+    uncertainty : of the derivative, from a run at a looser tolerance, same unit; None where there was none
+    check : the certificate
+    """
+
+    quantity: str
+    parameter: str
+    value: float
+    parameter_value: float
+    derivative: float
+    unit: str
+    dimensionless: float
+    uncertainty: float | None
+    check: Check
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensitivityReport:
+    """Answer to a query: every pair, with what it takes to judge them.
+
+    Attributes
+    ----------
+    scene : name
+    quantities : values
+    parameters : names
+    pairs : quantity by quantity, parameters in order
+    grazing : where the trajectory grazes a kink
+    settings : cycles, transient, method, tolerances, steps
+    """
+
+    scene: str
+    quantities: tuple[QuantityValue, ...]
+    parameters: tuple[str, ...]
+    pairs: tuple[Sensitivity, ...]
+    grazing: tuple[Grazing, ...]
+    settings: Mapping[str, Any]
+
+    def __getitem__(self, key: tuple[str, str]) -> Sensitivity:
+        """The pair of a quantity and a parameter."""
+        quantity, parameter = key
+        names = [item.name for item in self.quantities]
+        if quantity not in names:
+            raise RequestError(unknown_name("quantity of this report", quantity, names))
+        if parameter not in self.parameters:
+            raise RequestError(unknown_name("parameter of this report", parameter, self.parameters))
+        return self.pairs[names.index(quantity) * len(self.parameters) + self.parameters.index(parameter)]
+
+    def of(self, quantity: str) -> tuple[Sensitivity, ...]:
+        """Pairs of one quantity, ranked by the size of the dimensionless derivative."""
+        pairs = [self[quantity, name] for name in self.parameters]
+        return tuple(sorted(pairs, key=lambda pair: -_rank(pair.dimensionless)))
+
+    @property
+    def verdicts(self) -> dict[Verdict, int]:
+        """How many pairs have each verdict."""
+        return {verdict: sum(pair.check.verdict is verdict for pair in self.pairs) for verdict in Verdict}
+
+    @property
+    def disagreements(self) -> tuple[Sensitivity, ...]:
+        """Pairs whose two routes disagree."""
+        return tuple(pair for pair in self.pairs if pair.check.verdict is Verdict.DISAGREES)
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as JSON-ready mapping; numbers that are not finite are null."""
+        return {
+            "scene": self.scene,
+            "settings": dict(self.settings),
+            "verdicts": {verdict.value: count for verdict, count in self.verdicts.items()},
+            "quantities": [
+                {
+                    "name": item.name,
+                    "value": _plain(item.value),
+                    "unit": item.unit,
+                    "time": _plain(item.time),
+                    "ball": item.ball,
+                    "notes": list(item.notes),
+                }
+                for item in self.quantities
+            ],
+            "sensitivities": [
+                {
+                    "quantity": pair.quantity,
+                    "parameter": pair.parameter,
+                    "value": _plain(pair.value),
+                    "parameter_value": pair.parameter_value,
+                    "derivative": _plain(pair.derivative),
+                    "unit": pair.unit,
+                    "dimensionless": _plain(pair.dimensionless),
+                    "uncertainty": _plain(pair.uncertainty),
+                    "certificate": {
+                        "route": pair.check.route,
+                        "value": _plain(pair.check.value),
+                        "uncertainty": _plain(pair.check.uncertainty),
+                        "disagreement": _plain(pair.check.disagreement),
+                        "verdict": pair.check.verdict.value,
+                        "reason": pair.check.reason,
+                    },
+                }
+                for pair in self.pairs
+            ],
+            "grazing": [
+                {
+                    "ball": item.ball,
+                    "time": item.time,
+                    "crank_angle": item.crank_angle,
+                    "depth": item.depth,
+                    "kink": item.kink,
+                }
+                for item in self.grazing
+            ],
+        }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Query:
+    """What is asked for; None takes the scene's run settings, or this module's defaults.
+
+    Attributes
+    ----------
+    of, wrt : names; None for the sensible ones, and for all parameters
+    span : how long to run
+    method : of the derivatives: ``auto``, one of the stepper's, ``erk``
+    direction : of ``erk``: "forward" or "adjoint"
+    check : True (differences), False, or one of `CHECKS`
+    rtol, sensitivity_rtol : tolerances of states and derivatives
+    samples_per_cycle : nodes of quadratures in a turn
+    agreement : relative disagreement that is allowed [1]
+    progress : called with words and a finished fraction
+    """
+
+    of: Sequence[str] | None
+    wrt: Sequence[str] | None
+    span: Span
+    method: str = "auto"
+    direction: Literal["forward", "adjoint"] = "forward"
+    check: bool | str = True
+    rtol: float = RTOL
+    sensitivity_rtol: float = SENSITIVITY_RTOL
+    samples_per_cycle: int | None = None
+    agreement: float = AGREEMENT
+    progress: Callable[[str, float], None] | None = None
+
+
+def make_span(manifest: Manifest, cycles: float | None, duration: float | None, transient: float | None) -> Span:
+    """How long to run: as given, else as the scene's run settings say.
+
+    Raises
+    ------
+    RequestError
+        Both cycles and duration, or numbers that are none.
+    """
+    run = manifest.run
+    if cycles is not None and duration is not None:
+        raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
+    if cycles is None and duration is None:
+        cycles, duration = run.cycles, run.duration
+    for name, number in (("cycles", cycles), ("duration", duration)):
+        if number is not None and not 0.0 < number < math.inf:
+            raise RequestError(f"{name}: a number above 0 is expected, not {number!r}.")
+    dropped = run.transient_cycles if transient is None else real(transient)
+    if not 0.0 <= dropped < math.inf:
+        raise RequestError(f"transient: a number of cycles from 0 on is expected, not {transient!r}.")
+    return Span(
+        cycles=None if cycles is None else float(cycles),
+        duration=None if duration is None else float(duration),
+        transient=dropped,
+    )
+
+
+def make_query(
+    manifest: Manifest,
+    *,
+    of: str | Sequence[str] | None,
+    wrt: str | Sequence[str] | None,
+    cycles: float | None,
+    duration: float | None,
+    transient: float | None,
+    method: str,
+    direction: Literal["forward", "adjoint"],
+    check: bool | str,
+    rtol: float | None,
+    sensitivity_rtol: float | None,
+    samples_per_cycle: int | None,
+    agreement: float | None,
+    progress: Callable[[str, float], None] | None,
+) -> Query:
+    """A query from what `Model.sensitivity` is given.
+
+    Raises
+    ------
+    RequestError
+        A wrong request.
+    """
+    for name, given in (("rtol", rtol), ("sensitivity_rtol", sensitivity_rtol)):
+        if given is not None and not TOLERANCES[0] <= given <= TOLERANCES[1]:
+            raise RequestError(
+                f"{name}: a number from {TOLERANCES[0]:g} to {TOLERANCES[1]:g} is expected, not {given!r}."
+            )
+    if samples_per_cycle is not None and not (int(samples_per_cycle) == samples_per_cycle >= 8):
+        raise RequestError(f"samples_per_cycle: a whole number from 8 on is expected, not {samples_per_cycle!r}.")
+    if agreement is not None and not 0.0 < agreement < 1.0:
+        raise RequestError(f"agreement: a number between 0 and 1 is expected, not {agreement!r}.")
+    if direction not in ("forward", "adjoint"):
+        raise RequestError(f"direction: forward or adjoint is expected, not {direction!r}.")
+    return Query(
+        of=[of] if isinstance(of, str) else of,
+        wrt=[wrt] if isinstance(wrt, str) else wrt,
+        span=make_span(manifest, cycles, duration, transient),
+        method=method,
+        direction=direction,
+        check=check,
+        rtol=RTOL if rtol is None else rtol,
+        sensitivity_rtol=SENSITIVITY_RTOL if sensitivity_rtol is None else sensitivity_rtol,
+        samples_per_cycle=samples_per_cycle,
+        agreement=AGREEMENT if agreement is None else agreement,
+        progress=progress,
+    )
+
+
+def answer(model: Model, numbers: Numbers, query: Query) -> SensitivityReport:
+    """Run a model and differentiate quantities by parameters, with certificates.
+
+    Raises
+    ------
+    RequestError
+        Unknown names, a law whose force jumps, a run without steady turns.
+    SimulationError
+        The computation failed.
+    """
+    manifest = model.manifest
+    _refuse_jumps(manifest)
+    check_assembly(model, numbers)
+    quantities = [parse_quantity(manifest, name) for name in _listed("of", query.of, default_quantities(manifest))]
+    names = _listed("wrt", query.wrt, tuple(numbers.parameters))
+    for name in names:
+        if name not in numbers.parameters:
+            raise RequestError(unknown_name("parameter", name, numbers.parameters))
+    route = _check_route(query)
+    study = Study(model, quantities, query.span, query.samples_per_cycle or FINER * manifest.run.samples_per_cycle)
+    window = study.window(numbers)
+    magnitude, family, fine = np.zeros(0), Family.AUTO, Family.AUTO
+    if model.states:
+        start = np.array([numbers.values[name] for name in manifest.initial])
+        scales = model_scales(model, numbers, start, window.duration, window.turn)
+        magnitude = scales.magnitude
+        family, fine = _families(query.method, scales)
+    tell = query.progress or (lambda _words, _fraction: None)
+    stepping = Stepping(family=family, rtol=query.rtol, magnitude=magnitude, sensitivity_rtol=query.sensitivity_rtol)
+
+    if query.method == "erk":
+        from raceway.runtime.erk_route import by_erk
+
+        found = by_erk(study, numbers, names, magnitude, direction=query.direction, progress=lambda f: tell("erk", f))
+        course = study.measure(numbers, stepping)
+        values = np.array([item.value for item in course.estimates])
+        slopes, own = found.value, found.uncertainty
+        tolerance: float | None = None
+    else:
+        tell("differentiating", 0.0)
+        course, tolerance = _differentiate(study, numbers, names, stepping)
+        values = np.array([item.value for item in course.estimates])
+        slopes = np.array([item.slope for item in course.estimates])
+        own = np.zeros_like(slopes)
+        if route is not None and model.states:
+            tell("differentiating", 0.5)
+            looser = replace(stepping, rtol=min(10.0 * query.rtol, 1e-3), sensitivity_rtol=10.0 * tolerance)
+            own = np.abs(
+                slopes - np.array([e.slope for e in _differentiate(study, numbers, names, looser)[0].estimates])
+            )
+    difference_scales = _difference_scales(manifest, numbers, names, magnitude)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        quantum = FLOOR * np.abs(values)[:, None] / difference_scales[None, :]
+    second = None
+    if route is not None:
+        plain = Stepping(family=fine, rtol=DIFFERENCE_RTOL, magnitude=magnitude)
+        second = _second(study, model, numbers, names, route, plain, difference_scales, quantum, query, tell)
+    pairs = []
+    units = {info.name: info.unit for info in manifest.parameters}
+    for row, (quantity, estimate) in enumerate(zip(quantities, course.estimates, strict=True)):
+        for column, name in enumerate(names):
+            derivative, at = float(slopes[row, column]), numbers.parameters[name]
+            check = UNCHECKED
+            if second is not None:
+                check = compare(
+                    derivative,
+                    float(own[row, column]),
+                    float(second.value[row, column]),
+                    float(second.uncertainty[row, column]),
+                    route=second.route,
+                    quantum=float(quantum[row, column]),
+                    agreement=query.agreement,
+                )
+            pairs.append(
+                Sensitivity(
+                    quantity=quantity.name,
+                    parameter=name,
+                    value=estimate.value,
+                    parameter_value=at,
+                    derivative=derivative,
+                    unit=ratio_unit(quantity.unit, units[name]),
+                    dimensionless=at * derivative / estimate.value if estimate.value != 0.0 else math.nan,
+                    uncertainty=float(own[row, column]) if route is not None else None,
+                    check=check,
+                )
+            )
+    return SensitivityReport(
+        scene=manifest.scene,
+        quantities=tuple(
+            QuantityValue(
+                name=item.name, value=found.value, unit=item.unit, time=found.time, ball=found.ball, notes=found.notes
+            )
+            for item, found in zip(quantities, course.estimates, strict=True)
+        ),
+        parameters=tuple(names),
+        pairs=tuple(pairs),
+        grazing=_grazing(model, numbers, course),
+        settings={
+            "cycles": query.span.cycles,
+            "duration": window.duration,
+            "transient_cycles": query.span.transient,
+            "method": query.method,
+            "rtol": query.rtol,
+            "sensitivity_rtol": tolerance,
+            "agreement": query.agreement,
+            "steps": 0 if course.track is None else course.track.steps,
+            "parameters": {name: numbers.parameters[name] for name in names},
+        },
+    )
+
+
+def _refuse_jumps(manifest: Manifest) -> None:
+    jumping = [law for law, smoothness in manifest.smoothness if smoothness == "discontinuous"]
+    if jumping:
+        raise RequestError(
+            f"sensitivity: the {' and '.join(jumping)} law of this scene is discontinuous (its force jumps at "
+            "contact), so the derivative of the steps is not that of the motion. Allowed: a continuous law, "
+            '[bearing.damping] law = "tangent" or "one-sided", or a smoothed contact, [bearing.contact] smoothing.'
+        )
+
+
+def _listed(option: str, given: Sequence[str] | None, default: Sequence[str]) -> list[str]:
+    names = list(dict.fromkeys(default if given is None else given))
+    if not names:
+        raise RequestError(f"sensitivity: {option} names nothing. Name at least one.")
+    return names
+
+
+def _check_route(query: Query) -> str | None:
+    if query.check is False:
+        return None
+    route = "differences" if query.check is True else str(query.check)
+    if route not in CHECKS:
+        raise RequestError(f"check: {unknown_name('route', route, CHECKS)} Or True, or False for none.")
+    if query.method == "erk" and route in ("erk", "adjoint"):
+        raise RequestError(
+            "check: the derivatives come from erk themselves, so that erk is no second route. Take differences."
+        )
+    return route
+
+
+def _families(method: str, scales: Scales) -> tuple[Family, Family]:
+    """Family for derivatives, and family for the tight runs of difference quotients."""
+    if method not in ("auto", "erk", *METHODS):
+        raise RequestError(
+            f"sensitivity: the method {method!r} was given; allowed are auto, {', '.join(METHODS)} and erk, which "
+            "differentiate their own steps."
+        )
+    stiff = scales.stiffness > STIFF_RATIO
+    family = METHODS.get(method, Family.AUTO)
+    if family is Family.AUTO:
+        family = Family.RODAS5P if stiff else Family.DP54
+    return family, Family.RODAS5P if stiff else Family.DOP853
+
+
+def _differentiate(study: Study, numbers: Numbers, names: Sequence[str], stepping: Stepping) -> tuple[Course, float]:
+    """Derivatives at the tightest tolerance that the resolution of time allows; that tolerance."""
+    tolerance = stepping.sensitivity_rtol
+    assert tolerance is not None
+    while True:
+        try:
+            return study.differentiate(numbers, names, replace(stepping, sensitivity_rtol=tolerance)), tolerance
+        except SimulationError:
+            if tolerance * 10.0 > max(LOOSEST, stepping.sensitivity_rtol or 0.0):
+                raise
+            tolerance *= 10.0
+
+
+def _difference_scales(manifest: Manifest, numbers: Numbers, names: Sequence[str], magnitude: Array) -> Array:
+    """Change of each parameter that is a large one: its value; a radian; what its state or length is measured in."""
+    units = {info.name: info.unit for info in manifest.parameters}
+    at_start = dict(zip(manifest.initial, magnitude.tolist(), strict=True))
+    position = float(np.max(magnitude[: len(magnitude) // 2])) if len(magnitude) else 1e-3
+    scales = []
+    for name in names:
+        value = abs(numbers.parameters[name])
+        if name in at_start:
+            value = max(value, START_SHARE * at_start[name])
+        elif units[name] == ANGLE:
+            value = 1.0
+        elif value == 0.0:
+            alike = [abs(numbers.parameters[other]) for other, unit in units.items() if unit == units[name]]
+            value = position if units[name] == "m" else max(alike, default=0.0)
+        scales.append(value or 1.0)
+    return np.array(scales)
+
+
+def _second(
+    study: Study,
+    model: Model,
+    numbers: Numbers,
+    names: Sequence[str],
+    route: str,
+    plain: Stepping,
+    scales: Array,
+    quantum: Array,
+    query: Query,
+    tell: Callable[[str, float], None],
+) -> Second:
+    """Derivatives by the second route."""
+    if route != "differences":
+        from raceway.runtime.erk_route import by_erk
+
+        direction: Literal["forward", "adjoint"] = "adjoint" if route == "adjoint" else "forward"
+        return by_erk(
+            study, numbers, names, plain.magnitude, direction=direction, progress=lambda f: tell("checking", f)
+        )
+    base = dict(numbers.parameters)
+
+    def measure(change: Mapping[str, float]) -> Array:
+        course = study.measure(model.numbers({**base, **change}), plain)
+        return np.array([item.value for item in course.estimates])
+
+    return by_differences(
+        measure,
+        {name: numbers.parameters[name] for name in names},
+        scales,
+        quantum=quantum,
+        agreement=query.agreement,
+        progress=lambda fraction: tell("checking", fraction),
+    )
+
+
+def _grazing(model: Model, numbers: Numbers, course: Course, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:
+    """Where the run grazes a kink; nothing where the scene does not compute the balls' deflections."""
+    manifest, track = model.manifest, course.track
+    if track is None or "ball.deflection" not in model.outputs or manifest.bearing is None:
+        return ()
+    deflection = Outlook(model, ["ball.deflection"]).look(track, numbers)["ball.deflection"].value
+    order = np.lexsort((track.nodes.t, track.nodes.segment))
+    times = track.nodes.t[order]
+    angles = np.array([clock.crank_angle(manifest, numbers.values, float(time)) for time in times])
+    return find_grazing(
+        times,
+        track.nodes.segment[order],
+        deflection[order],
+        angles,
+        one_sided=manifest.bearing.damping_law == "one-sided",
+        tolerance=tolerance,
+    )
+
+
+def ratio_unit(above: str, below: str) -> str:
+    """Unit of a derivative."""
+    if below in ("", "1"):
+        return above or "1"
+    under = f"({below})" if any(sign in below for sign in "*/") else below
+    return f"{above or '1'}/{under}"
+
+
+def _rank(value: float) -> float:
+    return abs(value) if math.isfinite(value) else -1.0
+
+
+def _plain(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)

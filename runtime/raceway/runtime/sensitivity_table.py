@@ -1,0 +1,116 @@
+"""A report of sensitivities as tables for the terminal.
+
+In: a `SensitivityReport`.  Out: things that rich prints.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rich import box
+from rich.console import Group
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
+
+from raceway.runtime.certificate import Verdict
+from raceway.runtime.sensitivity_query import Sensitivity, SensitivityReport
+
+#: Grazing places that are listed; the JSON has all.
+LISTED = 5
+
+#: Styles of the verdicts.
+_STYLES = {Verdict.VERIFIED: "green", Verdict.DISAGREES: "bold red", Verdict.NOT_CHECKED: "yellow"}
+
+
+def render_report(report: SensitivityReport, *, top: int | None = None) -> Group:
+    """Tables of the report, a quantity each, parameters ranked by the size of the dimensionless derivative.
+
+    Parameters
+    ----------
+    top : most rows of each table; None for all.  Pairs that disagree are always there
+    """
+    parts: list[Table | Text] = []
+    for quantity in report.quantities:
+        table = Table(
+            title=_title(report, quantity.name),
+            caption="; ".join(quantity.notes) or None,
+            title_justify="left",
+            caption_justify="left",
+            header_style="bold",
+            box=box.SIMPLE_HEAD,
+            padding=(0, 1, 0, 0),
+        )
+        table.add_column("parameter", overflow="fold")
+        for name in ("p/Q dQ/dp", "dQ/dp", "apart"):
+            table.add_column(name, justify="right", no_wrap=True)
+        table.add_column("verdict", no_wrap=True)
+        ranked = report.of(quantity.name)
+        shown = [
+            pair
+            for rank, pair in enumerate(ranked)
+            if top is None or rank < top or pair.check.verdict is Verdict.DISAGREES
+        ]
+        for pair in shown:
+            table.add_row(*_row(pair))
+        if len(shown) < len(ranked):
+            table.add_row(f"{len(ranked) - len(shown)} more, smaller", "", "", "", "", style="dim")
+        parts.append(table)
+    parts += [Text.from_markup(line) for line in _remarks(report)]
+    return Group(*parts)
+
+
+def _title(report: SensitivityReport, name: str) -> str:
+    quantity = next(item for item in report.quantities if item.name == name)
+    words = f"{name} = {quantity.value:.6g} {quantity.unit}"
+    if quantity.time is not None:
+        words += f" at t = {quantity.time:.6g} s"
+    if quantity.ball is not None:
+        words += f", ball {quantity.ball}"
+    return escape(words)
+
+
+def _row(pair: Sensitivity) -> tuple[str, ...]:
+    check = pair.check
+    relative = f"{pair.dimensionless:+.4f}" if math.isfinite(pair.dimensionless) else "-"
+    size = max(abs(pair.derivative), abs(check.value or 0.0))
+    apart = "-" if check.disagreement is None else f"{check.disagreement / size:.0e}" if size > 0.0 else "0"
+    style = _STYLES[check.verdict]
+    return (
+        escape(pair.parameter),
+        relative,
+        f"{pair.derivative:.4g}",
+        apart,
+        f"[{style}]{check.verdict.value}[/]",
+    )
+
+
+def _remarks(report: SensitivityReport) -> list[str]:
+    """What stands below the tables."""
+    counts = report.verdicts
+    words = ", ".join(f"{count} {verdict.value}" for verdict, count in counts.items() if count)
+    route = next((pair.check.route for pair in report.pairs if pair.check.route != "none"), None)
+    lines = [f"{len(report.pairs)} pairs: {words}" + (f"; apart: relative distance to {route}" if route else "")]
+    lines += [
+        f"[bold red]disagrees[/]: d({escape(pair.quantity)})/d({escape(pair.parameter)}) is {pair.derivative:.9g}, by "
+        f"{pair.check.route} {_number(pair.check.value)} ± {_number(pair.check.uncertainty)} {pair.unit}"
+        for pair in report.disagreements
+    ]
+    reasons: dict[str, int] = {}
+    for pair in report.pairs:
+        if pair.check.verdict is Verdict.NOT_CHECKED and pair.check.reason:
+            # numbers differ from pair to pair; what may help is the same
+            kind = pair.check.reason.split(" by ", 1)[0] + ": " + pair.check.reason.rsplit(": ", 1)[-1]
+            kind = pair.check.reason if ": " not in pair.check.reason else kind
+            reasons[kind] = reasons.get(kind, 0) + 1
+    lines += [f"[yellow]not checked[/], {count} pairs: {escape(reason)}" for reason, count in reasons.items()]
+    if report.grazing:
+        lines.append("[yellow]grazing[/]: derivatives are fragile, for a small change moves the motion over a kink")
+        lines += [f"  {escape(str(item))}" for item in report.grazing[:LISTED]]
+        if len(report.grazing) > LISTED:
+            lines.append(f"  and {len(report.grazing) - LISTED} more")
+    return lines
+
+
+def _number(value: float | None) -> str:
+    return "no number" if value is None else f"{value:.9g}"

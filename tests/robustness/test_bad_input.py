@@ -1,0 +1,583 @@
+"""Claims about scenes, overrides and requests of any content: read right, or refused in words that name the place.
+
+Scenes are made by hypothesis: as a tree whose numbers are known, written as TOML in units drawn at random.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from profiles import examples
+from typer.testing import CliRunner
+
+from raceway.derive import SceneError, derive, generate
+from raceway.derive.read import parse_override, read_scene, scene_from_text, with_values
+from raceway.derive.scene import Scene
+from raceway.runtime import Model, RequestError, load
+from raceway.runtime.cli import app
+from raceway.runtime.export import export_c
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
+ROTOR = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
+NAMES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
+
+# --------------------------------------------------------------------------------------------------------- valid scenes
+
+#: Ways to write one SI unit: name, and how many of it make one SI unit, exact as text.
+UNITS = {
+    "kg": {"kg": 1, "g": 1000},
+    "m": {"m": 1, "mm": 1000, "um": 10**6},
+    "rad/s": {"rad/s": 1},
+    "N": {"N": 1, "mN": 1000},
+    "N/m": {"N/m": 1, "mN/m": 1000},
+    "N*s/m": {"N*s/m": 1, "mN*s/m": 1000},
+    "N/m^1.5": {"N/m^1.5": 1},
+    "Pa": {"Pa": 1},
+}
+
+
+def digits(low: float, high: float) -> st.SearchStrategy[float]:
+    """Numbers of four digits between two bounds: their text in another unit is exact as well."""
+    return st.floats(low, high).map(lambda value: float(f"{value:.4g}")).filter(lambda value: low <= value <= high)
+
+
+@st.composite
+def rotors(draw: st.DrawFn) -> dict[str, Any]:
+    """A valid scene of a loaded ring: keys as in the file, quantities as (number in SI, SI unit)."""
+    balls = draw(st.integers(3, 14))
+    ball = draw(digits(1e-3, 2e-2))
+    pitch = float(f"{ball / math.sin(math.pi / balls) * draw(st.floats(1.05, 3.0)):.4g}")
+    law = draw(st.sampled_from(["none", "one-sided", "one-sided-gated", "two-sided-gated"]))
+    damping: dict[str, Any] = {"law": law}
+    if law != "none":
+        damping["coefficient"] = (draw(digits(0.0, 1e5)), "N*s/m")
+    bearing: dict[str, Any] = {
+        "balls": balls,
+        "ball_diameter": (ball, "m"),
+        "pitch_diameter": (pitch, "m"),
+        "clearance": (draw(digits(-3e-5, 1e-3)), "m"),
+        "damping": damping,
+        "inner_ring": {"mass": (draw(digits(1e-3, 1e3)), "kg")},
+    }
+    if draw(st.booleans()):
+        bearing["contact"] = {"stiffness": (draw(digits(1e6, 1e12)), "N/m^1.5")}
+    else:
+        bearing["contact"] = {
+            "inner_groove_radius": (float(f"{0.52 * ball:.4g}"), "m"),
+            "outer_groove_radius": (float(f"{0.53 * ball:.4g}"), "m"),
+            "young_modulus": (draw(digits(1e10, 5e11)), "Pa"),
+            "poisson_ratio": draw(digits(0.0, 0.45)),
+        }
+    if draw(st.booleans()):
+        bearing["outer_ring"] = {"support": "fixed"}
+    else:
+        bearing["outer_ring"] = {
+            "support": "elastic",
+            "mass": (draw(digits(1e-3, 1e4)), "kg"),
+            "stiffness": (draw(digits(0.0, 1e9)), "N/m"),
+            "damping": (draw(digits(0.0, 1e5)), "N*s/m"),
+        }
+    return {
+        "shaft": {"speed": (draw(digits(0.1, 6e3)), "rad/s")},
+        "load": {"type": "constant", "force": [(draw(digits(-1e4, 1e4)), "N"), (draw(digits(-1e4, 1e4)), "N")]},
+        "bearing": bearing,
+        "run": {"cycles": draw(st.integers(1, 100)), "outputs": ["inner.*"]},
+    }
+
+
+def written(value: Any, unit_of: Callable[[str], str], order: Callable[[list[Any]], list[Any]]) -> str:
+    """TOML of a tree, in units and an order of keys chosen by the caller."""
+    if isinstance(value, tuple):
+        number, unit = value
+        name = unit_of(unit)
+        # exact: the shortest decimal digits, times a power of ten
+        mantissa, _, exponent = repr(number).partition("e")
+        shift = len(str(UNITS[unit][name])) - 1
+        return f'"{mantissa}e{int(exponent or 0) + shift} {name}"'
+    if isinstance(value, dict):
+        pairs = (f"{key} = {written(item, unit_of, order)}" for key, item in order(list(value.items())))
+        return "{" + ", ".join(pairs) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(written(item, unit_of, order) for item in value) + "]"
+    return f'"{value}"' if isinstance(value, str) else repr(value)
+
+
+def text_of(tree: dict[str, Any], unit_of: Callable[[str], str], order: Callable[[list[Any]], list[Any]]) -> str:
+    return "\n".join(f"{key} = {written(item, unit_of, order)}" for key, item in order(list(tree.items())))
+
+
+def numbers_of(tree: Any) -> list[float]:
+    if isinstance(tree, tuple):
+        return [tree[0]]
+    items = tree.values() if isinstance(tree, dict) else tree if isinstance(tree, list) else []
+    return [number for item in items for number in numbers_of(item)]
+
+
+@given(tree=rotors(), data=st.data())
+@examples(40, 2000)
+def test_a_valid_scene_is_read_to_its_numbers_in_any_units_and_any_order(
+    tree: dict[str, Any], data: st.DataObject
+) -> None:
+    plain = scene_from_text(text_of(tree, lambda unit: unit, list), "made")
+    other = scene_from_text(
+        text_of(
+            tree,
+            lambda unit: data.draw(st.sampled_from(list(UNITS[unit]))),
+            lambda items: data.draw(st.permutations(items)),
+        ),
+        "made",
+    )
+    # the decimal digits are exact in the text, so the floats are those of the text
+    assert other == plain
+    read = {quantity.value for quantity in plain.quantities}
+    assert set(numbers_of(tree)) <= read
+    assert plain.bearing is not None
+    assert plain.bearing.balls == tree["bearing"]["balls"]
+
+
+@given(tree=rotors())
+@examples(4, 40)
+def test_a_valid_scene_is_derived_and_its_parameters_are_its_quantities(tree: dict[str, Any]) -> None:
+    scene = scene_from_text(text_of(tree, lambda unit: unit, list), "made")
+    system = derive(scene)
+    assert {p.name: p.default for p in system.parameters} == {q.path: q.value for q in scene.quantities}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_scene_given_its_own_values_is_itself(name: str) -> None:
+    scene = read_scene(SCENES / f"{name}.toml")
+    own = {}
+    for quantity in scene.quantities:
+        unit = "" if quantity.unit == "1" else quantity.unit
+        path, value = parse_override(scene, f"{quantity.path}={quantity.value!r} {unit}")
+        own[path] = value
+    assert with_values(scene, own) == scene
+
+
+# ------------------------------------------------------------------------------------------------------- mutated scenes
+
+TREES = {name: tomllib.loads((SCENES / f"{name}.toml").read_text(encoding="utf-8")) for name in NAMES}
+EVIL = (
+    *("__import__('os').system('touch pwned')", "$(touch pwned)", "`touch pwned`", "; touch pwned", "| touch pwned"),
+    *(
+        "../x",
+        "/etc/passwd",
+        "..",
+        ".",
+        "",
+        " ",
+        "a;b",
+        "a b",
+        "a/b",
+        "a\\b",
+        "a\nb",
+        "a\0b",
+        'a"b',
+        "a'b",
+        "*/",
+        "/*",
+        "//",
+    ),
+    *(
+        "#include <x>",
+        '*/ #include "x" /*',
+        "%s%n",
+        "{0}",
+        "{title}",
+        "${HOME}",
+        "${x:-y}",
+        "\\input{x}",
+        "[bold]x[/bold]",
+    ),
+    *(
+        "\x1b[31m",
+        "é",
+        "x\u202ey",
+        "\u200b",
+        "𝒳",
+        "i" * 10_000,
+        "int",
+        "double",
+        "for",
+        "main",
+        "NULL",
+        "lambda",
+        "None",
+    ),
+)
+NUMBERS = (
+    *(0, -1, 1, 2**63, -(2**63), 10**400, 0.0, -0.0, 5e-324, 1e308, -1e308, math.nan, math.inf, -math.inf, True, False),
+    *("0", "1e999 m", "-1e999 kg", "nan rpm", "inf N", "1 furlong", "1 m/0", "1 m^1e9", "1e-999 m", "9" * 300 + " mm"),
+    *("1 " + "(" * 40 + "m", "1 m" + "*m" * 20, "0x10 m", "1_000 m", "1,5 mm", "½ m", "１ m", "1 K", "1 degC", "1 dB"),
+)
+JUNK = st.one_of(
+    st.sampled_from(EVIL),
+    st.sampled_from(NUMBERS),
+    st.text(max_size=12),
+    st.recursive(
+        st.just([]), lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.sampled_from("xyz"), inner)
+    ),
+    st.sampled_from(EVIL).map(lambda name: {name: {}}),
+)
+
+
+def places(tree: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    pairs = tree.items() if isinstance(tree, dict) else enumerate(tree) if isinstance(tree, list) else ()
+    return [place for key, item in pairs for place in [(*path, key), *places(item, (*path, key))]]
+
+
+def as_toml(value: object) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{as_toml(str(key))} = {as_toml(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(as_toml, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return (
+            '"'
+            + "".join(f"\\U{ord(c):08x}" if not c.isalnum() else c for c in value if not 0xD800 <= ord(c) < 0xE000)
+            + '"'
+        )
+    return repr(value)
+
+
+def read_or_refused(text: str, name: str = "mutant") -> Scene | SceneError:
+    """The scene, or the refusal, which names its places, tells what to do, and is as long as people read."""
+    try:
+        scene = scene_from_text(text, name)
+    except SceneError as error:
+        message = str(error)
+        assert "Traceback" not in message
+        assert len(message) < 100_000
+        assert "\x1b" not in message
+        for fault in error.faults:
+            assert fault.problem
+            assert fault.remedy
+            assert len(fault.render()) < 3000
+        return error
+    assert all(math.isfinite(quantity.value) for quantity in scene.quantities)
+    assert all(re.fullmatch(r"[A-Za-z0-9_.]+", quantity.path) for quantity in scene.quantities)
+    return scene
+
+
+@given(name=st.sampled_from(NAMES), data=st.data())
+@examples(250, 5000)
+def test_a_mutated_scene_is_read_or_refused_in_words(name: str, data: st.DataObject) -> None:
+    tree = copy.deepcopy(TREES[name])
+    for _ in range(data.draw(st.integers(1, 3))):
+        found = places(tree)
+        if not found:
+            break
+        path = data.draw(st.sampled_from(found))
+        table: Any = tree
+        for key in path[:-1]:
+            table = table[key]
+        kind = data.draw(st.sampled_from(["value", "remove", "rename", "unit"]))
+        if kind == "value":
+            table[path[-1]] = data.draw(JUNK)
+        elif kind == "remove":
+            del table[path[-1]]
+        elif kind == "rename" and isinstance(table, dict):
+            table[data.draw(st.sampled_from(EVIL))] = table.pop(path[-1])
+        elif isinstance(table[path[-1]], str):
+            number = table[path[-1]].partition(" ")[0]
+            table[path[-1]] = (
+                f"{number} {data.draw(st.sampled_from(['mm', 'kg', 's', 'rpm', 'N', 'deg', 'Hz', 'N*s/m', '']))}"
+            )
+    read_or_refused("\n".join(f"{as_toml(key)} = {as_toml(value)}" for key, value in tree.items()))
+
+
+@given(data=st.data())
+@examples(120, 3000)
+def test_torn_text_is_read_or_refused_in_words(data: st.DataObject) -> None:
+    text = data.draw(st.sampled_from([PRESS, ROTOR]))
+    start = data.draw(st.integers(0, len(text)))
+    end = data.draw(st.integers(start, min(len(text), start + 200)))
+    read_or_refused(text[:start] + data.draw(st.text(max_size=6)) + text[end:])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a." * 200_000 + "a = 1", "a key with more than 64 dots"),
+        ("[" + "a." * 5000 + "a]", "a key with more than 64 dots"),
+        ("x = {" + '"a".' * 5000 + "a = 1}", "a key with more than 64 dots"),
+        ("a = " + "[" * 100_000, "not TOML"),
+        ("a = " + "{a=" * 5000 + "1" + "}" * 5000, "not TOML"),
+        ("k" * 1_000_000 + " = 1", "the file describes nothing"),
+        ("\n".join(f"k{n} = 1" for n in range(20_000)), "the file describes nothing"),
+        ("#" + "'\"" * 1_000_000, "the file is empty"),
+        (PRESS.replace("[bearing]\n", "[bearing]\n" + "".join(f"k{n} = 1\n" for n in range(5000))), "unknown key"),
+        (PRESS.replace("[mechanism.joints.B]", f"[mechanism.joints.{'B' * 10_000}]"), "this is no name for a joint"),
+    ],
+    ids=["dots", "header", "inline", "lists", "tables", "key", "keys", "quotes", "unknown", "name"],
+)
+def test_texts_made_to_take_long_are_refused_at_once(text: str, words: str) -> None:
+    """A key of 200 000 parts once kept the reader for hours; an unknown key of a million letters was printed whole."""
+    code = (
+        "import sys; from raceway.derive.read import scene_from_text; from raceway.derive import SceneError\n"
+        "import faulthandler; faulthandler.dump_traceback_later(20, exit=True)\n"
+        "try: scene_from_text(sys.stdin.read(), 'long')\n"
+        "except SceneError as fault: print(fault)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], input=text, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert words in done.stdout
+    assert len(done.stdout) < 100_000
+
+
+def test_a_message_lists_the_first_hundred_faults_and_counts_the_others() -> None:
+    error = read_or_refused(PRESS.replace("[bearing]\n", "[bearing]\n" + "".join(f"k{n} = 1\n" for n in range(250))))
+    assert isinstance(error, SceneError)
+    assert len(error.faults) == 250
+    assert "250 faults" in str(error)
+    assert "... and 150 more; mend these first" in str(error)
+
+
+# ------------------------------------------------------------------------------------------------- a scene file is data
+
+
+@pytest.mark.parametrize("evil", EVIL)
+def test_a_name_that_is_no_name_is_refused_wherever_the_user_chooses_one(evil: str, tmp_path: Path) -> None:
+    allowed = re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,63}", evil) is not None
+    for table, what in (
+        ("bodies.slider", "body"),
+        ("joints.C", "joint"),
+        ("forces.punch", "force"),
+        ("frame.points.guide", "point"),
+    ):
+        tree = copy.deepcopy(TREES["punching_press"])
+        *outer, last = table.split(".")
+        holder = tree["mechanism"]
+        for key in outer:
+            holder = holder[key]
+        holder[evil] = holder.pop(last)
+        result = read_or_refused("\n".join(f"{as_toml(key)} = {as_toml(value)}" for key, value in tree.items()))
+        named = isinstance(result, SceneError) and any(
+            f"this is no name for a {what}" in fault.problem for fault in result.faults
+        )
+        assert named is not allowed
+    result = read_or_refused(PRESS, evil)
+    assert isinstance(result, SceneError) is not allowed
+
+
+@pytest.mark.parametrize("title", [evil for evil in EVIL if evil.isprintable() and 0 < len(evil) <= 200])
+def test_any_printable_title_reaches_the_program_as_text(title: str, rotor_model: Callable[[str], Path]) -> None:
+    """Into the manifest, the equations and the C of an export, as the very text; no more files than without it."""
+    folder = rotor_model(title)
+    assert json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["title"] == title
+    program = export_c(folder, folder.parent / "program")
+    assert not list(folder.parent.rglob("pwned"))
+    source = (program / "scene.c").read_text(encoding="utf-8")
+    literal = re.search(r'scene_title = "((?:[^"\\\n]|\\[0-7]{3})*)";\n', source)
+    assert literal is not None
+    plain = re.sub(r"\\([0-7]{3})", lambda match: chr(int(match.group(1), 8)), literal.group(1))
+    assert plain.encode("latin-1").decode("utf-8") == title
+
+
+@pytest.fixture
+def rotor_model(rotor: Path) -> Callable[[str], Path]:
+    """The folder of the rotor with another title, which is a number of the manifest as others are."""
+
+    def make(title: str) -> Path:
+        scene = scene_from_text(f"title = {as_toml(title)}\n" + re.sub(r"(?m)^title = .*$", "", ROTOR), "rotor")
+        return generate(scene, rotor)
+
+    return make
+
+
+@pytest.mark.parametrize("word", ["int", "main", "NULL", "clean", "run", "all", "Makefile", "stepper", "casadi_real"])
+def test_words_of_c_and_make_are_names_like_others(word: str, tmp_path: Path) -> None:
+    text = PRESS
+    for old in ("crank", "rod", "slider", "punch", "guide"):
+        text = re.sub(rf"\b{old}\b(?! = \"whole)", f"{word}_{old}" if old != "rod" else word, text)
+    text = text.replace(f'{word}_crank = "whole"', 'crank = "whole"').replace(
+        'joint = "A"                             # the', 'joint = "A" # the'
+    )
+    scene = scene_from_text(text, word)
+    folder = generate(scene, tmp_path / "generated")
+    program = export_c(folder, tmp_path / "program")
+    done = subprocess.run(
+        ["make", "-s", "CFLAGS=-O0 -std=c99"], cwd=program, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "warning" not in done.stderr
+    ran = subprocess.run(
+        ["make", "-s", "run", "CFLAGS=-O0 -std=c99"],
+        cwd=program,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stderr
+    rows = (program / "out.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) > 100
+    subprocess.run(["make", "-s", "clean"], cwd=program, check=True, timeout=60)
+    assert (program / "scene.c").exists()
+    assert not list(program.glob("*.o"))
+
+
+# ------------------------------------------------------------------------------------------------------------- requests
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
+    return load(generate(scene_from_text(PRESS, "press"), tmp_path_factory.mktemp("requests") / "press"))
+
+
+WRONG_VALUES = [
+    (math.nan, "a finite number in m is expected, not nan"),
+    (math.inf, "a finite number in m is expected, not inf"),
+    (-math.inf, "a finite number in m is expected, not -inf"),
+    (10**400, "a finite number in m is expected, not inf"),
+    ("8 um", "one number in m is expected, not '8 um' (str)"),
+    (b"1", "one number in m is expected, not b'1' (bytes)"),
+    (None, "one number in m is expected, not None (NoneType)"),
+    (True, "one number in m is expected, not True (bool)"),
+    (1 + 2j, "one number in m is expected, not (1+2j) (complex)"),
+    ([1e-6], "one number in m is expected, not [1e-06] (list)"),
+    (np.array([1e-6, 2e-6]), "one number in m is expected, not array"),
+    (np.array([[1e-6]]), "one number in m is expected, not array"),
+]
+
+
+@pytest.mark.parametrize(("value", "words"), WRONG_VALUES, ids=[repr(value)[:20] for value, _ in WRONG_VALUES])
+def test_an_override_that_is_no_finite_number_is_refused(model: Model, value: Any, words: str) -> None:
+    calls: list[Callable[[], object]] = [
+        lambda: model.simulate(cycles=0.1, parameters={"bearing.clearance": value}),
+        lambda: model.reduce(cycles=0.1, parameters={"bearing.clearance": value}),
+        lambda: model.evaluate(0.0, parameters={"bearing.clearance": value}),
+        lambda: model.jacobian("rhs", parameters={"bearing.clearance": value}),
+    ]
+    for call in calls:
+        with pytest.raises(RequestError) as caught:
+            call()
+        assert f"bearing.clearance: {words}" in str(caught.value)
+    with pytest.raises(RequestError, match=r"bearing\.clearance"):
+        model.simulate_many({"bearing.clearance": [1e-6, value]}, ["peak_ball_force"], cycles=0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [
+        ("bearing.clearence", "'bearing.clearance'"),
+        ("clearance", "'bearing.clearance'"),
+        ("mechanism.bodies.crank.masss", "'mechanism.bodies.crank.mass'"),
+        ("bearing.balls", "'bearing."),
+        ("x" * 10_000, "There are "),
+        ("__class__", "There are "),
+        (3, "There are "),
+    ],
+)
+def test_an_unknown_parameter_is_refused_with_the_nearest_names(model: Model, name: Any, near: str) -> None:
+    with pytest.raises(RequestError) as caught:
+        model.simulate(cycles=0.1, parameters={name: 1.0})
+    assert "There is no parameter" in str(caught.value)
+    assert near in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+WRONG_REQUESTS = [
+    ("cycles", "2", "cycles: a number above 0 is expected, not '2'"),
+    ("cycles", math.nan, "cycles: a number above 0 is expected, not nan"),
+    ("cycles", -1, "cycles: a number above 0 is expected, not -1"),
+    ("cycles", [1], r"cycles: a number above 0 is expected, not \[1\]"),
+    ("cycles", 10**400, "cycles: a number above 0 is expected"),
+    ("cycles", 1e12, "samples of .* numbers would not fit into memory.*Model.reduce"),
+    ("cycles", 1e300, "samples of .* numbers would not fit into memory.*Model.reduce"),
+    ("duration", "1 s", "duration: a time above 0 s is expected, not '1 s'"),
+    ("duration", 1e12, "samples of .* numbers would not fit into memory.*Model.reduce"),
+    ("rtol", "a", "rtol: a number from 1e-13 to 0.1 is expected, not 'a'"),
+    ("rtol", math.nan, "rtol: a number from 1e-13 to 0.1 is expected, not nan"),
+    ("rtol", 0, "rtol: a number from 1e-13 to 0.1 is expected, not 0"),
+    ("samples_per_cycle", "a", "samples_per_cycle: a whole number from 1 on is expected, not 'a'"),
+    ("samples_per_cycle", math.nan, "samples_per_cycle: a whole number from 1 on is expected, not nan"),
+    ("samples_per_cycle", math.inf, "samples_per_cycle: a whole number from 1 on is expected, not inf"),
+    ("samples_per_cycle", 1.5, r"samples_per_cycle: a whole number from 1 on is expected, not 1\.5"),
+    ("samples_per_cycle", 10**30, "samples of .* numbers would not fit into memory"),
+    ("transient", "x", "transient: a number of cycles from 0 on is expected, not 'x'"),
+    ("transient", math.nan, "transient: a number of cycles from 0 on is expected, not nan"),
+    ("initial", "abc", "initial: 8 finite numbers are expected"),
+    ("initial", [0.0] * 3, r"initial: 8 finite numbers are expected .*not an array of shape \(3,\)"),
+    ("initial", [math.nan] * 8, "initial: 8 finite numbers are expected .*NaN or inf"),
+    ("initial", [[0.0] * 8], r"initial: 8 finite numbers are expected .*shape \(1, 8\)"),
+    ("method", "euler", "There is no method 'euler'"),
+    ("method", 3, "There is no method 3"),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"), WRONG_REQUESTS, ids=[f"{n}={v!r}"[:30] for n, v, _ in WRONG_REQUESTS]
+)
+def test_a_request_out_of_bounds_is_refused(model: Model, name: str, value: Any, words: str) -> None:
+    given = {name: value} if name in ("cycles", "duration") else {"cycles": 0.1, name: value}
+    with pytest.raises(RequestError, match=words):
+        model.simulate(**given)
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("bearing.clearence=1 um", ("bearing.clearence", 'did you mean "bearing.clearance"?')),
+        ("bearing.clearance=1 kg", ('"1 kg"', "wrong dimension for a length", "SI: m")),
+        ("bearing.clearance=1", ("the unit is missing",)),
+        ("bearing.clearance=nan m", ("the number is not finite",)),
+        ("bearing.clearance=inf m", ("the number is not finite",)),
+        ("bearing.clearance=1e999 m", ("the number is not finite", "given", "allowed", "remedy")),
+        ("bearing.clearance=[1 m, 2 m]", ("no number in front",)),
+        ("bearing.clearance=__import__('os').getcwd()", ("no number in front",)),
+        ("bearing.clearance=1 m; touch pwned", ("has no place in a unit",)),
+        ("bearing.clearance=$(touch pwned)", ("no number in front",)),
+        ("bearing.clearance", ("an override without a value", "PATH=VALUE")),
+        ("=1 m", ("the scene has no quantity of this path",)),
+        ("x" * 10_000 + "=1", ("the scene has no quantity of this path",)),
+        ("\x1b[31m=1 m", ("the scene has no quantity of this path",)),
+        ("mechanism.bodies.rod.mass=-1 kg", ("the value is negative", "a value above zero")),
+    ],
+)
+def test_a_wrong_setting_exits_with_2_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, setting: str, words: tuple[str, ...]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, ["run", str(SCENES / "punching_press.toml"), "--set", setting])
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert "Traceback" not in result.stderr
+    assert "\x1b" not in result.stderr
+    assert len(result.stderr) < 5000
+    for word in words:
+        assert word in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("evil", [evil for evil in EVIL if "\0" not in evil and "/" not in evil and len(evil) < 200])
+def test_a_scene_file_of_any_name_writes_within_its_folders_or_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, evil: str
+) -> None:
+    here = tmp_path / "outer" / "here"
+    here.mkdir(parents=True)
+    monkeypatch.chdir(here)
+    scene = here / f"{evil}.toml"
+    scene.write_text(ROTOR.replace("balls = 8", "balls = x"), encoding="utf-8")  # refused in any case
+    result = CliRunner().invoke(app, ["derive", str(scene)])
+    assert result.exit_code == 2
+    assert "Traceback" not in result.output
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [scene]

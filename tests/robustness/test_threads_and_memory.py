@@ -1,0 +1,134 @@
+"""Claims about one process that does much: threads give the bits of serial calls, memory does not grow.
+
+Threads and long loops run in processes of their own: what breaks there may end them.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import textwrap
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from profiles import LONG
+
+from raceway.derive import generate
+from raceway.derive.read import scene_from_text
+from raceway.runtime import Model, load
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+
+
+@pytest.fixture(scope="module")
+def press(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    text = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
+    return generate(scene_from_text(text, "press"), tmp_path_factory.mktemp("threads") / "press")
+
+
+def everything(model: Model, clearance: float) -> list[np.ndarray]:
+    """What a caller may ask of a model: each of these once shared memory with every other call."""
+    parameters = {"bearing.clearance": clearance}
+    found = []
+    for method in ("auto", "erk"):
+        run = model.simulate(cycles=0.3, samples_per_cycle=400, parameters=parameters, method=method, rtol=1e-5)
+        found += [run.x, *run.outputs.values()]
+    reduced = model.reduce(cycles=1, transient=0, parameters=parameters)
+    found += [np.array([reduced["inner.y"].maximum, reduced["ball.force"].maximum])]
+    found += [model.jacobian("rhs", t=0.001, parameters=parameters)]
+    found += [model.jacobian("rhs", wrt=["bearing.clearance"], t=0.001, parameters=parameters)]
+    found += [np.asarray(value) for value in model.evaluate(0.002, parameters=parameters).values()]
+    found += [np.array(list(model.constants(parameters).values()))]
+    return [np.array(array) for array in found]
+
+
+def assert_same_bits(one: list[np.ndarray], other: list[np.ndarray]) -> None:
+    assert len(one) == len(other)
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["one model", "a model for each thread"])
+def test_concurrent_calls_give_the_bits_of_serial_ones(press: Path, own: bool) -> None:
+    sizes = [k * 1e-6 for k in range(1, 9 if not LONG else 100)]
+    model = load(press)
+    serial = [everything(model, size) for size in sizes]
+    fresh = load(press)  # nothing is made yet: threads make it at once
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)  # threads take turns in the middle of everything
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            parallel = list(pool.map(lambda size: everything(load(press) if own else fresh, size), sizes))
+    finally:
+        sys.setswitchinterval(before)
+    for one, other in zip(serial, parallel, strict=True):
+        assert_same_bits(one, other)
+
+
+MANY = """
+    import sys
+    import numpy as np
+    from raceway.runtime import load
+
+    def resident():  # [bytes]
+        with open("/proc/self/statm") as stream:
+            return int(stream.read().split()[1]) * 4096
+
+    model = load(sys.argv[1])
+    def run(k):
+        return model.simulate(
+            cycles=0.05, samples_per_cycle=400, parameters={"bearing.clearance": (1 + k % 20) * 1e-6}, rtol=1e-4,
+            method=("auto", "auto", "auto", "erk")[k % 4],
+        )
+    first = [run(k).x for k in range(20)]
+    for k in range(60):
+        run(k)
+    before, count = resident(), int(sys.argv[2])
+    for k in range(count):
+        last = run(k)
+        if k % 50 == 0:
+            model.reduce(cycles=0.05, transient=0)
+            model.jacobian("rhs", t=1e-3)
+    for k in range(20):
+        np.testing.assert_array_equal(run(k).x, first[k])
+    print(resident() - before)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="asks Linux for the memory of a process")
+def test_memory_is_flat_over_many_simulations(press: Path) -> None:
+    count = 10_000 if LONG else 400
+    command = [sys.executable, "-W", "error", "-c", textwrap.dedent(MANY), str(press), str(count)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False)
+    assert done.returncode == 0, done.stderr
+    # a kilobyte lost in each simulation would be 10 MB in ten thousand; 4 MB are the allocator's own moods
+    assert int(done.stdout) < 4_000_000 + count * 200
+
+
+def test_a_process_with_models_at_work_in_threads_ends_well(press: Path) -> None:
+    """At the end of an interpreter nothing calls into code that is gone, whoever still holds what."""
+    code = """
+        import sys, threading
+        from raceway.runtime import load
+        model = load(sys.argv[1])
+        kept = [model.simulate(cycles=0.1), model.kernel("rhs"), model.function("outputs"), model.stepper]
+        stop = threading.Event()
+        def work():
+            while not stop.is_set():
+                model.simulate(cycles=0.05)
+        threads = [threading.Thread(target=work, daemon=True) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        cycle = []
+        cycle.append((cycle, model, kept))
+        del model, kept
+        print("done")
+    """
+    for _ in range(20 if LONG else 3):
+        command = [sys.executable, "-X", "faulthandler", "-c", textwrap.dedent(code), str(press)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout == "done\n"
+        assert "Segmentation" not in done.stderr

@@ -1,0 +1,70 @@
+"""What `explain` says of a model against what the contacts' formulas say."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from raceway.runtime import Model
+from raceway.runtime.cli import app
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_breakpoints_are_the_edges_of_the_punch_window(make_model: Callable[..., Model]) -> None:
+    said = make_model("punching_press").explain()
+    assert [(round(math.degrees(b.angle), 9), b.cause) for b in said.breakpoints] == [
+        (237.0, "punch on"),
+        (267.0, "punch off"),
+    ]
+
+
+def test_an_edge_at_the_start_of_the_turn_counts_once(make_model: Callable[..., Model]) -> None:
+    said = make_model("punching_press").explain({"mechanism.driver.start_angle": math.radians(237.0)})
+    assert [b.cause for b in said.breakpoints] == ["punch on", "punch off"]
+
+
+def test_frequency_is_that_of_the_hertz_springs_at_equilibrium(make_model: Callable[..., Model]) -> None:
+    """Stiffness of a ring on balls, sum of 3/2 k sqrt(delta) n n^T over those that touch, by hand at the equilibrium."""
+    model = make_model("varying_compliance")
+    scale = model.explain().scales[-1]
+    found = model.static_equilibrium(t=scale.time)
+    parameters, constants = model.parameters, model.constants()
+    balls = model.manifest.bearing.balls if model.manifest.bearing else 0
+    cage = model.inputs_at(scale.time)[[i.name for i in model.manifest.inputs].index("phase.cage")]
+    angle = cage + 2.0 * np.pi * np.arange(balls) / balls
+    direction = np.array([np.cos(angle), np.sin(angle)])
+    depth = direction.T @ found.x[:2] - 0.5 * parameters["bearing.clearance"]
+    k = constants.get("bearing.k_b", parameters.get("bearing.contact.stiffness"))
+    slopes = 1.5 * k * np.sqrt(np.maximum(depth, 0.0))
+    matrix = (direction * slopes) @ direction.T / parameters["bearing.inner_ring.mass"]
+    assert scale.frequency == pytest.approx(math.sqrt(np.max(np.linalg.eigvalsh(matrix))), rel=1e-9)
+
+
+def test_damping_of_the_two_presses_is_told_apart(make_model: Callable[..., Model]) -> None:
+    """One-sided damping of 683 N*s/m outlives the contacts' own oscillation; the tangent law is light."""
+    one_sided, tangent = (make_model(name).explain() for name in ("punching_press", "punching_press_tangent"))
+    assert max(s.stiffness for s in one_sided.scales) > 3.0 * max(s.stiffness for s in tangent.scales)
+    assert dict(one_sided.smoothness)["damping"] == "kinked"
+
+
+def test_command_names_the_line_that_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    scene = ROOT / "scenes/punching_press.toml"
+    done = CliRunner().invoke(app, ["explain", str(scene), "--json"])
+    assert done.exit_code == 0, done.stderr
+    report = json.loads(done.stdout)
+    lines = scene.read_text(encoding="utf-8").splitlines()
+    by_name = {part["name"]: part for part in report["modelled"]}
+    assert lines[by_name["outer ring"]["line"] - 1] == "[bearing.outer_ring]"
+    assert lines[by_name["gravity"]["line"] - 1].startswith("gravity")
+    assert any("inner_ring.damping" in text for text in report["not_modelled"])
+    assert not any("bearing.outer_ring" in text for text in report["not_modelled"])
+    assert report["step"]["all"] == sum(v for k, v in report["step"].items() if k != "all")
+    assert report["method"]["auto"] == "stepper"

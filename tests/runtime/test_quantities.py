@@ -1,0 +1,161 @@
+"""Quantities of interest: one meaning for one name, closed forms, wrong names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from raceway.runtime import Model, RequestError
+from raceway.runtime.quantities import KINDS, parse_quantity
+
+ENSEMBLE = [
+    "peak_ball_force",
+    "rms_inner_y",
+    "mean:ball.force",
+    "range:inner.x",
+    "min:ball.deflection",
+    "rms:ball.force",
+]
+
+
+def values(model: Model, of: list[str], **options: object) -> dict[str, float]:
+    report = model.sensitivity(of, [next(iter(model.parameters))], check=False, **options)  # type: ignore[arg-type]
+    return {item.name: item.value for item in report.quantities}
+
+
+def test_names_mean_the_numbers_of_ensembles(make_model: Callable[..., Model]) -> None:
+    """Nodes and panels here, reductions inside the stepper's steps there."""
+    model = make_model("punching_press")
+    found = values(model, ENSEMBLE, cycles=2, transient=1)
+    many = model.simulate_many({"bearing.clearance": [10e-6]}, ENSEMBLE, cycles=2, transient=1, rtol=1e-10)
+    for name in ENSEMBLE:
+        assert found[name] == pytest.approx(float(many[name][0]), rel=2e-5), name
+
+
+def test_drive_work_is_the_work_of_the_punch_and_falls_with_its_window(make_model: Callable[..., Model]) -> None:
+    """Work F (y(start) - y(end)) of a turn: its derivatives by force and edges need no simulation at all."""
+    model = make_model("punching_press")
+    punch = "mechanism.forces.punch"
+    names = [f"{punch}.force.y", f"{punch}.window.start", f"{punch}.window.end", "mechanism.driver.speed"]
+    report = model.sensitivity("drive_work", names, 2, transient=1, check=False)
+    force = model.parameters[names[0]]
+    start, end = model.parameters[names[1]], model.parameters[names[2]]
+    crank, rod = (model.parameters[f"mechanism.bodies.{name}"] for name in ("crank.points.B", "rod.points.C"))
+
+    def height(angle: float) -> float:
+        return crank * math.sin(angle) - math.sqrt(rod**2 - (crank * math.cos(angle)) ** 2)
+
+    def falling(angle: float) -> float:
+        x = crank * math.cos(angle)
+        return crank * math.cos(angle) - x * crank * math.sin(angle) / math.sqrt(rod**2 - x**2)
+
+    work = force * (height(start) - height(end))
+    assert report.quantities[0].value == pytest.approx(work, rel=1e-9)
+    expected = [work / force, force * falling(start), -force * falling(end)]
+    for name, number in zip(names, expected, strict=False):
+        assert report["drive_work", name].derivative == pytest.approx(number, rel=1e-8), name
+    assert abs(report["drive_work", names[3]].dimensionless) < 1e-10
+
+
+def test_an_unloaded_press_does_no_work(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press")
+    off = {"mechanism.forces.punch.force.y": 0.0}
+    report = model.sensitivity("drive_work", "mechanism.gravity", 1, transient=0, parameters=off, check=False)
+    assert abs(report.quantities[0].value) < 1e-9
+    assert abs(report.pairs[0].derivative) < 1e-9
+
+
+def test_static_deflection_follows_the_two_thirds_power(make_model: Callable[..., Model]) -> None:
+    """With zero clearance delta = const (F/k)^(2/3) and Q proportional to F: elasticities 2/3, -2/3, 1 and 0."""
+    model = make_model("varying_compliance")
+    wrt = ["load.force.x", "bearing.contact.stiffness"]
+    report = model.sensitivity(["static_deflection", "static_peak_ball_force"], wrt)
+    expected = {
+        ("static_deflection", wrt[0]): 2 / 3,
+        ("static_deflection", wrt[1]): -2 / 3,
+        ("static_peak_ball_force", wrt[0]): 1.0,
+        ("static_peak_ball_force", wrt[1]): 0.0,
+    }
+    for key, number in expected.items():
+        assert report[key].dimensionless == pytest.approx(number, abs=1e-8)
+        assert report[key].check.verdict.value == "verified"
+
+
+def test_amplitude_of_a_ring_on_a_linear_spring(make_model: Callable[..., Model]) -> None:
+    """Heavy preload makes the contacts linear: the outer ring on its housing then answers a constant load, and the
+    amplitude at an order of the shaft falls with the housing's stiffness as the static compliance does."""
+    model = make_model("punching_press_tangent")
+    loose = {
+        "mechanism.forces.punch.force.y": 0.0,
+        "bearing.clearance": -60e-6,
+        "bearing.outer_ring.stiffness": 1e6,
+        "bearing.outer_ring.damping": 3e3,
+        "mechanism.driver.speed": 2.0,
+    }
+    report = model.sensitivity(
+        "amplitude:outer.y@1x", "bearing.outer_ring.stiffness", 2, transient=1, parameters=loose, check=False
+    )
+    # a slow load: quasi-static, amplitude = F/k_p up to (omega/omega_0)^2 ~ 1e-5 and the damper's c omega/k = 6e-3 squared
+    assert report.pairs[0].dimensionless == pytest.approx(-1.0, abs=2e-4)
+
+
+def test_value_at_a_crank_angle_is_that_of_the_run(make_model: Callable[..., Model]) -> None:
+    model = make_model("offset_slider")
+    angle = math.radians(200.0)
+    found = values(model, ["value:inner.y@200deg", f"value:inner.y@{angle!r}rad", "end:inner.y"], cycles=1, transient=0)
+    turn = model.period()
+    fine = model.simulate(1, rtol=1e-11, samples_per_cycle=360)
+    assert found["value:inner.y@200deg"] == pytest.approx(float(fine["inner.y"][200]), rel=1e-6)
+    assert found[f"value:inner.y@{angle!r}rad"] == found["value:inner.y@200deg"]
+    assert found["end:inner.y"] == pytest.approx(float(fine["inner.y"][-1]), rel=1e-5)
+    assert fine.t[-1] == pytest.approx(turn)
+
+
+def test_a_sum_rule_of_amplitudes_holds(make_model: Callable[..., Model]) -> None:
+    """Parseval: mean square about the mean is half the sum of squares of the harmonics' amplitudes."""
+    model = make_model("four_bar")
+    orders = [f"amplitude:drive_torque@{k}x" for k in range(1, 40)]
+    found = values(model, ["rms:drive_torque", "mean:drive_torque", *orders], cycles=1, transient=0)
+    square = found["mean:drive_torque"] ** 2 + 0.5 * sum(found[name] ** 2 for name in orders)
+    # the torque steps with its load: amplitudes fall like 1/k, and 40 of them leave about a hundredth of the square
+    assert square == pytest.approx(found["rms:drive_torque"] ** 2, rel=0.02)
+    assert square < found["rms:drive_torque"] ** 2
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("peak_bal_force", "peak_ball_force"),
+        ("max:ball.forse", r"ball\.force"),
+        ("mx:ball.force", "max"),
+        ("max:ball.force[9]", "1 to 8"),
+        ("max:inner.y[1]", "no balls"),
+        ("value:inner.y", "240deg"),
+        ("value:inner.y@bpfo", "240deg"),
+        ("amplitude:inner.y@9", "bpfo"),
+        ("max:inner.y@2x", "nothing behind"),
+        ("peak_time:ball.force", "no derivative"),
+        ("drive_wrok", "drive_work"),
+    ],
+)
+def test_wrong_names_are_refused_with_a_remedy(make_model: Callable[..., Model], text: str, words: str) -> None:
+    with pytest.raises(RequestError, match=words):
+        parse_quantity(make_model("punching_press").manifest, text)
+
+
+def test_every_kind_is_documented_and_evaluated(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press")
+    names = {
+        "value": "value:inner.y@240deg",
+        "amplitude": "amplitude:inner.y@bpfo",
+        "drive_work": "drive_work",
+        "static_deflection": "static_deflection@250deg",
+        "static_peak_ball_force": "static_peak_ball_force@250deg",
+    }
+    asked = [names.get(kind, f"{kind}:inner.y") for kind in KINDS]
+    found = values(model, asked, cycles=1, transient=0)
+    assert all(np.isfinite(number) for number in found.values())
+    assert all(kind.summary for kind in KINDS.values())
