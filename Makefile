@@ -3,6 +3,8 @@
 # make lint    style, types, import contract, freshness of the committed artefact
 # make docs    builds the documentation into docs/_build/html
 # make generated   derives the committed artefact anew
+# make extremes   runs the tour of extremes and writes docs/extremes.md (ten minutes); QUICK=1: the test suite's part
+# make trade   measures accuracy against time on the shipped scenes and writes docs/trade.md (about ten minutes)
 # make bench   installs the peers into a venv of their own and measures (a quarter of an hour); QUICK=1: a minute, for show
 
 PYTHON ?= python3
@@ -10,7 +12,7 @@ VENV ?= .venv
 export PYTHON VENV
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint docs generated bench bench-test clean
+.PHONY: demo test lint docs generated trade bench bench-test clean extremes
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.ready
@@ -33,10 +35,16 @@ docs: $(VENV)/.ready-docs
 generated: $(VENV)/.ready
 	$(BIN)/raceway derive scenes/punching_press.toml
 
+trade: $(VENV)/.ready
+	$(BIN)/python -m trade
+
 BENCH_VENV := benchmarks/.venv
 
 bench: $(BENCH_VENV)/.ready
 	$(BENCH_VENV)/bin/python -m benchmarks $(if $(QUICK),--quick --out build/benchmarks/quick) $(if $(FRESH),--fresh)
+
+extremes: $(VENV)/.ready-dev
+	$(BIN)/python -m extremes $(if $(QUICK),--quick)
 
 bench-test: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest benchmarks

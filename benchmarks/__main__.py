@@ -16,7 +16,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import costs, ensemble, regeneration, report, sensitivity_cost, sensitivity_error, work_precision
+from benchmarks import (
+    arithmetic,
+    costs,
+    ensemble,
+    jacobians,
+    regeneration,
+    report,
+    sensitivity_cost,
+    sensitivity_error,
+    work_precision,
+)
 from benchmarks.machine import load, machine
 from benchmarks.problem import ROOT
 
@@ -50,6 +60,8 @@ def main(arguments: list[str] | None = None) -> int:
         else sensitivity_error.sensitivity_error(24, _say)
     )
     parts["ensemble"] = lambda: ensemble.throughput(*((32, 2) if options.quick else (10_000, 3)))
+    parts["jacobians"] = lambda: jacobians.measure(rounds)
+    parts["arithmetic"] = lambda: arithmetic.arithmetic(2 if options.quick else 32, rounds)
     parts["regeneration"] = lambda: regeneration.regeneration(1 if options.quick else 5)
     unknown = [wanted for wanted in options.parts if not any(name.startswith(wanted) for name in parts)]
     if unknown:

@@ -55,6 +55,8 @@ def throughput(members: int, rounds: int) -> dict[str, Any]:
 
 def _case(case: Case, model: Model, members: int, rounds: int) -> dict[str, Any]:
     sets = parameter_sets(case, model, members)
+    if not model.ensemble_driver.lanes > 1:  # compiles it, before anything is timed
+        raise RuntimeError("the ensembles' driver has no lanes")
     # a quarter is enough for the slow one
     few = max(8, members // 4)
     calls: dict[str, tuple[int, Callable[[], object]]] = {"single": (few, _single_runs(model, sets[:few]))}

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import ensemble, figures, sensitivity_cost, sensitivity_error
+from benchmarks import arithmetic, ensemble, figures, jacobians, sensitivity_cost, sensitivity_error
 from benchmarks.curves import LEVELS, curve, lower, time_at
 from benchmarks.problem import SPREAD
 from benchmarks.tables import milliseconds, table
@@ -43,6 +43,7 @@ def write(folder: Path, page: Path) -> None:
         machine="\n".join(_machine(results)),
         summary="\n".join(_summary(cases)),
         level=f"{LEVELS[0]:.0e}",
+        elsewhere="\n".join(f"- {text}" for name, text in _ELSEWHERE if name in results),
         spread=f"{100 * SPREAD:g} %",
         cases="\n".join(line for case in cases for line in _case(case, images)),
         targets="\n".join(targets(cases, results)),
@@ -52,6 +53,20 @@ def write(folder: Path, page: Path) -> None:
     page.parent.mkdir(parents=True, exist_ok=True)
     page.write_text(text.rstrip() + "\n", encoding="utf-8")
 
+
+#: Name of a file of results, and what its section tells, for the list on top.
+_ELSEWHERE = (
+    ("ensemble", "[Ensembles](#ensembles) advance eight parameter sets in the lanes of one core, and on all cores."),
+    ("sensitivity_cost", "[Derivatives](#number-of-parameters) by any number of parameters come out of the same run."),
+    (
+        "sensitivity_error",
+        "[How accurate derivatives are](#errors-of-derivatives) is a question of its own: pass `sensitivity_rtol`.",
+    ),
+    (
+        "regeneration",
+        "Changing a number compiles nothing; [from a scene to a model](#from-scene-to-model) takes seconds.",
+    ),
+)
 
 #: A load below this is that of the benchmarks alone.
 QUIET = 1.5
@@ -93,15 +108,13 @@ def _summary(cases: Sequence[Result]) -> list[str]:
         )
     labels |= {"hand-best": "by hand in C, best method", "numpy-best": "best of SciPy with NumPy"}
     own = {name: time_at(each["stepper"], LEVELS[0]) for name, each in curves.items()}
-    keys = [
-        key for key in labels if not key.startswith(("stepper", "hand-", "simulate")) and not key.endswith("-numpy")
-    ]
+    peers = [key for key in labels if not key.startswith(("stepper", "hand-", "simulate", "numpy-"))]
     rows = [["**raceway**, ms a cycle", *(f"**{milliseconds(own[case['case']])}**" for case in cases)]]
-    for key in ("hand-best", *keys, "numpy-best"):
+    for key in ("hand-best", *(key for key in peers if not key.endswith("-numpy")), "numpy-best"):
         cells = []
         for case in cases:
             taken, mine = time_at(curves[case["case"]].get(key, ()), LEVELS[0]), own[case["case"]]
-            cells.append("–" if taken is None or mine is None else f"{taken / mine:.2g}×")
+            cells.append("–" if taken is None or mine is None else f"{float(f'{taken / mine:.2g}'):g}×")
         rows.append([labels[key], *cells])
     return table(["", *(case["words"] for case in cases)], rows)
 
@@ -304,6 +317,31 @@ def _ensemble(result: Result, _: Path) -> list[str]:
     ]
 
 
+def _jacobians(result: Result, _: Path) -> list[str]:
+    return [
+        "## Jacobians",
+        "",
+        f"One call at a state of `{result['scene']}` under the punch's load. *Code*: the compiled function through its "
+        "buffer. *Prepared*: `model.jacobian_function`, with a state copied in and the entries picked. *Dense*: "
+        "`model.jacobian`, which looks up names and numbers anew. One right-hand side through its buffer: "
+        f"{1e6 * result['rhs']:.3g} µs. The last column: central differences, two calls for each column.",
+        "",
+        *jacobians.lines(result),
+    ]
+
+
+def _arithmetic(result: Result, _: Path) -> list[str]:
+    return [
+        "## Fast arithmetic",
+        "",
+        "The stepper is compiled for IEEE arithmetic without contraction. Compiled with `-ffast-math` (NaN kept) and "
+        f"fused multiplications, over {result['members']} parameter sets at a tolerance of {result['tolerance']:.0e}: "
+        "the largest change of motion, peak force and rms, in units of the tolerance, and the time, paired.",
+        "",
+        *arithmetic.lines(result),
+    ]
+
+
 #: Name of a file of results, and what makes lines of it.
 SECTIONS: tuple[tuple[str, Callable[[Result, Path], list[str]]], ...] = (
     ("one_step", _one_step),
@@ -311,6 +349,8 @@ SECTIONS: tuple[tuple[str, Callable[[Result, Path], list[str]]], ...] = (
     ("sensitivity_cost", _sensitivity_cost),
     ("sensitivity_error", _sensitivity_error),
     ("ensemble", _ensemble),
+    ("jacobians", _jacobians),
+    ("arithmetic", _arithmetic),
     ("regeneration", _regeneration),
 )
 

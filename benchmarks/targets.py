@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from benchmarks.curves import LEVELS, curve, lower, time_at, tolerance_at
+from benchmarks.problem import CASES
 
 Result = dict[str, Any]
 
@@ -20,6 +21,8 @@ _AT_1E3 = (
     (("cvodes-compiled",), "CasADi cvodes, compiled", 20.0, False),
     (("scipy-lsoda-numpy", "scipy-dop853-numpy", "scipy-radau-numpy"), "best SciPy with NumPy", 300.0, False),
 )
+
+_WORDS = {case.key: case.words for case in CASES}
 
 #: Not peers: the project itself, and the limit.
 _NOT_PEERS = ("stepper", "simulate", "hand-")
@@ -57,7 +60,7 @@ def _sensitivity_cost(result: Result) -> list[Row]:
                     continue
                 ratio = row["times_plain"]["median"]
                 text = f"{count} sensitivities: at most {limit:g}× the plain run ({way})"
-                rows.append((text, row["case"], f"{ratio:.3g}×", _met(ratio <= limit)))
+                rows.append((text, _WORDS[row["case"]], f"{ratio:.3g}×", _met(ratio <= limit)))
     deviations = [fit["largest_deviation"] for fit in result["fits"]]
     if deviations:
         worst = max(deviations)
@@ -78,6 +81,24 @@ def _ensemble(result: Result) -> list[Row]:
     return rows
 
 
+def _jacobians(result: Result) -> list[Row]:
+    slowest = max(result["rows"], key=lambda row: float(row["code"]["time"]))
+    time = slowest["code"]["time"]
+    what = f"{1e6 * time:.3g} µs ({slowest['of']} by {slowest['wrt']})"
+    return [("a Jacobian of generated code in under 2 µs", "", what, _met(time < 2e-6))]
+
+
+def _arithmetic(result: Result) -> list[Row]:
+    rows: list[Row] = []
+    for case in result["cases"]:
+        measured = (
+            f"{case['change']['worst']:.2g} tolerances, {case['time_over_ieee']['median']:.2f}× the time; not used"
+        )
+        text = "`-ffast-math` would change no quantity by 0.01 tolerances"
+        rows.append((text, case["words"], measured, _met(case["change"]["worst"] <= 0.01)))
+    return rows
+
+
 def _regeneration(result: Result) -> list[Row]:
     cold, warm = (result["stages"][how] for how in ("cold", "warm"))
     derive = sum(v["median"] for k, v in cold.items() if not k.startswith(("C compiler", "first", "load")))
@@ -95,6 +116,8 @@ _JUDGES: tuple[tuple[str, Callable[[Result], list[Row]]], ...] = (
     ("balls", _balls),
     ("sensitivity_cost", _sensitivity_cost),
     ("ensemble", _ensemble),
+    ("jacobians", _jacobians),
+    ("arithmetic", _arithmetic),
     ("regeneration", _regeneration),
 )
 

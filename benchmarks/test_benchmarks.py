@@ -34,7 +34,7 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
         env={**os.environ, "MPLBACKEND": "Agg"},
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=600,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -47,7 +47,7 @@ def _result(folder: Path, name: str) -> dict[str, Any]:
 
 
 def test_every_contender_has_runs_or_says_why_not(quick: Path) -> None:
-    page = (quick / "benchmarks.md").read_text(encoding="utf-8")
+    page = (quick / "benchmarks.md").read_text(encoding="utf-8").partition("## Work and precision")[2]
     contenders = _result(quick, "work_precision_onesided")["contenders"]
     assert {"stepper", "simulate", "hand-dp54", "erk", "cvodes", "numbalsoda", "diffrax-tsit5"} <= {
         c["key"] for c in contenders
@@ -70,13 +70,22 @@ def test_all_methods_converge_to_the_same_cycle(quick: Path) -> None:
 
 
 def test_stepper_takes_the_steps_of_the_same_method_by_hand(quick: Path) -> None:
+    """Sums over the balls are rounded in another order: at tight tolerances a few steps of thousands fall elsewhere,
+    and with them the places where steps meet a contact that opens, on which the error hangs."""
     contenders = {c["key"]: c for c in _result(quick, "work_precision_onesided")["contenders"]}
+    same_steps = 0
     for method in ("dp54", "rodas4", "rodas5p"):
         own, hand = (contenders[f"{who}-{method}"]["runs"] for who in ("stepper", "hand"))
         for mine, theirs in zip(own, hand, strict=True):
-            assert mine["counts"]["steps"] == pytest.approx(theirs["counts"]["steps"], rel=0.05)
-            if theirs["error"]["worst"]["median"] < 1e-2:
-                assert mine["error"]["worst"]["median"] == pytest.approx(theirs["error"]["worst"]["median"], rel=0.5)
+            steps, by_hand = mine["counts"]["steps"], theirs["counts"]["steps"]
+            assert steps == pytest.approx(by_hand, rel=0.05)
+            error, expected = mine["error"]["worst"]["median"], theirs["error"]["worst"]["median"]
+            if 1e-6 < expected < 1e-2 and steps == by_hand:
+                same_steps += 1
+                assert error == pytest.approx(expected, rel=0.1)
+            elif expected < 1e-2:
+                assert 1 / 3 < error / expected < 3
+    assert same_steps >= 4
 
 
 def test_two_references_agree_and_right_hand_sides_are_one_model(quick: Path) -> None:
@@ -94,6 +103,11 @@ def test_page_shows_figures_and_names_no_paths(quick: Path) -> None:
         "Targets",
         "One right-hand side",
         "Number of balls",
+        "Number of parameters",
+        "Errors of derivatives",
+        "Ensembles",
+        "Jacobians",
+        "Fast arithmetic",
         "From scene",
     ):
         assert f"## {title}" in page
@@ -104,6 +118,26 @@ def test_page_shows_figures_and_names_no_paths(quick: Path) -> None:
     everything = page + "".join(p.read_text(encoding="utf-8") for p in (quick / "results").glob("*.json"))
     for place in (str(ROOT), str(Path.home()), str(quick)):
         assert place not in everything
+
+
+def test_derivatives_of_casadi_and_of_the_stepper_are_one(quick: Path) -> None:
+    rows = [row for row in _result(quick, "sensitivity_cost")["rows"] if "agreement" in row]
+    assert {row["way"] for row in rows} == {"CasADi erk, C", "CasADi rosenbrock, C"}
+    assert all(row["agreement"] < 1e-2 for row in rows)
+
+
+def test_control_of_derivatives_lowers_their_error_over_the_ensemble(quick: Path) -> None:
+    for case in _result(quick, "sensitivity_error")["cases"]:
+        for row in case["rows"]:
+            free, controlled = row["states alone"], row["with derivatives"]
+            assert controlled["derivative"]["median"] < 0.2 * free["derivative"]["median"]
+            assert controlled["state"]["median"] < free["state"]["median"]
+
+
+def test_an_unknown_part_is_refused() -> None:
+    from benchmarks.__main__ import main
+
+    assert main(["--quick", "work_precission"]) == 2
 
 
 def test_time_at_an_error_follows_a_power_law() -> None:

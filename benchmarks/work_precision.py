@@ -42,7 +42,7 @@ class Effort:
 
     members: int = 32
     rounds: int = 32
-    error_budget: float = 0.6
+    error_budget: float = 0.4
     time_budget: float = 0.3
     longest: float = 3.0
     tolerances: int = 1
@@ -75,7 +75,7 @@ def measure(case: Case, model: Model, effort: Effort, say: Callable[[str], None]
         for tol in tolerances:
             begun = time.perf_counter()
             found[contender.key].append(_errors(contender, members, tol, effort))
-            if time.perf_counter() - begun > effort.longest:
+            if len(found[contender.key]) > 1 and time.perf_counter() - begun > effort.longest:
                 break  # tighter ones take longer still
         for k, tol in enumerate(tolerances[: len(found[contender.key])]):
             if not found[contender.key][k].get("fault"):

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from scipy.integrate import quad
 
 from extremes.case import Case, Finding
-from extremes.models import DAMPING, ROTOR_LOAD, SHIPPED_DAMPING, Change, made, press, rotor
-from extremes.physics import GIVEN_MASS, OUTER, RATIO, SPEED, START, WINDOW, difference
+from extremes.models import ROTOR_LOAD, Change, press, rotor
+from extremes.physics import GIVEN_MASS, OUTER, SPEED, START, WINDOW, difference
 from extremes.reference import TURN, Machine
 
 GROUP = "Invariants"
@@ -31,8 +32,8 @@ ANGLES = (
 NO_LOAD: Change = (ROTOR_LOAD, 'type = "constant"\nforce = ["0 N", "0 N"]')
 
 
-#: Oscillations, words, clearance [m], method, tolerance and the drift that is allowed.  A step may err by rtol, and where
-#: balls lose and find contact all steps err alike: the drift grows like rtol times steps.
+#: Oscillations, words, clearance [m], method, tolerance and the drift that is allowed.  A step may err by rtol, and
+#: where balls lose and find contact all steps err alike: the drift grows like rtol times steps.
 ENERGY = (
     (1000, "all balls in contact", -120e-6, "stepper-dop853", 1e-12, 1e-9, True),
     (1000, "balls losing contact", -10e-6, "stepper-dp54", 1e-9, 1e-3, True),
@@ -59,11 +60,22 @@ def energy(oscillations: int, method: str, rtol: float, bound: float, clearance:
 
     # counted, not estimated: passages of x through zero upwards
     short = model.simulate(
-        duration=0.02, parameters=numbers, initial=start, rtol=rtol, method=method, samples_per_cycle=20_000, transient=0
+        duration=0.02,
+        parameters=numbers,
+        initial=start,
+        rtol=rtol,
+        method=method,
+        samples_per_cycle=20_000,
+        transient=0,
     )["inner.x"]
     period = 0.02 / np.count_nonzero((short[:-1] < 0.0) & (short[1:] >= 0.0))
     solution = model.simulate(
-        duration=oscillations * period, parameters=numbers, initial=start, rtol=rtol, method=method, samples_per_cycle=64,
+        duration=oscillations * period,
+        parameters=numbers,
+        initial=start,
+        rtol=rtol,
+        method=method,
+        samples_per_cycle=64,
         transient=0,
     )
     drift = max(abs(total(x) / total(start) - 1.0) for x in solution.x)
@@ -85,10 +97,12 @@ def works(numbers: dict[str, float]) -> Finding:
     torque, work = solution["drive_torque"], 0.0
     edges = np.unique(np.round(np.array([0.0, *np.degrees(linkage.windows).ravel(), 360.0]) * 20).astype(int))
     size = float(np.sum(np.abs(torque))) * TURN / 7200
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         # the sample at an edge shows what follows; what came before is the matrix of the hand-written press
         part = torque[a : b + 1].copy()
-        part[-1] = linkage.solve(linkage.start + TURN * b / 7200, linkage.punching(linkage.start + TURN * (a + b) / 14400))[1]
+        part[-1] = linkage.solve(
+            linkage.start + TURN * b / 7200, linkage.punching(linkage.start + TURN * (a + b) / 14400)
+        )[1]
         weights = np.ones(len(part))
         weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
         work += float(weights @ part) * TURN / 7200 / 3.0
@@ -123,8 +137,14 @@ def mirror() -> Finding:
 
 def scaling(length: float, mass: float, time: float) -> Finding:
     """Other units of length, mass and time: the same motion in them."""
-    model = press("one-sided", *GIVEN_MASS)
-    powers = {"m": (1, 0, 0), "kg": (0, 1, 0), "kg*m^2": (2, 1, 0), "N": (1, 1, -2), "Pa": (-1, 1, -2)}
+    model = press("one-sided", *TURNABLE)
+    powers: dict[str, tuple[float, float, float]] = {
+        "m": (1, 0, 0),
+        "kg": (0, 1, 0),
+        "kg*m^2": (2, 1, 0),
+        "N": (1, 1, -2),
+        "Pa": (-1, 1, -2),
+    }
     powers |= {"N/m": (0, 1, -2), "N*s/m": (0, 1, -1), "N*s/m^1.5": (-0.5, 1, -1), "s*m^0.5": (0.5, 0, 1)}
     powers |= {"m/s": (1, 0, -1), "m/s^2": (1, 0, -2), "rad/s": (0, 0, -1), "rad": (0, 0, 0), "1": (0, 0, 0)}
     numbers = {}
@@ -155,10 +175,14 @@ def momentum(numbers: dict[str, float]) -> Finding:
     worst = 0.0
     for k, axis in enumerate("xy"):
         impulse = size = 0.0
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in pairwise(edges):
             on = linkage.punching(linkage.start + linkage.speed * 0.5 * (a + b))
             value, _ = quad(
-                lambda t, on=on, k=k: (lambda f: (f.real, f.imag)[k])(machine.force(t, on)), a, b, epsabs=0.0, epsrel=1e-11,
+                lambda t, on=on, k=k: (lambda f: (f.real, f.imag)[k])(machine.force(t, on)),
+                a,
+                b,
+                epsabs=0.0,
+                epsrel=1e-11,
                 limit=200,
             )
             impulse, size = impulse + value, size + abs(value)
@@ -181,7 +205,9 @@ def settles() -> Finding:
     solution = model.simulate(duration=0.5, parameters=numbers, rtol=1e-10, samples_per_cycle=10, transient=0)
     machine = Machine.of(model, numbers)
     end = machine.equilibrium(0.0, False, solution.x[-1, :2])
-    return Finding(status="done", error=float(np.max(np.abs(solution.x[-1, :2] - end)) / np.max(np.abs(end))), bound=1e-9)
+    return Finding(
+        status="done", error=float(np.max(np.abs(solution.x[-1, :2] - end)) / np.max(np.abs(end))), bound=1e-9
+    )
 
 
 def sampling(method: str, bound: float) -> Finding:
@@ -223,30 +249,93 @@ def cases() -> list[Case]:
     big = {"mechanism.bodies.crank.points.B": 5.0, "mechanism.bodies.rod.points.C": 83.0,
            "mechanism.bodies.rod.center_of_mass": 41.0}  # fmt: skip
     table: list[tuple[str, str, str, Any, bool]] = [
-        *((f"energy over {count} oscillations, {words}", method, "energy, largest relative drift",
-           partial(energy, count, method, rtol, bound, clearance), quick)
-          for count, words, clearance, method, rtol, bound, quick in ENERGY),
+        *(
+            (
+                f"energy over {count} oscillations, {words}",
+                method,
+                "energy, largest relative drift",
+                partial(energy, count, method, rtol, bound, clearance),
+                quick,
+            )
+            for count, words, clearance, method, rtol, bound, quick in ENERGY
+        ),
         ("drive work, shipped press", "outputs", "work of the punch over that of |torque|", partial(works, {}), True),
-        ("drive work at 60 000 rpm", "outputs", "work of the punch over that of |torque|",
-         partial(works, {SPEED: 60_000 * TURN / 60.0}), True),
-        ("drive work with a crank of 5 m", "outputs", "work of the punch over that of |torque|", partial(works, big), True),
-        ("drive work with crank over rod 0.9", "outputs", "work of the punch over that of |torque|",
-         partial(works, {"mechanism.bodies.crank.points.B": 0.09}), False),
-        *((f"scene turned by {degrees:g} deg", "stepper", "the motion turned", partial(rotation, math.radians(degrees)),
-           degrees == 137.0) for degrees in (90.0, 137.0, -200.0)),
+        (
+            "drive work at 60 000 rpm",
+            "outputs",
+            "work of the punch over that of |torque|",
+            partial(works, {SPEED: 60_000 * TURN / 60.0}),
+            True,
+        ),
+        (
+            "drive work with a crank of 5 m",
+            "outputs",
+            "work of the punch over that of |torque|",
+            partial(works, big),
+            True,
+        ),
+        (
+            "drive work with crank over rod 0.9",
+            "outputs",
+            "work of the punch over that of |torque|",
+            partial(works, {"mechanism.bodies.crank.points.B": 0.09}),
+            False,
+        ),
+        *(
+            (
+                f"scene turned by {degrees:g} deg",
+                "stepper",
+                "the motion turned",
+                partial(rotation, math.radians(degrees)),
+                degrees == 137.0,
+            )
+            for degrees in (90.0, 137.0, -200.0)
+        ),
         ("scene in a mirror", "stepper", "the motion mirrored", mirror, True),
-        ("length x 4, mass x 8, time x 2", "stepper", "the motion in the other units", partial(scaling, 4.0, 8.0, 2.0), True),
-        ("length x 1000, mass x 1e-3, time x 60", "stepper", "the motion in the other units",
-         partial(scaling, 1000.0, 1e-3, 60.0), False),
-        ("momentum over a turn, shipped press", "reduce", "impulse of load and housing, relative", partial(momentum, {}), True),
-        ("momentum over a turn, outer ring 10 t, clearance 1 mm", "reduce", "impulse of load and housing, relative",
-         partial(momentum, {f"{OUTER}.mass": 1e4, "bearing.clearance": 1e-3}), False),
+        (
+            "length x 4, mass x 8, time x 2",
+            "stepper",
+            "the motion in the other units",
+            partial(scaling, 4.0, 8.0, 2.0),
+            True,
+        ),
+        (
+            "length x 1000, mass x 1e-3, time x 60",
+            "stepper",
+            "the motion in the other units",
+            partial(scaling, 1000.0, 1e-3, 60.0),
+            False,
+        ),
+        (
+            "momentum over a turn, shipped press",
+            "reduce",
+            "impulse of load and housing, relative",
+            partial(momentum, {}),
+            True,
+        ),
+        (
+            "momentum over a turn, outer ring 10 t, clearance 1 mm",
+            "reduce",
+            "impulse of load and housing, relative",
+            partial(momentum, {f"{OUTER}.mass": 1e4, "bearing.clearance": 1e-3}),
+            False,
+        ),
         ("ring pressed by a constant force", "stepper", "SciPy's root of the balance of forces", settles, True),
         ("16 and 5600 samples a turn", "stepper", "each other", partial(sampling, "stepper", 0.0), True),
         ("16 and 5600 samples a turn", "erk", "each other", partial(sampling, "erk", 1e-5), False),
         ("16 and 5600 samples a turn", "rosenbrock", "each other", partial(sampling, "rosenbrock", 1e-4), False),
-        *((("samples between steps", method, "rate of the hand-written press", partial(dense, method), method == "stepper"))
-          for method in ("stepper", "stepper-rodas4", "stepper-rodas5p", "stepper-dp54", "stepper-dop853")),
+        *(
+            (
+                (
+                    "samples between steps",
+                    method,
+                    "rate of the hand-written press",
+                    partial(dense, method),
+                    method == "stepper",
+                )
+            )
+            for method in ("stepper", "stepper-rodas4", "stepper-rodas5p", "stepper-dp54", "stepper-dop853")
+        ),
     ]
     return [
         Case(group=GROUP, name=name, method=method, against=against, run=run, quick=quick)

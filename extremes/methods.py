@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
 from extremes.case import Case, Finding
-from extremes.models import HARMONIC, ROTOR_LOAD, STEP_TABLE, press, rotor
+from extremes.models import HARMONIC, ROTOR_LOAD, press, rotor
 from extremes.physics import BEFORE_PUNCH, OUTER, PUNCH, RATIO, START, difference
 from extremes.reference import Machine
 from raceway.runtime import IntegrationError, Model
@@ -43,9 +43,7 @@ def _expected(kind: str) -> np.ndarray:
     solution = _run(kind, "stepper", 1e-6)
     size = np.max(np.abs(solution.x), axis=0) + 1e-12
     by, tight = ("LSODA", 1e-9) if kind == "stiffest" else ("DOP853", 1e-11)
-    return Machine.of(model, numbers).integrate(
-        solution.t, solution.x[0], method=by, rtol=tight, magnitude=1e-2 * size
-    )
+    return Machine.of(model, numbers).integrate(solution.t, solution.x[0], method=by, rtol=tight, magnitude=1e-2 * size)
 
 
 def edge(kind: str, method: str, rtol: float, bound: float) -> Finding:
@@ -53,7 +51,10 @@ def edge(kind: str, method: str, rtol: float, bound: float) -> Finding:
     solution = _run(kind, method, rtol)
     steps = solution.statistics.steps
     return Finding(
-        status="done", error=difference(solution.x, _expected(kind)), bound=bound, note=f"{steps} steps" if steps else ""
+        status="done",
+        error=difference(solution.x, _expected(kind)),
+        bound=bound,
+        note=f"{steps} steps" if steps else "",
     )
 
 
@@ -62,10 +63,13 @@ def crawl(method: str) -> Finding:
     numbers = {**STIFFEST, RATIO: 2.5e-4}
     patterns = (r"method erk: damping decays at up to [\d.e+]+ 1/s.*Take method stepper or rosenbrock",
                 r"more steps than allowed.*an explicit method crawls on a stiff model")  # fmt: skip
+    said = ""
     try:
         solution = press().simulate(cycles=1, parameters=numbers, method=method, samples_per_cycle=100, transient=0)
     except RacewayError as fault:
-        assert any(re.search(pattern, str(fault), re.DOTALL) for pattern in patterns), str(fault)
+        said = str(fault)
+    if said:
+        assert any(re.search(pattern, said, re.DOTALL) for pattern in patterns), said
         return Finding(status="refused: " + ("too stiff for erk" if method == "erk" else "too many steps"))
     same = press().simulate(
         cycles=1, parameters=numbers, method="stepper-rodas4", rtol=1e-9, samples_per_cycle=100, transient=0
@@ -83,23 +87,25 @@ def refused(
     request: Callable[[], object], error: type[Exception], cause: str, *, kept: int | None = None, place: bool = True
 ) -> Finding:
     """A request that must be refused with such words; `kept`: samples that the solution must hold at least."""
+    caught: Exception | None = None
     try:
         request()
     except error as fault:
-        said = str(fault)
-        assert re.search(cause, said, re.DOTALL), said
-        if place:
-            assert re.search(WHERE, said, re.DOTALL), said
-        if kept is not None:
-            assert isinstance(fault, IntegrationError)
-            partial_run = fault.partial
-            assert len(partial_run.t) >= kept, (len(partial_run.t), kept)
-            assert np.all(np.isfinite(partial_run.x))
-            assert partial_run.t[-1] <= fault.time * (1.0 + 1e-12)
-            assert fault.ball is not None
-        status = getattr(fault, "status", None)
-        return Finding(status="refused: " + (status.name.lower().replace("_", " ") if status else "request"))
-    raise AssertionError("it was not refused")
+        caught = fault
+    assert caught is not None, "it was not refused"
+    said = str(caught)
+    assert re.search(cause, said, re.DOTALL), said
+    if place:
+        assert re.search(WHERE, said, re.DOTALL), said
+    if kept is not None:
+        assert isinstance(caught, IntegrationError)
+        partial_run = caught.partial
+        assert len(partial_run.t) >= kept, (len(partial_run.t), kept)
+        assert np.all(np.isfinite(partial_run.x))
+        assert partial_run.t[-1] <= caught.time * (1.0 + 1e-12)
+        assert caught.ball is not None
+    status = getattr(caught, "status", None)
+    return Finding(status="refused: " + (status.name.lower().replace("_", " ") if status else "request"))
 
 
 GROWS = {f"{OUTER}.damping": -1e5}
@@ -111,7 +117,7 @@ def _growing(method: str) -> object:
 
 
 def _overflowing(method: str) -> object:
-    # the run reaches the punch at 237 degrees, and keeps the 1300 samples before it
+    # tolerances are relative to this load: the motion before it is followed no better than that
     return press().simulate(cycles=1, parameters=OVERFLOWS, method=method, transient=0)
 
 
@@ -136,7 +142,7 @@ def fast_load(frequency: float) -> Finding:
         "bearing.initial.inner.x": 0.0, "bearing.initial.inner.y": 0.0,
     }  # fmt: skip
     w = 2.0 * math.pi * frequency
-    solution = model.simulate(duration=duration, parameters=numbers, rtol=1e-9, samples_per_cycle=50, transient=0)
+    solution = model.simulate(duration=duration, parameters=numbers, rtol=1e-12, samples_per_cycle=50, transient=0)
     speed = amplitude / (mass * w)
     expected = speed * np.sin(w * solution.t)
     error = float(np.max(np.abs(solution["inner.vx"] - expected))) / speed
@@ -163,20 +169,23 @@ def cases() -> list[Case]:
     ]  # fmt: skip
     small = r"(step size fell to the resolution of time|stopped being finite).*check initial state"
     failed = r"integrator could not go on.*method=\"rosenbrock\""
-    wide = partial(press().simulate, cycles=1, parameters={"mechanism.bodies.crank.points.B": 0.1})
+
+    def wide() -> object:
+        return press().simulate(cycles=1, parameters={"mechanism.bodies.crank.points.B": 0.1})
+
     plain: list[tuple[str, str, Callable[[], Finding], bool]] = [
-        *((f"growth without bound (damping below zero)", method,
+        *(("growth without bound (damping below zero)", method,
            partial(refused, partial(_growing, method), IntegrationError,
                    small if method.startswith("stepper") else failed + "|" + small, kept=1), method == "stepper")
           for method in METHODS),
-        *((f"overflow of a load of 1e300 N", method,
-           partial(refused, partial(_overflowing, method), IntegrationError, small, kept=400), method == "stepper")
+        *(("overflow of a load of 1e300 N", method,
+           partial(refused, partial(_overflowing, method), IntegrationError, small, kept=50), method == "stepper")
           for method in ("stepper", "stepper-rodas5p", "stepper-dop853")),
         ("growth without bound", "reduce",
          partial(refused, lambda: press().reduce(cycles=3, parameters=GROWS), SimulationError,
                  small + r".*crank angle [\d.]+ deg.*ball \d+ at", place=False), True),
         ("a linkage at its dead centre", "assembly",
-         partial(refused, wide, RequestError, r"cannot be assembled at joint 'C', worst at crank angle.*Change the lengths",
+         partial(refused, wide, RequestError, r"cannot be assembled at joint 'C', worst at.*Change the lengths",
                  place=False), True),
         ("turns of a shaft that stands", "request",
          partial(refused, lambda: press().simulate(cycles=1, parameters={"mechanism.driver.speed": 0.0}), RequestError,
@@ -200,7 +209,7 @@ def cases() -> list[Case]:
     ]  # fmt: skip
     found += [
         Case(group=GROUP, name=f"load of {f:g} Hz with nothing turning, 1 s", method="stepper", against="closed form",
-             run=partial(fast_load, f), quick=f < 1e4)
+             run=partial(fast_load, f))
         for f in (1e3, 1e5)
     ]  # fmt: skip
     return found

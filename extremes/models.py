@@ -71,12 +71,15 @@ FIXED_RING: tuple[Change, ...] = (
         'support = "fixed"',
     ),
     (_lines("punching_press", "outer = ", "outer_velocity = "), ""),
+    ('"outer.*", ', ""),
 )
 
 #: Load of the shipped rotor, and loads instead of it.
 ROTOR_LOAD = _lines("varying_compliance", "type = ", "force = ")
 STEP_TABLE = 'type = "table"\ntime = ["0 s", "1 us"]\nx = ["0 N", "100 N"]\ny = ["0 N", "0 N"]'
-HARMONIC = 'type = "harmonic"\nmean = ["196 N", "0 N"]\namplitude = ["20 N", "0 N"]\nfrequency = "40 Hz"\nphase = "0 deg"'
+HARMONIC = (
+    'type = "harmonic"\nmean = ["196 N", "0 N"]\namplitude = ["20 N", "0 N"]\nfrequency = "40 Hz"\nphase = "0 deg"'
+)
 
 
 def rotor(*changes: Change) -> Model:

@@ -45,7 +45,9 @@ class Linkage:
 
     def punching(self, angle: float) -> bool:
         """Whether the crank is inside a window."""
-        return any(last - first >= TURN or (angle - first) % TURN < (last - first) % TURN for first, last in self.windows)
+        return any(
+            last - first >= TURN or (angle - first) % TURN < (last - first) % TURN for first, last in self.windows
+        )
 
     def hinge(self, angle: float, punching: bool) -> complex:
         """Force of the crank on the frame [N]."""
@@ -226,8 +228,14 @@ class Machine:
         return sorted(found)
 
     def integrate(
-        self, times: Sequence[float] | np.ndarray, start: np.ndarray, *, method: str = "DOP853", rtol: float = 1e-10,
-        magnitude: np.ndarray | None = None, **options: Any,
+        self,
+        times: Sequence[float] | np.ndarray,
+        start: np.ndarray,
+        *,
+        method: str = "DOP853",
+        rtol: float = 1e-10,
+        magnitude: np.ndarray | None = None,
+        **options: Any,
     ) -> np.ndarray:
         """States at increasing `times`, the first of which is the start's; shape (times, states).
 
@@ -239,7 +247,7 @@ class Machine:
         size = np.full(len(start), 1e-5) if magnitude is None else magnitude
         states = np.empty((len(times), len(start)))
         state = np.array(start, dtype=float)
-        edges = [edge for edge in self.edges(float(times[0]), float(times[-1]))]
+        edges = self.edges(float(times[0]), float(times[-1]))
         for left, right in pairwise(edges):
             if right <= left:
                 continue

@@ -91,7 +91,8 @@ static inline void rw_member_stage_lanes(const double *restrict t, const double 
         w11 = w11 * w3;
         w11 = w11 * w6;
         w10 = w10 - w11;
-        w10 = w10 / w7;
+        const double i0 = 1.0 / w7;
+        w10 = w10 * i0;
         w10 = w10 * w10;
         w11 = w2 * w10;
         double w12 = c[20 * RW_LANES + lane];
@@ -111,7 +112,7 @@ static inline void rw_member_stage_lanes(const double *restrict t, const double 
         w4 = w4 - w12;
         w14 = w16 * w4;
         w15 = w15 + w14;
-        w15 = w15 / w7;
+        w15 = w15 * i0;
         w14 = w15 * w6;
         double w17 = p[12 * RW_LANES + lane];
         w14 = w14 * w17;
@@ -134,7 +135,7 @@ static inline void rw_member_stage_lanes(const double *restrict t, const double 
         w4 = w4 * w6;
         w11 = w11 * w5;
         w4 = w4 - w11;
-        w4 = w4 / w7;
+        w4 = w4 * i0;
         w2 = w4 * w2;
         w2 = w2 * w17;
         w12 = w12 + w2;
@@ -161,7 +162,7 @@ static inline void rw_member_stage_lanes(const double *restrict t, const double 
         w18 = w18 + w4;
         w5 = w18 * w5;
         w8 = w8 - w5;
-        w8 = w8 / w7;
+        w8 = w8 * i0;
         w13 = w13 * w2;
         w8 = w8 + w13;
         w13 = c[29 * RW_LANES + lane];
@@ -179,7 +180,7 @@ static inline void rw_member_stage_lanes(const double *restrict t, const double 
         w16 = w16 * w9;
         w18 = w18 * w6;
         w16 = w16 + w18;
-        w16 = w16 / w7;
+        w16 = w16 * i0;
         w16 = w16 - w12;
         w16 = w16 - w11;
         w4 = w4 * w3;
@@ -242,7 +243,8 @@ static inline void rw_member_stage_rate_lanes(const double *restrict t, const do
         double w20 = w19 * w2;
         w20 = w20 * w11;
         w18 = w18 - w20;
-        w18 = w18 / w13;
+        const double i0 = 1.0 / w13;
+        w18 = w18 * i0;
         w20 = w18 * w18;
         double w21 = w14 * w20;
         double w22 = c[20 * RW_LANES + lane];
@@ -262,7 +264,7 @@ static inline void rw_member_stage_rate_lanes(const double *restrict t, const do
         w8 = w8 - w27;
         w28 = w26 * w8;
         w25 = w25 + w28;
-        w25 = w25 / w13;
+        w25 = w25 * i0;
         w28 = w25 * w11;
         double w29 = p[12 * RW_LANES + lane];
         w28 = w28 * w29;
@@ -285,7 +287,7 @@ static inline void rw_member_stage_rate_lanes(const double *restrict t, const do
         double w33 = w8 * w11;
         double w34 = w21 * w9;
         w33 = w33 - w34;
-        w33 = w33 / w13;
+        w33 = w33 * i0;
         w34 = w33 * w30;
         w34 = w34 * w31;
         w27 = w27 + w34;
@@ -312,7 +314,7 @@ static inline void rw_member_stage_rate_lanes(const double *restrict t, const do
         w39 = w39 + w43;
         w43 = w39 * w9;
         w15 = w15 - w43;
-        w15 = w15 / w13;
+        w15 = w15 * i0;
         w23 = w23 * w36;
         w23 = w15 + w23;
         w43 = c[29 * RW_LANES + lane];
@@ -330,7 +332,7 @@ static inline void rw_member_stage_rate_lanes(const double *restrict t, const do
         w23 = w26 * w16;
         w39 = w39 * w11;
         w23 = w23 + w39;
-        w23 = w23 / w13;
+        w23 = w23 * i0;
         w27 = w23 - w27;
         w27 = w27 - w37;
         w37 = w46 * w2;
@@ -372,8 +374,8 @@ static inline void rw_member_stage_rate_lanes(const double *restrict t, const do
         w19 = w19 * w5;
         w19 = w11 * w19;
         w17 = w17 + w19;
-        w17 = w17 / w13;
-        w18 = w18 / w13;
+        w17 = w17 * i0;
+        w18 = w18 * i0;
         w18 = w18 * w12;
         w17 = w17 - w18;
         w1 = w1 * w17;
@@ -399,8 +401,8 @@ static inline void rw_member_stage_rate_lanes(const double *restrict t, const do
         w24 = w26 * w3;
         w8 = w8 + w24;
         w21 = w21 + w8;
-        w21 = w21 / w13;
-        w25 = w25 / w13;
+        w21 = w21 * i0;
+        w25 = w25 * i0;
         w25 = w25 * w12;
         w21 = w21 - w25;
         w25 = w11 * w21;
@@ -418,8 +420,8 @@ static inline void rw_member_stage_rate_lanes(const double *restrict t, const do
         w3 = w11 * w3;
         w6 = w9 * w6;
         w3 = w3 - w6;
-        w3 = w3 / w13;
-        w6 = w33 / w13;
+        w3 = w3 * i0;
+        w6 = w33 * i0;
         w6 = w6 * w12;
         w3 = w3 - w6;
         w30 = w30 * w3;
@@ -454,8 +456,8 @@ static inline void rw_member_stage_rate_lanes(const double *restrict t, const do
         w38 = w38 + w42;
         w9 = w9 * w38;
         w7 = w7 - w9;
-        w7 = w7 / w13;
-        w15 = w15 / w13;
+        w7 = w7 * i0;
+        w15 = w15 * i0;
         w15 = w15 * w12;
         w7 = w7 - w15;
         w36 = w36 * w17;
@@ -473,8 +475,8 @@ static inline void rw_member_stage_rate_lanes(const double *restrict t, const do
         w16 = w16 + w26;
         w11 = w11 * w38;
         w16 = w16 + w11;
-        w16 = w16 / w13;
-        w23 = w23 / w13;
+        w16 = w16 * i0;
+        w23 = w23 * i0;
         w23 = w23 * w12;
         w16 = w16 - w23;
         w16 = w16 - w30;

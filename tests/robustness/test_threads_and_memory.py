@@ -5,6 +5,8 @@ Threads and long loops run in processes of their own: what breaks there may end 
 
 from __future__ import annotations
 
+import ctypes
+import re
 import subprocess
 import sys
 import textwrap
@@ -17,7 +19,8 @@ from profiles import LONG
 
 from raceway.derive import generate
 from raceway.derive.read import scene_from_text
-from raceway.runtime import Model, load
+from raceway.runtime import Model, ensemble_driver, load, quasi_static, stepper
+from raceway.runtime.compile import compile_sources, find_compiler
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
@@ -132,3 +135,53 @@ def test_a_process_with_models_at_work_in_threads_ends_well(press: Path) -> None
         assert done.returncode == 0, done.stderr
         assert done.stdout == "done\n"
         assert "Segmentation" not in done.stderr
+
+
+LAYOUTS = {
+    "raceway_options": stepper._Options,
+    "raceway_result": stepper._Result,
+    "raceway_tangents": stepper._Tangents,
+    "raceway_ensemble_options": ensemble_driver._Options,
+    "raceway_equilibrium_options": quasi_static._Options,
+    "raceway_equilibrium_result": quasi_static._Result,
+}
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_records_of_the_driver_have_the_layout_that_python_gives_them(name: str, tmp_path: Path) -> None:
+    """A field that only one side knows lets C read or write beyond the record: chance numbers, or a crash at exit."""
+    record = LAYOUTS[name]
+    fields = [field[0] for field in record._fields_]
+    entries = [f"sizeof({name})"]
+    for field in fields:
+        entries += [f"offsetof({name}, {field})", f"sizeof((({name} *)0)->{field})"]
+    includes = "".join(f'#include "{header}"\n' for header in ("stepper.h", "ensemble.h", "equilibrium.h"))
+    source = tmp_path / "layout.c"
+    numbers = ", ".join(f"(long){entry}" for entry in entries)
+    source.write_text(f"#include <stddef.h>\n{includes}const long layout[] = {{{numbers}}};\n", encoding="utf-8")
+    compiler = find_compiler()
+    assert compiler is not None
+    code = ctypes.CDLL(str(compile_sources((source,), compiler, include=(stepper.DRIVER,)).path))
+    found = list((ctypes.c_long * len(entries)).in_dll(code, "layout"))
+    expected = [ctypes.sizeof(record)]
+    for field in fields:
+        place = getattr(record, field)
+        expected += [place.offset, place.size]
+    assert found == expected
+    header = next(
+        path for path in sorted(stepper.DRIVER.glob("*.h")) if f"}} {name};" in path.read_text(encoding="utf-8")
+    )
+    body = re.search(
+        rf"typedef struct \{{([^}}]*)\}} {name};", re.sub(r"(?s)/\*.*?\*/", "", header.read_text(encoding="utf-8"))
+    )
+    assert body is not None
+    declared = re.findall(r"(\w+)\s*[;,]", body.group(1))
+    assert declared == fields
+
+
+def test_results_of_ensembles_have_the_layout_of_those_of_single_runs() -> None:
+    assert ensemble_driver.RESULT.itemsize == ctypes.sizeof(stepper._Result)
+    assert ensemble_driver.RESULT.names == tuple(field[0] for field in stepper._Result._fields_)
+    for field in ensemble_driver.RESULT.names:
+        assert ensemble_driver.RESULT.fields is not None
+        assert ensemble_driver.RESULT.fields[field][1] == getattr(stepper._Result, field).offset

@@ -189,12 +189,13 @@ def test_changed_number_recompiles_nothing_and_changed_structure_does(
     first = load(write_folder(tmp_path / "a"), compiler=command)
     first.simulate(cycles=0.1, rtol=1e-6)
     first.simulate(cycles=0.1, rtol=1e-9, parameters={"spring.stiffness": 77.0}, samples_per_cycle=50)
+    so_far = log.read_text().count("compiled")  # the model, and the loop that is the same for all models
     numbers = load(write_folder(tmp_path / "a", defaults={"spring.stiffness": 500.0}), compiler=command)
     assert numbers.library is not None
     assert numbers.library.cached
-    assert log.read_text().count("compiled") == 1
+    assert log.read_text().count("compiled") == so_far
     changed = load(write_folder(tmp_path / "a", extra_term=1.0), compiler=command)
-    assert log.read_text().count("compiled") == 2
+    assert log.read_text().count("compiled") == so_far + 1
     point = {"t": 0.0, "x": [0.1, 0.2], "u": [0.0] * 4, "p": list(first.parameters.values()), "c": [2.0]}
     # the changed file is used although the first library is still open in this process
     np.testing.assert_allclose(changed.kernel("rhs")(point) - first.kernel("rhs")(point), [0.0, 0.5], rtol=1e-12)
@@ -213,7 +214,9 @@ def test_two_processes_loading_at_once_both_get_a_whole_library(cache: Path, tmp
     answers = [process.communicate(timeout=60)[0] for process in running]
     assert [process.returncode for process in running] == [0, 0]
     assert answers[0] == answers[1] != ""
-    assert len(list(cache.iterdir())) == 1
+    names = [path.name for path in cache.iterdir()]
+    assert len([name for name in names if name.startswith("oscillator-")]) == 1
+    assert not [name for name in names if name.startswith(".")]
 
 
 def test_without_compiler_the_virtual_machine_gives_the_same_results_and_a_warning_names_the_cost(

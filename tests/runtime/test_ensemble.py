@@ -10,8 +10,8 @@ import pytest
 
 from raceway.runtime import Model, RequestError, SimulationError, clock
 from raceway.runtime.ensemble import EnsembleResult
-from raceway.runtime.members import Span, inputs_of, make_members, member_arrays
 from raceway.runtime.magnitudes import model_scales
+from raceway.runtime.members import Span, inputs_of, make_members, member_arrays
 
 ModelMaker = Callable[..., Model]
 LAW = 'law = "one-sided"\nratio = "0.25e-5 s*mm^0.5"'
@@ -56,13 +56,14 @@ def same(a: EnsembleResult, b: EnsembleResult, rows: np.ndarray | slice = slice(
 @pytest.mark.parametrize("method", ["auto", "stepper-dp54", "stepper-rodas5p", "stepper-rodas4"])
 def test_members_equal_single_runs_within_the_tolerance(make_model: ModelMaker, law: str, method: str) -> None:
     model, columns = press(make_model, law), table(11)
-    result = model.simulate_many(columns, OBSERVABLES, cycles=1.5, transient=0.75, rtol=1e-8, method=method)
+    rtol = 1e-10 if law == "tangent" else 1e-8
+    result = model.simulate_many(columns, OBSERVABLES, cycles=1.5, transient=0.75, rtol=rtol, method=method)
     assert result.failures == ()
     for k in range(11):
-        single = model.reduce(1.5, transient=0.75, rtol=1e-8, method=method, parameters=member(columns, k))
+        single = model.reduce(1.5, transient=0.75, rtol=rtol, method=method, parameters=member(columns, k))
         force, y = single["ball.force"], single["inner.y"]
         # damping that jumps or turns steeply at contact costs order, and light damping lets one impact decide the next:
-        # single runs by two methods differ by as much
+        # single runs by two methods differ by as much, with light damping at 1e-8 still by a two-hundredth of the range
         loose = {"one-sided": 5.0, "stiff": 20.0, "tangent": 500.0, "one-sided-gated": 50.0}[law]
         expected = {
             "max:ball.force": (force.maximum, 2e-6 * force.maximum),

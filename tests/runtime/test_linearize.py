@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
+from virtual import virtual_model
 
 from raceway.runtime import Model
 from raceway.runtime.cli import app
@@ -23,6 +25,15 @@ ELASTIC_OUTER = (
     'support = "fixed"',
     'support = "elastic"\nmass = "3 kg"\nstiffness = "4e7 N/m"\ndamping = "300 N*s/m"',
 )
+
+
+@pytest.fixture(scope="module")
+def make_virtual(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., str]) -> Callable[..., Model]:
+    @cache
+    def make(name: str, *changes: tuple[str, str]) -> Model:
+        return virtual_model(scene_text(name, *changes), tmp_path_factory.mktemp(name) / name)
+
+    return make
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +60,9 @@ def test_one_loaded_ball_is_a_single_degree_of_freedom(rotor: Model) -> None:
     assert creep.eigenvalue == pytest.approx(-c / m, rel=1e-6)
 
 
-def test_two_masses_in_a_row_have_the_roots_of_the_quadratic(make_model: Callable[..., Model]) -> None:
+def test_two_masses_in_a_row_have_the_roots_of_the_quadratic(make_virtual: Callable[..., Model]) -> None:
     """Ring on one ball on ring on housing: m1 m2 w^4 - (m1 (k1 + k2) + m2 k1) w^2 + k1 k2 = 0 without damping."""
-    model = make_model("varying_compliance", ELASTIC_OUTER)
+    model = make_virtual("varying_compliance", ELASTIC_OUTER)
     parameters = {**AT_REST, "bearing.clearance": 1e-3, "bearing.inner_ring.damping": 0.0}
     parameters["bearing.outer_ring.damping"] = 0.0
     with pytest.warns(FreeRingWarning):
@@ -68,10 +79,10 @@ def test_two_masses_in_a_row_have_the_roots_of_the_quadratic(make_model: Callabl
     ("scene", "angle"), [("punching_press", 240.0), ("punching_press_tangent", 240.0), ("varying_compliance", 10.0)]
 )
 def test_eigenvalues_are_those_of_the_right_hand_side(
-    make_model: Callable[..., Model], scene: str, angle: float
+    make_virtual: Callable[..., Model], scene: str, angle: float
 ) -> None:
     """M, C, K and the first-order form written out against the Jacobian of the states as it is generated."""
-    model = make_model(scene)
+    model = make_virtual(scene)
     result = model.linearize(crank_angle=math.radians(angle))
     matrix = model.jacobian("rhs", "states", t=result.time, x=result.x)
     expected = np.linalg.eigvals(matrix)
@@ -84,9 +95,9 @@ def test_eigenvalues_are_those_of_the_right_hand_side(
         assert np.linalg.norm(matrix @ z - mode.eigenvalue * z) <= 1e-8 * abs(mode.eigenvalue) * np.linalg.norm(z)
 
 
-def test_mass_matrix_times_acceleration_is_the_load(make_model: Callable[..., Model]) -> None:
+def test_mass_matrix_times_acceleration_is_the_load(make_virtual: Callable[..., Model]) -> None:
     """The masses are the model's own: a force on free rings accelerates them by F/m."""
-    model = make_model("punching_press_tangent")
+    model = make_virtual("punching_press_tangent")
     parameters = {"bearing.clearance": 1e-2}
     result = model.linearize(crank_angle=1.0, x=np.zeros(8), parameters=parameters)
     numbers = model.numbers(parameters)
@@ -120,9 +131,9 @@ def test_unrestrained_rings_have_rigid_modes_only(rotor: Model) -> None:
     assert all(mode.rigid for mode in result.modes)
 
 
-def test_a_kink_at_rest_is_said_with_the_side_that_is_given(make_model: Callable[..., Model]) -> None:
+def test_a_kink_at_rest_is_said_with_the_side_that_is_given(make_virtual: Callable[..., Model]) -> None:
     """One-sided damping at zero rate: the derivative is that of parting, which resists nothing."""
-    model = make_model("punching_press")
+    model = make_virtual("punching_press")
     with pytest.warns(KinkWarning, match="parting side"):
         result = model.linearize(x=np.zeros(8))
     assert result.notes

@@ -98,7 +98,7 @@ def test_amplitude_of_a_ring_on_a_linear_spring(make_model: Callable[..., Model]
     report = model.sensitivity(
         "amplitude:outer.y@1x", "bearing.outer_ring.stiffness", 2, transient=1, parameters=loose, check=False
     )
-    # a slow load: quasi-static, amplitude = F/k_p up to (omega/omega_0)^2 ~ 1e-5 and the damper's c omega/k = 6e-3 squared
+    # a slow load: amplitude = F/k_p up to (omega/omega_0)^2 ~ 1e-5 and the square of the damper's c omega/k = 6e-3
     assert report.pairs[0].dimensionless == pytest.approx(-1.0, abs=2e-4)
 
 

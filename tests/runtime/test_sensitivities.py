@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -194,7 +195,7 @@ def test_a_rejected_step_leaves_no_trace_in_the_derivatives(make_model: Callable
     start = model.initial()
     ends = [run(0.0, start, None, tries, 2e-4, 1e-5) for tries in range(1, 120)]
     followed = 0
-    for (before, x, derivatives), (after, tried, found) in zip(ends[:-1], ends[1:], strict=True):
+    for (before, x, derivatives), (after, tried, found) in pairwise(ends):
         if after.rejected > before.rejected:
             assert np.array_equal(x, tried)
             assert np.array_equal(derivatives, found)

@@ -38,7 +38,7 @@ def test_without_the_jump_term_they_disagree(model: Model, monkeypatch: pytest.M
 
 
 def test_the_peak_of_a_load_at_the_edge_of_its_window_moves_with_it(model: Model) -> None:
-    """The reaction is largest when the punch strikes, a moment that the window's start sets: d/d(start) is its slope."""
+    """The reaction is largest when the punch strikes: its derivative by the window's start is its own slope there."""
     report = model.sensitivity("max:reaction.A.y", MOVING[0], 1.0, transient=0.0, check=False)
     (peak,) = report.quantities
     assert peak.time is not None

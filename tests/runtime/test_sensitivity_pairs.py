@@ -13,7 +13,7 @@ import pytest
 
 from raceway.runtime import Model
 from raceway.runtime.certificate import Verdict
-from raceway.runtime.sensitivity_query import Sensitivity
+from raceway.runtime.sensitivity_report import Sensitivity
 
 TABLE = Path(__file__).resolve().parents[2] / "build" / "sensitivity_pairs.md"
 

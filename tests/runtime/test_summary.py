@@ -129,3 +129,18 @@ def test_table_fits_a_terminal_and_shows_micrometres(summary: dict[str, Any]) ->
     assert row.split()[-1] == "µm"
     assert "2 transient cycles" in " ".join(text.split())
     assert "one-sided" in text
+
+
+def test_a_run_with_some_outputs_has_the_summary_of_these(
+    press: tuple[Model, Solution], summary: dict[str, Any]
+) -> None:
+    model = press[0]
+    found = summarize(model, model.simulate(cycles=4, outputs=["ball.force", "drive_torque"]))
+    peak, told = found["peak_ball_force"], summary["peak_ball_force"]
+    assert (peak["total"], peak["time"]["total"]) == (told["total"], told["time"]["total"])
+    assert "elastic" not in peak
+    assert found["drive_work"] == summary["drive_work"]
+    # states are there without being asked for
+    assert found["inner.y"] == summary["inner.y"]
+    assert "reaction.A.x" not in found
+    render_summary(found)

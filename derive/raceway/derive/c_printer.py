@@ -89,6 +89,7 @@ def print_function(
         lines += ["#pragma omp simd", f"    for (int lane = 0; lane < {lanes}; lane++) {{"]
     indent = "        " if lanes else "    "
     declared: set[int] = set()
+    inverses = _shared_divisors(function)
     for k in range(function.n_instructions()):
         operation, out, take = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if operation == ca.OP_OUTPUT:
@@ -101,6 +102,11 @@ def print_function(
             text = name if name in by_value else f"{name}[{place}]"
         elif operation == ca.OP_CONST:
             text = _literal(function.instruction_constant(k))
+        elif k in inverses:
+            name, first = inverses[k]
+            if first:
+                lines.append(f"{indent}const double {name} = 1.0 / w{take[1]};")
+            text = f"w{take[0]} * {name}"
         elif operation in _UNARY:
             text = _UNARY[operation].format(f"w{take[0]}")
         elif operation in _BINARY:
@@ -111,6 +117,24 @@ def print_function(
         declared.add(out[0])
     lines += ["    }", "}"] if lanes else ["}"]
     return "\n".join(lines)
+
+
+def _shared_divisors(function: ca.Function) -> dict[int, tuple[str, bool]]:
+    """Divisions by a number that other divisions share, by instruction: the name of its inverse, and whether it is
+    the first.
+
+    A division costs as much as several products, and vectors of them more so.
+    """
+    made_by: dict[int, int] = {}
+    divisions: dict[int, list[int]] = {}
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        if operation == ca.OP_DIV:
+            divisions.setdefault(made_by[function.instruction_input(k)[1]], []).append(k)
+        if operation != ca.OP_OUTPUT:
+            made_by[function.instruction_output(k)[0]] = k
+    shared = [places for places in divisions.values() if len(places) > 1]
+    return {k: (f"i{number}", k == places[0]) for number, places in enumerate(shared) for k in places}
 
 
 def _argument(name: str, by_value: frozenset[str]) -> str:

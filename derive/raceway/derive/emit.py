@@ -8,7 +8,8 @@ tangents.h         derivatives of these along several directions at once, for se
 ensemble_kernels.h the kernels for several members of an ensemble at once, and what reductions need
 methods.h          the stepper's methods
 model.casadi       the same functions serialised, for machines without a compiler
-jacobians.c, .casadi  derivatives of the right-hand side and of all quantities, compiled when first asked for
+jacobians.c, .h    all quantities, their derivatives and those of the right-hand side, compiled when first asked for
+jacobians.casadi   the quantities serialised
 EQUATIONS.md       the derivation for people
 manifest.json      the contract with the runtime, written last
 
@@ -33,7 +34,7 @@ import casadi as ca
 from raceway.derive.emit_ensemble import ensemble_header
 from raceway.derive.emit_stepper import kernels_header, methods_header, tangents_header
 from raceway.derive.equations import equations
-from raceway.derive.jacobians import Described
+from raceway.derive.jacobians import DERIVATIVES, Described
 from raceway.derive.linkage import check_assembly
 from raceway.derive.lower import Functions, lower, operations
 from raceway.derive.read import read_scene
@@ -180,7 +181,9 @@ def _write(folder: Path, system: System, functions: Functions) -> None:
         tangents = tangents_header(functions.kernels)
         (folder / "tangents.h").write_text(tangents, encoding="utf-8", newline="\n")
     _pack(folder / "model.casadi", functions.functions)
-    _pack(folder / "jacobians.casadi", functions.jacobians)
+    # values only: where there is no compiler, the runtime makes their derivatives when they are asked for
+    values = [entry for entry in functions.jacobians if not entry[0].name().endswith(DERIVATIVES)]
+    _pack(folder / "jacobians.casadi", values)
     (folder / "EQUATIONS.md").write_text(equations(system), encoding="utf-8", newline="\n")
     files = tuple((p.name, _digest(p)) for p in sorted(folder.iterdir()))
     mf.write(folder, _manifest(system, functions, files))

@@ -37,6 +37,8 @@ def kernels_header(system: System, functions: Functions, kernels: Kernels) -> st
         "RW_NP": len(system.parameters),
         "RW_NC": len(functions.constants),
         "RW_NW": kernels.stage_size,
+        "RW_NA": kernels.angles,
+        "RW_NK": kernels.law_numbers,
         "RW_NB": kernels.balls,
         "RW_LANES": LANES,
     }
@@ -64,10 +66,9 @@ def kernels_header(system: System, functions: Functions, kernels: Kernels) -> st
                 description=f"{k.description}, for RW_LANES times at once.",
                 scalars=frozenset({"t"}),
                 lanes="RW_LANES",
-                varying=frozenset({"t"}),
+                varying=frozenset({"t", "C", "S"}),
             )
-            for k in kernels.functions
-            if k.function.name() == "stage"
+            for k in kernels.turned
         ),
         "#endif",
     ]

@@ -32,6 +32,9 @@ _WORDS = {
     "c": "constants",
 }
 
+#: Ends of the names of derivatives.
+DERIVATIVES = (*(f"_jac_{key}" for key in _WORDS), "_tangent")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Group:

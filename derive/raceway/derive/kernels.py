@@ -7,6 +7,12 @@ stage_rate     (t, u, p, c) -> w, wt        the same with its time derivative
 relative       (x, u, p, c, w) -> r         delta = r0 + r1 cos + r2 sin, delta_rate = r3 cos + r4 sin of a ball's angle
 law            (delta, rate, p, c) -> F     force of one ball
 law_slopes     (delta, rate, p, c) -> F, Fd, Fv      and its slopes by deflection and rate
+law_numbers    (p, c) -> k                  the entries of p and c that the law of a ball needs
+ball_force     (delta, rate, k) -> F        the law over these
+ball_slopes    (delta, rate, k) -> F, Fd, Fv
+angles         (t, u, p, c) -> a, at        arguments of sines and cosines in w, linear in time, and their rates
+stage_turned   (C, S, t, u, p, c) -> w      w from cosines C and sines S of the angles
+stage_rate_turned  (C, S, at, t, u, p, c) -> w, wt     the same with its time derivative
 acceleration   (x, S, u, p, c, w) -> a      from the sums S = (sum F cos, sum F sin) over the balls
 acceleration_jacobian  (x, S, G, u, p, c, w) -> A, B     da/dq, da/dv (row-major); G: sums of slopes times cos², cos
 sin, sin²
@@ -44,12 +50,17 @@ class Kernel:
 class Kernels:
     """Kernels of a model; `stage_size` entries of w, the first two of which are cosine and sine of the cage's angle.
 
-    `tangents` are directional derivatives of the functions, for sensitivities.
+    `law_numbers` counts the entries of k.  `angles` counts those of the functions `turned`, which evaluate w for many
+    times close to each other: an angle that grows by little needs no sine of its own.  `tangents` are directional
+    derivatives of the functions, for sensitivities.
     """
 
     stage_size: int
     balls: int
+    angles: int
+    law_numbers: int
     functions: tuple[Kernel, ...]
+    turned: tuple[Kernel, ...]
     tangents: tuple[Kernel, ...]
 
 
@@ -211,12 +222,116 @@ class KernelBuilder:
             for k in functions
             if k.function.name() == kernel
         )
+        numbers, laws = _gathered({k.function.name(): k.function for k in functions})
+        angles, turned = _turned(next(k.function for k in functions if k.function.name() == "stage"))
         return Kernels(
             stage_size=len(self._stage),
             balls=self._system.bearing.ball.count,
-            functions=tuple(functions),
+            angles=angles.function.size1_out(0),
+            law_numbers=numbers.function.size1_out(0),
+            functions=(*functions, numbers, *laws, angles),
+            turned=turned,
             tangents=tangents,
         )
+
+
+def _gathered(functions: dict[str, ca.Function]) -> tuple[Kernel, tuple[Kernel, ...]]:
+    """The entries of p and c in the law of a ball, and the law over them.
+
+    A compiler makes lanes of a loop over balls only where a selection needs no load: the numbers are gathered first.
+    """
+    used: list[tuple[int, int]] = []
+    for name in ("law", "law_slopes"):
+        law = functions[name]
+        for k in range(law.n_instructions()):
+            if law.instruction_id(k) == ca.OP_INPUT:
+                argument, entry = law.instruction_input(k)
+                if argument > 1 and (argument, entry) not in used:
+                    used.append((argument, entry))
+    used.sort()
+    law = functions["law"]
+    given = {law.name_in(k): ca.SX.sym(law.name_in(k), law.sparsity_in(k)) for k in range(2, law.n_in())}
+    vectors = [*given.values()]
+    # C has no arrays of length zero
+    chosen = ca.vertcat(*(vectors[a - 2][e] for a, e in used)) if used else ca.SX(0.0)
+    numbers = ca.Function("law_numbers", vectors, [ca.densify(chosen)], [*given], ["k"])
+    entries = ca.SX.sym("k", max(len(used), 1))
+    replaced = [ca.SX.zeros(v.numel()) for v in vectors]
+    for place, (argument, entry) in enumerate(used):
+        replaced[argument - 2][entry] = entries[place]
+    delta, rate = ca.SX.sym("delta"), ca.SX.sym("rate")
+    made = []
+    for name, new in (("law", "ball_force"), ("law_slopes", "ball_slopes")):
+        results = functions[name].call([delta, rate, *replaced], True, False)
+        function = ca.Function(
+            new,
+            [delta, rate, entries],
+            ca.cse([ca.densify(r) for r in results]),
+            ["delta", "rate", "k"],
+            functions[name].name_out(),
+        )
+        made.append(
+            Kernel(function=function, description="Force of one ball [N]" + " and its slopes" * (name != "law"))
+        )
+    return Kernel(function=numbers, description="Numbers that the force of a ball depends on"), tuple(made)
+
+
+def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...]]:
+    """The angles of a stage, and the stage from their cosines and sines.
+
+    Sines and cosines whose arguments are linear in time are taken out; others stay where they are.
+    """
+    symbols = {stage.name_in(k): ca.SX.sym(stage.name_in(k), stage.sparsity_in(k)) for k in range(stage.n_in())}
+    t = symbols["t"]
+    angles: list[ca.SX] = []
+    cosines: list[ca.SX] = []
+    sines: list[ca.SX] = []
+    work: dict[int, ca.SX] = {}
+    w = ca.SX(stage.size1_out(0), 1)
+
+    def place(angle: ca.SX) -> int | None:
+        """Number of an angle; None where it is no linear function of time."""
+        if not ca.depends_on(angle, t) or ca.depends_on(ca.jacobian(angle, t), t):
+            return None
+        for k, known in enumerate(angles):
+            if ca.is_equal(known, angle, 4):
+                return k
+        angles.append(angle)
+        cosines.append(ca.SX.sym(f"C{len(angles)}"))
+        sines.append(ca.SX.sym(f"S{len(angles)}"))
+        return len(angles) - 1
+
+    for k in range(stage.n_instructions()):
+        operation, out, take = stage.instruction_id(k), stage.instruction_output(k), stage.instruction_input(k)
+        if operation == ca.OP_INPUT:
+            work[out[0]] = [*symbols.values()][take[0]][take[1]]
+        elif operation == ca.OP_OUTPUT:
+            w[out[1]] = work[take[0]]
+        elif operation == ca.OP_CONST:
+            work[out[0]] = ca.SX(stage.instruction_constant(k))
+        elif operation in (ca.OP_SIN, ca.OP_COS) and (number := place(work[take[0]])) is not None:
+            work[out[0]] = (sines if operation == ca.OP_SIN else cosines)[number]
+        elif len(take) == 1:
+            work[out[0]] = ca.SX.unary(operation, work[take[0]])
+        else:
+            work[out[0]] = ca.SX.binary(operation, work[take[0]], work[take[1]])
+
+    angle = ca.vertcat(*angles)
+    rate = ca.jacobian(angle, t)
+    cosine, sine, turning = ca.vertcat(*cosines), ca.vertcat(*sines), ca.SX.sym("at", len(angles))
+    wt = ca.jtimes(w, ca.vertcat(t, cosine, sine), ca.vertcat(1.0, -sine * turning, cosine * turning))
+    made = ca.Function("angles", [*symbols.values()], [ca.densify(angle), ca.densify(rate)], [*symbols], ["a", "at"])
+    directions = {"C": cosine, "S": sine}
+    results = ca.cse([ca.densify(w), ca.densify(wt)])
+    takes = {**directions, **symbols}
+    plain = ca.Function("stage_turned", [*takes.values()], ca.cse([ca.densify(w)]), [*takes], ["w"])
+    takes = {**directions, "at": turning, **symbols}
+    rated = ca.Function("stage_rate_turned", [*takes.values()], results, [*takes], ["w", "wt"])
+    words = "from cosines and sines of its angles"
+    return Kernel(function=made, description="Angles of a stage and their rates"), (
+        Kernel(function=plain, description=f"Stage variables {words}"),
+        Kernel(function=rated, description=f"Stage variables and their time derivatives {words}"),
+    )
 
 
 #: Directional derivatives for sensitivities: name, kernel, the arguments that move, and the results that are wanted.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from raceway.runtime.peaks import Peak
     from raceway.runtime.reductions import Reduction, Reductions
     from raceway.runtime.sensitivity import Sensitivities
-    from raceway.runtime.sensitivity_query import SensitivityReport
+    from raceway.runtime.sensitivity_report import SensitivityReport
     from raceway.runtime.solution import Solution, Statistics, load_solution
     from raceway.runtime.statics import FreeRingWarning, StaticEquilibrium
     from raceway.runtime.status import IntegrationError, Status
@@ -86,7 +86,7 @@ _HOME = {
     "Reduction": "reductions",
     "Reductions": "reductions",
     "Sensitivities": "sensitivity",
-    "SensitivityReport": "sensitivity_query",
+    "SensitivityReport": "sensitivity_report",
     "Solution": "solution",
     "Statistics": "solution",
     "load_solution": "solution",

@@ -13,6 +13,7 @@ import os
 import signal
 import sys
 import tempfile
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from types import FrameType
@@ -36,7 +37,7 @@ from raceway.runtime.commands_shared import (
     reported,
     warnings_shown,
 )
-from raceway.runtime.commands_trade import trade
+from raceway.runtime.commands_trade import read_error, trade, usable_trade
 from raceway.runtime.errors import RequestError
 
 if TYPE_CHECKING:
@@ -93,6 +94,18 @@ def run(
             help="Integrator: auto, stepper (or stepper-rodas4, -rodas5p, -dp54, -dop853), erk, rosenbrock, cvodes.",
         ),
     ] = None,
+    error: Annotated[
+        str | None,
+        typer.Option(
+            metavar="E",
+            help="Relative error wanted, as 1% or 0.01, instead of method and rtol: both are chosen, and the error of "
+            "the run is estimated.",
+        ),
+    ] = None,
+    of: Annotated[
+        list[str] | None,
+        typer.Option("--of", metavar="Q", help="Quantity that --error is about: peak_ball_force. May be repeated."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the results; results/<scene> if not given.")
     ] = None,
@@ -107,6 +120,7 @@ def run(
         stages("read")
         read, asked, overrides = read_with_settings(scene, set_ or [])
         _check_request(asked, cycles, transient, rtol, method)
+        target = read_error(error, of, method, rtol)
         folder = out if out is not None else Path("results") / read.name
         check_folder(folder)
         with faults_of(scene):
@@ -119,8 +133,13 @@ def run(
             method=method,
             rtol=rtol,
             progress=stages.fraction,
+            error=target,
+            of=of,
+            trade=usable_trade(folder, read) if target is not None else None,
         )
         summary, files = _write_results(model, solution, folder, stages, figures=figures)
+    if solution.accuracy is not None:
+        summary["accuracy"] = asdict(solution.accuracy)
     from raceway.runtime.summary import render_summary
 
     if json_:
@@ -128,6 +147,8 @@ def run(
     else:
         console = Console()
         console.print(render_summary(summary))
+        if solution.accuracy is not None:
+            console.print(solution.accuracy.words, highlight=False, soft_wrap=True, markup=False)
         console.print(f"results in {folder}: {', '.join(files)}", highlight=False, soft_wrap=True, markup=False)
 
 

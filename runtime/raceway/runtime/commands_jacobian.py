@@ -33,7 +33,9 @@ _SET = Annotated[
 ]
 _ANGLE = Annotated[
     str | None,
-    typer.Option("--at-angle", metavar="ANGLE", help='Angle of crank or shaft in the first turn, as "240 deg".'),
+    typer.Option(
+        "--at-angle", "--angle", metavar="ANGLE", help='Angle of crank or shaft in the first turn, as "240 deg".'
+    ),
 ]
 _TIME = Annotated[str | None, typer.Option("--time", metavar="TIME", help='The instant as a time, as "0.08 s".')]
 _JSON = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, nothing else.")]
@@ -149,9 +151,15 @@ def _checked(
     model.check_assembly(overrides)
     numbers = model.numbers(overrides)
     t = instant(model, numbers, seconds, angle)
-    # names first: a wrong one is said before anything is computed
-    rows_of(model, of)
-    directions_of(model, numbers, wrt, t)
+    # names first, and all wrong ones at once, before anything is computed
+    faults = []
+    for look in (lambda: rows_of(model, of), lambda: directions_of(model, numbers, wrt, t)):
+        try:
+            look()
+        except RequestError as error:
+            faults.append(str(error))
+    if faults:
+        raise RequestError("\n".join(faults))
     x: Any = None
     if model.states and state == "equilibrium":
         x = static_equilibrium(model, numbers, t=t).x
@@ -181,11 +189,18 @@ def _render(result: CheckedJacobian) -> Table:
     for entry, check in zip(
         result.to_dict()["jacobian"], (check for row in result.checks for check in row), strict=True
     ):
-        if entry["value"] == 0.0 and check.verdict is not Verdict.DISAGREES and len(result.rows) > 1:
+        if check.verdict is not Verdict.DISAGREES and entry["value"] == 0.0 and len(result.rows) > 1:
             still += 1
             continue
         second = "" if entry["second"] is None else f"{entry['second']:.7g}"
-        table.add_row(entry["of"], entry["wrt"], f"{entry['value']:.7g}", second, entry["unit"], entry["verdict"])
+        table.add_row(
+            entry["of"],
+            entry["wrt"],
+            "not finite" if entry["value"] is None else f"{entry['value']:.7g}",
+            second,
+            entry["unit"],
+            entry["verdict"],
+        )
     if still:
         table.add_row(f"{still} more are zero", "", "", "", "", "")
     return table

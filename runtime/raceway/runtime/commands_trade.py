@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import re
 from collections.abc import Sequence
@@ -31,6 +32,9 @@ HARMONICS = (4, 16)
 
 #: Name of the file with the measurement, in the folder of the results.
 FILE_NAME = "trade.json"
+
+#: Name of the folder with the models, beside it.
+MODELS = "models"
 
 
 def trade(
@@ -123,7 +127,7 @@ def load_models(scene: Scene, folder: Path, stages: Stages) -> dict[str, Model]:
 
     found = {}
     for name, variant in models_of(scene).items():
-        place = folder / "models" / re.sub(r"[^a-z0-9]+", "_", name)
+        place = folder / MODELS / re.sub(r"[^a-z0-9]+", "_", name)
         generated = generate(variant, place, progress=lambda stage, name=name: stages(f"{stage}: {name}"))  # type: ignore[misc]
         stages(f"compiling: {name}")
         found[name] = load(generated)
@@ -151,13 +155,54 @@ def stored_trade(folder: Path, key: dict[str, Any]) -> Trade | None:
     """A measurement that is still valid, or None."""
     from raceway.runtime.trade_report import SCHEMA, from_plain
 
+    data = _read(folder)
+    return from_plain(data) if data.get("schema") == SCHEMA and data.get("key") == key else None
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    """What the folder's measurement holds; nothing where there is none, or what is there is no measurement."""
     try:
         data = json.loads((folder / FILE_NAME).read_text(encoding="utf-8"))
     except (FileNotFoundError, json.JSONDecodeError):
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
+def usable_trade(folder: Path, scene: Scene) -> Trade | None:
+    """A measurement in the folder whose ranking still holds for the scene, of whatever quantities; or None."""
+    from raceway.runtime.trade_report import SCHEMA, from_plain
+
+    data = _read(folder)
+    if scene.bearing is None or data.get("schema") != SCHEMA or not isinstance(data.get("key"), dict):
         return None
-    if not isinstance(data, dict) or data.get("schema") != SCHEMA or data.get("key") != key:
+    given = data["key"]
+    return from_plain(data) if given == key_of(scene, given.get("of"), given.get("members", 0)) else None
+
+
+def read_error(text: str | None, of: list[str] | None, method: str | None, rtol: float | None) -> float | None:
+    """A relative error as people write it: 1%, 1 %, 0.01.
+
+    Raises
+    ------
+    RequestError
+        It is no such thing, or asked for together with a method or a tolerance.
+    """
+    if text is None:
+        if of:
+            raise RequestError("--of names what --error is about, and no --error was given. Add --error 1%.")
         return None
-    return from_plain(data)
+    if method is not None or rtol is not None:
+        raise RequestError(
+            "--error chooses method and tolerance, and --method or --rtol was given as well. Give one or the other."
+        )
+    number, mark = text.strip().removesuffix("%").strip(), text.strip().endswith("%")
+    try:
+        value = float(number) / (100.0 if mark else 1.0)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise RequestError(f"--error: {text!r} is no relative error. Allowed: a number above 0 as 1% or 0.01.")
+    return value
 
 
 def _stored_or_measured(
@@ -180,7 +225,9 @@ def _stored_or_measured(
             stages(what)
         stages.fraction(fraction)
 
-    measured = measure_trade(models, of, members=count, fast_math=compile_fast_math(models[FULL]), progress=say)
+    measured = measure_trade(
+        models, of, members=count, fast_math=compile_fast_math(models[FULL], folder / MODELS / FULL), progress=say
+    )
     return measured, key, False
 
 

@@ -2,8 +2,8 @@
 
 In: a model's manifest, parameter values, magnitudes of the states.  Out: a scale for each parameter.
 
-The error allowed in a derivative dx/dp is ``rtol * magnitude of x / scale of p``: that of the change of x which a change of
-p by its scale would bring.  Scales are
+The error allowed in a derivative dx/dp is ``rtol * magnitude of x / scale of p``: that of the change of x which a
+change of p by its scale would bring.  Scales are
 
 - an angle: a radian, for its value depends on where one counts from;
 - a state at the start: its own magnitude, or its value where that is larger;

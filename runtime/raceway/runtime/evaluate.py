@@ -51,9 +51,7 @@ def point(
     RequestError
         `x` has another shape than (states,).
     """
-    state = (
-        np.array([numbers.values[name] for name in model.manifest.initial]) if x is None else vector(x)
-    )
+    state = np.array([numbers.values[name] for name in model.manifest.initial]) if x is None else vector(x)
     if state.shape != (len(model.states),) or not np.all(np.isfinite(state)):
         raise RequestError(
             f"x: shape ({len(model.states)},) is expected ({', '.join(model.states)}), not {state.shape}"

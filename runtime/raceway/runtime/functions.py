@@ -6,6 +6,7 @@ loops that call them cheaply, each made when first asked for and kept.
 
 from __future__ import annotations
 
+import re
 import tempfile
 import threading
 from collections.abc import Mapping, Sequence
@@ -24,6 +25,11 @@ from raceway.runtime.parameters import unknown_name
 
 #: Arguments of a function of outputs that change from sample to sample.
 _MOVING = ("t", "x", "u")
+
+
+#: Names of derivatives, and of integrators over a grid.
+_DERIVATIVE = re.compile(r"(?P<of>\w+?)_(?:jac_(?P<along>[a-z])|tangent)")
+_INTEGRATOR = re.compile(r"(?P<plugin>\w+)_(?P<intervals>\d+)")
 
 
 class _OwnMemory(threading.local):
@@ -85,19 +91,6 @@ class Functions:
         """Function by name on memory of its own."""
         if name not in self._own.kernels:
             self._own.kernels[name] = Kernel(self.function(name))
-        return self._own.kernels[name]
-
-    def derived_kernel(self, name: str, expression: str, of: str) -> Kernel:
-        """Kernel of a derivative that is not generated, made from the expression graph of `of`.
-
-        Parameters
-        ----------
-        name : under which it is kept, and called
-        expression : in the language of ``casadi.Function.factory``: ``jac:xdot:u``
-        """
-        if name not in self._own.kernels:
-            graph = self.symbolic(of)
-            self._own.kernels[name] = Kernel(graph.factory(name, graph.name_in(), [expression]))
         return self._own.kernels[name]
 
     def loop(self, name: str, varying: tuple[str, ...]) -> PointLoop:
@@ -173,11 +166,14 @@ class Functions:
                 self._symbolic |= _read_functions(path)
                 self._read.add(where)
             if name not in self._symbolic:
-                plugin, _, intervals = name.rpartition("_")
-                if name == "rhs" or not intervals.isdecimal():
+                derivative, integrator = _DERIVATIVE.fullmatch(name), _INTEGRATOR.fullmatch(name)
+                # derivatives and integrators are generated to C only; here they are made from what they belong to
+                if derivative is not None and self.has(derivative["of"]):
+                    self._symbolic[name] = _differentiate(self.symbolic(derivative["of"]), name, derivative["along"])
+                elif integrator is not None:
+                    self._symbolic[name] = self.virtual_integrator(integrator["plugin"], int(integrator["intervals"]))
+                else:
                     raise ArtefactError(f"{path}: has no function {name!r}. Write the folder again.")
-                # the integrators are generated to C only; here they are made from the right-hand side
-                self._symbolic[name] = self.virtual_integrator(plugin, int(intervals))
             return self._symbolic[name]
 
     def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function:
@@ -229,6 +225,20 @@ def _read_functions(path: Path) -> dict[str, casadi.Function]:
     except (RuntimeError, SystemError) as fault:
         raise ArtefactError(f"{path}: no functions can be read from it. Write the folder again.\n{fault}") from fault
     return {function.name(): function for function in functions}
+
+
+def _differentiate(graph: casadi.Function, name: str, along: str | None) -> casadi.Function:
+    """Sparse derivative by one argument, or along a direction of all (``dx`` for ``x``) where `along` is None."""
+    result = graph.name_out(0)
+    arguments = dict(zip(graph.name_in(), graph.sx_in(), strict=True))
+    value = graph(*arguments.values())
+    if along is not None:
+        block = casadi.cse(casadi.jacobian(value, arguments[along]))
+        return casadi.Function(name, [*arguments.values()], [block], [*arguments], [f"{result}_{along}"])
+    directions = {f"d{key}": casadi.SX.sym(f"d{key}", argument.numel()) for key, argument in arguments.items()}
+    moved = casadi.jtimes(value, casadi.vertcat(*arguments.values()), casadi.vertcat(*directions.values()))
+    both = {**arguments, **directions}
+    return casadi.Function(name, [*both.values()], [casadi.cse(casadi.densify(moved))], [*both], [f"d{result}"])
 
 
 def _check_signature(function: casadi.Function, manifest: Manifest) -> None:

@@ -88,7 +88,9 @@ def _near_zero(t: Array, signal: Array, angles: Array, kink: str, width: float) 
     top = (here > before) & (here >= behind) & (here <= 2.0 * width)
     bottom = (here < before) & (here <= behind) & (here >= -2.0 * width)
     found: list[Grazing] = []
-    for row, ball in np.argwhere(top | bottom).tolist():
+    # a signal that stands still wiggles by rounding
+    moving = np.maximum(np.abs(here - before), np.abs(here - behind)) > 1e-6 * width
+    for row, ball in np.argwhere((top | bottom) & moving).tolist():
         fit = np.polynomial.Polynomial.fit(t[row : row + 3], signal[row : row + 3, ball], 2)
         places = fit.deriv().roots()
         time = float(np.real(places[0])) if len(places) else float(t[row + 1])

@@ -149,7 +149,9 @@ def directions_of(model: Model, numbers: Numbers, wrt: str | Sequence[str], t: f
             words = f"'{STATES}', names of states, '{TIME}' and '{CRANK_ANGLE}'"
             hint = unknown_name("parameter", name, (*rows, *model.states, STATES, TIME, CRANK_ANGLE))
             faults.append(f"{hint} Besides parameters, wrt takes {words}.")
-    if not names:
+    if not names and not model.states and wrt == STATES:
+        faults.append("wrt: this model has no states: a scene with [bearing] has. Give parameters, or 'crank_angle'.")
+    elif not names:
         faults.append("wrt: nothing to differentiate by was named. Give a parameter, or 'states'.")
     if faults:
         raise RequestError("\n".join(faults))

@@ -96,7 +96,7 @@ class CheckedJacobian:
                     {
                         "of": row,
                         "wrt": column,
-                        "value": float(self.value[i, j]),
+                        "value": _number(self.value[i, j]),
                         "unit": _quotient(self.row_units[i], self.column_units[j]),
                         "second": check.value,
                         "second_uncertainty": check.uncertainty,
@@ -108,7 +108,7 @@ class CheckedJacobian:
             "time": {"value": self.time, "unit": "s"},
             "state": self.x.tolist(),
             "values": {
-                row: {"value": float(value), "unit": unit}
+                row: {"value": _number(value), "unit": unit}
                 for row, value, unit in zip(self.rows, self.at, self.row_units, strict=True)
             },
             "jacobian": entries,
@@ -213,6 +213,11 @@ def _motion(
 def _same_kind(model: Model, k: int) -> slice:
     half = len(model.states) // 2
     return slice(0, half) if k < half else slice(half, 2 * half)
+
+
+def _number(value: float) -> float | None:
+    """A number for JSON, which knows no infinity."""
+    return float(value) if np.isfinite(value) else None
 
 
 def _quotient(above: str, below: str) -> str:

@@ -61,6 +61,7 @@ class JacobianFunction:
     sparsity : where entries can differ from zero
     values : entries of the last call, in the order of `sparsity`; overwritten by the next call
     x : memory of the state, shape (states,)
+    evaluate : the compiled code alone, for whoever writes `x` and reads the memory himself
     """
 
     def __init__(
@@ -83,7 +84,7 @@ class JacobianFunction:
         function, entries = self._prepare(rows, directions)
         self._entries = entries
         buffer: Any = function.buffer()
-        self._buffer, self._evaluate = buffer  # the first owns the memory the second works on
+        self._buffer, self.evaluate = buffer  # the first owns the memory the second works on
         self._memory: dict[str, Array] = {}
         for k, name in enumerate(function.name_in()):
             memory = self._memory[name] = np.zeros(function.nnz_in(k))
@@ -143,7 +144,7 @@ class JacobianFunction:
     def __call__(self, x: Array | Sequence[float]) -> Array:
         """Entries at a state, in the order of `sparsity`; the same memory each time: copy what is to be kept."""
         self.x[:] = x
-        self._evaluate()  # straight-line code: it has no failure to report
+        self.evaluate()  # straight-line code: it has no failure to report
         if self._result is not None:
             # mode: the indices are right, and checking them would need a buffer
             self._result.take(self._entries, out=self.values, mode="clip")

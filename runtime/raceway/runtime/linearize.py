@@ -51,9 +51,9 @@ class Mode:
     Attributes
     ----------
     eigenvalue : of the motion exp(eigenvalue t) [1/s]; of a conjugate pair the one with positive imaginary part
-    natural_frequency : |eigenvalue| / (2 pi) [Hz]
+    natural_frequency : absolute value of the eigenvalue over 2 pi [Hz]
     damped_frequency : Im(eigenvalue) / (2 pi) [Hz]; 0 for a decay without vibration
-    damping_ratio : -Re(eigenvalue) / |eigenvalue| [1]; NaN for a rigid mode
+    damping_ratio : -Re(eigenvalue) over its absolute value [1]; NaN for a rigid mode
     shape : complex displacement of each coordinate, the largest 1, shape (coordinates,)
     """
 
@@ -266,16 +266,17 @@ def _deflections(model: Model, numbers: Numbers, t: float, x: Array) -> tuple[Ar
 def render_linearization(result: Linearization) -> Table:
     """Modes as a table for a terminal of 80 columns."""
     where = "static equilibrium" if result.at_equilibrium else "given state"
+    words = "f: natural frequency; ratio: damping over critical damping; shapes: size and phase, the largest 1"
     table = Table(
         title=f"Small vibrations about the {where} at t = {result.time:.6g} s",
-        caption="\n".join(result.notes) or None,
+        caption="\n".join((words, *result.notes)),
         title_justify="left",
         caption_justify="left",
         header_style="bold",
         box=box.SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
     )
-    for head in ("frequency Hz", "damped Hz", "damping ratio", *result.coordinates):
+    for head in ("f, Hz", "damped, Hz", "ratio", *result.coordinates):
         table.add_column(head, justify="right", no_wrap=True)
     for mode in result.modes:
         ratio = "" if mode.rigid else f"{mode.damping_ratio:.4g}"

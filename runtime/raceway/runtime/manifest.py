@@ -24,7 +24,7 @@ import os
 import re
 import tempfile
 import types
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -394,7 +394,7 @@ def _kind(value: object) -> str:
 
 
 #: Types of a record's fields, found once: there are hundreds of records in a manifest, and few kinds.
-_hints = cache(get_type_hints)
+_hints: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
 
 
 def _read(hint: Any, value: Any, place: str, faults: list[str]) -> Any:

@@ -315,6 +315,8 @@ def _timing(inputs: Sequence[InputInfo]) -> list[str]:
             names += [item.offset, item.rate, *(name for window in item.windows for name in window)]
         elif item.kind in ("table", "table_rate"):
             names += (*item.times, *item.values)
+        elif item.kind == "phase":
+            names.append(item.rate)  # segments end before a phase gets large
     return list(dict.fromkeys(names))
 
 

@@ -16,6 +16,7 @@ from raceway.runtime.compile import CompiledLibrary, compile_model
 from raceway.runtime.drivers import Drivers
 from raceway.runtime.ensemble import EnsembleResult, simulate_many
 from raceway.runtime.ensemble_driver import EnsembleDriver
+from raceway.runtime.error_target import simulate_to_error
 from raceway.runtime.errors import RequestError
 from raceway.runtime.evaluate import checked_time, evaluate_point
 from raceway.runtime.explain import Explanation, explain
@@ -41,9 +42,10 @@ from raceway.runtime.stepper import Stepper
 
 if TYPE_CHECKING:
     from raceway.runtime.linearize import Linearization
-    from raceway.runtime.sensitivity_query import SensitivityReport
+    from raceway.runtime.sensitivity_report import SensitivityReport
     from raceway.runtime.solution import Solution
     from raceway.runtime.statics import StaticEquilibrium
+    from raceway.runtime.trade import Trade
 
 
 def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True) -> Model:
@@ -177,10 +179,6 @@ class Model:
         """Function by name on memory of its own: ``kernel({"t": 0.0, "x": x, ...})`` costs microseconds."""
         return self._functions.kernel(name)
 
-    def derived_kernel(self, name: str, expression: str, of: str) -> Kernel:
-        """Kernel of a derivative that is not generated (see `raceway.runtime.functions`)."""
-        return self._functions.derived_kernel(name, expression, of)
-
     def loop(self, name: str, varying: tuple[str, ...]) -> PointLoop:
         """Function by name for many points at once; `varying` names the inputs that change between them."""
         return self._functions.loop(name, varying)
@@ -289,6 +287,9 @@ class Model:
         initial: Sequence[float] | np.ndarray | None = None,
         transient: float | None = None,
         progress: Callable[[float], None] | None = None,
+        error: float | None = None,
+        of: str | Sequence[str] | None = None,
+        trade: Trade | None = None,
     ) -> Solution:
         """Simulate from t = 0.  What is not given is taken from the scene's run settings.
 
@@ -308,6 +309,11 @@ class Model:
         initial : state at the start, shape (states,)
         transient : turns at the start that `Solution.steady` leaves out
         progress : called with the finished fraction
+        error : relative error wanted instead of `method` and `rtol`: the tool chooses them, estimates the error of
+            this run and tightens until the estimate is within it; ``Solution.accuracy`` tells (see
+            `raceway.runtime.error_target`)
+        of : quantities that `error` is about.  Default: peak ball force, rms and range of the inner ring's motion
+        trade : a measurement of this scene (`raceway trade`), from which `error` begins its search
 
         Raises
         ------
@@ -315,6 +321,8 @@ class Model:
             A wrong request, or a linkage that cannot be assembled.
         IntegrationError
             The computation failed; ``.partial`` holds what was computed.
+        TargetMissed
+            No way keeps the error that was asked for.
         """
         numbers = self._runnable(parameters)
         request = Request(
@@ -329,7 +337,9 @@ class Model:
             transient_cycles=transient,
             progress=progress,
         )
-        return simulate(self, numbers, request)
+        if error is None:
+            return simulate(self, numbers, request)
+        return simulate_to_error(self, numbers, request, error, of, trade)
 
     def sensitivities(
         self,

@@ -110,7 +110,7 @@ def scalar(value: object) -> float | None:
         try:
             return float(value)
         except OverflowError:  # an integer of more than 308 digits
-            return math.inf if value > 0 else -math.inf
+            return math.inf if abs(value) == value else -math.inf
     return None
 
 

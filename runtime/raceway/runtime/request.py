@@ -136,8 +136,8 @@ def _sample_times(model: Model, request: Request, turn: float, outputs: Sequence
     if len(falls):
         k = int(falls[0])
         raise RequestError(
-            f"times: they must increase, but {float(times[k + 1])!r} s follows {float(times[k])!r} s (places {k} and {k + 1}). "
-            "Sort them, each once: numpy.unique does."
+            f"times: they must increase, but {float(times[k + 1])!r} s follows {float(times[k])!r} s "
+            f"(places {k} and {k + 1}). Sort them, each once: numpy.unique does."
         )
     if request.cycles is None and request.duration is None:
         duration = float(times[-1])
@@ -149,8 +149,8 @@ def _sample_times(model: Model, request: Request, turn: float, outputs: Sequence
         duration = run_length(model, request, turn)
         if times[-1] > duration * (1.0 + clock.TIME_RESOLUTION):
             raise RequestError(
-                f"times: the run ends at {duration!r} s, and {float(times[-1])!r} s lies behind it. Run longer, or leave "
-                "cycles and duration out: the run then ends at the last time."
+                f"times: the run ends at {duration!r} s, and {float(times[-1])!r} s lies behind it. Run longer, or "
+                "leave cycles and duration out: the run then ends at the last time."
             )
     if times[0] < 0.0:
         raise RequestError(

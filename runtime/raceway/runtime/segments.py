@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from raceway.runtime.model import Model
 
 
+#: Largest angle that a phase may reach within a segment [rad]: sines of larger ones lose digits.
+LARGEST_PHASE = 1e6
+
+
 def time_resolution(begin: float, end: float, turn: float) -> float:
     """Times of a run closer than this are one time [s].  It does not depend on how the run is sampled."""
     return clock.TIME_RESOLUTION * max(abs(begin), abs(end), turn if math.isfinite(turn) else 0.0)
@@ -39,7 +43,20 @@ def segment_edges(model: Model, numbers: Numbers, begin: float, end: float, turn
         right = np.searchsorted(fenced, whole)
         free = (fenced[right] - whole > near) & (whole - fenced[right - 1] > near)
         cuts = np.sort(np.concatenate([cuts, whole[free]]))
-    return np.concatenate([[begin], cuts, [end]])
+    return _short_of_rounding(model.manifest.inputs, numbers, np.concatenate([[begin], cuts, [end]]))
+
+
+def _short_of_rounding(inputs: Sequence[InputInfo], numbers: Numbers, edges: np.ndarray) -> np.ndarray:
+    """The edges, and more where a phase would get beyond `LARGEST_PHASE` between two: a fast load on a slow shaft."""
+    fastest = max((abs(numbers.values[item.rate]) for item in inputs if item.kind == "phase"), default=0.0)
+    parts = np.ceil(np.diff(edges) * fastest / LARGEST_PHASE)
+    if not np.any(parts > 1.0) or not np.all(np.isfinite(parts)):
+        return edges
+    pieces = [
+        np.linspace(a, b, int(n) + 1)[:-1]
+        for a, b, n in zip(edges[:-1], edges[1:], np.maximum(parts, 1.0), strict=True)
+    ]
+    return np.concatenate([*pieces, edges[-1:]])
 
 
 def make_segments(

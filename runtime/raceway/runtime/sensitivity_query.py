@@ -11,22 +11,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from raceway.runtime import clock
 from raceway.runtime.assembly import check_assembly
-from raceway.runtime.certificate import AGREEMENT, FLOOR, UNCHECKED, Check, Second, Verdict, by_differences, compare
+from raceway.runtime.certificate import AGREEMENT, FLOOR, UNCHECKED, Second, by_differences, compare
 from raceway.runtime.direction_scales import ANGLE
 from raceway.runtime.errors import RequestError, SimulationError
 from raceway.runtime.grazing import TOLERANCE, Grazing, find_grazing
 from raceway.runtime.magnitudes import model_scales
 from raceway.runtime.manifest import Manifest
+from raceway.runtime.nodes import Window
 from raceway.runtime.parameters import Numbers, real, unknown_name
 from raceway.runtime.quantities import default_quantities, parse_quantity
 from raceway.runtime.request import TOLERANCES
+from raceway.runtime.scales import Scales
+from raceway.runtime.sensitivity_report import QuantityValue, Sensitivity, SensitivityReport, ratio_unit
 from raceway.runtime.simulate import STIFF_RATIO
 from raceway.runtime.stepper import METHODS, Family
 from raceway.runtime.study import Course, Span, Study
@@ -34,12 +37,11 @@ from raceway.runtime.track import Outlook, Stepping
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
-    from raceway.runtime.scales import Scales
 
 Array = NDArray[np.float64]
 
 #: Tolerance of the states in a run with derivatives, and that of the derivatives themselves.
-RTOL, SENSITIVITY_RTOL = 1e-11, 1e-9
+RTOL, SENSITIVITY_RTOL = 1e-11, 1e-10
 
 #: The derivatives' tolerance is loosened tenfold, down to this, where steps would fall below the resolution of time:
 #: under laws whose slope is infinite at contact onset derivatives have singular rates there.
@@ -52,145 +54,14 @@ DIFFERENCE_RTOL = 1e-13
 #: quadrature is of first order there.
 FINER = 4
 
+#: Nodes for each radian of the fastest vibration, and the most of them, in `FINER` runs' samples.
+NODES_A_RADIAN, MOST = 3, 4
+
 #: A change of the start by this share of the motion is a large one: it stays near, so that its effect is linear.
 START_SHARE = 1e-2
 
 #: Ways to check.
 CHECKS = ("differences", "erk", "adjoint")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class QuantityValue:
-    """A quantity's value: name, number, unit; time and ball of an extreme; what to mind."""
-
-    name: str
-    value: float
-    unit: str
-    time: float | None
-    ball: int | None
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sensitivity:
-    """Derivative of one quantity by one parameter.
-
-    Attributes
-    ----------
-    quantity, parameter : names
-    value, parameter_value : numbers
-    derivative, unit : dQ/dp
-    dimensionless : (p/Q) dQ/dp; NaN where Q is zero
-    uncertainty : of the derivative, from a run at a looser tolerance, same unit; None where there was none
-    check : the certificate
-    """
-
-    quantity: str
-    parameter: str
-    value: float
-    parameter_value: float
-    derivative: float
-    unit: str
-    dimensionless: float
-    uncertainty: float | None
-    check: Check
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SensitivityReport:
-    """Answer to a query: every pair, with what it takes to judge them.
-
-    Attributes
-    ----------
-    scene : name
-    quantities : values
-    parameters : names
-    pairs : quantity by quantity, parameters in order
-    grazing : where the trajectory grazes a kink
-    settings : cycles, transient, method, tolerances, steps
-    """
-
-    scene: str
-    quantities: tuple[QuantityValue, ...]
-    parameters: tuple[str, ...]
-    pairs: tuple[Sensitivity, ...]
-    grazing: tuple[Grazing, ...]
-    settings: Mapping[str, Any]
-
-    def __getitem__(self, key: tuple[str, str]) -> Sensitivity:
-        """The pair of a quantity and a parameter."""
-        quantity, parameter = key
-        names = [item.name for item in self.quantities]
-        if quantity not in names:
-            raise RequestError(unknown_name("quantity of this report", quantity, names))
-        if parameter not in self.parameters:
-            raise RequestError(unknown_name("parameter of this report", parameter, self.parameters))
-        return self.pairs[names.index(quantity) * len(self.parameters) + self.parameters.index(parameter)]
-
-    def of(self, quantity: str) -> tuple[Sensitivity, ...]:
-        """Pairs of one quantity, ranked by the size of the dimensionless derivative."""
-        pairs = [self[quantity, name] for name in self.parameters]
-        return tuple(sorted(pairs, key=lambda pair: -_rank(pair.dimensionless)))
-
-    @property
-    def verdicts(self) -> dict[Verdict, int]:
-        """How many pairs have each verdict."""
-        return {verdict: sum(pair.check.verdict is verdict for pair in self.pairs) for verdict in Verdict}
-
-    @property
-    def disagreements(self) -> tuple[Sensitivity, ...]:
-        """Pairs whose two routes disagree."""
-        return tuple(pair for pair in self.pairs if pair.check.verdict is Verdict.DISAGREES)
-
-    def to_json(self) -> dict[str, Any]:
-        """The report as JSON-ready mapping; numbers that are not finite are null."""
-        return {
-            "scene": self.scene,
-            "settings": dict(self.settings),
-            "verdicts": {verdict.value: count for verdict, count in self.verdicts.items()},
-            "quantities": [
-                {
-                    "name": item.name,
-                    "value": _plain(item.value),
-                    "unit": item.unit,
-                    "time": _plain(item.time),
-                    "ball": item.ball,
-                    "notes": list(item.notes),
-                }
-                for item in self.quantities
-            ],
-            "sensitivities": [
-                {
-                    "quantity": pair.quantity,
-                    "parameter": pair.parameter,
-                    "value": _plain(pair.value),
-                    "parameter_value": pair.parameter_value,
-                    "derivative": _plain(pair.derivative),
-                    "unit": pair.unit,
-                    "dimensionless": _plain(pair.dimensionless),
-                    "uncertainty": _plain(pair.uncertainty),
-                    "certificate": {
-                        "route": pair.check.route,
-                        "value": _plain(pair.check.value),
-                        "uncertainty": _plain(pair.check.uncertainty),
-                        "disagreement": _plain(pair.check.disagreement),
-                        "verdict": pair.check.verdict.value,
-                        "reason": pair.check.reason,
-                    },
-                }
-                for pair in self.pairs
-            ],
-            "grazing": [
-                {
-                    "ball": item.ball,
-                    "time": item.time,
-                    "crank_angle": item.crank_angle,
-                    "depth": item.depth,
-                    "kink": item.kink,
-                }
-                for item in self.grazing
-            ],
-        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -318,21 +189,23 @@ def answer(model: Model, numbers: Numbers, query: Query) -> SensitivityReport:
         if name not in numbers.parameters:
             raise RequestError(unknown_name("parameter", name, numbers.parameters))
     route = _check_route(query)
-    study = Study(model, quantities, query.span, query.samples_per_cycle or FINER * manifest.run.samples_per_cycle)
+    study = Study(model, quantities, query.span, 4)
     window = study.window(numbers)
     magnitude, family, fine = np.zeros(0), Family.AUTO, Family.AUTO
+    scales = Scales(magnitude=magnitude, frequency=0.0, decay=0.0)
     if model.states:
         start = np.array([numbers.values[name] for name in manifest.initial])
         scales = model_scales(model, numbers, start, window.duration, window.turn)
         magnitude = scales.magnitude
         family, fine = _families(query.method, scales)
+    study.per_turn = query.samples_per_cycle or _nodes_a_turn(manifest, window, scales)
     tell = query.progress or (lambda _words, _fraction: None)
     stepping = Stepping(family=family, rtol=query.rtol, magnitude=magnitude, sensitivity_rtol=query.sensitivity_rtol)
 
     if query.method == "erk":
         from raceway.runtime.erk_route import by_erk
 
-        found = by_erk(study, numbers, names, magnitude, direction=query.direction, progress=lambda f: tell("erk", f))
+        found = by_erk(study, numbers, names, scales, direction=query.direction, progress=lambda f: tell("erk", f))
         course = study.measure(numbers, stepping)
         values = np.array([item.value for item in course.estimates])
         slopes, own = found.value, found.uncertainty
@@ -355,7 +228,7 @@ def answer(model: Model, numbers: Numbers, query: Query) -> SensitivityReport:
     second = None
     if route is not None:
         plain = Stepping(family=fine, rtol=DIFFERENCE_RTOL, magnitude=magnitude)
-        second = _second(study, model, numbers, names, route, plain, difference_scales, quantum, query, tell)
+        second = _second(study, model, numbers, names, route, plain, scales, difference_scales, quantum, query, tell)
     pairs = []
     units = {info.name: info.unit for info in manifest.parameters}
     for row, (quantity, estimate) in enumerate(zip(quantities, course.estimates, strict=True)):
@@ -418,6 +291,13 @@ def _refuse_jumps(manifest: Manifest) -> None:
             "contact), so the derivative of the steps is not that of the motion. Allowed: a continuous law, "
             '[bearing.damping] law = "tangent" or "one-sided", or a smoothed contact, [bearing.contact] smoothing.'
         )
+
+
+def _nodes_a_turn(manifest: Manifest, window: Window, scales: Scales) -> int:
+    """Nodes that quadratures need: more than a run's samples, and some in each period of the fastest vibration."""
+    ordinary = FINER * manifest.run.samples_per_cycle
+    span = window.turn if math.isfinite(window.turn) else window.duration
+    return max(ordinary, min(math.ceil(NODES_A_RADIAN * scales.frequency * span), MOST * ordinary))
 
 
 def _listed(option: str, given: Sequence[str] | None, default: Sequence[str]) -> list[str]:
@@ -493,6 +373,7 @@ def _second(
     names: Sequence[str],
     route: str,
     plain: Stepping,
+    scales_of_states: Scales,
     scales: Array,
     quantum: Array,
     query: Query,
@@ -504,7 +385,7 @@ def _second(
 
         direction: Literal["forward", "adjoint"] = "adjoint" if route == "adjoint" else "forward"
         return by_erk(
-            study, numbers, names, plain.magnitude, direction=direction, progress=lambda f: tell("checking", f)
+            study, numbers, names, scales_of_states, direction=direction, progress=lambda f: tell("checking", f)
         )
     base = dict(numbers.parameters)
 
@@ -539,19 +420,3 @@ def _grazing(model: Model, numbers: Numbers, course: Course, tolerance: float = 
         one_sided=manifest.bearing.damping_law == "one-sided",
         tolerance=tolerance,
     )
-
-
-def ratio_unit(above: str, below: str) -> str:
-    """Unit of a derivative."""
-    if below in ("", "1"):
-        return above or "1"
-    under = f"({below})" if any(sign in below for sign in "*/") else below
-    return f"{above or '1'}/{under}"
-
-
-def _rank(value: float) -> float:
-    return abs(value) if math.isfinite(value) else -1.0
-
-
-def _plain(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)

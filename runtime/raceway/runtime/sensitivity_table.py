@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from raceway.runtime.certificate import Verdict
-from raceway.runtime.sensitivity_query import Sensitivity, SensitivityReport
+from raceway.runtime.sensitivity_report import Sensitivity, SensitivityReport
 
 #: Grazing places that are listed; the JSON has all.
 LISTED = 5

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from raceway.runtime import clock
 from raceway.runtime.errors import RequestError
 from raceway.runtime.integrators import METHODS, available_methods
 from raceway.runtime.limits import refuse_crawl

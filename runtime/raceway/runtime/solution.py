@@ -22,6 +22,8 @@ from raceway.runtime.status import Status
 if TYPE_CHECKING:
     import xarray
 
+    from raceway.runtime.error_target import Accuracy
+
 #: Number of the layout of saved files.
 FILE_SCHEMA = 1
 
@@ -76,6 +78,7 @@ class Solution:
     manifest : names, units and descriptions
     statistics : how the solution came about
     status : how the simulation ended
+    accuracy : what was asked, chosen and estimated, where an error was named instead of a method
     """
 
     t: np.ndarray
@@ -88,6 +91,7 @@ class Solution:
     manifest: Manifest
     statistics: Statistics
     status: Status
+    accuracy: Accuracy | None = None
 
     def __post_init__(self) -> None:
         for array in (self.t, self.x, *self.outputs.values()):

@@ -29,9 +29,9 @@ SEGMENTS_A_CALL = 600
 #: ... and steps, accepted and rejected: a fraction of a second.
 STEPS_A_CALL = 1_000_000
 
-#: A call that takes all its steps must come this far, as a fraction of the run, or as far as the limits of a turn and of
-#: a second allow, whichever is less.  What does not diverges or chatters, or is an explicit method on a stiff model: in
-#: a long run it would crawl for hours before the run's own limit is met.
+#: A call that takes all its steps must come this far, as a fraction of the run, or as far as the limits of a turn and
+#: of a second allow, whichever is less.  What does not diverges or chatters, or is an explicit method on a stiff model:
+#: in a long run it would crawl for hours before the run's own limit is met.
 LEAST_PROGRESS = 0.01
 
 #: What the ways of the stepper to end mean to people.

@@ -8,8 +8,9 @@ to see where the extremes lie, then with derivatives along parameters and nodes 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,7 +36,7 @@ from raceway.runtime.parameters import Numbers
 from raceway.runtime.quantities import KINDS, Estimate, Mark, Place, Quantity, View, place_of, place_slope
 from raceway.runtime.sensitivity import Chain
 from raceway.runtime.statics import static_equilibrium
-from raceway.runtime.track import Outlook, Stepping, Track, follow
+from raceway.runtime.track import Outlook, Signal, Stepping, Track, follow
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -44,6 +45,9 @@ Array = NDArray[np.float64]
 
 #: Fractions nearer than this to an edge are at it.
 AT_EDGE = 1e-12
+
+#: Nodes whose weights in a quantity are found at once.
+TOGETHER = 512
 
 #: Outputs with kinks where contacts begin and end, and the one that shows where.
 BROKEN = ("ball.", "ring_force.")
@@ -71,6 +75,26 @@ class Course:
 
     track: Track | None
     estimates: tuple[Estimate, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Prepared:
+    """A run laid out, ready to be followed by any integrator.
+
+    Attributes
+    ----------
+    numbers, chain : of the run, and the derivatives of its numbers
+    edges, nodes : where it is looked at, and how that moves
+    marks : moments of extremes and places
+    track : where the stepper has followed it already, for it had to find how kinks move
+    """
+
+    numbers: Numbers
+    chain: Chain
+    edges: Edges
+    nodes: Nodes
+    marks: dict[tuple[str, str], Mark]
+    track: Track | None
 
 
 class Study:
@@ -171,9 +195,25 @@ class Study:
             The computation failed.
         """
         chain = Chain(self.model, numbers, names)
-        if not self._moving:
+        prepared = self.prepare(numbers, chain, stepping)
+        if prepared is None:
             return Course(track=None, estimates=tuple(self._at_rest(numbers, item, chain) for item in self.quantities))
-        edges = make_edges(self.model, numbers, self.window(numbers), chain.derivative, len(names))
+        track = prepared.track or follow(self.model, numbers, prepared.edges, prepared.nodes, stepping, chain)
+        return self.finish(prepared, track)
+
+    def prepare(
+        self, numbers: Numbers, chain: Chain, stepping: Stepping, *, from_start: bool = False
+    ) -> Prepared | None:
+        """Find extremes and kinks, and lay nodes accordingly; None where nothing needs to be run.
+
+        Parameters
+        ----------
+        from_start : lay nodes over the transient as well
+        """
+        if not self._moving:
+            return None
+        directions = len(chain.names)
+        edges = make_edges(self.model, numbers, self.window(numbers), chain.derivative, directions)
         extremes: dict[tuple[str, str], Extreme] = {}
         kinks: tuple[Kink, ...] = ()
         if self._kinked or any(KINDS[item.kind].extremes for item in self._moving):
@@ -185,10 +225,13 @@ class Study:
         extremes = {key: _moved(item, edges, broken) for key, item in extremes.items()}
         edges = broken
         points = list(dict.fromkeys((item.segment, item.fraction) for item in extremes.values()))
-        full = with_points(uniform_plan(edges, self.per_turn), points)
-        track, marks = self._follow(numbers, edges, full, stepping, chain)
+        full = with_points(uniform_plan(edges, self.per_turn, from_start=from_start), points)
+        nodes, marks = self._nodes(numbers, edges, full, chain)
+        track = None
         if kinks:
+            track = follow(self.model, numbers, edges, nodes, stepping, chain)
             track = self._released(numbers, track, full, kinks, chain)
+            nodes, edges = track.nodes, track.edges
         for key, item in extremes.items():
             here = np.flatnonzero((full.segment == item.segment) & (full.fraction == item.fraction))
             marks[key] = Mark(
@@ -201,17 +244,67 @@ class Study:
                 runner_up=item.runner_up,
                 at_edge=min(item.fraction, 1.0 - item.fraction) < AT_EDGE,
             )
-        view = View(
+        return Prepared(numbers=numbers, chain=chain, edges=edges, nodes=nodes, marks=marks, track=track)
+
+    def finish(self, prepared: Prepared, track: Track) -> Course:
+        """Quantities and their derivatives from a track along the nodes that were prepared."""
+        view = self._view(prepared, self._outlook.look(track, prepared.numbers, prepared.chain))
+        estimates = tuple(self._estimate(view, item, prepared.chain) for item in self.quantities)
+        return Course(track=track, estimates=estimates)
+
+    def _view(self, prepared: Prepared, signals: Mapping[str, Signal]) -> View:
+        return View(
             manifest=self.model.manifest,
-            numbers=numbers,
-            window=edges.window,
-            nodes=track.nodes,
-            signals=self._outlook.look(track, numbers, chain),
-            marks=marks,
-            slopes=chain.derivative,
-            directions=len(names),
+            numbers=prepared.numbers,
+            window=prepared.edges.window,
+            nodes=prepared.nodes,
+            signals=signals,
+            marks=prepared.marks,
+            slopes=prepared.chain.derivative,
+            directions=len(prepared.chain.names),
         )
-        return Course(track=track, estimates=tuple(self._estimate(view, item, chain) for item in self.quantities))
+
+    def state_weights(self, prepared: Prepared, track: Track, quantity: Quantity) -> Array | None:
+        """Derivative of a quantity by the states at all nodes, shape (nodes, states); None for one that is static.
+
+        Raises
+        ------
+        RequestError
+            The quantity lies where two balls change rank: the moment then depends on the states as well.
+        """
+        kind = KINDS[quantity.kind]
+        if kind.evaluate is None:
+            return None
+        marks = [prepared.marks[quantity.name, name] for name in kind.extremes]
+        if any(mark.other is not None for mark in marks):
+            raise RequestError(f"{quantity.name}: two balls change rank there, which the adjoint does not follow.")
+        signal = self._outlook.look(track, prepared.numbers, prepared.chain)[quantity.channel]
+        by_states = self._outlook.by_states(track, prepared.numbers)[quantity.channel]
+        count = len(track.nodes)
+        columns = np.argmax(signal.value, axis=1)
+        if quantity.ball is not None:
+            columns[:] = quantity.ball - 1
+        for mark in marks:
+            columns[mark.node] = mark.ball
+        rows = np.arange(count)
+        # linear in the channel's change at each node: one direction for each node shows its weight
+        value = signal.value[rows, columns][:, None]
+        at = {(quantity.name, name): replace(prepared.marks[quantity.name, name], ball=0) for name in kind.extremes}
+        weights = np.zeros(count)
+        for first in range(0, count, TOGETHER):
+            some = min(TOGETHER, count - first)
+            unit = np.zeros((count, 1, some))
+            unit[first + np.arange(some), 0, np.arange(some)] = 1.0
+            still = np.zeros((count, some))
+            view = replace(
+                self._view(prepared, {quantity.channel: Signal(value=value, slope=unit)}),
+                nodes=replace(prepared.nodes, slope=still, weight_slope=still),
+                marks={**prepared.marks, **at},
+                slopes=partial(_still, some),
+                directions=some,
+            )
+            weights[first : first + some] = kind.evaluate(view, replace(quantity, ball=None)).slope
+        return np.asarray(weights[:, None] * by_states[rows, columns])
 
     def _estimate(self, view: View, quantity: Quantity, chain: Chain | None) -> Estimate:
         evaluate = KINDS[quantity.kind].evaluate
@@ -241,14 +334,14 @@ class Study:
             slope = rest.derivative("ball.elastic_force", names)[best] if names else np.zeros(1)
         return Estimate(value=value, slope=slope[:-1] + slope[-1] * moved, time=time, ball=ball)
 
-    def _follow(
-        self, numbers: Numbers, edges: Edges, plan: Plan, stepping: Stepping, chain: Chain | None
-    ) -> tuple[Track, dict[tuple[str, str], Mark]]:
-        """The run along a plan and the places asked for."""
+    def _nodes(
+        self, numbers: Numbers, edges: Edges, plan: Plan, chain: Chain | None
+    ) -> tuple[Nodes, dict[tuple[str, str], Mark]]:
+        """Nodes of a plan and of the places asked for."""
         nodes = place(plan, edges)
         marks: dict[tuple[str, str], Mark] = {}
         manifest = self.model.manifest
-        for item in self.quantities:
+        for item in self._moving:
             if item.kind not in ("value", "end"):
                 continue
             time, kind = place_of(manifest, numbers, edges.window, item)
@@ -257,6 +350,13 @@ class Study:
                 slope = place_slope(manifest, numbers, kind, time, edges.slopes[-1], chain.derivative)
             marks[item.name, "place"] = Mark(node=len(nodes), time=time, ball=0)
             nodes = _appended(nodes, edges, time, slope, kind)
+        return nodes, marks
+
+    def _follow(
+        self, numbers: Numbers, edges: Edges, plan: Plan, stepping: Stepping, chain: Chain | None
+    ) -> tuple[Track, dict[tuple[str, str], Mark]]:
+        """The run along a plan and the places asked for."""
+        nodes, marks = self._nodes(numbers, edges, plan, chain)
         return follow(self.model, numbers, edges, nodes, stepping, chain), marks
 
     @property
@@ -361,6 +461,11 @@ def _appended(nodes: Nodes, edges: Edges, time: float, slope: Array, kind: Place
         slope=np.vstack([nodes.slope, slope[None, :]]),
         weight_slope=np.vstack([nodes.weight_slope, np.zeros((1, len(slope)))]),
     )
+
+
+def _still(directions: int, _name: str) -> Array:
+    """Derivative of a number that does not move."""
+    return np.zeros(directions)
 
 
 def _moved(extreme: Extreme, edges: Edges, broken: Edges) -> Extreme:

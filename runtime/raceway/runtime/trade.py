@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -166,8 +167,12 @@ def switched_configurations() -> tuple[Configuration, ...]:
     return tuple(replace(one, switch=FAST_MATH) for one in simple_configurations(FULL))
 
 
-def compile_fast_math(model: Model) -> EnsembleDriver | None:
+def compile_fast_math(model: Model, folder: Path) -> EnsembleDriver | None:
     """The stepper, compiled so that arithmetic may be reordered, but NaN stays NaN; None without a compiler.
+
+    Parameters
+    ----------
+    folder : the model's generated folder
 
     Raises
     ------
@@ -179,17 +184,21 @@ def compile_fast_math(model: Model) -> EnsembleDriver | None:
         return None
     flags = (*compiler.flags, "-ffast-math", "-fno-finite-math-only", "-ffp-contract=fast")
     return EnsembleDriver(
-        compile_ensemble(model.folder, model.manifest, replace(compiler, flags=flags)), model.manifest
+        compile_ensemble(folder.absolute(), model.manifest, replace(compiler, flags=flags)), model.manifest
     )
 
 
 def perturbed(model: Model, count: int, spread: float = SPREAD, seed: int = 1) -> dict[str, np.ndarray]:
-    """Parameter sets around the model's: every number that is not zero, drawn evenly from its neighbourhood."""
+    """Parameter sets around the model's: every number that is not zero, drawn evenly from its neighbourhood.
+
+    The times of a load's table stay: drawn one by one they would change places where the load is steep.
+    """
     random = np.random.default_rng(seed)
+    times = {name for item in model.manifest.inputs for name in item.times}
     return {
         info.name: info.default * (1.0 + spread * random.uniform(-1.0, 1.0, count))
         for info in model.manifest.parameters
-        if info.default != 0.0
+        if info.default != 0.0 and info.name not in times
     }
 
 

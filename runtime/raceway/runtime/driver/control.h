@@ -5,7 +5,10 @@
 #include "explicit.h"
 #include "rosenbrock.h"
 
-enum { RW_STIFF_STEPS = 12 }; /* steps at the stability limit before an explicit method gives up */
+enum {
+    RW_STIFF_STEPS = 12, /* steps at the stability limit before an explicit method gives up */
+    RW_STIFF_LOOK = 8    /* every so many steps it looks whether it is there */
+};
 
 /* Logarithm of 1e-4: smaller errors of the step before do not tell the controller more. */
 static const double RW_LOG_SMALL_ERROR = -9.210340371976182;

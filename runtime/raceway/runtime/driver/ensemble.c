@@ -57,7 +57,7 @@ typedef struct {
     int balls;          /* whether channels of the balls are reduced */
     unsigned long wanted; /* channels reduced, a bit each; all members have the same */
     rw_lane_numbers numbers;
-} rw_block;
+} rw_lane_block;
 
 static void put(double *lanes, int lane, const double *row, int count)
 {
@@ -119,7 +119,7 @@ static void begin_segment(const rw_job *job, long m)
 }
 
 /* Put a member whose segment has begun into a lane, all that depends on the segment included. */
-static void enter_segment(const rw_job *job, rw_block *b, int lane)
+static void enter_segment(const rw_job *job, rw_lane_block *b, int lane)
 {
     const long m = b->who[lane];
     const rw_member *at = job->member + m;
@@ -152,7 +152,7 @@ static void enter_segment(const rw_job *job, rw_block *b, int lane)
     }
 }
 
-static void enter_lane(const rw_job *job, rw_block *b, int lane, long m)
+static void enter_lane(const rw_job *job, rw_lane_block *b, int lane, long m)
 {
     double weight[RW_NX];
     b->who[lane] = m;
@@ -177,7 +177,7 @@ static void enter_lane(const rw_job *job, rw_block *b, int lane, long m)
 }
 
 /* Keep what a lane knows of its member, and free the lane. */
-static void leave_lane(const rw_job *job, rw_block *b, int lane, int status)
+static void leave_lane(const rw_job *job, rw_lane_block *b, int lane, int status)
 {
     const long m = b->who[lane];
     raceway_result *result = job->results + m;
@@ -208,7 +208,7 @@ static void leave_lane(const rw_job *job, rw_block *b, int lane, int status)
 
 /* A channel of the member in a lane within the step just taken, for rw_extreme. */
 typedef struct {
-    const rw_block *b;
+    const rw_lane_block *b;
     rw_numbers n;
     int lane;
 } rw_lane_source;
@@ -216,7 +216,7 @@ typedef struct {
 static double lane_channel(const void *from, int channel, double theta, int *ball)
 {
     const rw_lane_source *source = from;
-    const rw_block *b = source->b;
+    const rw_lane_block *b = source->b;
     double y[RW_NX];
     for (int k = 0; k < RW_NX; k++) {
         const int i = k * RW_L + source->lane;
@@ -228,7 +228,7 @@ static double lane_channel(const void *from, int channel, double theta, int *bal
 }
 
 /* Reductions of the lanes whose step was accepted; the same rules as rw_reduce. */
-static void reduce(const rw_job *job, rw_block *b)
+static void reduce(const rw_job *job, rw_lane_block *b)
 {
     double add[RW_L] RW_ALIGNED;
     RW_EACH_LANE add[lane] = b->accepted[lane] * b->reducing[lane];
@@ -296,7 +296,7 @@ static void reduce(const rw_job *job, rw_block *b)
 }
 
 /* Sizes of the steps to try: as proposed, or so that the segment's end is met. */
-static void choose_steps(rw_block *b)
+static void choose_steps(rw_lane_block *b)
 {
     RW_EACH_LANE {
         const double proposed = b->step[lane], left = b->length[lane] - b->t[lane];
@@ -306,7 +306,7 @@ static void choose_steps(rw_block *b)
 }
 
 /* Accept or reject; propose the next step sizes by the PI controller (Hairer & Wanner II, section IV.2). */
-static void judge(rw_block *b, int changeable)
+static void judge(rw_lane_block *b, int changeable)
 {
     const double exponent = 1.0 / (b->linearly ? rw_rodas5p.error_exponent : rw_dp54.error_exponent);
     const double log_least = -23.025850929940457; /* of 1e-10 */
@@ -369,7 +369,7 @@ static void judge(rw_block *b, int changeable)
 }
 
 /* Take over what accepted steps reached. */
-static void advance(rw_block *b)
+static void advance(rw_lane_block *b)
 {
     for (int k = 0; k < RW_NX; k++)
         RW_EACH_LANE {
@@ -397,7 +397,7 @@ static void advance(rw_block *b)
 }
 
 /* The state that moved most against its tolerance, or the first that is no number. */
-static int worst_state(const rw_block *b, int lane)
+static int worst_state(const rw_lane_block *b, int lane)
 {
     int worst = 0;
     double largest = -1.0;
@@ -414,7 +414,7 @@ static int worst_state(const rw_block *b, int lane)
 }
 
 /* What happens to a lane beyond a step: ends of segments, failures, changes of method.  Returns whether the lane has become free. */
-static int settle(const rw_job *job, rw_block *b, int lane)
+static int settle(const rw_job *job, rw_lane_block *b, int lane)
 {
     const long m = b->who[lane];
     raceway_result *result = job->results + m;
@@ -475,7 +475,7 @@ static long next_member(const rw_job *job, int linearly, long from)
 }
 
 /* Advance all members that wait for a family until they are done or leave it; returns 0 when asked to stop. */
-static int pass(const rw_job *job, rw_block *b, int linearly)
+static int pass(const rw_job *job, rw_lane_block *b, int linearly)
 {
     const int changeable = job->options->method == RACEWAY_AUTO;
     long waiting = next_member(job, linearly, 0);
@@ -532,7 +532,7 @@ int raceway_ensemble(const raceway_ensemble_options *options, long members, cons
                      double *reductions, void *work, raceway_result *results)
 {
     const rw_job job = {options, members, p, c, tolerance, x, first, times, inputs, restarts, reductions, work, results};
-    rw_block block;
+    rw_lane_block block;
     if (options->method != RACEWAY_AUTO && options->method != RACEWAY_DP54 && options->method != RACEWAY_RODAS5P) return RACEWAY_BAD_ARGUMENT;
     for (long m = 0; m < members; m++) {
         raceway_result *result = results + m;

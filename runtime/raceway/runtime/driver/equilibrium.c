@@ -170,7 +170,7 @@ int raceway_equilibria(const raceway_equilibrium_options *options, const double 
                        const double *times, const double *inputs, long outputs, const double *output_times, double *output_states,
                        raceway_equilibrium_result *result)
 {
-    rw_follower f = {options, result, {inputs, p, c}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}, RACEWAY_EQUILIBRIUM_DONE};
+    rw_follower f = {.options = options, .result = result, .numbers = {inputs, p, c}};
     memset(result, 0, sizeof *result);
     result->time = segments > 0 ? times[0] : 0.0;
     for (long i = 1; i <= segments; i++)

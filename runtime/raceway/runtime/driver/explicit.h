@@ -20,13 +20,13 @@ static inline void rw_explicit_rate(const rw_numbers *n, double t, const double 
 static inline __attribute__((always_inline)) void rw_combine(const double *restrict row, int count, const double k[][RW_NX], double h,
                                                              const double *restrict x, double *restrict y)
 {
-    for (int i = 0; i < RW_NX; i++) y[i] = 0.0;
+    rw_state sum = {0.0};
     for (int j = 0; j < count; j++) {
         const double a = row[j];
         if (a == 0.0) continue;
-        for (int i = 0; i < RW_NX; i++) y[i] += a * k[j][i];
+        sum += a * RW_STATE(k[j]);
     }
-    for (int i = 0; i < RW_NX; i++) y[i] = x[i] + h * y[i];
+    *(rw_state *)y = RW_STATE(x) + h * sum;
 }
 
 /* One step of size h from (t, x) to `next`, the end slope included; returns the scaled error. */
@@ -58,12 +58,13 @@ static inline __attribute__((always_inline)) double rw_explicit_step(const rw_ex
     double first = 0.0, below = 0.0;
     for (int m = 0; m < method->estimates; m++) {
         double error[RW_NX];
-        for (int i = 0; i < RW_NX; i++) error[i] = 0.0;
+        rw_state sum = {0.0};
         for (int j = 0; j <= stages; j++) {
             const double e = h * method->error[m][j];
             if (e == 0.0) continue;
-            for (int i = 0; i < RW_NX; i++) error[i] += e * work->k[j][i];
+            sum += e * RW_STATE(work->k[j]);
         }
+        *(rw_state *)error = sum;
         const double norm = rw_norm(error, weight);
         if (m == 0) first = norm;
         below += method->error_share[m] * norm * norm;
@@ -85,41 +86,44 @@ static inline double rw_explicit_stiffness(const rw_explicit *restrict work, int
 }
 
 /* Terms F1, F2, ... of the dense output of an accepted step; may take further slopes. */
-static inline void rw_explicit_dense(const rw_explicit_method *restrict method, rw_explicit *restrict work, const rw_numbers *n, double t,
-                                     const double *restrict x, double h, const double *restrict next,
-                                     double dense[RW_DENSE_ROWS][RW_NX])
+static inline __attribute__((always_inline)) void rw_explicit_dense(const rw_explicit_method *restrict method, rw_explicit *restrict work,
+                                                                     const rw_numbers *n, double t, const double *restrict x, double h,
+                                                                     const double *restrict next, double dense[RW_DENSE_ROWS][RW_NX])
 {
     const int end = method->stages;
-    for (int r = 0; r < method->dense_stages; r++) {
-        double y[RW_NX];
-        rw_combine(method->dense_a[r], end + 1 + r, (const double(*)[RW_NX])work->k, h, x, y);
-        rw_explicit_rate(n, t + method->dense_nodes[r] * h, y, work->k[end + 1 + r]);
+    if (method->dense_stages > 0) {
+        double w[RW_METHOD_STAGES][RW_NW];
+        rw_stages(n, t, h, method->dense_nodes, method->dense_stages, w);
+        for (int r = 0; r < method->dense_stages; r++) {
+            double y[RW_NX];
+            rw_combine(method->dense_a[r], end + 1 + r, (const double(*)[RW_NX])work->k, h, x, y);
+            rw_rate(n, w[r], y, work->k[end + 1 + r]);
+        }
     }
-    for (int i = 0; i < RW_NX; i++) {
-        const double delta = next[i] - x[i];
-        dense[0][i] = h * work->k[0][i] - delta;
-        dense[1][i] = 2.0 * delta - h * (work->k[0][i] + work->k[end][i]);
-    }
+    const rw_state delta = RW_STATE(next) - RW_STATE(x), first = h * RW_STATE(work->k[0]);
+    *(rw_state *)dense[0] = first - delta;
+    *(rw_state *)dense[1] = 2.0 * delta - (first + h * RW_STATE(work->k[end]));
     for (int row = 0; row < method->dense_rows; row++) {
-        for (int i = 0; i < RW_NX; i++) dense[2 + row][i] = 0.0;
+        rw_state sum = {0.0};
         for (int j = 0; j < end + 1 + method->dense_stages; j++) {
             const double d = h * method->dense[row][j];
             if (d == 0.0) continue;
-            for (int i = 0; i < RW_NX; i++) dense[2 + row][i] += d * work->k[j][i];
+            sum += d * RW_STATE(work->k[j]);
         }
+        *(rw_state *)dense[2 + row] = sum;
     }
 }
 
 /* y = x + theta (D + (1 - theta) (F1 + theta (F2 + (1 - theta) (F3 + ...)))). */
-static inline void rw_explicit_at(const rw_explicit_method *restrict method, const double dense[RW_DENSE_ROWS][RW_NX],
-                                  const double *restrict x, const double *restrict next, double theta, double *restrict y)
+static inline __attribute__((always_inline)) void rw_explicit_at(const rw_explicit_method *restrict method,
+                                                                  const double dense[RW_DENSE_ROWS][RW_NX], const double *restrict x,
+                                                                  const double *restrict next, double theta, double *restrict y)
 {
-    const int terms = 2 + method->dense_rows;
-    for (int i = 0; i < RW_NX; i++) {
-        double inner = 0.0;
-        for (int row = terms - 1; row >= 0; row--) inner = (dense[row][i] + inner) * (row % 2 == 0 ? 1.0 - theta : theta);
-        y[i] = x[i] + theta * (next[i] - x[i] + inner);
-    }
+    rw_state inner = {0.0};
+#pragma GCC unroll 16
+    for (int row = 1 + method->dense_rows; row >= 0; row--)
+        inner = (RW_STATE(dense[row]) + inner) * (row % 2 == 0 ? 1.0 - theta : theta);
+    *(rw_state *)y = RW_STATE(x) + theta * (RW_STATE(next) - RW_STATE(x) + inner);
 }
 
 #endif

@@ -89,82 +89,83 @@ static inline __attribute__((always_inline)) double rw_rosenbrock_step(const rw_
     if (!rw_factorize(matrix, work->A, work->B, s)) return -1.0;
     /* the times inside the step at once; its end, which serves several stages and the next step, with the time derivative */
     double w[RW_METHOD_STAGES][RW_NW];
-    rw_stages(n, t, h, method->nodes + 1, method->inner, w);
-    rw_stage_rate(t + h, n->u, n->p, n->c, work->end_w, work->end_wt);
-    double last[RW_NX];
+    rw_stages_and_end(n, t, h, method->nodes + 1, method->inner, w, work->end_w, work->end_wt);
+    rw_half last_q = {0.0}, last_v = {0.0};
     for (int i = 0; i < stages; i++) {
         double y[RW_NX], dx[RW_NX], R[RW_NX], *restrict u = work->u[i];
-        for (int k = 0; k < RW_NX; k++) y[k] = x[k];
-        for (int k = 0; k < RW_NX; k++) R[k] = 0.0;
+        rw_half y_q = RW_HALF(x), y_v = RW_HALF(x + RW_NQ), R_q = {0.0}, R_v = {0.0};
         for (int j = 0; j < i - 1; j++) {
             const double a = method->a[i][j], coupling = method->coupling[i][j];
-            for (int k = 0; k < RW_NX; k++) {
-                y[k] += a * work->u[j][k];
-                R[k] += coupling * work->u[j][k];
-            }
+            const rw_half u_q = RW_HALF(work->u[j]), u_v = RW_HALF(work->u[j] + RW_NQ);
+            y_q += a * u_q;
+            y_v += a * u_v;
+            R_q += coupling * u_q;
+            R_v += coupling * u_v;
         }
         if (i > 0) {
             /* the latest stage last: all else is ready before it is */
             const double a = method->a[i][i - 1], coupling = method->coupling[i][i - 1];
-#pragma GCC unroll 16
-            for (int k = 0; k < RW_NX; k++) {
-                y[k] += a * last[k];
-                R[k] += coupling * last[k];
-            }
+            y_q += a * last_q;
+            y_v += a * last_v;
+            R_q += coupling * last_q;
+            R_v += coupling * last_v;
         }
+        *(rw_half *)y = y_q;
+        *(rw_half *)(y + RW_NQ) = y_v;
         if (i == 0) {
             for (int k = 0; k < RW_NX; k++) dx[k] = work->dx[k];
         } else {
             rw_rate(n, i <= method->inner ? w[i - 1] : work->end_w, y, dx);
+            /* positions move with the velocities: taken from the vector, not from the copy just stored */
+            R_q = R_q * inverse_h + y_v;
         }
-        for (int k = 0; k < RW_NX; k++) R[k] = R[k] * inverse_h + dx[k];
+        if (i == 0) R_q = RW_HALF(dx);
         const double d = h * method->time_weights[i];
-        for (int k = 0; k < RW_NQ; k++) R[RW_NQ + k] += d * work->at[k];
-        double kv[RW_NQ];
-        for (int k = 0; k < RW_NQ; k++) kv[k] = 0.0;
-        for (int j = 0; j < RW_NX; j++)
-            for (int k = 0; k < RW_NQ; k++) kv[k] += matrix->solve[j][k] * R[j];
-#pragma GCC unroll 16
-        for (int k = 0; k < RW_NQ; k++) {
-            last[RW_NQ + k] = kv[k];
-            last[k] = (R[k] + kv[k]) * inverse_s;
-        }
-#pragma GCC unroll 16
-        for (int k = 0; k < RW_NX; k++) u[k] = last[k];
+        *(rw_half *)R = R_q;
+        *(rw_half *)(R + RW_NQ) = R_v * inverse_h;
+        for (int k = 0; k < RW_NQ; k++) R[RW_NQ + k] = R[RW_NQ + k] + dx[RW_NQ + k] + d * work->at[k];
+        /* two sums, that of the positions ready before the forces are */
+        rw_half by_q = {0.0}, by_v = {0.0};
+        for (int j = 0; j < RW_NQ; j++) by_q += RW_HALF(matrix->solve[j]) * R[j];
+        for (int j = RW_NQ; j < RW_NX; j++) by_v += RW_HALF(matrix->solve[j]) * R[j];
+        last_v = by_q + by_v;
+        last_q = (R_q + last_v) * inverse_s;
+        *(rw_half *)u = last_q;
+        *(rw_half *)(u + RW_NQ) = last_v;
     }
     double error[RW_NX];
-    for (int k = 0; k < RW_NX; k++) {
-        next[k] = x[k];
-        error[k] = 0.0;
-    }
+    rw_state end = RW_STATE(x), estimate = {0.0};
     for (int i = 0; i < stages; i++) {
         const double m = method->weights[i], e = method->error_weights[i];
-        for (int k = 0; k < RW_NX; k++) next[k] += m * work->u[i][k];
-        if (e != 0.0)
-            for (int k = 0; k < RW_NX; k++) error[k] += e * work->u[i][k];
+        end += m * RW_STATE(work->u[i]);
+        if (e != 0.0) estimate += e * RW_STATE(work->u[i]);
     }
+    *(rw_state *)next = end;
+    *(rw_state *)error = estimate;
     return rw_norm(error, weight);
 }
 
 /* Dense output of an accepted step: y = x + theta (D + (1 - theta) (H1 + theta (H2 + theta H3))). */
-static inline void rw_rosenbrock_dense(const rw_rosenbrock_method *restrict method, const rw_rosenbrock *restrict work,
-                                       double dense[RW_DENSE_ROWS][RW_NX])
+static inline __attribute__((always_inline)) void rw_rosenbrock_dense(const rw_rosenbrock_method *restrict method,
+                                                                       const rw_rosenbrock *restrict work,
+                                                                       double dense[RW_DENSE_ROWS][RW_NX])
 {
     for (int row = 0; row < method->dense_rows; row++) {
-        for (int k = 0; k < RW_NX; k++) dense[row][k] = 0.0;
-        for (int i = 0; i < method->stages; i++)
-            for (int k = 0; k < RW_NX; k++) dense[row][k] += method->dense[row][i] * work->u[i][k];
+        rw_state sum = {0.0};
+        for (int i = 0; i < method->stages; i++) sum += method->dense[row][i] * RW_STATE(work->u[i]);
+        *(rw_state *)dense[row] = sum;
     }
 }
 
-static inline void rw_rosenbrock_at(const rw_rosenbrock_method *restrict method, const double dense[RW_DENSE_ROWS][RW_NX],
-                                    const double *restrict x, const double *restrict next, double theta, double *restrict y)
+static inline __attribute__((always_inline)) void rw_rosenbrock_at(const rw_rosenbrock_method *restrict method,
+                                                                    const double dense[RW_DENSE_ROWS][RW_NX], const double *restrict x,
+                                                                    const double *restrict next, double theta, double *restrict y)
 {
-    for (int k = 0; k < RW_NX; k++) {
-        double inner = 0.0;
-        for (int row = method->dense_rows - 1; row >= 0; row--) inner = dense[row][k] + (row < method->dense_rows - 1 ? theta * inner : 0.0);
-        y[k] = x[k] + theta * (next[k] - x[k] + (1.0 - theta) * inner);
-    }
+    const int rows = method->dense_rows;
+    rw_state inner = RW_STATE(dense[rows - 1]);
+#pragma GCC unroll 16
+    for (int row = rows - 2; row >= 0; row--) inner = RW_STATE(dense[row]) + theta * inner;
+    *(rw_state *)y = RW_STATE(x) + theta * (RW_STATE(next) - RW_STATE(x) + (1.0 - theta) * inner);
 }
 
 #endif

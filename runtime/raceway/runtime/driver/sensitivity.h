@@ -60,7 +60,9 @@ static inline void rw_point_at(rw_point *restrict at, const rw_numbers *n, const
     at->x = x;
     at->w = w;
     rw_relative(x, n->u, n->p, n->c, w, at->r);
-    const double *restrict r = at->r, *restrict p = n->p, *restrict c = n->c, cage_cos = w[0], cage_sin = w[1];
+    const double *restrict r = at->r, cage_cos = w[0], cage_sin = w[1];
+    double k[RW_NK];
+    rw_law_numbers(n->p, n->c, k);
 #pragma omp simd
     for (int j = 0; j < RW_NB; j++) {
         at->co[j] = rw_cos[j] * cage_cos - rw_sin[j] * cage_sin;
@@ -68,7 +70,7 @@ static inline void rw_point_at(rw_point *restrict at, const rw_numbers *n, const
         at->delta[j] = r[0] + r[1] * at->co[j] + r[2] * at->si[j];
         at->rate[j] = r[3] * at->co[j] + r[4] * at->si[j];
         double force, by_delta, by_rate;
-        rw_law_slopes(at->delta[j], at->rate[j], p, c, &force, &by_delta, &by_rate);
+        rw_ball_slopes(at->delta[j], at->rate[j], k, &force, &by_delta, &by_rate);
         at->force[j] = force;
         at->by_delta[j] = by_delta;
         at->by_rate[j] = by_rate;
@@ -334,14 +336,18 @@ static inline void rw_explicit_tangent_at(const rw_explicit_method *restrict met
 {
     const int terms = 2 + method->dense_rows;
     for (long b = 0; b < tangents->blocks; b++) {
-        const double *restrict from = rw_tangent_state(tangents, b), *restrict to = &work[b].next[0][0];
-        double *restrict y = out + b * (RW_NX * RW_LANES);
-        for (int i = 0; i < RW_NX * RW_LANES; i++) {
-            double inner = 0.0;
-            for (int row = terms - 1; row >= 0; row--)
-                inner = ((&work[b].dense[row][0][0])[i] + inner) * (row % 2 == 0 ? 1.0 - theta : theta);
-            y[i] = from[i] + theta * (to[i] - from[i] + inner);
+        const rw_vector *from = (const rw_vector *)rw_tangent_state(tangents, b), *to = (const rw_vector *)&work[b].next[0][0];
+        rw_vector *y = (rw_vector *)(out + b * (RW_NX * RW_LANES)), inner[RW_NX];
+#pragma GCC unroll 16
+        for (int i = 0; i < RW_NX; i++) inner[i] = (rw_vector){0.0};
+        for (int row = terms - 1; row >= 0; row--) {
+            const rw_vector *dense = (const rw_vector *)&work[b].dense[row][0][0];
+            const double factor = row % 2 == 0 ? 1.0 - theta : theta;
+#pragma GCC unroll 16
+            for (int i = 0; i < RW_NX; i++) inner[i] = (dense[i] + inner[i]) * factor;
         }
+#pragma GCC unroll 16
+        for (int i = 0; i < RW_NX; i++) y[i] = from[i] + theta * (to[i] - from[i] + inner[i]);
     }
 }
 
@@ -419,14 +425,17 @@ static inline void rw_rosenbrock_tangent_at(const rw_rosenbrock_method *restrict
                                             const rw_tangent_block *restrict work, double theta, double *restrict out)
 {
     for (long b = 0; b < tangents->blocks; b++) {
-        const double *restrict from = rw_tangent_state(tangents, b), *restrict to = &work[b].next[0][0];
-        double *restrict y = out + b * (RW_NX * RW_LANES);
-        for (int i = 0; i < RW_NX * RW_LANES; i++) {
-            double inner = 0.0;
-            for (int row = method->dense_rows - 1; row >= 0; row--)
-                inner = (&work[b].dense[row][0][0])[i] + (row < method->dense_rows - 1 ? theta * inner : 0.0);
-            y[i] = from[i] + theta * (to[i] - from[i] + (1.0 - theta) * inner);
+        const rw_vector *from = (const rw_vector *)rw_tangent_state(tangents, b), *to = (const rw_vector *)&work[b].next[0][0];
+        rw_vector *y = (rw_vector *)(out + b * (RW_NX * RW_LANES)), inner[RW_NX];
+#pragma GCC unroll 16
+        for (int i = 0; i < RW_NX; i++) inner[i] = (rw_vector){0.0};
+        for (int row = method->dense_rows - 1; row >= 0; row--) {
+            const rw_vector *dense = (const rw_vector *)&work[b].dense[row][0][0];
+#pragma GCC unroll 16
+            for (int i = 0; i < RW_NX; i++) inner[i] = dense[i] + theta * inner[i];
         }
+#pragma GCC unroll 16
+        for (int i = 0; i < RW_NX; i++) y[i] = from[i] + theta * (to[i] - from[i] + (1.0 - theta) * inner[i]);
     }
 }
 

@@ -358,6 +358,7 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
     /* slopes that overflow give an estimate of zero, or none */
     if (!(run->step > 2.0 * resolution)) run->step = 2.0 * resolution;
     int stiff = 0, rejected_last = 0;
+    long look = 0;
     reduce_start(run, start);
     tangent_jump(run);
     if (is_explicit(run->method)) first_slope(run, t);
@@ -396,7 +397,7 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
             result->steps++;
             write_outputs(run, start, t, h, last ? end : start + (t + h));
             reduce_step(run, start, t, h);
-            if (changeable && is_explicit(run->method)) {
+            if (changeable && is_explicit(run->method) && (stiff > 0 || look++ % RW_STIFF_LOOK == 0)) {
                 const double limit = run->method == RACEWAY_DP54 ? 3.25 : 6.1;
                 const double reach = rw_explicit_stiffness(&run->plain, run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES, h,
                                                            run->next, run->weight);

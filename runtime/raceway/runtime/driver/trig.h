@@ -28,6 +28,19 @@ static inline void rw_sincos(double x, double *restrict sine, double *restrict c
     *cosine = b * (centred * centred - 1.25);
 }
 
+/* Largest angle of rw_turn. */
+static const double RW_SMALL_ANGLE = 0.0625;
+
+/* Cosine and sine of c0, s0 turned by a small angle: Taylor's series, their rest below 2^-54. */
+static inline void rw_turn(double c0, double s0, double angle, double *restrict cosine, double *restrict sine)
+{
+    const double z = angle * angle;
+    const double s = angle + angle * z * (-1.0 / 6.0 + z * (1.0 / 120.0 + z * (-1.0 / 5040.0 + z * (1.0 / 362880.0))));
+    const double c = z * (-0.5 + z * (1.0 / 24.0 + z * (-1.0 / 720.0 + z * (1.0 / 40320.0)))); /* less one */
+    *cosine = c0 + (c0 * c - s0 * s);
+    *sine = s0 + (s0 * c + c0 * s);
+}
+
 static inline double rw_sin1(double x)
 {
     double sine, cosine;

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from raceway.runtime.certificate import Verdict
 from raceway.runtime.errors import RequestError
 from raceway.runtime.figures.canvas import GREY, INK, PALE, SAND, caption, new_figure, save, styled
-from raceway.runtime.sensitivity_query import Sensitivity, SensitivityReport
+from raceway.runtime.sensitivity_report import Sensitivity, SensitivityReport
 
 #: Bars of a chart.
 BARS = 15

@@ -27,7 +27,7 @@ _METHODS: dict[str, tuple[str, str]] = {
 }
 
 #: Markers of simpler models and of the switch.
-_OTHERS = ("P", "X", "h", "8", "d")
+_OTHERS = ("P", "X", "<", "d", ">")
 
 
 @styled

@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from pathlib import Path
+from functools import cache
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import minimize
+from virtual import virtual_model
 
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
 from raceway.runtime import Model
 from raceway.runtime.differences import richardson
 from raceway.runtime.errors import RequestError, SimulationError
-from raceway.runtime.manifest import read_manifest
 from raceway.runtime.statics import FreeRingWarning
 
 GIVEN = 'stiffness = "13.34e9 N/m^1.5"'
@@ -29,13 +27,22 @@ BETWEEN = math.pi / 8
 
 
 @pytest.fixture(scope="module")
-def bearing_6204(make_model: Callable[..., Model]) -> Model:
-    return make_model("varying_compliance", (GIVEN, HERTZ))
+def make_virtual(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., str]) -> Callable[..., Model]:
+    @cache
+    def make(name: str, *changes: tuple[str, str]) -> Model:
+        return virtual_model(scene_text(name, *changes), tmp_path_factory.mktemp(name) / name)
+
+    return make
 
 
 @pytest.fixture(scope="module")
-def press(make_model: Callable[..., Model]) -> Model:
-    return make_model("punching_press_tangent")
+def bearing_6204(make_virtual: Callable[..., Model]) -> Model:
+    return make_virtual("varying_compliance", (GIVEN, HERTZ))
+
+
+@pytest.fixture(scope="module")
+def press(make_virtual: Callable[..., Model]) -> Model:
+    return make_virtual("punching_press_tangent")
 
 
 @pytest.mark.parametrize(
@@ -70,13 +77,11 @@ def test_deflection_follows_the_two_thirds_power_of_the_load(bearing_6204: Model
 
 
 def test_many_balls_give_the_radial_integral_of_stribeck_and_sjovall(
-    scene_text: Callable[..., str], tmp_path: Path
+    make_virtual: Callable[..., Model],
 ) -> None:
     """Zero clearance: F = Z Q_max J_r(1/2), J_r = (1/2 pi) integral of cos^2.5 over the loaded half."""
     changes = ("balls = 8", "balls = 100"), ('ball_diameter = "7.9375 mm"', 'ball_diameter = "1 mm"')
-    scene = scene_from_text(scene_text("varying_compliance", *changes), "many")
-    folder = generate(scene, tmp_path / "many")
-    model = Model(folder, read_manifest(folder), None)  # evaluated a few times: not worth a compiler
+    model = make_virtual("varying_compliance", *changes)
     integral, _ = quad(lambda a: math.cos(a) ** 2.5 / (2 * math.pi), -math.pi / 2, math.pi / 2, epsabs=1e-13)
     found = model.static_equilibrium(parameters={"bearing.ball_angle": 0.01}, load=(0.0, -500.0))
     largest = model.constants()["bearing.k_b"] * float(np.linalg.norm(found.positions)) ** 1.5

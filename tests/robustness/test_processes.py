@@ -1,0 +1,554 @@
+"""Claims about processes that are killed, interrupted, or short of disk, permission or compiler.
+
+What a process leaves is the old file or the new one, whenever it ends; what it cannot do it says, with a remedy.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import sysconfig
+import textwrap
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from profiles import LONG
+
+from raceway.derive import generate
+from raceway.derive.read import scene_from_text
+from raceway.derive.replace_folder import replace_folder
+from raceway.runtime import CacheWarning, CompileError, RequestError, load, load_solution
+from raceway.runtime import compile as compiling
+from raceway.runtime.errors import ArtefactError
+from raceway.runtime.manifest import read_artefact
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+ROTOR = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
+SOURCE = "double twice(double x) { return 2.0 * x; }\n"
+
+
+def python(code: str, *words: object, **options: Any) -> subprocess.Popen[str]:
+    """A Python process that prints "ready" when it begins with what it is there for."""
+    command = [sys.executable, "-c", textwrap.dedent(code), *map(str, words)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+def killed_at_random(code: str, *words: object, kills: int, within: float) -> Iterator[None]:
+    """Start such a process again and again, and kill each within a time [s] of its "ready"; yields behind each."""
+    draw = random.Random(kills)
+    for _ in range(200 if LONG else kills):
+        with python(code, *words) as process:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "ready\n", process.communicate()[1]
+            time.sleep(draw.random() * within)
+            process.kill()
+            _, errors = process.communicate(timeout=60)
+            assert process.returncode == -signal.SIGKILL, errors
+        yield
+
+
+def shown(folder: Path) -> list[str]:
+    """Names in a folder without those that begin with a dot."""
+    return sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+
+
+# -------------------------------------------------------------------------------------------------------------- SIGKILL
+
+REPLACING = """
+    import itertools, shutil, sys
+    from pathlib import Path
+    from raceway.derive.replace_folder import replace_folder
+    target, *sources = map(Path, sys.argv[1:])
+    print("ready", flush=True)
+    for source in itertools.cycle(sources):
+        def write(made):
+            for path in sorted(source.iterdir()):
+                shutil.copy(path, made)
+        replace_folder(target, "rotor", write)
+"""
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Two generated folders of one name: bearings of different numbers of balls."""
+    base = tmp_path_factory.mktemp("both")
+    texts = (ROTOR, re.sub(r"(?m)^balls = \d+", "balls = 7", ROTOR))
+    assert texts[0] != texts[1]
+    one, other = (generate(scene_from_text(text, "rotor"), base / str(k)) for k, text in enumerate(texts))
+    return one, other
+
+
+def test_a_killed_derivation_leaves_the_old_artefact_or_the_new_one(
+    tmp_path: Path, both: tuple[Path, Path], kept: Callable[[Path], dict[str, bytes]]
+) -> None:
+    target = tmp_path / "generated" / "rotor"
+    shutil.copytree(both[0], target)
+    whole = [kept(folder) for folder in both]
+    for _ in killed_at_random(REPLACING, target, *both, kills=6, within=0.05):
+        assert kept(target) in whole
+        read_artefact(target)
+        assert shown(target.parent) == ["rotor"]
+    generate(scene_from_text(ROTOR, "rotor"), target)
+    assert kept(target) == whole[0]
+
+
+def test_a_killed_derivation_beside_files_of_others_is_refused_by_readers_and_mended_by_the_next(
+    tmp_path: Path, both: tuple[Path, Path], kept: Callable[[Path], dict[str, bytes]]
+) -> None:
+    """Files are moved one by one there: what is between old and new does not pass for either."""
+    target = tmp_path / "rotor"
+    shutil.copytree(both[0], target)
+    (target / "notes.txt").write_text("mine", encoding="utf-8")
+    whole = [kept(folder) for folder in both]
+    for _ in killed_at_random(REPLACING, target, *both, kills=4, within=0.03):
+        found = kept(target)
+        assert found.pop("notes.txt") == b"mine"
+        if found not in whole:
+            with pytest.raises(ArtefactError):
+                read_artefact(target)
+    generate(scene_from_text(ROTOR, "rotor"), target)
+    assert kept(target) == {**whole[0], "notes.txt": b"mine"}
+
+
+def test_what_killed_derivations_left_behind_is_deleted_after_a_day(tmp_path: Path) -> None:
+    old, new, other = (tmp_path / name for name in (".rotor-a.new", ".rotor-b.new", ".rotors"))
+    for folder in (old, new, other):
+        folder.mkdir()
+    for folder in (old, other):
+        os.utime(folder, (0, 0))
+    replace_folder(tmp_path / "rotor", "rotor", lambda made: (made / "manifest.json").touch())
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".rotor-b.new", ".rotors", "rotor"]
+
+
+def test_a_killed_compiler_leaves_no_library_or_a_whole_one(cache: Path, tmp_path: Path) -> None:
+    code = """
+        import sys
+        from pathlib import Path
+        from raceway.runtime import compile as compiling
+        compiler = compiling.find_compiler()
+        print("ready", flush=True)
+        for k in range(100):
+            source = Path(sys.argv[1]) / "twice.c"
+            source.write_text(f"double twice(double x) {{ return x * {k}; }}")
+            compiling.compile_sources((source,), compiler)
+    """
+    for _ in killed_at_random(code, tmp_path, kills=3, within=0.4):
+        for path in cache.iterdir():
+            if not path.name.startswith("."):
+                assert path.stem.endswith(compiling._digest(path))
+    compiler = compiling.find_compiler()
+    assert compiler is not None
+    (tmp_path / "twice.c").write_text(SOURCE, encoding="utf-8")
+    assert compiling.compile_sources((tmp_path / "twice.c",), compiler).path.exists()
+
+
+def test_a_killed_process_leaves_the_old_solution_or_the_new_one(rotor: Path, tmp_path: Path) -> None:
+    code = """
+        import itertools, sys
+        from raceway.runtime import load_solution
+        one, other = map(load_solution, sys.argv[2:])
+        print("ready", flush=True)
+        for solution in itertools.cycle((one, other)):
+            solution.save(sys.argv[1])
+    """
+    model = load(rotor)
+    runs = [model.simulate(cycles=length) for length in (0.2, 0.3)]
+    places = [run.save(tmp_path / f"{k}.nc") for k, run in enumerate(runs)]
+    target = tmp_path / "results" / "solution.nc"
+    target.parent.mkdir()
+    runs[0].save(target)
+    lengths = {len(run.t) for run in runs}
+    for _ in killed_at_random(code, target, *places, kills=2, within=0.3):
+        assert len(load_solution(target).t) in lengths
+        assert shown(target.parent) == ["solution.nc"]
+
+
+# --------------------------------------------------------------------------------------------------------------- Ctrl-C
+
+
+def raceway(*words: object, cwd: Path, env: dict[str, str] | None = None, **options: Any) -> subprocess.Popen[str]:
+    command = [str(Path(sysconfig.get_path("scripts")) / "raceway"), *map(str, words)]
+    return subprocess.Popen(
+        command,
+        cwd=cwd,
+        env={**os.environ, **(env or {})},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
+    )
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "rotor.toml"
+    path.write_text(ROTOR, encoding="utf-8")
+    return path
+
+
+def test_an_interrupt_at_any_moment_ends_with_130_and_whole_files(
+    scene: Path, tmp_path: Path, both: tuple[Path, Path], kept: Callable[[Path], dict[str, bytes]]
+) -> None:
+    """While modules are imported as well, where Python turns an interrupt into other exceptions."""
+    words = (
+        "run",
+        scene,
+        "--cycles",
+        "3",
+        "--transient",
+        "1",
+        "--out",
+        "results",
+        *(() if LONG else ("--no-figures",)),
+    )
+    with raceway(*words, cwd=tmp_path) as process:
+        out, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    old = kept(tmp_path / "results")
+    draw = random.Random(5)
+    for k in range(100 if LONG else 3):
+        if k % 3 == 0:
+            shutil.copytree(both[1], tmp_path / "generated" / "rotor", dirs_exist_ok=True)  # stale: derived anew
+        with raceway(*words, cwd=tmp_path) as process:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(0.6 + 2.5 * draw.random())
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+            begun = time.perf_counter()
+            out, errors = process.communicate(timeout=60)
+            lasted = time.perf_counter() - begun
+        assert process.returncode in (0, 130), errors
+        assert "Traceback" not in errors
+        if process.returncode == 130:
+            assert "interrupted. Whatever files are there are whole." in errors
+            assert out == ""
+            assert lasted < 10.0
+        found = kept(tmp_path / "results")
+        assert set(found) == set(old)
+        load_solution(tmp_path / "results" / "solution.nc")
+        read_artefact(tmp_path / "generated" / "rotor")
+        assert not [path for path in tmp_path.rglob(".*") if path.suffix in (".tmp", ".new") or "writing" in path.name]
+
+
+def test_an_interrupt_that_an_import_turns_into_something_else_is_one_still() -> None:
+    """Python 3.11 wraps what `__set_name__` raises in a RuntimeError: once a traceback and exit code 1."""
+    code = """
+        import os, signal, sys
+        from raceway.runtime import cli
+        def broken():
+            class Name:
+                def __set_name__(self, owner, name):
+                    os.kill(os.getpid(), signal.SIGINT)
+            class Owner:
+                name = Name()
+        cli.app = broken
+        cli.main()
+    """
+    with python(code) as process:
+        out, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.strip() == "error: interrupted. Whatever files are there are whole."
+    assert out == ""
+
+
+def test_an_interrupt_while_compiling_ends_the_compiler_and_its_children(
+    cache: Path, scene: Path, tmp_path: Path
+) -> None:
+    script, note = tmp_path / "slow-cc", tmp_path / "child"
+    script.write_text(
+        f'#!/bin/sh\nfor word; do if [ "$word" = -o ]; then sleep 60 & echo $! > {note}; wait; fi; done\necho 1\n',
+        encoding="utf-8",
+    )
+    script.chmod(0o755)
+    with raceway("run", scene, cwd=tmp_path, env={"CC": str(script)}) as process:
+        while not (note.exists() and note.read_text().strip()):
+            assert process.poll() is None, process.communicate()[1]
+            time.sleep(0.02)
+        begun = time.perf_counter()
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert time.perf_counter() - begun < 5.0
+    assert "interrupted" in errors
+    assert gone(int(note.read_text()))
+    assert not list(cache.iterdir())
+    assert not (tmp_path / "results").exists()
+
+
+def gone(process: int) -> bool:
+    """Whether a process that is no child of this one has ended, or ends within a second."""
+    for _ in range(100):
+        try:
+            state = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
+        except (FileNotFoundError, ProcessLookupError):
+            return True
+        if state == "Z":
+            return True
+        time.sleep(0.01)
+    return False
+
+
+# ------------------------------------------------------------------------------------------------------------ compilers
+
+
+def wrapper(folder: Path, text: str) -> compiling.Compiler:
+    script = folder / "strange-cc"
+    script.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+    script.chmod(0o755)
+    return compiling.Compiler(command=(str(script),), flags=(), identity=text)
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    path = tmp_path / "twice.c"
+    path.write_text(SOURCE, encoding="utf-8")
+    return path
+
+
+def test_a_compiler_whose_child_hangs_is_stopped_with_its_child(
+    cache: Path, source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """gcc is a driver that starts the real one: ending gcc alone left that one, and waited for it without end."""
+    monkeypatch.setattr(compiling, "TIMEOUT", 0.3)
+    note = tmp_path / "child"
+    begun = time.perf_counter()
+    with pytest.raises(CompileError, match=r"(?s)did not finish within 0\.3 s.*Nothing was written.*set CC") as caught:
+        compiling.compile_sources((source,), wrapper(tmp_path, f"sleep 60 &\necho $! > {note}\nwait"))
+    assert time.perf_counter() - begun < 10.0
+    assert "strange-cc" in str(caught.value)
+    assert gone(int(note.read_text()))
+    assert not list(cache.iterdir())
+
+
+def test_a_compiler_that_does_not_tell_its_version_is_refused_in_words(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiling, "ANSWER_TIMEOUT", 0.3)
+    command = wrapper(tmp_path, "sleep 60").command[0]
+    with pytest.raises(CompileError, match=r"(?s)did not answer within 0\.3 s.*strange-cc --version.*set CC"):
+        compiling.find_compiler(command)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("exit 0", "ended well, but what it wrote cannot be loaded"),
+        ('for word; do out=$last; last=$word; done; echo text > "$out"; exit 0', "cannot be loaded"),
+        ("echo out of order >&2; exit 3", r"failed with exit code 3.*out of order.*Nothing was written"),
+        ("kill -SEGV $$", r"failed with exit code -11.*\(no output\).*Nothing was written"),
+    ],
+)
+def test_a_compiler_that_fails_quietly_or_loudly_leaves_nothing(
+    cache: Path, source: Path, tmp_path: Path, text: str, words: str
+) -> None:
+    """One that ends well without writing anything once left a library of no bytes in the cache, for good."""
+    with pytest.raises(CompileError, match=f"(?s){words}.*set CC"):
+        compiling.compile_sources((source,), wrapper(tmp_path, text))
+    assert not list(cache.iterdir())
+
+
+@pytest.mark.parametrize("command", ["'", " ", "no-such-compiler", "/", "cc\0x"])
+def test_a_command_that_is_none_is_a_wrong_request(rotor: Path, command: str) -> None:
+    with pytest.raises(RequestError, match="Give the command of a C compiler"):
+        load(rotor, compiler=command)
+
+
+def test_without_any_program_on_the_path_the_model_runs_in_the_virtual_machine(scene: Path, tmp_path: Path) -> None:
+    words = ("run", scene, "--cycles", "2", "--transient", "1", "--json", "--no-figures")
+    env = {"PATH": str(tmp_path / "nothing"), "CC": "", "PYTHONPATH": str(tmp_path)}
+    # a compiler from PyPI would be found without a path
+    (tmp_path / "sitecustomize.py").write_text("import sys; sys.modules['ziglang'] = None\n", encoding="utf-8")
+    with raceway(*words, cwd=tmp_path, env=env) as process:
+        out, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert "No C compiler was found" in errors
+    assert '"compiled": false' in out
+
+
+def test_two_processes_on_one_cold_cache_both_get_the_right_library(cache: Path, rotor: Path) -> None:
+    code = """
+        import sys
+        from raceway.runtime import load
+        print(load(sys.argv[1]).simulate(cycles=0.2).x.tobytes().hex())
+    """
+    running = [python(code, rotor) for _ in range(2)]
+    answers = [process.communicate(timeout=120) for process in running]
+    assert [process.returncode for process in running] == [0, 0], answers
+    assert answers[0][0] == answers[1][0] != ""
+    assert not [path for path in cache.iterdir() if path.name.startswith(".")]
+
+
+# -------------------------------------------------------------------------------------------------- disk and permission
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A folder on a disk of 200 kB."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    if os.geteuid() != 0:
+        pytest.skip("only the superuser may mount a small disk; the limit of a file's size is tested for everybody")
+    command = ["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", str(place)]
+    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+        pytest.skip("this machine does not let a test mount a small disk")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def full(folder: Path) -> None:
+    with contextlib.suppress(OSError), (folder / "ballast").open("wb") as stream:
+        while True:
+            stream.write(b"\0" * 1024)
+            stream.flush()
+
+
+def test_a_full_disk_leaves_the_old_solution_and_says_so(rotor: Path, small_disk: Path) -> None:
+    """HDF5 that cannot write ends the process when it closes the file: it writes to memory here."""
+    run = load(rotor).simulate(cycles=0.02)
+    run.save(small_disk / "solution.nc")
+    before = (small_disk / "solution.nc").read_bytes()
+    with pytest.raises(RequestError, match=r"cannot be written \(No space left on device\); a file that was there"):
+        load(rotor).simulate(cycles=3).save(small_disk / "solution.nc")
+    assert (small_disk / "solution.nc").read_bytes() == before
+    assert [path.name for path in small_disk.iterdir()] == ["solution.nc"]
+
+
+@pytest.mark.parametrize("what", ["cache", "generated", "results"])
+def test_a_full_disk_is_told_with_a_remedy_and_leaves_no_halves(
+    scene: Path, tmp_path: Path, small_disk: Path, what: str
+) -> None:
+    full(small_disk)
+    place = small_disk / what
+    env = {"RACEWAY_CACHE_DIR": str(place)} if what == "cache" else {}
+    (tmp_path / "here").mkdir()
+    words: tuple[object, ...] = ("run", scene, "--cycles", "2", "--transient", "1", "--no-figures")
+    words = {"cache": words, "generated": ("derive", scene, "--out", place), "results": (*words, "--out", place)}[what]
+    with raceway(*words, cwd=tmp_path / "here", env=env) as process:
+        out, errors = process.communicate(timeout=120)
+    assert process.returncode == (1 if what == "cache" else 2), errors
+    assert out == ""
+    assert "Traceback" not in errors
+    assert "space" in errors
+    assert not (tmp_path / "here" / "results").exists()
+    assert [path for path in small_disk.rglob("*") if path.is_file()] == [small_disk / "ballast"]
+
+
+def test_a_limit_of_file_size_is_told_and_the_old_solution_stays(rotor: Path, tmp_path: Path) -> None:
+    solution = load(rotor).simulate(cycles=0.2)
+    target = solution.save(tmp_path / "results.nc")
+    before = target.read_bytes()
+    code = """
+        import resource, sys
+        from raceway.runtime import load_solution
+        from raceway.runtime.errors import RequestError
+        solution = load_solution(sys.argv[1])
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+        try:
+            solution.save(sys.argv[1])
+        except RequestError as fault:
+            print(fault)
+    """
+    with python(code, target) as process:
+        out, errors = process.communicate(timeout=60)
+    assert process.returncode == 0, errors
+    assert "cannot be written (File too large); a file that was there is as it was. Free some space" in out
+    assert target.read_bytes() == before
+    assert shown(tmp_path) == ["results.nc", "rotor"]
+
+
+@pytest.fixture
+def read_only(tmp_path: Path) -> Iterator[Path]:
+    """A folder that cannot be written, by the superuser either."""
+    place = tmp_path / "locked"
+    place.mkdir()
+    if os.geteuid() != 0:
+        place.chmod(0o555)
+        yield place
+        place.chmod(0o755)
+        return
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "ro", "tmpfs", str(place)], check=False).returncode != 0:
+        pytest.skip("the superuser may write everywhere, and this machine does not let a test mount a read-only disk")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+@pytest.mark.parametrize(
+    "words", [("run", "--out"), ("derive", "--out"), ("export", "--c", "--out")], ids=lambda words: words[0]
+)
+def test_a_read_only_folder_is_told_with_a_remedy(
+    scene: Path, tmp_path: Path, read_only: Path, words: tuple[str, ...]
+) -> None:
+    (tmp_path / "here").mkdir()
+    with raceway(words[0], scene, *words[1:], read_only / "x", cwd=tmp_path / "here") as process:
+        out, errors = process.communicate(timeout=120)
+    assert process.returncode == 2, errors
+    assert out == ""
+    assert "Traceback" not in errors
+    assert str(read_only) in errors
+    assert "permissions" in errors or "Give another" in errors
+
+
+def test_a_read_only_cache_warns_and_names_the_folder_that_is_taken_instead(
+    read_only: Path, source: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiling, "_opened", {})
+    monkeypatch.setenv(compiling.CACHE_VARIABLE, str(read_only))
+    compiler = compiling.find_compiler()
+    assert compiler is not None
+    with pytest.warns(CacheWarning, match=r"cannot be written .* this time into (\S+),.*RACEWAY_CACHE_DIR") as caught:
+        library = compiling.compile_sources((source,), compiler)
+    assert str(library.path.parent) in str(caught[0].message)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert compiling.compile_sources((source,), compiler).path == library.path  # of this process, not once more
+
+
+def test_a_home_that_cannot_be_written_is_a_warning(scene: Path, tmp_path: Path) -> None:
+    env = {"HOME": "/dev/null", "XDG_CACHE_HOME": "", "RACEWAY_CACHE_DIR": ""}
+    words = ("run", scene, "--cycles", "2", "--transient", "1", "--json", "--no-figures")
+    with raceway(*words, cwd=tmp_path, env=env) as process:
+        out, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert "/dev/null/.cache/raceway cannot be written" in errors
+    assert "this time into" in errors
+    assert '"compiled": true' in out
+
+
+def test_no_folder_at_all_to_compile_in_is_refused_in_words(
+    source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def nowhere(*_: object, **__: object) -> str:
+        raise FileNotFoundError(2, "No usable temporary directory found")
+
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(compiling, "_opened", {})
+    monkeypatch.setenv(compiling.CACHE_VARIABLE, str(tmp_path / "file" / "cache"))
+    compiling._private_folder.cache_clear()
+    monkeypatch.setattr(compiling.tempfile, "mkdtemp", nowhere)
+    compiler = compiling.find_compiler()
+    assert compiler is not None
+    with pytest.raises(RequestError, match=r"Neither the cache .* nor a temporary folder .*RACEWAY_CACHE_DIR"):
+        compiling.compile_sources((source,), compiler)
+
+
+def test_a_relative_cache_folder_is_found_from_wherever_the_process_goes(
+    rotor: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiling, "_opened", {})
+    monkeypatch.setenv(compiling.CACHE_VARIABLE, "cache")
+    monkeypatch.chdir(tmp_path)
+    model = load(rotor)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert np.isfinite(model.simulate(cycles=0.05).x).all()

@@ -1,0 +1,124 @@
+"""Certificates: what agreement, disagreement and ignorance are called."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from raceway.runtime import Model, RequestError
+from raceway.runtime.certificate import Verdict, by_differences, compare, noise_of
+from raceway.runtime.study import Course, Study
+
+PRELOADED = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.0}
+
+
+@pytest.fixture(scope="module")
+def model(make_model: Callable[..., Model]) -> Model:
+    return make_model("punching_press_tangent")
+
+
+@pytest.mark.parametrize(
+    ("own", "second", "uncertainty", "verdict"),
+    [
+        (0.0, 1.0005, 1e-6, Verdict.VERIFIED),
+        (0.0, 1.01, 1e-6, Verdict.DISAGREES),
+        (0.1, 1.01, 1e-6, Verdict.NOT_CHECKED),
+        (0.0, 1.01, 0.1, Verdict.NOT_CHECKED),
+        (0.0, 1.0, 0.1, Verdict.NOT_CHECKED),
+        (0.0, math.nan, 0.1, Verdict.NOT_CHECKED),
+    ],
+)
+def test_verdicts_follow_from_distance_and_uncertainties(
+    own: float, second: float, uncertainty: float, verdict: Verdict
+) -> None:
+    found = compare(1.0, own, second, uncertainty, route="x", quantum=0.0)
+    assert found.verdict is verdict
+    assert (found.reason == "") == (verdict in (Verdict.VERIFIED, Verdict.DISAGREES))
+
+
+def test_a_derivative_that_is_no_number_disagrees_with_one_that_is() -> None:
+    assert compare(math.nan, 0.0, 1.0, 1e-9, route="x", quantum=0.0).verdict is Verdict.DISAGREES
+
+
+def test_differences_of_a_noisy_function_state_an_uncertainty_that_holds() -> None:
+    """exp with noise of 1e-9: the stated uncertainty must cover the error, and be no more than a thousand times it."""
+    generator = np.random.default_rng(3)
+
+    def noisy(change: Mapping[str, float]) -> np.ndarray:
+        x, y = change.get("a", 1.0), change.get("b", 2.0)
+        return np.array([math.exp(x) * y**3 + 1e-9 * generator.standard_normal()])
+
+    at, scales = {"a": 1.0, "b": 2.0}, np.array([1.0, 2.0])
+    found = by_differences(noisy, at, scales, quantum=np.zeros((1, 2)))
+    exact = np.array([[8 * math.e, 12 * math.e]])
+    error = np.abs(found.value - exact)
+    assert np.all(error <= 4.0 * found.uncertainty)
+    assert np.all(found.uncertainty < 1e-5 * exact)
+    noise = noise_of(noisy, at, scales)
+    assert 1e-10 < noise[0] < 1e-8
+
+
+def test_a_right_derivative_is_verified_and_a_wrong_one_disagrees(
+    model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = {"cycles": 0.4, "transient": 0.0, "parameters": PRELOADED}
+    names = ["rms:inner.y", "bearing.share"]
+    right = model.sensitivity(*names, **options)  # type: ignore[arg-type]
+    assert right.pairs[0].check.verdict is Verdict.VERIFIED
+    plain = Study.differentiate
+
+    def wrong(self: Study, *arguments: object, **more: object) -> Course:
+        course = plain(self, *arguments, **more)  # type: ignore[arg-type]
+        return replace(course, estimates=tuple(replace(item, slope=1.01 * item.slope) for item in course.estimates))
+
+    monkeypatch.setattr(Study, "differentiate", wrong)
+    found = model.sensitivity(*names, **options)  # type: ignore[arg-type]
+    (pair,) = found.disagreements
+    assert pair.check.value == pytest.approx(right.pairs[0].derivative, rel=1e-5)
+    assert pair.derivative == pytest.approx(1.01 * right.pairs[0].derivative, rel=1e-12)
+
+
+def test_in_chaos_nothing_is_called_verified_that_is_not_known(model: Model) -> None:
+    """At 200 um clearance perturbations grow by e^13 a turn: derivatives of the trajectory mean nothing, and the check
+    says so instead of vouching for them."""
+    report = model.sensitivity(
+        ["value:inner.y@200deg"],
+        ["bearing.clearance", "mechanism.bodies.slider.mass"],
+        2,
+        transient=1,
+        parameters={"bearing.clearance": 200e-6},
+        sensitivity_rtol=1e-7,
+        rtol=1e-9,
+    )
+    assert report.verdicts[Verdict.VERIFIED] == 0
+
+
+def test_turning_the_check_off_is_said(model: Model) -> None:
+    report = model.sensitivity("rms:inner.y", "bearing.share", 0.4, transient=0, parameters=PRELOADED, check=False)
+    (pair,) = report.pairs
+    assert pair.check.verdict is Verdict.NOT_CHECKED
+    assert "turned off" in pair.check.reason
+    assert report.to_json()["sensitivities"][0]["certificate"]["verdict"] == "not checked"
+
+
+def test_wrong_requests_are_refused(model: Model) -> None:
+    with pytest.raises(RequestError, match="differences"):
+        model.sensitivity("rms:inner.y", "bearing.share", 1, transient=0, check="diferences")  # type: ignore[arg-type]
+    with pytest.raises(RequestError, match=r"bearing\.clearance"):
+        model.sensitivity("rms:inner.y", "bearing.clearanse", 1, transient=0)
+    with pytest.raises(RequestError, match="transient cycles"):
+        model.sensitivity("rms:inner.y", "bearing.clearance", 1, transient=1)
+    with pytest.raises(RequestError, match="cvodes"):
+        model.sensitivity("rms:inner.y", "bearing.clearance", 1, transient=0, method="cvodes")
+    with pytest.raises(RequestError, match="agreement"):
+        model.sensitivity("rms:inner.y", "bearing.clearance", 1, transient=0, agreement=2.0)
+
+
+def test_laws_whose_force_jumps_are_refused_with_what_is_allowed(make_model: Callable[..., Model]) -> None:
+    jumping = make_model("punching_press", ('law = "one-sided"', 'law = "two-sided-gated"'))
+    with pytest.raises(RequestError, match=r"discontinuous.*tangent.*one-sided.*smoothing"):
+        jumping.sensitivity("rms:inner.y", "bearing.clearance", 1, transient=0)

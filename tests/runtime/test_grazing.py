@@ -1,0 +1,64 @@
+"""Grazing: a contact that is touched, not crossed, is flagged with ball and time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from raceway.runtime import Model
+from raceway.runtime.grazing import find_grazing
+from raceway.runtime.sensitivity_report import SensitivityReport
+
+TIMES = np.linspace(0.0, 1.0, 2001)
+ONE_PART = np.zeros(len(TIMES), dtype=int)
+
+
+def flags(signal: np.ndarray, *, one_sided: bool = False) -> list[tuple[int, float, str]]:
+    found = find_grazing(TIMES, ONE_PART, np.column_stack([signal, 0.3 + TIMES]), 0.0 * TIMES, one_sided=one_sided)
+    return [(item.ball, item.time, item.kink) for item in found]
+
+
+@pytest.mark.parametrize("depth", [2e-5, 0.0, -2e-5])
+def test_an_extreme_near_zero_is_flagged_with_ball_and_time(depth: float) -> None:
+    ((ball, time, kink),) = flags(1.0 - (1.0 - depth) * (1.0 - 0.0 * TIMES) - 4.0 * (TIMES - 0.4) ** 2)
+    assert (ball, kink) == (1, "contact")
+    assert time == pytest.approx(0.4, abs=1e-6)
+
+
+def test_a_crossing_and_a_deep_touch_are_not_flagged() -> None:
+    assert flags(np.sin(2 * np.pi * 3 * TIMES)) == []
+    assert flags(0.01 - 4.0 * (TIMES - 0.4) ** 2) == []
+
+
+def test_a_rate_that_touches_zero_is_flagged_under_one_sided_damping_alone() -> None:
+    """(t - 0.4)^3 stands still for a moment without turning back."""
+    creeping = 0.5 + (TIMES - 0.4) ** 3
+    assert flags(creeping) == []
+    found = flags(creeping, one_sided=True)
+    assert [(ball, kink) for ball, _, kink in found] == [(1, "rate")]
+    assert found[0][1] == pytest.approx(0.4, abs=1e-3)
+
+
+def test_a_trajectory_made_to_graze_is_flagged_and_its_neighbours_are_not(make_model: Callable[..., Model]) -> None:
+    """Preload is relieved behind the load: the clearance at which ball 1 is just relieved in passing makes it graze."""
+    model = make_model("varying_compliance")
+    span = {"cycles": 3.0, "transient": 0.3}
+
+    def report(clearance: float) -> SensitivityReport:
+        numbers = {"bearing.inner_ring.damping": 4e5, "bearing.clearance": clearance}
+        return model.sensitivity("min:ball.deflection[1]", "load.force.x", parameters=numbers, check=False, **span)  # type: ignore[arg-type]
+
+    def least(clearance: float) -> float:
+        return report(clearance).quantities[0].value
+
+    touching = brentq(least, -20e-6, -0.1e-6, xtol=1e-12)
+    (flag,) = [item for item in report(touching).grazing if item.ball == 1]
+    (quantity,) = report(touching).quantities
+    assert flag.kink == "contact"
+    assert flag.time == pytest.approx(quantity.time, abs=1e-3 * model.period())
+    assert abs(flag.depth) < 1e-9
+    for away in (0.9, 1.1):
+        assert [item for item in report(away * touching).grazing if item.ball == 1] == []
