@@ -108,7 +108,7 @@ def main() -> None:
         f"Peak ball force {peak.value:.1f} N (ball {peak.ball}, t = {peak.time:.5f} s); rms of the inner ring's y "
         f"{1e6 * rms.value:.3f} µm. Places where the motion grazes a kink: {len(report.grazing)}.",
     ]
-    (DOCS / "howto" / "sensitivity_numbers.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (DOCS / "howto" / "sensitivity_numbers.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
     save(linear_figure(model, report), DOCS / "images" / "sensitivity_linear.png")
     save(tornado(report, PEAK), DOCS / "images" / "sensitivity_tornado.png")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -47,3 +48,15 @@ def make_model(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..
         return load(generate(scene_from_text(scene_text(name, *changes), name), folder))
 
     return make
+
+
+@pytest.fixture
+def boundless(monkeypatch: pytest.MonkeyPatch) -> Callable[[Model], Model]:
+    """Lets a model take numbers that no scene may have, such as a negative damping: the surest way to diverge."""
+
+    def lift(model: Model) -> Model:
+        free = (replace(info, above=None, least=None, most=None, below=None) for info in model.manifest.parameters)
+        monkeypatch.setattr(model, "manifest", replace(model.manifest, parameters=tuple(free), relations=()))
+        return model
+
+    return lift

@@ -31,7 +31,7 @@ def test_an_edge_at_the_start_of_the_turn_counts_once(make_model: Callable[..., 
 
 
 def test_frequency_is_that_of_the_hertz_springs_at_equilibrium(make_model: Callable[..., Model]) -> None:
-    """Stiffness of a ring on balls, sum of 3/2 k sqrt(delta) n n^T over those that touch, by hand at the equilibrium."""
+    """Stiffness of a ring on balls by hand: the sum of 3/2 k sqrt(delta) n n^T over those that touch."""
     model = make_model("varying_compliance")
     scale = model.explain().scales[-1]
     found = model.static_equilibrium(t=scale.time)

@@ -25,7 +25,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -41,6 +41,7 @@ from raceway.derive.read import read_scene
 from raceway.derive.replace_folder import refuse_foreign, replace_folder
 from raceway.derive.scene import Scene
 from raceway.derive.system import Output, System, derive
+from raceway.derive.values import value_bounds, value_relations
 from raceway.runtime import manifest as mf
 from raceway.runtime.errors import ArtefactError
 
@@ -218,15 +219,24 @@ def _run(scene: Scene) -> mf.RunInfo:
 
 def _manifest(system: System, functions: Functions, files: tuple[tuple[str, str], ...]) -> mf.Manifest:
     scene = system.scene
+    bounds = value_bounds(scene)
     return mf.Manifest(
         scene=scene.name,
         title=scene.title,
         signature=signature(scene),
         versions=_versions(),
         parameters=tuple(
-            mf.ParameterInfo(name=p.name, unit=p.unit, description=p.description, latex=p.latex, default=p.default)
+            mf.ParameterInfo(
+                name=p.name,
+                unit=p.unit,
+                description=p.description,
+                latex=p.latex,
+                default=p.default,
+                **(asdict(bounds[p.name]) if p.name in bounds else {}),
+            )
             for p in system.parameters
         ),
+        relations=value_relations(scene),
         constants=tuple(
             mf.VariableInfo(name=c.name, unit=c.unit, description=c.description, latex=c.latex)
             for c in functions.constants

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from difflib import get_close_matches
 from typing import Any, cast
 
@@ -36,6 +36,16 @@ _STRUCTURE = (
     "mechanism.driver.joint",
 )
 _TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What a value must satisfy: > above, >= least, <= most, < below; None bounds nothing."""
+
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+    below: float | None = None
 
 
 def quantities_of(record: object) -> Iterator[Quantity]:
@@ -69,6 +79,32 @@ def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
         _check_bearing(checker, scene.bearing)
     _check_run(checker, scene)
     return checker.faults
+
+
+def value_bounds(scene: Scene) -> dict[str, Bounds]:
+    """What each quantity alone must satisfy, by path; quantities that may have any value are not in it."""
+    checker = _Checker({})
+    if scene.mechanism is not None:
+        _check_mechanism(checker, scene.mechanism)
+    if isinstance(scene.load, HarmonicLoad):
+        checker.positive(scene.load.frequency)
+    if scene.bearing is not None:
+        _check_bearing(checker, scene.bearing)
+    return checker.bounds
+
+
+def value_relations(scene: Scene) -> tuple[tuple[str, float, str], ...]:
+    """What quantities must be to each other: (path, factor, other path) for ``value > factor * other value``."""
+    bearing = scene.bearing
+    if bearing is None:
+        return ()
+    ball, pitch = bearing.ball_diameter.path, bearing.pitch_diameter.path
+    # the balls fit side by side on the pitch circle, a hair's breadth apart
+    relations = [(pitch, (1.0 - 1e-12) / math.sin(math.pi / bearing.balls) if bearing.balls > 1 else 1.0, ball)]
+    if isinstance(bearing.contact, HertzContact):
+        grooves = (bearing.contact.inner_groove_radius, bearing.contact.outer_groove_radius)
+        relations += [(radius.path, 0.5, ball) for radius in grooves]
+    return tuple(relations)
 
 
 def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
@@ -175,11 +211,12 @@ def _replaced(record: Any, changed: Mapping[str, Quantity]) -> Any:
 
 
 class _Checker:
-    """Notes faults; a comparison with NaN is false, so every check asks for what is wrong."""
+    """Notes faults, and the bounds it checks; a comparison with NaN is false, so every check asks for what is wrong."""
 
     def __init__(self, given: Mapping[str, str]) -> None:
         self.given = given
         self.faults: list[Fault] = []
+        self.bounds: dict[str, Bounds] = {}
 
     def show(self, quantity: Quantity) -> str:
         unit = "" if quantity.unit == "1" else f" {quantity.unit}"
@@ -189,12 +226,18 @@ class _Checker:
         self.faults.append(Fault(key=path, problem=problem, given=given, allowed=allowed, remedy=remedy))
 
     def positive(self, quantity: Quantity | None, remedy: str = "give a positive value") -> None:
-        if quantity is not None and quantity.value <= 0.0:
+        if quantity is None:
+            return
+        self.bounds[quantity.path] = Bounds(above=0.0)
+        if quantity.value <= 0.0:
             what = "zero" if quantity.value == 0.0 else "negative"
             self.fault(quantity.path, f"the value is {what}", self.show(quantity), "a value above zero", remedy)
 
     def not_negative(self, quantity: Quantity | None, remedy: str = "give zero or a positive value") -> None:
-        if quantity is not None and quantity.value < 0.0:
+        if quantity is None:
+            return
+        self.bounds[quantity.path] = Bounds(least=0.0)
+        if quantity.value < 0.0:
             self.fault(quantity.path, "the value is negative", self.show(quantity), "zero or a value above it", remedy)
 
 
@@ -266,6 +309,8 @@ def _check_table(checker: _Checker, load: TableLoad) -> None:
 
 
 def _check_bearing(checker: _Checker, bearing: Bearing) -> None:
+    if bearing.share is not None:
+        checker.bounds[bearing.share.path] = Bounds(least=0.0, most=1.0)
     if bearing.share is not None and (bearing.share.value < 0.0 or bearing.share.value > 1.0):
         checker.fault(
             bearing.share.path,
@@ -340,6 +385,7 @@ def _check_hertz(checker: _Checker, contact: HertzContact, ball: Quantity) -> No
             continue
         checker.positive(material.young_modulus)
         poisson = material.poisson_ratio
+        checker.bounds[poisson.path] = Bounds(above=-1.0, below=0.5)
         if poisson.value <= -1.0 or poisson.value >= 0.5:
             checker.fault(
                 poisson.path,

@@ -30,8 +30,9 @@ Array = NDArray[np.float64]
 #: Points of a grid, and how often it is refined: 1e-4 of a turn becomes 1e-8 of it.
 GRID, ROUNDS = 65, 2
 
-#: Nodes that are looked at closely: the best that no neighbour exceeds.
-CANDIDATES = 5
+#: Nodes that are looked at closely: the best that no neighbour exceeds.  Where the most loaded ball carries least the
+#: channel has a sharp corner, and nodes tell less about its depth.
+CANDIDATES, CORNERS = 5, 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +83,8 @@ def find_extreme(
     shown = values[:, [ball]] if ball is not None else values
     height = sign * np.max(shown, axis=1)
     best: list[Extreme] = []
-    for k in _tops(height, nodes.segment):
+    count = CORNERS if sign < 0.0 and shown.shape[1] > 1 else CANDIDATES
+    for k in _tops(height, nodes.segment, count):
         segment = int(nodes.segment[k])
         low = k - 1 if k > 0 and nodes.segment[k - 1] == segment else k
         high = k + 1 if k + 1 < len(nodes) and nodes.segment[k + 1] == segment else k
@@ -97,12 +99,12 @@ def find_extreme(
     return replace(first, runner_up=gap)
 
 
-def _tops(height: Array, segment: NDArray[np.int_]) -> list[int]:
-    """The largest nodes that no neighbour in the same segment exceeds, largest first."""
+def _tops(height: Array, segment: NDArray[np.int_], count: int) -> list[int]:
+    """The `count` largest nodes that no neighbour in the same segment exceeds, largest first."""
     before = np.concatenate([[-np.inf], np.where(np.diff(segment) == 0, height[:-1], -np.inf)])
     behind = np.concatenate([np.where(np.diff(segment) == 0, height[1:], -np.inf), [-np.inf]])
     tops = np.flatnonzero((height >= before) & (height >= behind))
-    order = np.argsort(-height[tops], kind="stable")[:CANDIDATES]
+    order = np.argsort(-height[tops], kind="stable")[:count]
     return [int(k) for k in tops[order]]
 
 

@@ -47,13 +47,20 @@ MODEL, JACOBIANS = "model", "jacobians"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParameterInfo:
-    """A run-time number: name (its path in the scene file), SI unit, description, LaTeX symbol, default."""
+    """A run-time number: name (its path in the scene file), SI unit, description, LaTeX symbol, default.
+
+    A value must be > `above`, >= `least`, <= `most` and < `below`; None bounds nothing.
+    """
 
     name: str
     unit: str
     description: str
     latex: str
     default: float
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+    below: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,6 +205,7 @@ class Manifest:
     bearing: BearingInfo | None
     run: RunInfo
     quantities: tuple[QuantityInfo, ...] = ()
+    relations: tuple[tuple[str, float, str], ...] = ()  # (name, factor, other): value > factor * value of the other
     files: tuple[tuple[str, str], ...] = field(default=())  # file name -> sha256
 
     def function(self, name: str) -> FunctionInfo:

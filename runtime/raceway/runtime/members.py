@@ -16,6 +16,7 @@ import numpy as np
 
 from raceway.runtime import clock
 from raceway.runtime.assembly import check_assembly
+from raceway.runtime.bounds import violations
 from raceway.runtime.ensemble_driver import MemberArrays
 from raceway.runtime.errors import RequestError
 from raceway.runtime.magnitudes import MOMENTS
@@ -152,13 +153,18 @@ def make_members(model: Model, table: Table) -> Members:
     p = np.ascontiguousarray(np.column_stack(list(columns.values())))
     c = np.zeros((count, 0))
     refused: dict[int, str] = {}
+    for mask, rule in violations(manifest, columns):
+        name = rule.partition(":")[0]
+        for member in np.flatnonzero(mask):
+            refused.setdefault(int(member), f"{rule}, not {columns[name][member]:.9g}.")
     if manifest.constants:
         c = np.ascontiguousarray(model.loop("constants", ("p",))(count, {"p": p})["c"])
         for member in np.flatnonzero(~np.all(np.isfinite(c), axis=1)):
             bad = [info.name for info, fine in zip(manifest.constants, np.isfinite(c[member]), strict=True) if not fine]
-            refused[int(member)] = (
+            refused.setdefault(
+                int(member),
                 f"The derived constants {', '.join(bad)} are not finite numbers. "
-                "Geometry and elastic constants must be physical."
+                "Geometry and elastic constants must be physical.",
             )
         columns |= {info.name: c[:, k] for k, info in enumerate(manifest.constants)}
     _check_knots(manifest, columns, refused)

@@ -10,6 +10,7 @@ from numbers import Real
 
 import numpy as np
 
+from raceway.runtime.bounds import violations
 from raceway.runtime.errors import RequestError
 from raceway.runtime.manifest import Manifest, ParameterInfo
 
@@ -73,7 +74,8 @@ def resolve_parameters(manifest: Manifest, overrides: Mapping[str, float] | None
     Raises
     ------
     RequestError
-        Unknown names (with the nearest known ones), values that are no finite real numbers; all faults at once.
+        Unknown names (with the nearest known ones), values that are no finite real numbers, or that no scene file
+        could have (see `bounds`); all faults at once.
     """
     values = {info.name: info.default for info in manifest.parameters}
     if overrides is None:
@@ -97,6 +99,10 @@ def resolve_parameters(manifest: Manifest, overrides: Mapping[str, float] | None
             faults.append(f"{name}: a finite number in {units[name]} is expected, not {number!r}")
         else:
             values[name] = number
+    if not faults:
+        for _, rule in violations(manifest, values):
+            name = rule.partition(":")[0]
+            faults.append(f"{rule}, not {values[name]:.9g}.")
     if faults:
         raise RequestError("\n".join(faults))
     return Parameters(manifest.parameters, values)

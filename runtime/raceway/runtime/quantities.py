@@ -389,6 +389,8 @@ def place_of(manifest: Manifest, numbers: Numbers, window: Window, quantity: Qua
         return number, Place(kind="time", number=number)
     angle = math.radians(number) if form["unit"] == "deg" else number
     speed = clock.shaft_speed(manifest, numbers.values)
+    if speed == 0.0:
+        raise RequestError(f"{quantity.name}: nothing turns (its speed is zero). Name a time instead, as in @0.41s.")
     start = numbers.values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
     turns = (start + speed * window.duration - angle) / clock.TURN
     # the last turn before the end, an angle at the very end included; 1e-9 of a turn is rounding

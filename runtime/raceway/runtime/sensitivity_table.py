@@ -96,6 +96,9 @@ def _remarks(report: SensitivityReport) -> list[str]:
         f"{pair.check.route} {_number(pair.check.value)} ± {_number(pair.check.uncertainty)} {pair.unit}"
         for pair in report.disagreements
     ]
+    tolerance = report.settings["sensitivity_rtol"]
+    if tolerance is not None:
+        lines.append(f"derivatives at tolerance {tolerance:.0e}, {report.settings['steps']} steps")
     reasons: dict[str, int] = {}
     for pair in report.pairs:
         if pair.check.verdict is Verdict.NOT_CHECKED and pair.check.reason:
