@@ -43,6 +43,10 @@ STIFF = 2.0
 #: Errors that may be asked for [1].
 SMALLEST, LARGEST = 1e-8, 0.5
 
+#: Most steps of a way: so many times those of the longest one before, and at least so many a cycle.  Ten times as tight takes twice
+#: the steps; a way that takes far more is stuck at the resolution of numbers.
+GROWTH, SPARE = 20, 100_000
+
 #: Method and tolerance.
 Way = tuple[str, float]
 
@@ -129,7 +133,9 @@ class _Search:
     def __call__(self, way: Way) -> Integrated | None:
         if way not in self.done:
             try:
-                self.done[way] = self.run.run(self.observables, *way)
+                longest = max((one.steps or 0 for one in self.done.values() if one is not None), default=0)
+                limit = max(GROWTH * longest, math.ceil(SPARE * self.run.cycles))
+                self.done[way] = self.run.run(self.observables, *way, max_steps=limit)
             except SimulationError:
                 # one way that fails is no reason to give up: the next one is tighter
                 self.done[way] = None

@@ -98,7 +98,12 @@ class Prepared:
         return self.duration / self.turn if math.isfinite(self.turn) else 1.0
 
     def run(
-        self, observables: Sequence[Observable], method: str, rtol: float, driver: EnsembleDriver | None = None
+        self,
+        observables: Sequence[Observable],
+        method: str,
+        rtol: float,
+        driver: EnsembleDriver | None = None,
+        max_steps: int | None = None,
     ) -> Integrated:
         """Integrate and reduce.
 
@@ -106,6 +111,7 @@ class Prepared:
         ----------
         method : one of the stepper's, ``quasi-static``, or one of CasADi's, which is sampled as the scene says
         driver : another compilation of the stepper
+        max_steps : of the stepper, accepted and rejected.  Default: as many as any run may take
 
         Raises
         ------
@@ -132,7 +138,7 @@ class Prepared:
                 output_times=np.zeros(0),
                 output_states=None,
                 reduction=row,
-                max_steps=step_limit(self.duration, self.turn),
+                max_steps=max_steps if max_steps is not None else step_limit(self.duration, self.turn),
             )
             seconds, steps = _now() - begin, outcome.steps
             if outcome.end is not End.DONE:

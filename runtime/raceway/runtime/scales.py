@@ -127,7 +127,7 @@ def _find_scales(
     # a model at rest without load: any magnitude will do
     position = position or speed * horizon / (2.0 * math.pi) or 1.0
     speed = speed or position * 2.0 * math.pi / horizon
-    magnitude = np.concatenate([np.full(half, position), np.full(half, speed)])
+    magnitude = np.concatenate([np.full(half, _rounded(position)), np.full(half, _rounded(speed))])
 
     decay = frequency = 0.0
     for u, base, _ in loaded:
@@ -181,3 +181,10 @@ def _equilibrium(
         if size <= 1e-6 * first:
             return x, True
     return None
+
+
+def _rounded(value: float) -> float:
+    """To twelve bits: an equilibrium is known to a part in a million, and the last digits of its size should not decide
+    about the last digits of the motion."""
+    part, exponent = math.frexp(value)
+    return math.ldexp(round(part * 4096.0) / 4096.0, exponent)

@@ -25,7 +25,7 @@ from raceway.runtime.grazing import TOLERANCE, Grazing, find_grazing
 from raceway.runtime.magnitudes import model_scales
 from raceway.runtime.manifest import Manifest
 from raceway.runtime.nodes import Window
-from raceway.runtime.parameters import Numbers, real, unknown_name
+from raceway.runtime.parameters import Numbers, Parameters, real, unknown_name
 from raceway.runtime.quantities import default_quantities, parse_quantity
 from raceway.runtime.request import TOLERANCES
 from raceway.runtime.scales import Scales
@@ -387,10 +387,9 @@ def _second(
         return by_erk(
             study, numbers, names, scales_of_states, direction=direction, progress=lambda f: tell("checking", f)
         )
-    base = dict(numbers.parameters)
 
     def measure(change: Mapping[str, float]) -> Array:
-        course = study.measure(model.numbers({**base, **change}), plain)
+        course = study.measure(neighbour(model, numbers, change), plain)
         return np.array([item.value for item in course.estimates])
 
     return by_differences(
@@ -401,6 +400,16 @@ def _second(
         agreement=query.agreement,
         progress=lambda fraction: tell("checking", fraction),
     )
+
+
+def neighbour(model: Model, numbers: Numbers, change: Mapping[str, float]) -> Numbers:
+    """Numbers beside those of a run.  Bounds do not hold: a difference looks a hair beyond a value at its bound."""
+    manifest = model.manifest
+    parameters = Parameters(manifest.parameters, {**numbers.parameters, **change})
+    p = np.array(list(parameters.values()), dtype=float)
+    c = model.kernel("constants")({"p": p}) if manifest.constants else np.zeros(0)
+    constants = {info.name: float(value) for info, value in zip(manifest.constants, c, strict=True)}
+    return Numbers(parameters=parameters, p=p, c=c, values={**parameters, **constants})
 
 
 def _grazing(model: Model, numbers: Numbers, course: Course, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:

@@ -129,6 +129,15 @@ static inline int rw_equilibrium(const rw_numbers *n, const double *mass, double
     return -1;
 }
 
+/* to twelve bits: an equilibrium is known to a part in a million, and the last digits of its size should not decide about
+   the last digits of the motion */
+static double rw_rounded(double value)
+{
+    int exponent;
+    double part = frexp(value, &exponent);
+    return ldexp(rint(part * 4096.0) / 4096.0, exponent);
+}
+
 /* Magnitudes of a member whose inputs at so many moments are the rows of u. */
 static inline void rw_magnitudes(const double *p, const double *c, const double *initial, long moments, const double *u, double horizon,
                                  double *magnitude)
@@ -185,8 +194,8 @@ static inline void rw_magnitudes(const double *p, const double *c, const double 
     if (position == 0.0) position = speed > 0.0 ? speed * horizon / turn : 1.0;
     if (speed == 0.0) speed = position * turn / horizon;
     for (int k = 0; k < RW_NQ; k++) {
-        magnitude[k] = position;
-        magnitude[RW_NQ + k] = speed;
+        magnitude[k] = rw_rounded(position);
+        magnitude[RW_NQ + k] = rw_rounded(speed);
     }
 }
 
