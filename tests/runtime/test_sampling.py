@@ -235,3 +235,17 @@ def test_a_run_that_crawls_ends_with_its_pace(rotor: Model) -> None:
         rotor.simulate(24, method="stepper-dp54", parameters={"bearing.inner_ring.damping": 1e11})
     assert caught.value.status is Status.TOO_MANY_STEPS
     assert caught.value.time < 0.01 * rotor.period()
+
+
+def test_derivatives_do_not_depend_on_how_a_run_is_cut_into_calls(
+    make_model: Callable[..., Model], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The jump at a load's edge needs the rate before the edge: no call may begin there."""
+    model = make_model("punching_press")
+    name = "mechanism.forces.punch.window.start"
+    whole = model.sensitivities(name, cycles=3, rtol=1e-8)
+    for segments in (1, 2, 4):  # edges of a turn: punch on, punch off, turn
+        monkeypatch.setattr("raceway.runtime.stepping.SEGMENTS_A_CALL", segments)
+        cut = model.sensitivities(name, cycles=3, rtol=1e-8)
+        scale = np.max(np.abs(whole.x), axis=(0, 2))[:, None]
+        assert np.max(np.abs(cut.x - whole.x) / scale) < 1e-3

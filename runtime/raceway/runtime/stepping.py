@@ -6,7 +6,7 @@ so many segments and steps at most.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -75,9 +75,7 @@ def step_through(
     span = trajectory.end - trajectory.begin
     allowed = step_limit(span, trajectory.turn)
     least = min(LEAST_PROGRESS * span, STEPS_A_CALL * min(trajectory.turn / STEPS_A_TURN, 1.0 / STEPS_A_SECOND))
-    count = len(trajectory.segments.inputs)
-    for first in range(0, count, SEGMENTS_A_CALL):
-        last = min(first + SEGMENTS_A_CALL, count)
+    for first, last in _calls(trajectory.segments.restarts, whole=directions is not None):
         left = part_of(trajectory.segments, first, last)
         sample, stop = int(trajectory.stops[first]), int(trajectory.stops[last])
         # a sample that rounding puts beside an edge lies on it
@@ -120,6 +118,24 @@ def step_through(
                 break
             left, wanted, step = rest, wanted[outcome.written :], outcome.step
         trajectory.passed = last
+
+
+def _calls(restarts: np.ndarray, *, whole: bool) -> Iterator[tuple[int, int]]:
+    """First and last segment (excluded) of each call.
+
+    Parameters
+    ----------
+    restarts : whether a load jumps at the start of each segment
+    whole : no call begins at a jump.  The derivative at fixed time jumps there by the difference of the rates before and
+        behind, and a call knows no rate from before its start.
+    """
+    first, count = 0, len(restarts)
+    while first < count:
+        last = min(first + SEGMENTS_A_CALL, count)
+        while whole and last < count and restarts[last]:
+            last += 1
+        yield first, last
+        first = last
 
 
 def _note(cost: Cost, outcome: Outcome, family: Family) -> None:
