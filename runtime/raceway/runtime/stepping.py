@@ -126,8 +126,8 @@ def _calls(restarts: np.ndarray, *, whole: bool) -> Iterator[tuple[int, int]]:
     Parameters
     ----------
     restarts : whether a load jumps at the start of each segment
-    whole : no call begins at a jump.  The derivative at fixed time jumps there by the difference of the rates before and
-        behind, and a call knows no rate from before its start.
+    whole : no call begins at a jump.  The derivative at fixed time jumps there by the difference of the rates before
+        and behind, and a call knows no rate from before its start.
     """
     first, count = 0, len(restarts)
     while first < count:
