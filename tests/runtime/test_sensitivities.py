@@ -13,8 +13,8 @@ import pytest
 
 from raceway.runtime import Model, RequestError, clock
 from raceway.runtime.direction_scales import direction_scales
+from raceway.runtime.evaluate import neighbour
 from raceway.runtime.sensitivity import Directions
-from raceway.runtime.sensitivity_query import neighbour
 from raceway.runtime.stepper import End, Family, Outcome, Segments
 
 # preload: every ball stays in contact, and the motion is smooth in every parameter

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from raceway.runtime import clock
 from raceway.runtime.errors import RequestError
-from raceway.runtime.parameters import Numbers, real, unknown_name, vector
+from raceway.runtime.parameters import Numbers, Parameters, real, unknown_name, vector
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -39,6 +39,16 @@ def evaluate_point(
             value = kernel.output(output)
             results[info.name] = value if info.size > 1 else float(value[0])
     return results
+
+
+def neighbour(model: Model, numbers: Numbers, change: Mapping[str, float]) -> Numbers:
+    """Numbers beside those of a run.  Bounds do not hold: a difference looks a hair beyond a value at its bound."""
+    manifest = model.manifest
+    parameters = Parameters(manifest.parameters, {**numbers.parameters, **change})
+    p = np.array(list(parameters.values()), dtype=float)
+    c = model.kernel("constants")({"p": p}) if manifest.constants else np.zeros(0)
+    constants = {info.name: float(value) for info, value in zip(manifest.constants, c, strict=True)}
+    return Numbers(parameters=parameters, p=p, c=c, values={**parameters, **constants})
 
 
 def point(

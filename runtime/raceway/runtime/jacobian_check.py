@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from raceway.runtime import clock
 from raceway.runtime.certificate import UNCHECKED, Check, Verdict, compare
 from raceway.runtime.differences import richardson
-from raceway.runtime.errors import RequestError
-from raceway.runtime.evaluate import point
+from raceway.runtime.evaluate import neighbour, point
 from raceway.runtime.jacobian import (
     CRANK_ANGLE,
     TIME,
@@ -197,15 +196,10 @@ def _motion(
             return values_of_rows(model, parts, {**there, "x": moved})
 
         return float(x[k]), 0.1 * size, with_state
-    base, parameters = numbers.parameters[name], dict(numbers.parameters)
-    nothing = np.full(sum(len(part.labels) for part in parts), np.nan)
+    base = numbers.parameters[name]
 
     def with_parameter(v: float) -> Array:
-        try:
-            changed = model.numbers({**parameters, name: v})
-        except RequestError:  # beyond what is physical: this difference does not count
-            return nothing
-        return values_of_rows(model, parts, point(model, changed, t, x))
+        return values_of_rows(model, parts, point(model, neighbour(model, numbers, {name: v}), t, x))
 
     return base, STEP * abs(base) or STEP_FROM_ZERO.get(unit, STEP), with_parameter
 

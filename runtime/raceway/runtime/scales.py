@@ -187,4 +187,4 @@ def _rounded(value: float) -> float:
     """To twelve bits: an equilibrium is known to a part in a million, and the last digits of its size should not decide
     about the last digits of the motion."""
     part, exponent = math.frexp(value)
-    return math.ldexp(round(part * 4096.0) / 4096.0, exponent)
+    return math.ldexp(float(np.rint(part * 4096.0)) / 4096.0, exponent)

@@ -21,11 +21,12 @@ from raceway.runtime.assembly import check_assembly
 from raceway.runtime.certificate import AGREEMENT, FLOOR, UNCHECKED, Second, by_differences, compare
 from raceway.runtime.direction_scales import ANGLE
 from raceway.runtime.errors import RequestError, SimulationError
+from raceway.runtime.evaluate import neighbour
 from raceway.runtime.grazing import TOLERANCE, Grazing, find_grazing
 from raceway.runtime.magnitudes import model_scales
 from raceway.runtime.manifest import Manifest
 from raceway.runtime.nodes import Window
-from raceway.runtime.parameters import Numbers, Parameters, real, unknown_name
+from raceway.runtime.parameters import Numbers, real, unknown_name
 from raceway.runtime.quantities import default_quantities, parse_quantity
 from raceway.runtime.request import TOLERANCES
 from raceway.runtime.scales import Scales
@@ -400,16 +401,6 @@ def _second(
         agreement=query.agreement,
         progress=lambda fraction: tell("checking", fraction),
     )
-
-
-def neighbour(model: Model, numbers: Numbers, change: Mapping[str, float]) -> Numbers:
-    """Numbers beside those of a run.  Bounds do not hold: a difference looks a hair beyond a value at its bound."""
-    manifest = model.manifest
-    parameters = Parameters(manifest.parameters, {**numbers.parameters, **change})
-    p = np.array(list(parameters.values()), dtype=float)
-    c = model.kernel("constants")({"p": p}) if manifest.constants else np.zeros(0)
-    constants = {info.name: float(value) for info, value in zip(manifest.constants, c, strict=True)}
-    return Numbers(parameters=parameters, p=p, c=c, values={**parameters, **constants})
 
 
 def _grazing(model: Model, numbers: Numbers, course: Course, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:
