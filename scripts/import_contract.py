@@ -1,7 +1,8 @@
 """Check the import contract: the runtime never needs the deriving half, SymPy or pint.
 
 Two routes: every import statement under runtime/ is read (the command line, `cli.py` and `commands_*.py`, serves both
-halves and may import `raceway.derive` inside functions), and a fresh interpreter that loads the runtime's modules is asked what it holds.
+halves and may import `raceway.derive` inside functions), and a fresh interpreter that loads the runtime's modules is
+asked what it holds.
 """
 
 from __future__ import annotations

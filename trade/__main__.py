@@ -95,7 +95,8 @@ def _scene(result: Result) -> list[str]:
         f"![Error of the peak ball force against time a cycle](images/trade_{result.scene}.png)",
         "Peak ball force, what no other way beats:",
         _markdown(head, rows),
-        "What an error costs, and what `--error` chooses from this measurement:",
+        'What an error costs, and what `--error` chooses from this measurement ("the ladder": no measured way is so '
+        "much more accurate that it could be a companion):",
         _markdown(
             (
                 "error",
@@ -122,7 +123,9 @@ def _choice(trade: Trade, target: float, of: tuple[str, ...]) -> list[tuple[str,
     preferred = prefer(trade, target, of)
     slow = next((one for one in trade.measured if one.configuration == SLOW), None)
     if preferred is None:
-        return [(percent(target), name, cheapest.configuration.words, milliseconds(cheapest.time), "ladder", "", "")]
+        return [
+            (percent(target), name, cheapest.configuration.words, milliseconds(cheapest.time), "by the ladder", "", "")
+        ]
     chosen = preferred[0]
     return [
         (

@@ -5,6 +5,8 @@
 
 #include "kernels.h"
 
+enum { RW_NCONTACT = 2 }; /* numbers of a contact */
+
 /* Stage variables that deflections need. 4 operations. */
 static inline void rw_cage(double t, const double *restrict u, const double *restrict p, const double *restrict c, double *restrict w)
 {
@@ -23,22 +25,31 @@ static inline void rw_cage(double t, const double *restrict u, const double *res
     w[3] = w0;
 }
 
-/* Elastic and damping force of one ball [N]. 8 operations. */
-static inline void rw_contact(double delta, double delta_rate, const double *restrict p, const double *restrict c, double *restrict elastic_force, double *restrict damping_force)
+/* Numbers that elastic and damping force of a ball depend on. 0 operations. */
+static inline void rw_contact_numbers(const double *restrict p, const double *restrict c, double *restrict k)
 {
     (void)p;
+    double w0 = c[10];
+    k[0] = w0;
+    w0 = c[14];
+    k[1] = w0;
+}
+
+/* Elastic and damping force of one ball [N]. 8 operations. */
+static inline void rw_ball_contact(double delta, double rate, const double *restrict k, double *restrict elastic_force, double *restrict damping_force)
+{
     double w0 = 0.0;
     double w1 = delta;
     double w2 = (double)(w0 < w1);
-    double w3 = c[10];
+    double w3 = k[0];
     double w4 = sqrt(w1);
     w1 = w1 * w4;
     w3 = w3 * w1;
     w2 = (w2 != 0.0 ? w3 : 0.0);
     elastic_force[0] = w2;
-    w2 = delta_rate;
+    w2 = rate;
     w0 = (double)(w0 < w2);
-    w3 = c[14];
+    w3 = k[1];
     w2 = w2 * w3;
     w0 = (w0 != 0.0 ? w2 : 0.0);
     damping_force[0] = w0;

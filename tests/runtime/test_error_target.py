@@ -58,8 +58,8 @@ def test_a_stiff_model_goes_up_the_linearly_implicit_ladder(make_model: Callable
 
 
 def test_an_error_that_chaos_forbids_is_refused_with_the_best_there_is(make_model: Callable[..., Model]) -> None:
-    """At 200 um of clearance the press is chaotic: after some turns no tolerance fixes an extreme."""
-    model = make_model("punching_press_tangent")
+    """At 200 um of clearance the motion is chaotic: after some turns no tolerance fixes an extreme."""
+    model = make_model("four_bar")
     run = prepare(model, {"bearing.clearance": 200e-6}, cycles=6, transient=3)
     with pytest.raises(TargetMissed, match=r"cannot be met\. The best is") as refused:
         meet_target(run, 1e-6, ["peak_ball_force", "range_inner_x"])

@@ -148,7 +148,8 @@ def test_every_family_converges_to_the_motion_cvodes_finds(
     assert np.all(errors < bounds), errors
     # below a ten-millionth it is the error of CVODES that shows
     seen = [max(error, 1e-7) for error in errors]
-    assert all(tight < max(loose / 2, 2e-7) for loose, tight in pairwise(seen)), errors
+    # over two of these tolerances: at one of them the landings may be met by luck
+    assert all(tight < max(loose / 10, 2e-7) for loose, tight in zip(seen, seen[2:], strict=False)), errors
 
 
 @pytest.mark.parametrize("scene", SCENES)

@@ -147,6 +147,14 @@ def test_members_lie_around_the_scene(slow: Model) -> None:
     assert all(slow.parameters[name] == 0.0 for name in slow.parameters if name not in members)
 
 
+def test_a_number_on_its_bound_is_drawn_to_the_allowed_side(make_model: Callable[..., Model]) -> None:
+    model = make_model("four_bar")
+    assert model.parameters["bearing.share"] == 1.0  # and no more is allowed
+    shares = perturbed(model, 50)["bearing.share"]
+    assert np.all(shares <= 1.0)
+    assert np.ptp(shares) > 0.003
+
+
 def test_a_trade_comes_back_from_its_file_with_its_words(step_trade: Trade) -> None:
     data = json.loads(json.dumps(to_plain(step_trade, {"scene": "x"}), allow_nan=False))
     back = from_plain(data)

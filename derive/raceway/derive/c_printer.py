@@ -58,6 +58,7 @@ def print_function(
     scalars: frozenset[str] = frozenset(),
     lanes: str = "",
     varying: frozenset[str] = frozenset(),
+    strided: frozenset[str] = frozenset(),
 ) -> str:
     """C99 text of an SX function.
 
@@ -70,6 +71,7 @@ def print_function(
         into SIMD
         lanes.  Results, and arguments named in `varying`, then hold that many values for each entry, next to each other
     varying : arguments that differ from lane to lane
+    strided : arguments that are the same in all lanes, one column of such results: their entries are `lanes` apart
 
     Raises
     ------
@@ -98,7 +100,11 @@ def print_function(
             continue
         if operation == ca.OP_INPUT:
             name = function.name_in(take[0])
-            place = f"{take[1]} * {lanes} + lane" if lanes and name in varying else str(take[1])
+            place = str(take[1])
+            if lanes and name in varying:
+                place = f"{take[1]} * {lanes} + lane"
+            elif lanes and name in strided:
+                place = f"{take[1]} * {lanes}"
             text = name if name in by_value else f"{name}[{place}]"
         elif operation == ca.OP_CONST:
             text = _literal(function.instruction_constant(k))

@@ -39,6 +39,7 @@ def kernels_header(system: System, functions: Functions, kernels: Kernels) -> st
         "RW_NW": kernels.stage_size,
         "RW_NA": kernels.angles,
         "RW_NK": kernels.law_numbers,
+        "RW_NJ": kernels.stage_slopes_size,
         "RW_NB": kernels.balls,
         "RW_LANES": LANES,
     }
@@ -78,6 +79,34 @@ def kernels_header(system: System, functions: Functions, kernels: Kernels) -> st
 def tangents_header(kernels: Kernels) -> str:
     """Text of tangents.h: the kernels' derivatives along RW_LANES directions at once."""
     parts = [_NOTE, "#ifndef RACEWAY_TANGENTS_H\n#define RACEWAY_TANGENTS_H", '#include "kernels.h"']
+    numbers = next(k for k in kernels.functions if k.function.name() == "law_numbers")
+    parts += [
+        *(
+            print_function(
+                k.function,
+                prefix="rw_",
+                description=f"{k.description}, for all balls at once.",
+                lanes="RW_NB",
+                varying=frozenset({"delta", "rate"}),
+            )
+            for k in kernels.shared_tangents
+        ),
+        print_function(
+            kernels.stage_slopes.function,
+            prefix="rw_",
+            description=f"{kernels.stage_slopes.description}, for RW_LANES times at once.",
+            scalars=frozenset({"t"}),
+            lanes="RW_LANES",
+            varying=frozenset({"t", "C", "S"}),
+        ),
+        print_function(
+            numbers.function,
+            prefix="rw_",
+            description="The numbers of the law out of RW_LANES directions of p and c.",
+            lanes="RW_LANES",
+            varying=frozenset({"p", "c"}),
+        ),
+    ]
     for kernel in kernels.tangents:
         names = kernel.function.name_in()
         parts.append(
@@ -88,6 +117,8 @@ def tangents_header(kernels: Kernels) -> str:
                 scalars=frozenset({"t", "delta", "rate"}),
                 lanes="RW_LANES",
                 varying=frozenset(n for n in names if n.endswith("_d")),
+                # of one time among those of stage_slopes
+                strided=frozenset({"J"}),
             )
         )
     parts.append("#endif")

@@ -13,6 +13,9 @@ ball_slopes    (delta, rate, k) -> F, Fd, Fv
 angles         (t, u, p, c) -> a, at        arguments of sines and cosines in w, linear in time, and their rates
 stage_turned   (C, S, t, u, p, c) -> w      w from cosines C and sines S of the angles
 stage_rate_turned  (C, S, at, t, u, p, c) -> w, wt     the same with its time derivative
+stage_slopes   (C, S, t, u, p, c) -> w, J    w and its derivatives by u, p, c, those that are not always zero
+stage_moved    (J, u_d, p_d, c_d) -> w_d       w along a direction of u, p, c
+ball_partials  (delta, rate, k) -> F, Fd, Fv, Fk      ball_slopes and the slopes by k
 acceleration   (x, S, u, p, c, w) -> a      from the sums S = (sum F cos, sum F sin) over the balls
 acceleration_jacobian  (x, S, G, u, p, c, w) -> A, B     da/dq, da/dv (row-major); G: sums of slopes times cos², cos
 sin, sin²
@@ -24,7 +27,7 @@ time do not depend on their number.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -52,16 +55,20 @@ class Kernels:
 
     `law_numbers` counts the entries of k.  `angles` counts those of the functions `turned`, which evaluate w for many
     times close to each other: an angle that grows by little needs no sine of its own.  `tangents` are directional
-    derivatives of the functions, for sensitivities.
+    derivatives of the functions, for sensitivities; what is the same for all directions is in `shared_tangents` and
+    `stage_slopes`, the latter of `stage_slopes_size` entries.
     """
 
     stage_size: int
     balls: int
     angles: int
     law_numbers: int
+    stage_slopes_size: int
     functions: tuple[Kernel, ...]
     turned: tuple[Kernel, ...]
     tangents: tuple[Kernel, ...]
+    shared_tangents: tuple[Kernel, ...]
+    stage_slopes: Kernel
 
 
 class KernelBuilder:
@@ -222,62 +229,83 @@ class KernelBuilder:
             for k in functions
             if k.function.name() == kernel
         )
-        numbers, laws = _gathered({k.function.name(): k.function for k in functions})
-        angles, turned = _turned(next(k.function for k in functions if k.function.name() == "stage"))
+        laws = [k.function for k in functions if k.function.name() in ("law", "law_slopes")]
+        numbers, (force, slopes) = gathered(laws, ("ball_force", "ball_slopes"), "law_numbers")
+        angles, turned, stage_slopes, stage_moved = _turned(
+            next(k.function for k in functions if k.function.name() == "stage")
+        )
         return Kernels(
             stage_size=len(self._stage),
             balls=self._system.bearing.ball.count,
             angles=angles.function.size1_out(0),
-            law_numbers=numbers.function.size1_out(0),
-            functions=(*functions, numbers, *laws, angles),
+            law_numbers=numbers.size1_out(0),
+            stage_slopes_size=stage_slopes.function.size1_out(1),
+            functions=(
+                *functions,
+                Kernel(function=numbers, description="Numbers that the force of a ball depends on"),
+                Kernel(function=force, description="Force of one ball [N]"),
+                Kernel(function=slopes, description="Force of one ball [N] and its slopes"),
+                angles,
+            ),
             turned=turned,
-            tangents=tangents,
+            tangents=(*tangents, stage_moved),
+            shared_tangents=(_partials(slopes),),
+            stage_slopes=stage_slopes,
         )
 
 
-def _gathered(functions: dict[str, ca.Function]) -> tuple[Kernel, tuple[Kernel, ...]]:
-    """The entries of p and c in the law of a ball, and the law over them.
+def gathered(
+    functions: Sequence[ca.Function], names: Sequence[str], numbers_name: str
+) -> tuple[ca.Function, tuple[ca.Function, ...]]:
+    """The entries of p and c in functions of a ball's deflection and rate, and the functions over these entries, k.
 
     A compiler makes lanes of a loop over balls only where a selection needs no load: the numbers are gathered first.
+
+    Parameters
+    ----------
+    functions : with arguments deflection, rate, p, c
+    names : of the functions over the entries
+    numbers_name : of the function (p, c) -> k
     """
     used: list[tuple[int, int]] = []
-    for name in ("law", "law_slopes"):
-        law = functions[name]
-        for k in range(law.n_instructions()):
-            if law.instruction_id(k) == ca.OP_INPUT:
-                argument, entry = law.instruction_input(k)
+    for function in functions:
+        for k in range(function.n_instructions()):
+            if function.instruction_id(k) == ca.OP_INPUT:
+                argument, entry = function.instruction_input(k)
                 if argument > 1 and (argument, entry) not in used:
                     used.append((argument, entry))
     used.sort()
-    law = functions["law"]
-    given = {law.name_in(k): ca.SX.sym(law.name_in(k), law.sparsity_in(k)) for k in range(2, law.n_in())}
+    first = functions[0]
+    given = {first.name_in(k): ca.SX.sym(first.name_in(k), first.sparsity_in(k)) for k in range(2, first.n_in())}
     vectors = [*given.values()]
     # C has no arrays of length zero
     chosen = ca.vertcat(*(vectors[a - 2][e] for a, e in used)) if used else ca.SX(0.0)
-    numbers = ca.Function("law_numbers", vectors, [ca.densify(chosen)], [*given], ["k"])
+    numbers = ca.Function(numbers_name, vectors, [ca.densify(chosen)], [*given], ["k"])
     entries = ca.SX.sym("k", max(len(used), 1))
     replaced = [ca.SX.zeros(v.numel()) for v in vectors]
     for place, (argument, entry) in enumerate(used):
         replaced[argument - 2][entry] = entries[place]
     delta, rate = ca.SX.sym("delta"), ca.SX.sym("rate")
     made = []
-    for name, new in (("law", "ball_force"), ("law_slopes", "ball_slopes")):
-        results = functions[name].call([delta, rate, *replaced], True, False)
-        function = ca.Function(
-            new,
-            [delta, rate, entries],
-            ca.cse([ca.densify(r) for r in results]),
-            ["delta", "rate", "k"],
-            functions[name].name_out(),
-        )
-        made.append(
-            Kernel(function=function, description="Force of one ball [N]" + " and its slopes" * (name != "law"))
-        )
-    return Kernel(function=numbers, description="Numbers that the force of a ball depends on"), tuple(made)
+    for function, name in zip(functions, names, strict=True):
+        results = ca.cse([ca.densify(r) for r in function.call([delta, rate, *replaced], True, False)])
+        made.append(ca.Function(name, [delta, rate, entries], results, ["delta", "rate", "k"], function.name_out()))
+    return numbers, tuple(made)
 
 
-def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...]]:
-    """The angles of a stage, and the stage from their cosines and sines.
+def _partials(slopes: ca.Function) -> Kernel:
+    """The force of a ball, its slopes, and its derivatives by the numbers it depends on."""
+    delta, rate, k = (ca.SX.sym(slopes.name_in(i), slopes.size1_in(i)) for i in range(3))
+    results = [*slopes.call([delta, rate, k], True, False)]
+    results.append(ca.densify(ca.jacobian(results[0], k)).T)
+    made = ca.Function(
+        "ball_partials", [delta, rate, k], ca.cse(results), ["delta", "rate", "k"], ["F", "Fd", "Fv", "Fk"]
+    )
+    return Kernel(function=made, description="Force of one ball [N], its slopes, and those by its numbers")
+
+
+def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Kernel]:
+    """The angles of a stage, the stage from their cosines and sines, its derivatives, and these along a direction.
 
     Sines and cosines whose arguments are linear in time are taken out; others stay where they are.
     """
@@ -328,19 +356,33 @@ def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...]]:
     takes = {**directions, "at": turning, **symbols}
     rated = ca.Function("stage_rate_turned", [*takes.values()], results, [*takes], ["w", "wt"])
     words = "from cosines and sines of its angles"
-    return Kernel(function=made, description="Angles of a stage and their rates"), (
-        Kernel(function=plain, description=f"Stage variables {words}"),
-        Kernel(function=rated, description=f"Stage variables and their time derivatives {words}"),
+    # the angles move with inputs, parameters and constants as well
+    moving = {name: symbols[name] for name in ("u", "p", "c")}
+    seeds = ca.vertcat(*moving.values())
+    by_angle = ca.jacobian(w, sine) @ ca.diag(cosine) - ca.jacobian(w, cosine) @ ca.diag(sine)
+    slopes = ca.jacobian(w, seeds) + by_angle @ ca.jacobian(angle, seeds)
+    entries: ca.SX = slopes.nz[:]
+    takes = {**directions, **symbols}
+    sloped = ca.Function("stage_slopes", [*takes.values()], ca.cse([ca.densify(w), entries]), [*takes], ["w", "J"])
+    known = ca.SX.sym("J", entries.numel())
+    along = {f"{name}_d": ca.SX.sym(f"{name}_d", moving[name].numel()) for name in moving}
+    change = ca.densify(ca.SX(slopes.sparsity(), known) @ ca.vertcat(*along.values()))
+    moved = ca.Function("stage_moved", [known, *along.values()], [change], ["J", *along], ["w_d"])
+    return (
+        Kernel(function=made, description="Angles of a stage and their rates"),
+        (
+            Kernel(function=plain, description=f"Stage variables {words}"),
+            Kernel(function=rated, description=f"Stage variables and their time derivatives {words}"),
+        ),
+        Kernel(function=sloped, description=f"Stage variables {words}, and their derivatives by u, p, c"),
+        Kernel(function=moved, description="Stage variables"),
     )
 
 
 #: Directional derivatives for sensitivities: name, kernel, the arguments that move, and the results that are wanted.
 _TANGENTS: tuple[tuple[str, str, tuple[str, ...], tuple[str, ...]], ...] = (
-    ("stage_tangent", "stage", ("u", "p", "c"), ("w",)),
     ("stage_rate_tangent", "stage_rate", ("u", "p", "c"), ("w", "wt")),
     ("relative_tangent", "relative", ("x", "u", "p", "c", "w"), ("r",)),
-    # the slopes of the law are known where this is called: only its own parameters are left
-    ("law_partial", "law", ("p", "c"), ("F",)),
     ("law_slopes_tangent", "law_slopes", ("delta", "rate", "p", "c"), ("Fd", "Fv")),
     ("acceleration_tangent", "acceleration", ("x", "S", "u", "p", "c", "w"), ("a",)),
     ("acceleration_jacobian_tangent", "acceleration_jacobian", ("x", "S", "G", "u", "p", "c", "w"), ("A", "B")),

@@ -36,6 +36,7 @@ METHODS = (
     "rosenbrock",
     "erk",
     "cvodes",
+    "quasi-static",
 )
 #: Largest file that is read [bytes]; the largest sensible one is a table of loads.
 MAX_FILE_SIZE = 8_000_000

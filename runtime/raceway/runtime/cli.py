@@ -13,7 +13,6 @@ import os
 import signal
 import sys
 import tempfile
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from types import FrameType
@@ -91,7 +90,8 @@ def run(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Integrator: auto, stepper (or stepper-rodas4, -rodas5p, -dp54, -dop853), erk, rosenbrock, cvodes.",
+            help="Integrator: auto, stepper (or stepper-rodas4, -rodas5p, -dp54, -dop853), erk, rosenbrock, "
+            "cvodes; or quasi-static, the rings in equilibrium at each instant.",
         ),
     ] = None,
     error: Annotated[
@@ -138,8 +138,6 @@ def run(
             trade=usable_trade(folder, read) if target is not None else None,
         )
         summary, files = _write_results(model, solution, folder, stages, figures=figures)
-    if solution.accuracy is not None:
-        summary["accuracy"] = asdict(solution.accuracy)
     from raceway.runtime.summary import render_summary
 
     if json_:
@@ -235,12 +233,14 @@ def _check_request(
     """Refuse options that no model can follow, before anything is derived or written."""
     from raceway.runtime.integrators import METHODS
     from raceway.runtime.parameters import unknown_name
+    from raceway.runtime.quasi_static import NAME as QUASI_STATIC
     from raceway.runtime.request import TOLERANCES
     from raceway.runtime.stepper import METHODS as STEPPERS
 
     faults = []
-    if method is not None and method not in ("auto", *STEPPERS, *METHODS):
-        faults.append(f"--method: {unknown_name('method', method, ('auto', *STEPPERS, *METHODS))}")
+    known = ("auto", *STEPPERS, QUASI_STATIC, *METHODS)
+    if method is not None and method not in known:
+        faults.append(f"--method: {unknown_name('method', method, known)}")
     if rtol is not None and not TOLERANCES[0] <= rtol <= TOLERANCES[1]:
         faults.append(
             f"--rtol: {rtol:g} lies outside its bounds. Allowed: {TOLERANCES[0]:g} to {TOLERANCES[1]:g}. "
@@ -284,6 +284,8 @@ def _write_results(
 
     stages("write")
     summary = summarize(model, solution)
+    if solution.accuracy is not None:
+        summary["accuracy"] = solution.accuracy.plain()
     made = _make_folder(folder)
     try:
         with tempfile.TemporaryDirectory(prefix=".writing-", dir=folder) as name:

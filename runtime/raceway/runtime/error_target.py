@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -43,8 +43,8 @@ STIFF = 2.0
 #: Errors that may be asked for [1].
 SMALLEST, LARGEST = 1e-8, 0.5
 
-#: Most steps of a way: so many times those of the longest one before, and at least so many a cycle.  Ten times as tight takes twice
-#: the steps; a way that takes far more is stuck at the resolution of numbers.
+#: Most steps of a way: so many times those of the longest one before, and at least so many a cycle.  Ten times as
+#: tight takes twice the steps; a way that takes far more is stuck at the resolution of numbers.
 GROWTH, SPARE = 20, 100_000
 
 #: Method and tolerance.
@@ -100,6 +100,12 @@ class Accuracy:
     reason: str
     time: float
     companion_time: float
+
+    def plain(self) -> dict[str, Any]:
+        """Plain data for JSON; an estimate that is infinite becomes None."""
+        data = asdict(self)
+        data["tried"] = [(*way, e if math.isfinite(e) else None) for *way, e in self.tried]
+        return data
 
     @property
     def words(self) -> str:
@@ -199,7 +205,7 @@ def meet_target(run: Prepared, target: float, of: Sequence[str], trade: Trade | 
             return reached
         tried.append((*way, estimate))
         # a rung is a decade of tolerance, and about a decade of error: those that cannot be enough are left out
-        if place > 1 and estimate < math.inf:
+        if 1 < place < len(pairs) and estimate < math.inf:
             place = min(place + max(0, math.floor(math.log10(SAFETY * estimate / target))), len(pairs) - 1)
         if best is None or estimate < best.estimate:
             best = reached
@@ -249,8 +255,10 @@ def prefer(trade: Trade, target: float, of: Sequence[str]) -> tuple[Measured, Me
         and one.configuration.method.startswith(("stepper", "quasi"))
         and one.failures == 0
     ]
-    fit = [one for one in ways if all(SAFETY * one.promised[name] <= target for name in of)]
-    if not fit:
+    # with room for the companion's error where there is such a way, else without: the estimate has the last word
+    fits = ([w for w in ways if all(room * w.promised[name] <= target for name in of)] for room in (SAFETY, 1.0))
+    fit = next((found for found in fits if found), None)
+    if fit is None:
         return None
     chosen = min(fit, key=lambda m: m.time)
     worst = max(chosen.median[name] for name in of)

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from raceway.runtime.bounds import outside, violations
 from raceway.runtime.compile import find_compiler
 from raceway.runtime.ensemble_driver import EnsembleDriver, compile_ensemble
 from raceway.runtime.errors import RequestError, SimulationError
@@ -191,15 +192,25 @@ def compile_fast_math(model: Model, folder: Path) -> EnsembleDriver | None:
 def perturbed(model: Model, count: int, spread: float = SPREAD, seed: int = 1) -> dict[str, np.ndarray]:
     """Parameter sets around the model's: every number that is not zero, drawn evenly from its neighbourhood.
 
-    The times of a load's table stay: drawn one by one they would change places where the load is steep.
+    The times of a load's table stay: drawn one by one they would change places where the load is steep.  A number that
+    is not allowed is mirrored at the user's, for that one may lie on its bound.
     """
     random = np.random.default_rng(seed)
-    times = {name for item in model.manifest.inputs for name in item.times}
-    return {
-        info.name: info.default * (1.0 + spread * random.uniform(-1.0, 1.0, count))
-        for info in model.manifest.parameters
-        if info.default != 0.0 and info.name not in times
-    }
+    manifest = model.manifest
+    times = {name for item in manifest.inputs for name in item.times}
+    sets = {}
+    for info in manifest.parameters:
+        if info.default == 0.0 or info.name in times:
+            continue
+        values = info.default * (1.0 + spread * random.uniform(-1.0, 1.0, count))
+        values = np.where(outside(info, values), 2.0 * info.default - values, values)
+        sets[info.name] = np.where(outside(info, values), info.default, values)
+    defaults = {info.name: info.default for info in manifest.parameters}
+    for bad, _ in violations(manifest, {name: sets.get(name, np.full(count, v)) for name, v in defaults.items()}):
+        # two numbers that are too near each other for their member: it becomes the user's own
+        for name, values in sets.items():
+            values[bad] = defaults[name]
+    return sets
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

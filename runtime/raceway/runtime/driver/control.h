@@ -7,8 +7,14 @@
 
 enum {
     RW_STIFF_STEPS = 12, /* steps at the stability limit before an explicit method gives up */
-    RW_STIFF_LOOK = 8    /* every so many steps it looks whether it is there */
+    RW_STIFF_LOOK = 8,   /* every so many steps it looks whether it is there */
+    RW_FAMILY_LOOKS = 3, /* looks that a change of family is decided on */
+    RW_FAMILY_CHANGES = 3 /* changes of family within a segment; more only where an explicit method gives up */
 };
+
+/* Step size times fastest rate, in the mean over the looks.  Above the first an explicit method is held down by stability and not by
+   accuracy.  Below the second an explicit step, of which more than three cost as much as a linearly implicit one, is not. */
+static const double RW_LIMITED = 2.6, RW_WORTH_SOLVING = 4.0;
 
 /* Logarithm of 1e-4: smaller errors of the step before do not tell the controller more. */
 static const double RW_LOG_SMALL_ERROR = -9.210340371976182;
@@ -32,6 +38,23 @@ static inline double rw_first_step(const rw_numbers *n, double t, const double *
     const double second = larger > 1e-15 ? pow(0.01 / larger, 1.0 / error_exponent) : h * 1e-3;
     h = 100.0 * h < second ? 100.0 * h : second;
     return h < longest ? h : longest;
+}
+
+/* Bound of the fastest rate of q'' = A q + B q' [1/s]: of decay or of oscillation. */
+static inline double rw_fastest_rate(const double *restrict A, const double *restrict B)
+{
+    double decay = 0.0, squared = 0.0;
+    for (int i = 0; i < RW_NQ; i++) {
+        double a = 0.0, b = 0.0;
+        for (int j = 0; j < RW_NQ; j++) {
+            a += fabs(A[i * RW_NQ + j]);
+            b += fabs(B[i * RW_NQ + j]);
+        }
+        decay = b > decay ? b : decay;
+        squared = a > squared ? a : squared;
+    }
+    const double half = 0.5 * decay, oscillation = sqrt(squared);
+    return half > oscillation ? half + sqrt(half * half - squared) : oscillation;
 }
 
 /* Whether the linearly implicit family fits: where damping is faster than the oscillation it damps, for then an explicit method's step is

@@ -260,16 +260,14 @@ static void reduce(const rw_job *job, rw_lane_block *b)
             const double v0 = b->sampled[0][row + lane], v1 = b->sampled[1][row + lane], v2 = b->sampled[2][row + lane];
             const double v3 = b->sampled[3][row + lane], v4 = b->sampled[4][row + lane];
             const double sum = rw_boole[0] * (v0 + v4) + rw_boole[1] * (v1 + v3) + rw_boole[2] * v2;
-            const double squares = rw_boole[0] * (v0 * v0 + v4 * v4) + rw_boole[1] * (v1 * v1 + v3 * v3) + rw_boole[2] * (v2 * v2);
+            double q[5], low, high;
+            rw_quartic(v0, v1, v2, v3, v4, q);
+            rw_survey(v0, v1, v2, v3, v4, q, &low, &high);
+            const double boole = rw_boole[0] * (v0 * v0 + v4 * v4) + rw_boole[1] * (v1 * v1 + v3 * v3) + rw_boole[2] * (v2 * v2);
+            const double squares = k < RW_NX ? rw_mean_square(q) : boole;
             b->integral[row + lane] += add[lane] != 0.0 ? b->h[lane] * sum : 0.0;
             b->square[row + lane] += add[lane] != 0.0 ? b->h[lane] * squares : 0.0;
-            const double a = v0 > v1 ? v0 : v1, c = v0 > v1 ? v1 : v0, d = v2 > v3 ? v2 : v3, e = v2 > v3 ? v3 : v2;
-            double high = a > d ? a : d, low = c < e ? c : e;
-            high = v4 > high ? v4 : high;
-            low = v4 < low ? v4 : low;
-            /* a parabola through three of the points rises above them by no more than an eighth of their range */
-            const double reach = 0.1250001 * (high - low);
-            const double above = high + reach > b->maximum[row + lane] ? 1.0 : 0.0, below = low - reach < b->minimum[row + lane] ? 1.0 : 0.0;
+            const double above = high > b->maximum[row + lane] ? 1.0 : 0.0, below = low < b->minimum[row + lane] ? 1.0 : 0.0;
             news[lane] = add[lane] * (above + 2.0 * below);
         }
         for (int lane = 0; lane < RW_L; lane++) any += news[lane];

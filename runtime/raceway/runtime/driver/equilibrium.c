@@ -14,6 +14,11 @@ static const double RW_RESOLUTION = 1e-9;
 /* Newton's method converges quadratically: what it leaves is far smaller than the last correction it makes. */
 static const double RW_NEWTON_SHARE = 1e-3;
 
+/* Where a single ball carries the load, for an instant, on its way from one neighbour's help to the other's, there is no single answer: so
+   many steps of other lengths are tried around such an instant, and a point within a step is taken beside it by this part of the step. */
+enum { RW_ATTEMPTS = 40 };
+static const double RW_BESIDE = 1e-5;
+
 /* An instant, with its clock in the segment. */
 typedef struct {
     double t, q[RW_NQ], v[RW_NQ];
@@ -66,7 +71,22 @@ static int within(rw_follower *f, double t, rw_instant *found)
     const rw_instant *a = late ? &f->middle : &f->left, *b = late ? &f->right : &f->middle;
     found->t = t;
     hermite(a, b, (t - a->t) / (b->t - a->t), found->q);
+    if (seek(f, found)) return 1;
+    f->status = RACEWAY_EQUILIBRIUM_DONE;
+    found->t = t + (late ? -RW_BESIDE : RW_BESIDE) * (f->right.t - f->left.t);
+    hermite(a, b, (found->t - a->t) / (b->t - a->t), found->q);
     return seek(f, found);
+}
+
+/* Ends of a step of length h from f->left on, and the guess for its middle. */
+static int step_ends(rw_follower *f, double h, double *guess)
+{
+    for (int k = 0; k < RW_NQ; k++) f->right.q[k] = f->left.q[k] + h * f->left.v[k];
+    if (!seek(f, &f->right)) return 0;
+    hermite(&f->left, &f->right, 0.5, guess);
+    f->middle.t = f->left.t + 0.5 * h;
+    memcpy(f->middle.q, guess, RW_NQ * sizeof *guess);
+    return seek(f, &f->middle);
 }
 
 /* A channel of the reductions within the step; where no equilibrium is found the run ends, and what is returned does not count. */
@@ -122,6 +142,7 @@ static int follow(rw_follower *f, double begin, double length, int is_final, dou
     double *reduction = f->options->reduction;
     const int reduced = reduction && begin >= reduction[RW_FROM];
     double h = *step < length ? *step : length;
+    int attempts = 0;
     while (f->left.t < length) {
         if (result->steps + result->rejected >= f->options->max_steps) {
             f->status = RACEWAY_EQUILIBRIUM_TOO_MANY_STEPS;
@@ -131,14 +152,17 @@ static int follow(rw_follower *f, double begin, double length, int is_final, dou
         double guess[RW_NQ];
         f->right.t = last ? length : f->left.t + h;
         h = f->right.t - f->left.t;
-        for (int k = 0; k < RW_NQ; k++) f->right.q[k] = f->left.q[k] + h * f->left.v[k];
-        if (!seek(f, &f->right)) return 0;
-        hermite(&f->left, &f->right, 0.5, guess);
-        f->middle.t = f->left.t + 0.5 * h;
-        memcpy(f->middle.q, guess, sizeof guess);
-        if (!seek(f, &f->middle)) return 0;
+        if (!step_ends(f, h, guess)) {
+            if (++attempts > RW_ATTEMPTS) return 0;
+            f->status = RACEWAY_EQUILIBRIUM_DONE;
+            result->rejected++;
+            /* such instants are isolated: shorter steps end before this one, and where none is shorter, longer ones behind it */
+            if (h <= 4.0 * shortest && attempts < RW_ATTEMPTS / 2) attempts = RW_ATTEMPTS / 2;
+            h *= attempts < RW_ATTEMPTS / 2 ? 0.37 : 2.9;
+            continue;
+        }
         const double error = misfit(f, guess);
-        const int passed = error > 1.0 && h <= 2.0 * shortest;
+        const int passed = error > 1.0 && (h <= 2.0 * shortest || attempts >= RW_ATTEMPTS / 2);
         /* the misfit of a smooth equilibrium goes like the fourth power of the step */
         double factor = error > 0.0 ? 0.9 * sqrt(sqrt(1.0 / error)) : 4.0;
         if (error > 1.0 && !passed) {
@@ -147,6 +171,7 @@ static int follow(rw_follower *f, double begin, double length, int is_final, dou
             h = h * factor > shortest ? h * factor : shortest;
             continue;
         }
+        attempts = 0;
         result->steps++;
         result->jumps += passed;
         if (reduced && !passed && !reduce(f, begin)) return 0;

@@ -1,13 +1,17 @@
 /* On-line reductions: extremes with their times, mean and mean square of channels, from the dense output of every accepted step.
 
    Channels are the states, then four quantities of the balls, each with its value of the most loaded ball at the moment: total force,
-   elastic force, damping force, deflection.  Every step is looked at in its quarters, theta = 0, 1/4, 1/2, 3/4, 1.
+   elastic force, damping force, deflection.  Every step is looked at in its quarters, theta = 0, 1/4, 1/2, 3/4, 1;
+   those of DOP853, whose output is of degree seven and not four, as two steps of half the size.
 
-   Integrals are taken by Boole's rule, exact up to degree five: for states exact with all methods but DOP853, whose output is of degree
-   seven.  Extremes: a parabola through the three best points says whether
-   and where there is a larger value between them; the channel is evaluated there from the dense output, and the parabola drawn anew.  So an
-   extreme is always a value that the solution takes, never an extrapolation across a kink.  At a kink it is met to a part of a quarter
-   step: the smallest value of the most loaded ball is such a place, for there two balls change rank.
+   Integrals are taken by Boole's rule; squares of states over the polynomial of degree four through the five values, which is exact for
+   all methods but DOP853; squares of the balls' quantities by Boole's rule as well, for where these jump a polynomial swings.
+
+   Extremes: that polynomial is looked at for tops, all of them, wherever its hull reaches
+   beyond the extreme known so far; the channel is evaluated there from the dense output, and where it is not what the polynomial promised
+   the search climbs on from there.  For states and all methods but DOP853 the polynomial is the dense output itself, and no extreme is
+   missed.  An extreme is always a value that the solution takes, never an extrapolation across a kink.  At a kink it is met to a part of
+   a quarter step: the smallest value of the most loaded ball is such a place, for there two balls change rank.
 
    A reduction is a row of RW_REDUCTION numbers, which a run adds to: it can go on in another call. */
 #ifndef RACEWAY_REDUCTIONS_H
@@ -35,7 +39,10 @@ enum {
     RW_REDUCTION = RW_SQUARE + RW_CHANNELS
 };
 
-enum { RW_REFINEMENTS = 12 }; /* evaluations spent on an extreme at most; a smooth one takes two or three */
+enum {
+    RW_REFINEMENTS = 12, /* evaluations spent on a top at most, besides the first three; one of a state takes one */
+    RW_CELLS = 16        /* parts of a step in which the slope of a channel may change its sign */
+};
 
 /* Channels wanted, a bit each; whether those of the balls are among them. */
 static inline unsigned long rw_wanted(const double *reduction) { return (unsigned long)reduction[RW_WANTED]; }
@@ -50,17 +57,18 @@ typedef double (*rw_channel_at)(const void *source, int channel, double theta, i
 /* Quantities of all balls at a state and time.  One ball a lane. */
 static inline void rw_ball_quantities(const rw_numbers *n, double t, const double *restrict x, double q[RW_BALL_CHANNELS][RW_NB])
 {
-    double w[RW_NW], r[5];
+    double w[RW_NW], r[5], k[RW_NCONTACT];
     rw_cage(t, n->u, n->p, n->c, w);
     rw_relative(x, n->u, n->p, n->c, w, r);
-    const double *restrict p = n->p, *restrict c = n->c;
+    rw_contact_numbers(n->p, n->c, k);
+    const double cage_cos = w[0], cage_sin = w[1];
 #pragma omp simd
     for (int j = 0; j < RW_NB; j++) {
-        const double co = rw_cos[j] * w[0] - rw_sin[j] * w[1];
-        const double si = rw_sin[j] * w[0] + rw_cos[j] * w[1];
+        const double co = rw_cos[j] * cage_cos - rw_sin[j] * cage_sin;
+        const double si = rw_sin[j] * cage_cos + rw_cos[j] * cage_sin;
         const double delta = r[0] + r[1] * co + r[2] * si;
         double elastic, damping;
-        rw_contact(delta, r[3] * co + r[4] * si, p, c, &elastic, &damping);
+        rw_ball_contact(delta, r[3] * co + r[4] * si, k, &elastic, &damping);
         q[0][j] = elastic + damping;
         q[1][j] = elastic;
         q[2][j] = damping;
@@ -78,6 +86,7 @@ static inline void rw_channels(const rw_numbers *n, double t, const double *rest
     rw_ball_quantities(n, t, x, q);
     for (int k = 0; k < RW_BALL_CHANNELS; k++) {
         double most = q[k][0];
+#pragma omp simd reduction(max : most)
         for (int j = 1; j < RW_NB; j++) most = q[k][j] > most ? q[k][j] : most;
         value[RW_NX + k] = most;
     }
@@ -107,6 +116,111 @@ static inline double rw_top(double a, double va, double b, double vb, double c, 
     return top > a && top < c ? top : b;
 }
 
+/* The polynomial of degree four through the values at the quarters, in powers of s = 4 theta - 2. */
+static inline void rw_quartic(double v0, double v1, double v2, double v3, double v4, double *restrict q)
+{
+    q[0] = v2;
+    q[1] = (8.0 * (v3 - v1) - (v4 - v0)) * (1.0 / 12.0);
+    q[2] = (16.0 * (v1 + v3) - (v0 + v4) - 30.0 * v2) * (1.0 / 24.0);
+    q[3] = ((v4 - v0) - 2.0 * (v3 - v1)) * (1.0 / 12.0);
+    q[4] = ((v0 + v4) - 4.0 * (v1 + v3) + 6.0 * v2) * (1.0 / 24.0);
+}
+
+/* Mean of its square over the step. */
+static inline double rw_mean_square(const double *restrict q)
+{
+    return q[0] * q[0] + 4.0 / 3.0 * (2.0 * q[0] * q[2] + q[1] * q[1]) + 16.0 / 5.0 * (2.0 * (q[0] * q[4] + q[1] * q[3]) + q[2] * q[2])
+           + 64.0 / 7.0 * (2.0 * q[2] * q[4] + q[3] * q[3]) + 256.0 / 9.0 * (q[4] * q[4]);
+}
+
+/* Bounds of that polynomial between its ends: its inner Bezier ordinates (it lies within their hull and that of its end values). */
+static inline void rw_hull(const double *restrict q, double *restrict hull)
+{
+    const double even = q[0] - 16.0 * q[4], odd = q[1] - 4.0 * q[3];
+    hull[0] = even - odd;
+    hull[1] = q[0] - 4.0 / 3.0 * q[2] + 16.0 * q[4];
+    hull[2] = even + odd;
+}
+
+/* Bounds of what a step may bring, from the values at its quarters and that polynomial: no extreme is looked for that lies within those
+   known.  A parabola through three of the points rises above them by no more than an eighth of their range. */
+static inline void rw_survey(double v0, double v1, double v2, double v3, double v4, const double *restrict q, double *restrict bottom,
+                             double *restrict top)
+{
+    double hull[3];
+    rw_hull(q, hull);
+    const double a = v0 > v1 ? v0 : v1, c = v0 > v1 ? v1 : v0, d = v2 > v3 ? v2 : v3, e = v2 > v3 ? v3 : v2;
+    double high = a > d ? a : d, low = c < e ? c : e;
+    high = v4 > high ? v4 : high;
+    low = v4 < low ? v4 : low;
+    const double reach = 0.1250001 * (high - low), up = hull[0] > hull[1] ? hull[0] : hull[1], down = hull[0] > hull[1] ? hull[1] : hull[0];
+    high = up > high + reach ? up : high + reach;
+    low = down < low - reach ? down : low - reach;
+    *top = hull[2] > high ? hull[2] : high;
+    *bottom = hull[2] < low ? hull[2] : low;
+}
+
+/* What the search for one extreme of a channel within a step knows. */
+typedef struct {
+    double *best; /* in the reduction; its time and ball follow */
+    double sign;  /* 1 for a maximum, -1 for a minimum */
+    double time, h;
+    rw_channel_at at;
+    const void *source;
+    int channel;
+} rw_search;
+
+/* The channel within the step, with the sign of a maximum; the extreme is brought up to date. */
+static inline double rw_probe(const rw_search *search, double theta)
+{
+    int ball;
+    const double value = search->at(search->source, search->channel, theta, &ball), found = search->sign * value;
+    if (found > search->sign * *search->best) {
+        search->best[0] = value;
+        search->best[RW_CHANNELS] = search->time + theta * search->h;
+        search->best[2 * RW_CHANNELS] = ball;
+    }
+    return found;
+}
+
+/* The top that is near theta, where `promised` was expected. */
+static inline void rw_climb(const rw_search *search, double theta, double promised)
+{
+    double b = theta, vb = rw_probe(search, b);
+    /* the polynomial is the channel: there is its top */
+    if (fabs(vb - promised) <= 1e-12 * (fabs(vb) + fabs(promised))) return;
+    const double side = 0.5 / RW_CELLS;
+    double a = b > side ? b - side : 0.0, c = b < 1.0 - side ? b + side : 1.0, va = rw_probe(search, a), vc = rw_probe(search, c);
+    for (int i = 0; i < RW_REFINEMENTS; i++) {
+        if (va > vb || vc > vb) {
+            /* not between the outer ones: go on uphill, with strides that double */
+            const double stride = 2.0 * (c - a);
+            if (vc > va) {
+                if (c >= 1.0) return;
+                a = b, va = vb, b = c, vb = vc;
+                c = c + stride < 1.0 ? c + stride : 1.0, vc = rw_probe(search, c);
+            } else {
+                if (a <= 0.0) return;
+                c = b, vc = vb, b = a, vb = va;
+                a = a > stride ? a - stride : 0.0, va = rw_probe(search, a);
+            }
+            continue;
+        }
+        /* what the next parabola promises on top; beside a jump of the force parabolas creep, and every other place is the middle of the
+           larger part instead */
+        const double range = va < vc ? vb - va : vb - vc, next = rw_top(a, va, b, vb, c, vc), move = (next - b) / (next < b ? b - a : c - b);
+        if (!(range * move * move > 1e-9 * fabs(vb))) return;
+        const double place = i % 2 == 0 ? next : b - a > c - b ? 0.5 * (a + b) : 0.5 * (b + c), found = rw_probe(search, place);
+        if (place < b) {
+            if (found > vb) c = b, vc = vb, b = place, vb = found;
+            else a = place, va = found;
+        } else {
+            if (found > vb) a = b, va = vb, b = place, vb = found;
+            else c = place, vc = found;
+        }
+    }
+}
+
 /* Bring one extreme of a channel up to date with a step.
 
    reduction   the row
@@ -117,51 +231,47 @@ static inline double rw_top(double a, double va, double b, double vb, double c, 
 static inline void rw_extreme(double *reduction, int value, int channel, double sign, const double *v, int stride, double time, double h,
                               rw_channel_at at, const void *source)
 {
-    double *best = reduction + value + channel;
-    double *best_time = best + RW_CHANNELS, *best_ball = best_time + RW_CHANNELS;
+    const rw_search search = {reduction + value + channel, sign, time, h, at, source, channel};
+    double *best = search.best, u[RW_POINTS], q[5], hull[3], slope[RW_CELLS + 1];
     const int first = !(reduction[RW_DURATION] > 0.0);
     int top = 0, ball;
-    for (int i = 1; i < RW_POINTS; i++)
-        if (sign * v[i * stride] > sign * v[top * stride]) top = i;
-    if (first || sign * v[top * stride] > sign * *best) {
+    for (int i = 0; i < RW_POINTS; i++) {
+        u[i] = sign * v[i * stride];
+        if (u[i] > u[top]) top = i;
+    }
+    if (first || u[top] > sign * *best) {
         const double theta = (double)top / (RW_POINTS - 1);
         at(source, channel, theta, &ball);
-        *best = v[top * stride];
-        *best_time = time + theta * h;
-        *best_ball = ball;
+        best[0] = v[top * stride];
+        best[RW_CHANNELS] = time + theta * h;
+        best[2 * RW_CHANNELS] = ball;
     }
-    /* does a parabola promise more within the step?  At its ends the nearest three points are taken. */
+    /* is there anything above it?  The parabola is for balls that change rank within the step, where no polynomial is the channel. */
+    rw_quartic(u[0], u[1], u[2], u[3], u[4], q);
+    rw_hull(q, hull);
     const int middle = top == 0 ? 1 : top == RW_POINTS - 1 ? RW_POINTS - 2 : top;
-    const double low = sign * v[(middle - 1) * stride], mid = sign * v[middle * stride], high = sign * v[(middle + 1) * stride];
-    const double curvature = low - 2.0 * mid + high, slope = 0.5 * (high - low);
-    if (!(curvature < 0.0)) return;
-    const double shift = -slope / curvature;
-    double theta = (middle + shift) / (RW_POINTS - 1);
-    if (!(theta > 0.0 && theta < 1.0) || !(mid - 0.5 * slope * slope / curvature > sign * *best)) return;
-    /* bracket a < b < c, values with the sign of a maximum */
-    double a = (double)(middle - 1) / (RW_POINTS - 1), b = (double)middle / (RW_POINTS - 1), c = (double)(middle + 1) / (RW_POINTS - 1);
-    double va = low, vb = mid, vc = high;
-    for (int i = 0; i < RW_REFINEMENTS; i++) {
-        const double found = sign * at(source, channel, theta, &ball);
-        if (found > sign * *best) {
-            *best = sign * found;
-            *best_time = time + theta * h;
-            *best_ball = ball;
-        }
-        if (theta < b) {
-            if (found > vb) c = b, vc = vb, b = theta, vb = found;
-            else a = theta, va = found;
-        } else if (theta > b) {
-            if (found > vb) a = b, va = vb, b = theta, vb = found;
-            else c = theta, vc = found;
-        }
-        if (!(vb >= va && vb >= vc)) return;
-        /* what the next parabola promises on top; beside a jump of the force parabolas creep, and every other place is the middle of the
-           larger part instead */
-        const double range = va < vc ? vb - va : vb - vc, next = rw_top(a, va, b, vb, c, vc), move = (next - b) / (next < b ? b - a : c - b);
-        if (!(range * move * move > 1e-9 * fabs(vb))) return;
-        theta = i % 2 == 0 ? next : b - a > c - b ? 0.5 * (a + b) : 0.5 * (b + c);
+    const double bend = u[middle - 1] - 2.0 * u[middle] + u[middle + 1], rise = 0.5 * (u[middle + 1] - u[middle - 1]);
+    const double shift = bend < 0.0 ? -rise / bend : 0.0, place = (middle + shift) / (RW_POINTS - 1);
+    const double above = u[middle] + 0.5 * rise * shift, known = sign * *best;
+    if (!(hull[0] > known || hull[1] > known || hull[2] > known || above > known)) return;
+    /* every top of the polynomial: where its slope changes sign */
+    for (int i = 0; i <= RW_CELLS; i++) {
+        const double s = 4.0 * i / RW_CELLS - 2.0;
+        slope[i] = q[1] + s * (2.0 * q[2] + s * (3.0 * q[3] + s * (4.0 * q[4])));
     }
+    for (int i = 0; i < RW_CELLS; i++) {
+        if (!(slope[i] > 0.0 && slope[i + 1] <= 0.0)) continue;
+        const double low = 4.0 * i / RW_CELLS - 2.0, high = 4.0 * (i + 1) / RW_CELLS - 2.0;
+        double s = low + (high - low) * slope[i] / (slope[i] - slope[i + 1]);
+        for (int k = 0; k < 4; k++) {
+            const double there = q[1] + s * (2.0 * q[2] + s * (3.0 * q[3] + s * (4.0 * q[4])));
+            const double curve = 2.0 * q[2] + s * (6.0 * q[3] + s * (12.0 * q[4])), moved = curve < 0.0 ? s - there / curve : s;
+            s = moved < low ? low : moved > high ? high : moved;
+        }
+        const double promised = q[0] + s * (q[1] + s * (q[2] + s * (q[3] + s * q[4])));
+        if (promised > sign * *best) rw_climb(&search, 0.25 * (s + 2.0), promised);
+    }
+    if (channel >= RW_NX && above > sign * *best && place > 0.0 && place < 1.0) rw_climb(&search, place, above);
 }
 
 /* Add an accepted step whose channels at the quarters are v. */
@@ -169,17 +279,29 @@ static inline void rw_reduce(double *reduction, const double v[RW_POINTS][RW_CHA
                              const void *source)
 {
     const unsigned long wanted = rw_wanted(reduction);
+    const int first = !(reduction[RW_DURATION] > 0.0);
+    double sum[RW_CHANNELS], square[RW_CHANNELS], top[RW_CHANNELS], bottom[RW_CHANNELS];
+#pragma omp simd
+    for (int k = 0; k < RW_CHANNELS; k++) {
+        const double v0 = v[0][k], v1 = v[1][k], v2 = v[2][k], v3 = v[3][k], v4 = v[4][k];
+        double q[5], low, high;
+        rw_quartic(v0, v1, v2, v3, v4, q);
+        rw_survey(v0, v1, v2, v3, v4, q, &low, &high);
+        top[k] = high;
+        bottom[k] = low;
+        sum[k] = rw_boole[0] * (v0 + v4) + rw_boole[1] * (v1 + v3) + rw_boole[2] * v2;
+        const double boole = rw_boole[0] * (v0 * v0 + v4 * v4) + rw_boole[1] * (v1 * v1 + v3 * v3) + rw_boole[2] * (v2 * v2);
+        const double exact = rw_mean_square(q);
+        square[k] = k < RW_NX ? exact : boole;
+    }
     for (int k = 0; k < RW_CHANNELS; k++) {
         if (!(wanted >> k & 1)) continue;
-        double sum = 0.0, square = 0.0;
-        for (int i = 0; i < RW_POINTS; i++) {
-            sum += rw_boole[i] * v[i][k];
-            square += rw_boole[i] * (v[i][k] * v[i][k]);
-        }
-        reduction[RW_INTEGRAL + k] += h * sum;
-        reduction[RW_SQUARE + k] += h * square;
-        rw_extreme(reduction, RW_MAX, k, 1.0, v[0] + k, RW_CHANNELS, time, h, at, source);
-        rw_extreme(reduction, RW_MIN, k, -1.0, v[0] + k, RW_CHANNELS, time, h, at, source);
+        reduction[RW_INTEGRAL + k] += h * sum[k];
+        reduction[RW_SQUARE + k] += h * square[k];
+        if (first || top[k] > reduction[RW_MAX + k])
+            rw_extreme(reduction, RW_MAX, k, 1.0, v[0] + k, RW_CHANNELS, time, h, at, source);
+        if (first || bottom[k] < reduction[RW_MIN + k])
+            rw_extreme(reduction, RW_MIN, k, -1.0, v[0] + k, RW_CHANNELS, time, h, at, source);
     }
     reduction[RW_DURATION] += h;
 }

@@ -34,10 +34,11 @@ typedef struct {
     rw_lanes A[RW_NQ * RW_NQ], B[RW_NQ * RW_NQ], at[RW_NQ];
 } rw_tangent_block;
 
-/* What the directions share at one state and time. */
+/* What the directions share at one state and time.  Force and slopes of the balls enter the derivative of their sums
+   S = (sum F cos, sum F sin) by sums of their own: all that moves a ball is r, the cage's angle, and the numbers of the law. */
 typedef struct {
     const double *x, *w;
-    double r[5], S[2], G[6];
+    double r[5], S[2], G[6], by_r0[2], by_angle[2], by_number[2][RW_NK];
     double co[RW_NB], si[RW_NB], delta[RW_NB], rate[RW_NB], force[RW_NB], by_delta[RW_NB], by_rate[RW_NB];
 } rw_point;
 
@@ -61,50 +62,55 @@ static inline void rw_point_at(rw_point *restrict at, const rw_numbers *n, const
     at->w = w;
     rw_relative(x, n->u, n->p, n->c, w, at->r);
     const double *restrict r = at->r, cage_cos = w[0], cage_sin = w[1];
-    double k[RW_NK];
+    double k[RW_NK], by_number[RW_NK * RW_NB];
+    double sx[RW_TERMS], sy[RW_TERMS], d[5][RW_TERMS], v[3][RW_TERMS], nx[RW_NK][RW_TERMS], ny[RW_NK][RW_TERMS];
     rw_law_numbers(n->p, n->c, k);
 #pragma omp simd
     for (int j = 0; j < RW_NB; j++) {
-        at->co[j] = rw_cos[j] * cage_cos - rw_sin[j] * cage_sin;
-        at->si[j] = rw_sin[j] * cage_cos + rw_cos[j] * cage_sin;
-        at->delta[j] = r[0] + r[1] * at->co[j] + r[2] * at->si[j];
-        at->rate[j] = r[3] * at->co[j] + r[4] * at->si[j];
-        double force, by_delta, by_rate;
-        rw_ball_slopes(at->delta[j], at->rate[j], k, &force, &by_delta, &by_rate);
-        at->force[j] = force;
-        at->by_delta[j] = by_delta;
-        at->by_rate[j] = by_rate;
+        const double co = rw_cos[j] * cage_cos - rw_sin[j] * cage_sin;
+        const double si = rw_sin[j] * cage_cos + rw_cos[j] * cage_sin;
+        at->co[j] = co;
+        at->si[j] = si;
+        at->delta[j] = r[0] + r[1] * co + r[2] * si;
+        at->rate[j] = r[3] * co + r[4] * si;
     }
-    double sx = 0.0, sy = 0.0;
-#pragma omp simd reduction(+ : sx, sy)
+    rw_ball_partials_lanes(at->delta, at->rate, k, at->force, at->by_delta, at->by_rate, by_number);
+#pragma omp simd
     for (int j = 0; j < RW_NB; j++) {
-        sx += at->force[j] * at->co[j];
-        sy += at->force[j] * at->si[j];
+        const double co = at->co[j], si = at->si[j], by_delta = at->by_delta[j], by_rate = at->by_rate[j];
+        sx[j] = at->force[j] * co;
+        sy[j] = at->force[j] * si;
+        d[3][j] = by_delta * co;
+        d[4][j] = by_delta * si;
+        d[0][j] = by_delta * co * co;
+        d[1][j] = by_delta * co * si;
+        d[2][j] = by_delta * si * si;
+        v[0][j] = by_rate * co * co;
+        v[1][j] = by_rate * co * si;
+        v[2][j] = by_rate * si * si;
     }
-    at->S[0] = sx;
-    at->S[1] = sy;
-}
-
-/* Sums of the slopes at a point, which only the linearization of a step's start asks for. */
-static inline void rw_point_slopes(rw_point *restrict at)
-{
-    double d0 = 0.0, d1 = 0.0, d2 = 0.0, v0 = 0.0, v1 = 0.0, v2 = 0.0;
-#pragma omp simd reduction(+ : d0, d1, d2, v0, v1, v2)
-    for (int j = 0; j < RW_NB; j++) {
-        const double co = at->co[j], si = at->si[j];
-        d0 += at->by_delta[j] * co * co;
-        d1 += at->by_delta[j] * co * si;
-        d2 += at->by_delta[j] * si * si;
-        v0 += at->by_rate[j] * co * co;
-        v1 += at->by_rate[j] * co * si;
-        v2 += at->by_rate[j] * si * si;
+    for (int m = 0; m < RW_NK; m++) {
+#pragma omp simd
+        for (int j = 0; j < RW_NB; j++) {
+            nx[m][j] = by_number[m * RW_NB + j] * at->co[j];
+            ny[m][j] = by_number[m * RW_NB + j] * at->si[j];
+        }
     }
-    at->G[0] = d0;
-    at->G[1] = d1;
-    at->G[2] = d2;
-    at->G[3] = v0;
-    at->G[4] = v1;
-    at->G[5] = v2;
+    at->S[0] = rw_total(sx);
+    at->S[1] = rw_total(sy);
+    for (int m = 0; m < 3; m++) {
+        at->G[m] = rw_total(d[m]);
+        at->G[3 + m] = rw_total(v[m]);
+    }
+    at->by_r0[0] = rw_total(d[3]);
+    at->by_r0[1] = rw_total(d[4]);
+    for (int m = 0; m < RW_NK; m++) {
+        at->by_number[0][m] = rw_total(nx[m]);
+        at->by_number[1][m] = rw_total(ny[m]);
+    }
+    const double *restrict G = at->G;
+    at->by_angle[0] = -r[1] * G[1] + r[2] * G[0] - r[3] * G[4] + r[4] * G[3] - at->S[1];
+    at->by_angle[1] = -r[1] * G[2] + r[2] * G[1] - r[3] * G[5] + r[4] * G[4] + at->S[0];
 }
 
 /* Derivatives of deflection and rate of ball j, and of its direction. */
@@ -120,24 +126,33 @@ static inline void rw_ball_tangent(const rw_point *restrict at, int j, const dou
     }
 }
 
+/* Derivatives of the sums S along the block's directions, for moved coefficients rd and stage variables wd. */
+static inline void rw_sums_tangent(const rw_point *restrict at, const rw_direction *d, const double *restrict wd, const double *restrict rd,
+                                   double *restrict Sd)
+{
+    const rw_vector *r = (const rw_vector *)rd, *w = (const rw_vector *)wd;
+    double numbers[RW_NK * RW_LANES];
+    rw_law_numbers_lanes(d->p, d->c, numbers);
+    const rw_vector *k = (const rw_vector *)numbers, angle = at->w[0] * w[1] - at->w[1] * w[0];
+    rw_vector x = at->by_angle[0] * angle, y = at->by_angle[1] * angle;
+    x += at->by_r0[0] * r[0] + at->G[0] * r[1] + at->G[1] * r[2] + at->G[3] * r[3] + at->G[4] * r[4];
+    y += at->by_r0[1] * r[0] + at->G[1] * r[1] + at->G[2] * r[2] + at->G[4] * r[3] + at->G[5] * r[4];
+#pragma GCC unroll 16
+    for (int m = 0; m < RW_NK; m++) {
+        x += at->by_number[0][m] * k[m];
+        y += at->by_number[1][m] * k[m];
+    }
+    *(rw_vector *)Sd = x;
+    *(rw_vector *)(Sd + RW_LANES) = y;
+}
+
 /* Derivative of dx/dt along the block's directions, for the moved state xd and stage variables wd. */
 static inline void rw_rate_tangent(const rw_point *restrict at, const rw_numbers *n, const rw_direction *d, const double *restrict wd,
                                    const double *restrict xd, double *restrict out)
 {
     double rd[5 * RW_LANES], Sd[2 * RW_LANES];
     rw_relative_tangent_lanes(at->x, n->u, n->p, n->c, at->w, xd, d->u, d->p, d->c, wd, rd);
-    for (int k = 0; k < 2 * RW_LANES; k++) Sd[k] = 0.0;
-    for (int j = 0; j < RW_NB; j++) {
-        double co[RW_LANES], si[RW_LANES], delta[RW_LANES], rate[RW_LANES], force[RW_LANES];
-        rw_ball_tangent(at, j, wd, rd, co, si, delta, rate);
-        rw_law_partial_lanes(at->delta[j], at->rate[j], n->p, n->c, d->p, d->c, force);
-#pragma omp simd
-        for (int l = 0; l < RW_LANES; l++) {
-            const double moved = force[l] + at->by_delta[j] * delta[l] + at->by_rate[j] * rate[l];
-            Sd[l] += moved * at->co[j] + at->force[j] * co[l];
-            Sd[RW_LANES + l] += moved * at->si[j] + at->force[j] * si[l];
-        }
-    }
+    rw_sums_tangent(at, d, wd, rd, Sd);
     for (int k = 0; k < RW_NQ * RW_LANES; k++) out[k] = xd[RW_NQ * RW_LANES + k];
     rw_acceleration_tangent_lanes(at->x, at->S, n->u, n->p, n->c, at->w, xd, Sd, d->u, d->p, d->c, wd, out + RW_NQ * RW_LANES);
 }
@@ -149,28 +164,27 @@ static inline void rw_linearize_tangent(const rw_point *restrict at, const rw_nu
 {
     double rd[5 * RW_LANES], Sd[2 * RW_LANES], Gd[6 * RW_LANES];
     rw_relative_tangent_lanes(at->x, n->u, n->p, n->c, at->w, xd, d->u, d->p, d->c, wd, rd);
-    for (int k = 0; k < 2 * RW_LANES; k++) Sd[k] = 0.0;
-    for (int k = 0; k < 6 * RW_LANES; k++) Gd[k] = 0.0;
+    rw_sums_tangent(at, d, wd, rd, Sd);
+    rw_vector sum[6];
+#pragma GCC unroll 6
+    for (int k = 0; k < 6; k++) sum[k] = (rw_vector){0.0};
     for (int j = 0; j < RW_NB; j++) {
-        double co[RW_LANES], si[RW_LANES], delta[RW_LANES], rate[RW_LANES], force[RW_LANES], by_delta[RW_LANES], by_rate[RW_LANES];
+        double co[RW_LANES], si[RW_LANES], delta[RW_LANES], rate[RW_LANES], by_delta[RW_LANES], by_rate[RW_LANES];
         rw_ball_tangent(at, j, wd, rd, co, si, delta, rate);
-        rw_law_partial_lanes(at->delta[j], at->rate[j], n->p, n->c, d->p, d->c, force);
         rw_law_slopes_tangent_lanes(at->delta[j], at->rate[j], n->p, n->c, delta, rate, d->p, d->c, by_delta, by_rate);
         const double c = at->co[j], s = at->si[j], fd = at->by_delta[j], fv = at->by_rate[j];
-#pragma omp simd
-        for (int l = 0; l < RW_LANES; l++) {
-            const double moved = force[l] + fd * delta[l] + fv * rate[l];
-            const double cc = 2.0 * c * co[l], cs = co[l] * s + c * si[l], ss = 2.0 * s * si[l];
-            Sd[l] += moved * c + at->force[j] * co[l];
-            Sd[RW_LANES + l] += moved * s + at->force[j] * si[l];
-            Gd[l] += by_delta[l] * c * c + fd * cc;
-            Gd[RW_LANES + l] += by_delta[l] * c * s + fd * cs;
-            Gd[2 * RW_LANES + l] += by_delta[l] * s * s + fd * ss;
-            Gd[3 * RW_LANES + l] += by_rate[l] * c * c + fv * cc;
-            Gd[4 * RW_LANES + l] += by_rate[l] * c * s + fv * cs;
-            Gd[5 * RW_LANES + l] += by_rate[l] * s * s + fv * ss;
-        }
+        const rw_vector c_d = *(const rw_vector *)co, s_d = *(const rw_vector *)si;
+        const rw_vector cc = 2.0 * c * c_d, cs = s * c_d + c * s_d, ss = 2.0 * s * s_d;
+        const rw_vector fd_d = *(const rw_vector *)by_delta, fv_d = *(const rw_vector *)by_rate;
+        sum[0] += c * c * fd_d + fd * cc;
+        sum[1] += c * s * fd_d + fd * cs;
+        sum[2] += s * s * fd_d + fd * ss;
+        sum[3] += c * c * fv_d + fv * cc;
+        sum[4] += c * s * fv_d + fv * cs;
+        sum[5] += s * s * fv_d + fv * ss;
     }
+#pragma GCC unroll 6
+    for (int k = 0; k < 6; k++) *(rw_vector *)(Gd + k * RW_LANES) = sum[k];
     rw_acceleration_jacobian_tangent_lanes(at->x, at->S, at->G, n->u, n->p, n->c, at->w, xd, Sd, Gd, d->u, d->p, d->c, wd, A, B);
     rw_acceleration_rate_tangent_lanes(at->x, at->S, at->G, at->r, n->u, n->p, n->c, at->w, wt, xd, Sd, Gd, rd, d->u, d->p, d->c, wd, wtd,
                                        rate_d);
@@ -198,17 +212,44 @@ static inline void rw_combine_lanes(const double *restrict row, int count, rw_la
 
 static inline double *rw_tangent_state(const raceway_tangents *tangents, long block) { return tangents->x + block * (RW_NX * RW_LANES); }
 
+/* Derivatives of the stage variables by inputs, parameters and constants at stage times, RW_LANES times to a row. */
+enum { RW_TIMES = (RW_METHOD_STAGES + RW_LANES - 1) / RW_LANES };
+typedef double rw_stage_slopes[RW_TIMES][RW_NJ * RW_LANES];
+
+/* Stage variables at the times t + nodes[i] h, i = 0 ... count - 1, into the rows of w, and their derivatives. */
+static inline void rw_sloped_stages(const rw_numbers *n, double t, double h, const double *restrict nodes, const int count, double w[][RW_NW],
+                                    rw_stage_slopes J)
+{
+    for (int first = 0; first < count; first += RW_LANES) {
+        double some[RW_LANES], time[RW_LANES], C[RW_NA * RW_LANES], S[RW_NA * RW_LANES], lanes[RW_NW * RW_LANES];
+        rw_some_nodes(nodes, first, count, some);
+        rw_directions(n, t, h, some, C, S);
+        for (int i = 0; i < RW_LANES; i++) time[i] = t + some[i] * h;
+        rw_stage_slopes_lanes(C, S, time, n->u, n->p, n->c, lanes, J[first / RW_LANES]);
+        for (int i = 0; i < RW_LANES && first + i < count; i++)
+            for (int k = 0; k < RW_NW; k++) w[first + i][k] = lanes[k * RW_LANES + i];
+    }
+}
+
+/* Derivatives of the stage variables at the time number `i` along a block's directions. */
+static inline void rw_stage_moved(rw_stage_slopes J, int i, const rw_direction *d, double *restrict wd)
+{
+    rw_stage_moved_lanes(J[i / RW_LANES] + i % RW_LANES, d->u, d->p, d->c, wd);
+}
+
 /* Derivative of the first slope, where no step before has left it. */
 static inline void rw_explicit_tangent_start(const raceway_tangents *tangents, rw_tangent_block *restrict work, const rw_numbers *n,
                                              long segment, double t, const double *restrict x)
 {
-    double w[RW_NW];
+    static const double start[1] = {0.0};
+    double w[1][RW_NW];
+    rw_stage_slopes J;
     rw_point at;
-    rw_stage(t, n->u, n->p, n->c, w);
-    rw_point_at(&at, n, w, x);
+    rw_sloped_stages(n, t, 0.0, start, 1, w, J);
+    rw_point_at(&at, n, w[0], x);
     for (long b = 0; b < tangents->blocks; b++) {
         const rw_direction d = rw_direction_of(tangents, segment, b);
-        rw_stage_tangent_lanes(t, n->u, n->p, n->c, d.u, d.p, d.c, &work[b].w[0][0]);
+        rw_stage_moved(J, 0, &d, &work[b].w[0][0]);
         rw_rate_tangent(&at, n, &d, &work[b].w[0][0], rw_tangent_state(tangents, b), &work[b].k[0][0][0]);
     }
 }
@@ -216,6 +257,7 @@ static inline void rw_explicit_tangent_start(const raceway_tangents *tangents, r
 /* What the directions share at all stages of a step. */
 typedef struct {
     double w[RW_METHOD_STAGES][RW_NW], y[RW_METHOD_STAGES][RW_NX];
+    rw_stage_slopes J;
     rw_point at[RW_METHOD_STAGES];
 } rw_step_points;
 
@@ -229,7 +271,7 @@ static inline __attribute__((always_inline)) void rw_explicit_tangent_step(const
                                                                             const double *restrict next)
 {
     rw_step_points points;
-    rw_stages(n, t, h, method->nodes + 1, stages - 1, points.w);
+    rw_sloped_stages(n, t, h, method->nodes + 1, stages - 1, points.w, points.J);
     for (int i = 1; i <= stages; i++) {
         const int end = i == stages;
         double *restrict y = points.y[i];
@@ -243,7 +285,7 @@ static inline __attribute__((always_inline)) void rw_explicit_tangent_step(const
         for (int i = 1; i <= stages; i++) {
             const int end = i == stages;
             double moved[RW_NX * RW_LANES];
-            if (!end) rw_stage_tangent_lanes(t + method->nodes[i] * h, n->u, n->p, n->c, d.u, d.p, d.c, &own->w[0][0]);
+            if (!end) rw_stage_moved(points.J, i - 1, &d, &own->w[0][0]);
             rw_combine_lanes(end ? method->weights : method->a[i], i, own->k, h, rw_tangent_state(tangents, b), moved);
             rw_rate_tangent(&points.at[i], n, &d, &own->w[0][0], moved, &own->k[i][0][0]);
             if (end) memcpy(own->next, moved, sizeof moved);
@@ -301,17 +343,18 @@ static inline void rw_explicit_tangent_dense(const rw_explicit_method *restrict 
                                              long segment, double t, const double *restrict x, double h)
 {
     const int end = method->stages;
+    double w[RW_METHOD_STAGES][RW_NW];
+    rw_stage_slopes J;
+    rw_sloped_stages(n, t, h, method->dense_nodes, method->dense_stages, w, J);
     for (int r = 0; r < method->dense_stages; r++) {
-        const double time = t + method->dense_nodes[r] * h;
-        double w[RW_NW], y[RW_NX];
+        double y[RW_NX];
         rw_point at;
-        rw_stage(time, n->u, n->p, n->c, w);
         rw_combine(method->dense_a[r], end + 1 + r, (const double(*)[RW_NX])plain->k, h, x, y);
-        rw_point_at(&at, n, w, y);
+        rw_point_at(&at, n, w[r], y);
         for (long b = 0; b < tangents->blocks; b++) {
             const rw_direction d = rw_direction_of(tangents, segment, b);
             double moved[RW_NX * RW_LANES];
-            rw_stage_tangent_lanes(time, n->u, n->p, n->c, d.u, d.p, d.c, &work[b].w[0][0]);
+            rw_stage_moved(J, r, &d, &work[b].w[0][0]);
             rw_combine_lanes(method->dense_a[r], end + 1 + r, work[b].k, h, rw_tangent_state(tangents, b), moved);
             rw_rate_tangent(&at, n, &d, &work[b].w[0][0], moved, &work[b].k[end + 1 + r][0][0]);
         }
@@ -361,15 +404,13 @@ static inline __attribute__((always_inline)) void rw_rosenbrock_tangent_step(con
 {
     const double inverse_s = h * method->gamma, inverse_h = 1.0 / h;
     rw_step_points points;
-    rw_stages(n, t, h, method->nodes + 1, stages - 1, points.w);
+    rw_sloped_stages(n, t, h, method->nodes + 1, stages - 1, points.w, points.J);
     rw_point_at(&points.at[0], n, plain->w, x);
-    rw_point_slopes(&points.at[0]);
     for (int i = 1; i < stages; i++) {
-        double *restrict y = points.y[i];
-        for (int k = 0; k < RW_NX; k++) y[k] = x[k];
-        for (int j = 0; j < i; j++)
-            for (int k = 0; k < RW_NX; k++) y[k] += method->a[i][j] * plain->u[j][k];
-        rw_point_at(&points.at[i], n, points.w[i - 1], y);
+        rw_state y = RW_STATE(x);
+        for (int j = 0; j < i; j++) y += method->a[i][j] * RW_STATE(plain->u[j]);
+        *(rw_state *)points.y[i] = y;
+        rw_point_at(&points.at[i], n, points.w[i - 1], points.y[i]);
     }
     for (long b = 0; b < tangents->blocks; b++) {
         const rw_direction d = rw_direction_of(tangents, segment, b);
@@ -381,31 +422,30 @@ static inline __attribute__((always_inline)) void rw_rosenbrock_tangent_step(con
         for (int i = 0; i < stages; i++) {
             double R[RW_NX * RW_LANES], moved[RW_NX * RW_LANES], rate[RW_NX * RW_LANES], zero[RW_NX * RW_LANES] = {0.0};
             if (i == 1 || (i > 1 && method->nodes[i] != method->nodes[i - 1]))
-                rw_stage_tangent_lanes(t + method->nodes[i] * h, n->u, n->p, n->c, d.u, d.p, d.c, &own->w[0][0]);
+                rw_stage_moved(points.J, i - 1, &d, &own->w[0][0]);
             if (i > 0) rw_combine_lanes(method->a[i], i, own->k, 1.0, xd, moved);
             rw_rate_tangent(&points.at[i], n, &d, &own->w[0][0], i > 0 ? moved : xd, rate);
             rw_combine_lanes(method->coupling[i], i, own->k, inverse_h, zero, R);
             const double hd = h * method->time_weights[i];
-            for (int k = 0; k < RW_NX * RW_LANES; k++) R[k] += rate[k];
+            rw_vector right[RW_NX], *to = (rw_vector *)&own->k[i][0][0];
+            const rw_vector *coupled = (const rw_vector *)R, *rates = (const rw_vector *)rate, *moving = (const rw_vector *)&own->at[0][0];
+            const rw_vector *A = (const rw_vector *)&own->A[0][0], *B = (const rw_vector *)&own->B[0][0];
+#pragma GCC unroll 16
+            for (int k = 0; k < RW_NX; k++) right[k] = coupled[k] + rates[k];
+#pragma GCC unroll 16
             for (int k = 0; k < RW_NQ; k++) {
-                double *restrict row = R + (RW_NQ + k) * RW_LANES;
-                for (int l = 0; l < RW_LANES; l++) row[l] += hd * own->at[k][l];
-                for (int j = 0; j < RW_NQ; j++) {
-                    const double uq = plain->u[i][j], uv = plain->u[i][RW_NQ + j];
-                    const double *restrict a = own->A[k * RW_NQ + j], *restrict v = own->B[k * RW_NQ + j];
-                    for (int l = 0; l < RW_LANES; l++) row[l] += a[l] * uq + v[l] * uv;
-                }
+                rw_vector row = right[RW_NQ + k] + hd * moving[k];
+#pragma GCC unroll 16
+                for (int j = 0; j < RW_NQ; j++) row += plain->u[i][j] * A[k * RW_NQ + j] + plain->u[i][RW_NQ + j] * B[k * RW_NQ + j];
+                right[RW_NQ + k] = row;
             }
+#pragma GCC unroll 16
             for (int k = 0; k < RW_NQ; k++) {
-                double kv[RW_LANES] = {0.0};
-                for (int j = 0; j < RW_NX; j++) {
-                    const double entry = matrix->solve[j][k];
-                    for (int l = 0; l < RW_LANES; l++) kv[l] += entry * R[j * RW_LANES + l];
-                }
-                for (int l = 0; l < RW_LANES; l++) {
-                    own->k[i][RW_NQ + k][l] = kv[l];
-                    own->k[i][k][l] = (R[k * RW_LANES + l] + kv[l]) * inverse_s;
-                }
+                rw_vector kv = matrix->solve[0][k] * right[0];
+#pragma GCC unroll 16
+                for (int j = 1; j < RW_NX; j++) kv += matrix->solve[j][k] * right[j];
+                to[RW_NQ + k] = kv;
+                to[k] = (right[k] + kv) * inverse_s;
             }
         }
         rw_combine_lanes(method->weights, stages, own->k, 1.0, xd, &own->next[0][0]);

@@ -23,6 +23,7 @@ typedef struct {
     double *x;
     double next[RW_NX];
     double step;           /* proposal for the next step; 0 where it has to be estimated */
+    double fastest, slowest; /* rates seen by the linearly implicit methods [1/s] */
     double last_error;     /* logarithm of that of the last accepted step, for the PI controller */
     int method;
     long outputs;
@@ -224,10 +225,10 @@ static void write_outputs(rw_run *run, double start, double t, double h, double 
 }
 
 #ifdef RACEWAY_REDUCTIONS
-/* An accepted step, for the reductions: its dense output is ready. */
+/* An accepted step, for the reductions: its dense output is ready.  They look at its part from `from` over `span` of it. */
 typedef struct {
     const rw_run *run;
-    double t, h;
+    double t, h, from, span;
 } rw_step_taken;
 
 static void state_at(const rw_run *run, double theta, double *y)
@@ -243,8 +244,9 @@ static double channel_at(const void *source, int channel, double theta, int *bal
 {
     const rw_step_taken *step = source;
     double y[RW_NX];
-    state_at(step->run, theta, y);
-    return rw_channel(&step->run->numbers, step->t + theta * step->h, y, channel, ball);
+    const double place = step->from + step->span * theta;
+    state_at(step->run, place, y);
+    return rw_channel(&step->run->numbers, step->t + place * step->h, y, channel, ball);
 }
 
 static void reduce_start(rw_run *run, double start)
@@ -261,16 +263,20 @@ static void reduce_step(rw_run *run, double start, double t, double h)
     else if (run->method == RACEWAY_DOP853) rw_explicit_dense(&rw_dop853, &run->plain, &run->numbers, t, run->x, h, run->next, run->dense);
     else if (run->method == RACEWAY_RODAS4) rw_rosenbrock_dense(&rw_rodas4, &run->linear, run->dense);
     else rw_rosenbrock_dense(&rw_rodas5p, &run->linear, run->dense);
-    for (int i = 1; i < RW_POINTS; i++) {
-        const double theta = (double)i / (RW_POINTS - 1);
-        double y[RW_NX];
-        if (i < RW_POINTS - 1) state_at(run, theta, y);
-        else memcpy(y, run->next, sizeof y);
-        rw_channels(&run->numbers, t + theta * h, y, rw_balls_wanted(run->reduction), run->sampled[i]);
+    /* the output of DOP853 is of degree seven, more than five points tell: its steps are taken in halves */
+    const int parts = run->method == RACEWAY_DOP853 ? 2 : 1;
+    for (int part = 0; part < parts; part++) {
+        const rw_step_taken step = {run, t, h, (double)part / parts, 1.0 / parts};
+        for (int i = 1; i < RW_POINTS; i++) {
+            const double theta = step.from + step.span * i / (RW_POINTS - 1);
+            double y[RW_NX];
+            if (theta < 1.0) state_at(run, theta, y);
+            else memcpy(y, run->next, sizeof y);
+            rw_channels(&run->numbers, t + theta * h, y, rw_balls_wanted(run->reduction), run->sampled[i]);
+        }
+        rw_reduce(run->reduction, (const double(*)[RW_CHANNELS])run->sampled, start + t + step.from * h, step.span * h, channel_at, &step);
+        memcpy(run->sampled[0], run->sampled[RW_POINTS - 1], sizeof run->sampled[0]);
     }
-    const rw_step_taken step = {run, t, h};
-    rw_reduce(run->reduction, (const double(*)[RW_CHANNELS])run->sampled, start + t, h, channel_at, &step);
-    memcpy(run->sampled[0], run->sampled[RW_POINTS - 1], sizeof run->sampled[0]);
 }
 #else
 #define reduce_start(run, start) ((void)0)
@@ -335,6 +341,49 @@ static void linearize(rw_run *run, double t, int fresh)
     run->result->evaluations++;
 }
 
+/* What a segment has shown about the families so far. */
+typedef struct {
+    double sum;    /* of the reach of the steps looked at */
+    double stable; /* step at which an explicit method is at its limit, where the last look was at a linearly implicit one [s] */
+    int looks, stiff, changes;
+    long steps;
+} rw_family;
+
+/* The family for the next step, from the accepted one.  The reach of a step is its size times the fastest rate. */
+static int judge_family(rw_run *run, rw_family *family, double h)
+{
+    const int explicitly = is_explicit(run->method), looking = family->stiff > 0 || family->steps++ % RW_STIFF_LOOK == 0;
+    if (!looking) return run->method;
+    if (explicitly) {
+        const int dp54 = run->method == RACEWAY_DP54;
+        const double limit = dp54 ? 3.25 : 6.1;
+        const double reach = rw_explicit_stiffness(&run->plain, dp54 ? RW_DP54_STAGES : RW_DOP853_STAGES, h, run->next, run->weight);
+        family->stiff = reach > limit ? family->stiff + 1 : 0;
+        if (family->stiff >= RW_STIFF_STEPS) {
+            *family = (rw_family){.changes = family->changes + 1};
+            return RACEWAY_RODAS5P;
+        }
+        family->sum += reach < limit ? reach : limit;
+    } else {
+        /* the fastest of the run: balls that are off now come back.  Before rates have changed no ball has landed yet, and they say
+           nothing; a ring that is always loaded has shown at the start what it is */
+        const double rate = rw_fastest_rate(run->linear.A, run->linear.B);
+        run->fastest = rate > run->fastest ? rate : run->fastest;
+        run->slowest = rate < run->slowest ? rate : run->slowest;
+        if (!(run->fastest > 2.0 * run->slowest)) return run->method;
+        family->stable = RW_LIMITED / run->fastest;
+        family->sum += h * run->fastest;
+    }
+    if (++family->looks < RW_FAMILY_LOOKS) return run->method;
+    const double mean = family->sum / family->looks;
+    family->sum = 0.0;
+    family->looks = 0;
+    if (family->changes >= RW_FAMILY_CHANGES || (explicitly ? !(mean > RW_LIMITED) : !(mean < RW_WORTH_SOLVING))) return run->method;
+    family->changes++;
+    family->stiff = 0;
+    return explicitly ? RACEWAY_RODAS5P : RACEWAY_DP54;
+}
+
 /* Integrate one segment from `start` to `end`; its clock starts at zero. */
 static int run_segment(rw_run *run, double start, double end, int restart, int changeable)
 {
@@ -357,8 +406,8 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
     }
     /* slopes that overflow give an estimate of zero, or none */
     if (!(run->step > 2.0 * resolution)) run->step = 2.0 * resolution;
-    int stiff = 0, rejected_last = 0;
-    long look = 0;
+    int rejected_last = 0;
+    rw_family family = {0};
     reduce_start(run, start);
     tangent_jump(run);
     if (is_explicit(run->method)) first_slope(run, t);
@@ -397,22 +446,22 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
             result->steps++;
             write_outputs(run, start, t, h, last ? end : start + (t + h));
             reduce_step(run, start, t, h);
-            if (changeable && is_explicit(run->method) && (stiff > 0 || look++ % RW_STIFF_LOOK == 0)) {
-                const double limit = run->method == RACEWAY_DP54 ? 3.25 : 6.1;
-                const double reach = rw_explicit_stiffness(&run->plain, run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES, h,
-                                                           run->next, run->weight);
-                stiff = reach > limit ? stiff + 1 : 0;
-            }
+            const int chosen = changeable ? judge_family(run, &family, h) : run->method;
             tangent_accept(run);
             memcpy(run->x, run->next, sizeof run->next);
             t = last ? length : t + h;
             if (!last || factor < 1.0) run->step = h * factor;
             rejected_last = 0;
-            if (stiff >= RW_STIFF_STEPS) {
-                run->method = RACEWAY_RODAS5P;
+            if (chosen != run->method) {
+                run->method = chosen;
                 result->switches++;
-                stiff = 0;
-                linearize(run, t, 1);
+                if (is_explicit(chosen)) {
+                    if (run->step > family.stable) run->step = family.stable;
+                    first_slope(run, t);
+                    tangent_start(run, t);
+                } else {
+                    linearize(run, t, 1);
+                }
             } else if (is_explicit(run->method)) {
                 const int stages = run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES;
                 memcpy(run->plain.k[0], run->plain.k[stages], sizeof run->plain.k[0]);
@@ -452,6 +501,8 @@ static int run_all(rw_run *run, const raceway_options *options, const double *p,
     run->x = x;
     run->step = 0.0;
     run->last_error = RW_LOG_SMALL_ERROR;
+    run->fastest = 0.0;
+    run->slowest = INFINITY;
     run->method = options->method;
     run->outputs = outputs;
     run->output_times = output_times;
