@@ -24,6 +24,8 @@ html_title = f"raceway {release}"
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
+# words of signatures that name several things, as two classes Statistics: a link to either would do
+suppress_warnings = ["ref.python"]
 default_role = "code"  # single backquotes in docstrings are names
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
