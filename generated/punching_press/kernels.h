@@ -7,7 +7,7 @@
 
 #include "trig.h"
 
-enum { RW_NQ = 4, RW_NX = 8, RW_NU = 3, RW_NP = 41, RW_NC = 39, RW_NW = 4, RW_NA = 2, RW_NK = 3, RW_NB = 8, RW_LANES = 8 };
+enum { RW_NQ = 4, RW_NX = 8, RW_NU = 3, RW_NP = 41, RW_NC = 39, RW_NW = 4, RW_NA = 2, RW_NK = 3, RW_NJ = 57, RW_NB = 8, RW_LANES = 8 };
 
 static const double rw_cos[8] = {1.0, 0.7071067811865476, 0.0, -0.7071067811865476, -1.0, -0.7071067811865476, 0.0, 0.7071067811865476};
 

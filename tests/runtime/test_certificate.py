@@ -40,6 +40,48 @@ def test_verdicts_follow_from_distance_and_uncertainties(
     assert (found.reason == "") == (verdict in (Verdict.VERIFIED, Verdict.DISAGREES))
 
 
+@pytest.mark.parametrize(
+    ("derivative", "second", "uncertainty", "bounded", "nothing"),
+    [
+        (1.82, -0.222, 0.604, True, True),  # both are below the quantum, and their signs differ
+        (400.0, 395.0, 0.1, True, False),  # a per cent apart: known to the quantum, and no nearer
+        (400.0, 400.1, 5.0, True, False),  # they agree, but the second is not known to a thousandth
+        (400.0, 400.1, 0.1, False, False),
+        (1.82, 1.8201, 1e-4, False, False),  # small, and known
+        (0.0, 0.0, 0.0, False, False),
+    ],
+)
+def test_a_verdict_says_when_it_rests_on_the_quantum_alone(
+    derivative: float, second: float, uncertainty: float, *, bounded: bool, nothing: bool
+) -> None:
+    found = compare(derivative, 2.59, second, uncertainty, route="x", quantum=266.0)
+    assert found.verdict is Verdict.VERIFIED
+    assert (found.bounded, found.is_nothing(derivative)) == (bounded, nothing)
+
+
+def test_an_effect_of_the_start_that_has_died_out_is_called_nothing(make_model: Callable[..., Model]) -> None:
+    """Damping takes the start away like exp(-t/0.2 s): no digit of its derivative 2.7 s later is known, and no report
+    may look as if one was."""
+    model = make_model("varying_compliance")
+    names = ["bearing.initial.inner.x", "load.force.x"]
+    report = model.sensitivity(["peak_ball_force"], names, 18, transient=17)
+    start, load = report.pairs
+    assert start.check.verdict is Verdict.VERIFIED
+    assert start.is_nothing
+    assert not load.is_nothing
+    rows = {row["parameter"]: row["certificate"] for row in report.to_json()["sensitivities"]}
+    assert rows[names[0]]["nothing"] is True
+    assert rows[names[0]]["bound"] > abs(start.derivative)
+    assert rows[names[1]]["nothing"] is False
+    (line,) = [line for line in str(report).splitlines() if names[0] in line]
+    assert "~0 (<" in line
+    assert "verified: ~0" in line
+    assert f"{start.derivative:.4g}" not in line
+    assert "1 of them ~0" in str(report)
+    assert repr(report).count("\n") == 0
+    assert "2 verified" in repr(report)
+
+
 def test_a_derivative_that_is_no_number_disagrees_with_one_that_is() -> None:
     assert compare(math.nan, 0.0, 1.0, 1e-9, route="x", quantum=0.0).verdict is Verdict.DISAGREES
 

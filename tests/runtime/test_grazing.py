@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from raceway.runtime import Model
-from raceway.runtime.grazing import find_grazing
+from raceway.runtime.grazing import Grazing, describe, find_grazing, merge_grazing
 from raceway.runtime.sensitivity_report import SensitivityReport
 
 TIMES = np.linspace(0.0, 1.0, 2001)
@@ -62,3 +62,26 @@ def test_a_trajectory_made_to_graze_is_flagged_and_its_neighbours_are_not(make_m
     assert abs(flag.depth) < 1e-9
     for away in (0.9, 1.1):
         assert [item for item in report(away * touching).grazing if item.ball == 1] == []
+
+
+def test_balls_that_graze_at_one_moment_are_one_place() -> None:
+    def place(ball: int, time: float, kink: str = "rate") -> Grazing:
+        return Grazing(ball=ball, time=time, crank_angle=0.0, depth=1e-9, kink=kink)
+
+    found = [place(5, 0.1), place(1, 0.1 + 1e-9), place(2, 0.1, "contact"), place(1, 0.2)]
+    merged = merge_grazing(found)
+    assert [[item.ball for item in items] for items in merged] == [[1, 5], [2], [1]]
+    assert describe(merged[0]).startswith("balls 1 and 5 graze the kink")
+
+
+def test_kinks_are_sought_whether_or_not_the_outputs_name_the_deflection(make_model: Callable[..., Model]) -> None:
+    """The mean force's derivative jumps at contact onset: both scenes must see the same places, and the same numbers."""
+    asked = ["mean:ball.force", "load.force.x"]
+    numbers = {"bearing.clearance": 20e-6, "bearing.initial.inner.x": 14e-6}
+    options = {"cycles": 0.6, "transient": 0.0, "parameters": numbers, "check": False}
+    full = make_model("varying_compliance")
+    fewer = make_model("varying_compliance", ('"ball.*"', '"ball.force"'))
+    assert "ball.deflection" not in fewer.outputs
+    expected, found = (model.sensitivity(*asked, **options) for model in (full, fewer))  # type: ignore[arg-type]
+    assert found.pairs[0].derivative == pytest.approx(expected.pairs[0].derivative, rel=1e-9)
+    assert [(item.ball, item.kink) for item in found.grazing] == [(item.ball, item.kink) for item in expected.grazing]

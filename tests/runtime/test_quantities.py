@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -84,6 +85,51 @@ def test_static_deflection_follows_the_two_thirds_power(make_model: Callable[...
         assert report[key].check.verdict.value == "verified"
 
 
+@pytest.mark.parametrize("start_angle", [0.0, 4.5])
+def test_static_quantities_are_those_of_the_static_query_in_the_first_turn(
+    make_model: Callable[..., Model], start_angle: float
+) -> None:
+    """In a later turn the balls stand elsewhere, for cage and crank turn at different speeds."""
+    model = make_model("punching_press_tangent")
+    numbers = {"mechanism.driver.start_angle": start_angle}
+    names = ["static_deflection@240deg", "static_peak_ball_force@240deg", "static_deflection"]
+    # without a place t = 0 counts: there must be a load then
+    asked = names if start_angle else names[:2]
+    found = values(model, asked, parameters=numbers)
+    rest = model.static_equilibrium(crank_angle=math.radians(240.0), parameters=numbers)
+    later = model.static_equilibrium(t=rest.time + model.period(), parameters=numbers)
+    assert found[names[0]] == pytest.approx(math.hypot(rest["inner.x"], rest["inner.y"]), rel=1e-12)
+    assert found[names[1]] == pytest.approx(rest.peak_ball_force, rel=1e-12)
+    assert abs(later.peak_ball_force / rest.peak_ball_force - 1.0) > 1e-3
+    if start_angle:
+        rest = model.static_equilibrium(t=0.0, parameters=numbers)
+        assert found[names[2]] == pytest.approx(math.hypot(rest["inner.x"], rest["inner.y"]), rel=1e-12)
+
+
+def test_a_parameter_that_is_zero_has_no_elasticity_and_is_ranked_by_its_effect(
+    make_model: Callable[..., Model],
+) -> None:
+    """One loaded ball: a change of the diametral clearance moves the ring by half of it, though clearance is 0 here."""
+    model = make_model("varying_compliance")
+    names = ["bearing.ball_angle", "load.force.y", "bearing.clearance", "load.force.x"]
+    report = model.sensitivity(["static_peak_ball_force", "static_deflection"], names)
+    pair = report["static_deflection", "bearing.clearance"]
+    # a tenth of a micrometre, of more than one: far more than any elasticity of 0 would let one expect
+    assert abs(pair.derivative) > 0.1
+    assert math.isnan(pair.dimensionless)
+    assert [row["dimensionless"] for row in report.to_json()["sensitivities"][:3]] == [None] * 3
+    ranked = report.of("static_deflection")
+    assert ranked[0].parameter == "load.force.x"
+    behind = [abs(item.change) for item in ranked[1:]]
+    assert behind == sorted(behind, reverse=True)
+    assert behind[0] > behind[-1]
+    text = str(report)
+    assert text.count("parameter is 0") == 2
+    (line, _) = [line for line in text.splitlines() if line.lstrip().startswith("bearing.clearance")]
+    assert "–" in line
+    assert "+0.0000" not in line
+
+
 def test_amplitude_of_a_ring_on_a_linear_spring(make_model: Callable[..., Model]) -> None:
     """Heavy preload makes the contacts linear: the outer ring on its housing then answers a constant load, and the
     amplitude at an order of the shaft falls with the housing's stiffness as the static compliance does."""
@@ -144,6 +190,28 @@ def test_a_sum_rule_of_amplitudes_holds(make_model: Callable[..., Model]) -> Non
 def test_wrong_names_are_refused_with_a_remedy(make_model: Callable[..., Model], text: str, words: str) -> None:
     with pytest.raises(RequestError, match=words):
         parse_quantity(make_model("punching_press").manifest, text)
+
+
+@pytest.mark.parametrize("scene", ["punching_press", "offset_slider", "four_bar"])
+@pytest.mark.parametrize(
+    "text",
+    ["peak_bal_force", "peaktime_ball_force", "valu_inner_y", "value_inner.y", "drive_wrok", "static_deflektion"],
+)
+def test_what_is_suggested_can_be_asked_for(make_model: Callable[..., Model], scene: str, text: str) -> None:
+    manifest = make_model(scene).manifest
+    with pytest.raises(RequestError) as refused:
+        parse_quantity(manifest, text)
+    suggested = re.findall(r"'([^']+)'", str(refused.value).partition("Did you mean")[2])
+    for name in suggested:
+        parse_quantity(manifest, name)
+
+
+def test_parameters_are_chosen_by_patterns_too(make_model: Callable[..., Model]) -> None:
+    model = make_model("varying_compliance")
+    report = model.sensitivity("static_deflection", ["load.force.y", "load.*", "bearing.b*_diameter"], check=False)
+    assert report.parameters == ("load.force.y", "load.force.x", "bearing.ball_diameter")
+    with pytest.raises(RequestError, match=r"bering\.\*"):
+        model.sensitivity("static_deflection", "bering.*", check=False)
 
 
 def test_every_kind_is_documented_and_evaluated(make_model: Callable[..., Model]) -> None:

@@ -381,3 +381,26 @@ def test_auto_takes_the_family_that_fits(make_model: Make, press: Model) -> None
     assert stiff_run.statistics.steps is not None
     assert forced.statistics.steps is not None
     assert forced.statistics.steps > 5 * stiff_run.statistics.steps
+
+
+def test_loose_runs_held_down_by_stability_go_on_linearly_implicitly(make_model: Make) -> None:
+    """Where an explicit step is no longer at a loose tolerance than at a tight one, fewer steps do the same."""
+    model = make_model("punching_press")
+    exact = model.simulate(1, method="stepper-dop853", rtol=1e-11, samples_per_cycle=250)
+    steps, error = {}, {}
+    for method in ("stepper", "stepper-dp54"):
+        for rtol in (1e-3, 1e-4):
+            run = model.simulate(1, method=method, rtol=rtol, samples_per_cycle=250)
+            steps[method, rtol] = run.statistics.steps or 0
+            error[method, rtol] = float(np.max(np.abs(run.x - exact.x) / exact.statistics.magnitudes))
+    assert steps["stepper-dp54", 1e-4] < 1.2 * steps["stepper-dp54", 1e-3], steps
+    for rtol in (1e-3, 1e-4):
+        assert 0 < steps["stepper", rtol] < 0.7 * steps["stepper-dp54", rtol], steps
+        assert error["stepper", rtol] < 2.0 * error["stepper-dp54", rtol], error
+
+
+def test_accurate_runs_stay_explicit(press: Model) -> None:
+    """Where accuracy rules, the choice is that of Dormand and Prince, step for step."""
+    free = press.simulate(1, method="stepper", rtol=1e-9, samples_per_cycle=250)
+    forced = press.simulate(1, method="stepper-dp54", rtol=1e-9, samples_per_cycle=250)
+    assert np.array_equal(free.x, forced.x)

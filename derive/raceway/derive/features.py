@@ -148,12 +148,27 @@ def _of_mechanism(scene: Scene, mechanism: Mechanism) -> Iterator[Feature]:
 
 
 def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
+    if bearing.load_harmonics is not None:
+        yield Feature(
+            name="load harmonics",
+            path="bearing.load_harmonics",
+            modelled=f"the joint's reaction as its mean and {bearing.load_harmonics} harmonics of the driver's angle",
+            without=replace(scene, bearing=replace(bearing, load_harmonics=None)),
+        )
     yield Feature(
         name="ball contacts",
         path="bearing.contact",
         modelled=f"{bearing.balls} balls at the cage's angles, Hertz force of each",
         without=None,
     )
+    if bearing.contact.smoothing is not None:
+        sharp = replace(bearing, contact=replace(bearing.contact, smoothing=None))
+        yield Feature(
+            name="contact smoothing",
+            path="bearing.contact.smoothing",
+            modelled="contact onset smoothed over a given width: second derivatives exist",
+            without=_without_smoothing(scene, sharp, "bearing.contact.smoothing"),
+        )
     if bearing.damping.law != "none":
         undamped = replace(bearing, damping=Damping(law="none", coefficient=None, ratio=None))
         yield Feature(
@@ -161,6 +176,14 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
             path="bearing.damping",
             modelled=f"law {bearing.damping.law} at each ball",
             without=_keep(scene, "ball.damping_force", bearing=undamped),
+        )
+    if bearing.damping.smoothing is not None:
+        kinked = replace(bearing, damping=replace(bearing.damping, smoothing=None))
+        yield Feature(
+            name="damping smoothing",
+            path="bearing.damping.smoothing",
+            modelled="kink of the one-sided law at rest smoothed over a given speed",
+            without=_without_smoothing(scene, kinked, "bearing.damping.smoothing"),
         )
     if bearing.inner.damping is not None:
         free = replace(bearing, inner=InnerRing(mass=bearing.inner.mass, damping=None))
@@ -181,6 +204,10 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
             modelled="outer ring on an elastic, damped housing: two coordinates more",
             without=_keep(scene, "outer", bearing=fixed),
         )
+
+
+def _without_smoothing(scene: Scene, bearing: Bearing, path: str) -> Scene:
+    return replace(scene, bearing=bearing, quantities=tuple(q for q in scene.quantities if q.path != path))
 
 
 def _windows(count: int) -> str:

@@ -2,7 +2,8 @@
 
 In: two numbers with their uncertainties.  Out: a `Check` with a verdict.
 
-verified      both agree within the tolerance, and the second is known well enough to say so
+verified      both agree within the tolerance, and the second is known well enough to say so.  Where they agree only
+              because a derivative below the quantum counts as nothing, the check says that too: `Check.bounded`
 disagrees     they differ by more than the tolerance and by more than their uncertainties explain
 not checked   the user turned the check off, or the uncertainties are too large for either answer (the reason is told):
               in chaos, and where a contact grazes, no route gives a derivative that means anything
@@ -62,6 +63,9 @@ class Check:
     disagreement : distance of both, same unit
     verdict : see above
     reason : why nothing is said, else ""
+    quantum : derivative that counts as nothing, same unit; None where nothing was compared
+    bounded : verified, but only to within the quantum: relative to their size the numbers differ by more than is
+        allowed, or the second is not known that well
     """
 
     route: str
@@ -70,6 +74,14 @@ class Check:
     disagreement: float | None
     verdict: Verdict
     reason: str = ""
+    quantum: float | None = None
+    bounded: bool = False
+
+    def is_nothing(self, derivative: float) -> bool:
+        """Whether all that is verified is that `derivative` and the second number lie below the quantum."""
+        if not self.bounded or self.value is None or self.quantum is None:
+            return False
+        return max(abs(derivative), abs(self.value)) <= self.quantum
 
 
 #: The check that was turned off.
@@ -114,7 +126,8 @@ def compare(
             reason=why,
         )
     apart = abs(derivative - second)
-    allowed = agreement * max(abs(derivative), abs(second)) + quantum
+    relative = agreement * max(abs(derivative), abs(second))
+    allowed = relative + quantum
     verdict, reason = Verdict.VERIFIED, ""
     if apart > allowed:
         explained = CAUTION * (own_uncertainty + uncertainty)
@@ -123,7 +136,16 @@ def compare(
             reason = _blame(own_uncertainty, uncertainty, allowed)
     elif uncertainty > allowed:
         verdict, reason = Verdict.NOT_CHECKED, _blame(own_uncertainty, uncertainty, allowed)
-    return Check(route=route, value=second, uncertainty=uncertainty, disagreement=apart, verdict=verdict, reason=reason)
+    return Check(
+        route=route,
+        value=second,
+        uncertainty=uncertainty,
+        disagreement=apart,
+        verdict=verdict,
+        reason=reason,
+        quantum=quantum,
+        bounded=verdict is Verdict.VERIFIED and max(apart, uncertainty) > relative,
+    )
 
 
 def _blame(own: float, second: float, allowed: float) -> str:

@@ -32,6 +32,7 @@ from raceway.runtime.commands_shared import (
     complain,
     faults_of,
     load_model,
+    note,
     read_with_settings,
     reported,
     warnings_shown,
@@ -43,6 +44,9 @@ if TYPE_CHECKING:
     from raceway.derive import Scene
     from raceway.runtime.model import Model
     from raceway.runtime.solution import Solution
+
+#: Bytes of samples that are written without a word.
+LARGE = 200_000_000
 
 app = typer.Typer(
     add_completion=False,
@@ -137,6 +141,7 @@ def run(
             of=of,
             trade=usable_trade(folder, read) if target is not None else None,
         )
+        _note_size(solution)
         summary, files = _write_results(model, solution, folder, stages, figures=figures)
     from raceway.runtime.summary import render_summary
 
@@ -147,7 +152,9 @@ def run(
         console.print(render_summary(summary))
         if solution.accuracy is not None:
             console.print(solution.accuracy.words, highlight=False, soft_wrap=True, markup=False)
-        console.print(f"results in {folder}: {', '.join(files)}", highlight=False, soft_wrap=True, markup=False)
+        size = _size((folder / "solution.nc").stat().st_size)
+        told = f"results in {folder}: {', '.join(files)} (solution.nc: {size})"
+        console.print(told, highlight=False, soft_wrap=True, markup=False)
 
 
 @app.command()
@@ -269,6 +276,20 @@ def _check_request(
             f"Allowed: fewer transient turns than turns. Simulate more (--cycles {dropped + 2:g}) or drop fewer "
             "(--transient 0)."
         )
+
+
+def _note_size(solution: Solution) -> None:
+    """Say so before a file is written that is larger than most people expect."""
+    if solution.nbytes > LARGE:
+        note(
+            f"{len(solution)} samples, about {_size(solution.nbytes)}; fewer with samples_per_cycle, none with "
+            "Model.reduce."
+        )
+
+
+def _size(count: int) -> str:
+    """Bytes for people."""
+    return f"{count / 1e6:.0f} MB" if count >= 1e6 else f"{math.ceil(count / 1e3)} kB"
 
 
 def _write_results(

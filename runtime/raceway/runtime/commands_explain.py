@@ -16,6 +16,7 @@ from rich.padding import Padding
 from rich.table import Table
 
 from raceway.runtime.commands_shared import SceneFile, Stages, faults_of, load_model, read_with_settings, reported
+from raceway.runtime.smoothness import WORDS
 
 if TYPE_CHECKING:
     from raceway.derive import Scene
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
     from raceway.runtime.explain import Explanation
     from raceway.runtime.manifest import Manifest
 
-#: Names of derivatives, which the table sums up.
-_DERIVATIVE = re.compile(r"_jac(_[a-z])?$|_tangent$")
+#: Names of derivatives and of the values that they are taken of, which the table sums up.
+_DERIVATIVE = re.compile(r"_jac(_[a-z])?$|_tangent$|_quantities$|^static_forces$")
 
 #: What no scene can ask for; said, so that nobody takes the model for more than it is.
 _NEVER = (
@@ -71,9 +72,13 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
 
     lines = index_lines(path.read_text(encoding="utf-8"))
     kernels = {k.removeprefix("kernel."): v for k, v in counted.functions.items() if k.startswith("kernel.")}
-    parts = []
-    for feature in features(scene):
+    parts: list[dict[str, Any]] = []
+    named = features(scene)
+    for feature in named:
         added = counted.added.get(feature.name)
+        rest = None
+        if added is None and feature.path == "bearing.contact" and "rhs" in counted.functions:
+            rest = _rest([(f.path, counted.added[f.name]["rhs"]) for f in named if f.name in counted.added], counted)
         parts.append(
             {
                 "name": feature.name,
@@ -81,10 +86,12 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
                 "line": lines.find(tuple(feature.path.split("."))),
                 "what": feature.modelled,
                 "operations": None if added is None else {k: v for k, v in added.items() if v},
+                "rest": rest,
             }
         )
     return {
         "scene": scene.name,
+        "mechanism": scene.mechanism is not None,
         "title": scene.title,
         "file": str(path),
         "modelled": parts,
@@ -97,13 +104,24 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
             {"time": b.time, "angle_deg": math.degrees(b.angle), "cause": b.cause} for b in said.breakpoints
         ],
         "turn": said.turn if math.isfinite(said.turn) else None,
-        "smoothness": [{"law": law, "is": kind} for law, kind in said.smoothness],
+        "smoothness": [{"law": law, "is": kind, "words": WORDS[kind]} for law, kind in said.smoothness],
         "time_scales": [
             asdict(s) | {"angle_deg": math.degrees(s.angle), "stiffness": _number(s.stiffness)} for s in said.scales
         ],
         "without_equilibrium": list(said.unsupported),
         "method": {"auto": said.method, "reason": said.reason},
     }
+
+
+def _rest(shares: list[tuple[str, int]], counted: Cost) -> int:
+    """Operations of the right-hand side that no part adds by itself; a part within another counts with that one."""
+    paths = [path for path, _ in shares]
+    within = [
+        any(path.startswith(f"{other}.") for other in paths)
+        or (path == "bearing.load_harmonics" and "mechanism" in paths)
+        for path in paths
+    ]
+    return counted.functions["rhs"] - sum(v for (_, v), inner in zip(shares, within, strict=True) if not inner)
 
 
 def _step(kernels: dict[str, int], balls: int) -> dict[str, int]:
@@ -153,14 +171,13 @@ def _render(report: dict[str, Any]) -> Group:
     modelled = Table("part", "line", "what", share, title="Modelled", title_justify="left", box=None, pad_edge=False)
     modelled.columns[3].justify = "right"
     for part in report["modelled"]:
-        counts = part["operations"]
-        cell = (
-            ""
-            if counts is None or not total
-            else f"{counts.get('rhs', 0)} ({100 * counts.get('rhs', 0) / total:.0f} %)"
-        )
+        counts, name = part["operations"], part["name"]
+        added = part["rest"] if counts is None else counts.get("rhs", 0)
+        if part["rest"] is not None:
+            name = "rest: ball contacts and rings"
+        cell = "" if added is None or not total else f"{added} ({100 * added / total:.0f} %)"
         line = "" if part["line"] is None else str(part["line"])
-        modelled.add_row(escape(part["name"]), line, escape(part["what"]), cell)
+        modelled.add_row(escape(name), line, escape(part["what"]), cell)
 
     functions = Table(
         "function", "operations", "what", title="Generated functions", title_justify="left", box=None, pad_edge=False
@@ -172,12 +189,15 @@ def _render(report: dict[str, Any]) -> Group:
             queries += 1
         elif info["operations"]:
             functions.add_row(name, str(info["operations"]), escape(info["what"]))
-    functions.add_row("and derivatives", "", f"{queries} functions, compiled when a query first needs them (--json)")
+    functions.add_row("for derivatives", "", f"{queries} functions, compiled when a query first needs them (--json)")
 
+    angle = "crank angle" if report["mechanism"] else "shaft angle"
     scales = Table(
-        *("at", "crank angle", "fastest decay", "fastest frequency", "slowest rate", "decay / frequency"),
+        *("at", angle, "fastest decay", "fastest frequency f", "slowest rate", "decay / (2π f)"),
         title="Time scales of small motions",
+        caption="decay / (2π f): of a single mode, up to 1, its damping ratio; above 3 decay bounds explicit steps",
         title_justify="left",
+        caption_justify="left",
         box=None,
         pad_edge=False,
     )
@@ -203,7 +223,7 @@ def _render(report: dict[str, Any]) -> Group:
         blocks += ["", f"[italic]One evaluation in the stepper[/] {report['step']['all']} operations: {parts}"]
     where = "; ".join(f"{b['angle_deg']:.4g}° {b['cause']}" for b in report["breakpoints"]) or "none"
     blocks += ["", f"[italic]Breakpoints of the first turn[/] {escape(where)}"]
-    laws = "; ".join(f"{entry['law']}: {entry['is']}" for entry in report["smoothness"]) or "no contact laws"
+    laws = "; ".join(f"{entry['law']}: {entry['words']}" for entry in report["smoothness"]) or "no contact laws"
     blocks += [f"[italic]Smoothness[/] {escape(laws)}"]
     if report["time_scales"]:
         blocks += ["", scales]

@@ -78,7 +78,7 @@ def jacobian(
     if json_:
         typer.echo(json.dumps(result.to_dict(), indent=2, allow_nan=False))
     else:
-        Console().print(_render(result), highlight=False)
+        _show(result)
     from raceway.runtime.certificate import Verdict
 
     if result.verdict is Verdict.DISAGREES:
@@ -116,7 +116,9 @@ def _instant(at_angle: str | None, time: str | None) -> tuple[float | None, floa
     """Angle [rad] and time [s] of the options, at most one of them."""
     if at_angle is not None and time is not None:
         raise RequestError("--at-angle and --time: both were given. Allowed: one of the two.")
-    return _quantity("--at-angle", at_angle, "rad"), _quantity("--time", time, "s")
+    angle = _quantity("--at-angle", at_angle, "rad")
+    # the unit was written out, so that many turns are meant as such
+    return None if angle is None else math.fmod(angle, math.tau), _quantity("--time", time, "s")
 
 
 def _quantity(option: str, text: str | None, unit: str) -> float | None:
@@ -166,24 +168,33 @@ def _checked(
     return checked_jacobian(model, numbers, of, wrt, t=t, x=x, check=check)
 
 
-def _render(result: CheckedJacobian) -> Table:
-    """Entries with their second opinion; what does not depend at all is left out."""
+def _show(result: CheckedJacobian) -> None:
+    """Print the table as wide as its names are, and below it what is left out and the notes."""
+    console = Console()
+    table, still = _render(result)
+    wide = Console(width=10_000).measure(table).maximum
+    Console(width=max(console.width, wide)).print(table, highlight=False)
+    below = ([f"{still} more are zero."] if still else []) + list(result.notes)
+    for text in below:
+        console.print(text, highlight=False, markup=False)
+
+
+def _render(result: CheckedJacobian) -> tuple[Table, int]:
+    """Entries with their second opinion; what does not depend at all is left out, and counted."""
     from raceway.runtime.certificate import Verdict
 
     table = Table(
         title=f"Derivatives at t = {result.time:.6g} s: {result.verdict.value}",
-        caption="\n".join(result.notes) or None,
         title_justify="left",
-        caption_justify="left",
         header_style="bold",
         box=box.SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
     )
     for head in ("of", "wrt"):
-        table.add_column(head, overflow="fold")
+        table.add_column(head, no_wrap=True)
     for head in ("derivative", "by differences"):
         table.add_column(head, justify="right", no_wrap=True)
-    table.add_column("unit", overflow="fold")
+    table.add_column("unit", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     still = 0
     for entry, check in zip(
@@ -201,6 +212,4 @@ def _render(result: CheckedJacobian) -> Table:
             entry["unit"],
             entry["verdict"],
         )
-    if still:
-        table.add_row(f"{still} more are zero", "", "", "", "", "")
-    return table
+    return table, still

@@ -32,13 +32,17 @@ def sensitivity(
         typer.Option(
             metavar="Q",
             help="Quantity: max:ball.force (or peak_ball_force), rms:inner.y, value:inner.y@240deg, "
-            "amplitude:inner.y@bpfo, drive_work ... May be repeated. Peak ball force and motion of the rings if none "
+            "amplitude:inner.y@bpfo, drive_work, static_deflection@240deg ... May be repeated. Peak ball force and motion of the rings if none "
             "is given.",
         ),
     ] = None,
     wrt: Annotated[
         list[str] | None,
-        typer.Option(metavar="P", help="Parameter by its path in the scene. May be repeated. All if none is given."),
+        typer.Option(
+            metavar="P",
+            help='Parameter by its path in the scene, or a pattern, as "bearing.*". May be repeated. All if none is '
+            "given.",
+        ),
     ] = None,
     set_: Annotated[
         list[str] | None,

@@ -38,6 +38,14 @@ SceneFile = Annotated[
 #: What an interrupted command says.
 INTERRUPTED = "interrupted. Whatever files are there are whole."
 
+#: Lines of a scene's run table that have an option of ``raceway run``.
+RUN_OPTIONS = {
+    "run.cycles": "--cycles",
+    "run.transient_cycles": "--transient",
+    "run.rtol": "--rtol",
+    "run.method": "--method",
+}
+
 #: Names of the stages as they are announced.
 STAGES = {
     "read": "reading the scene",
@@ -79,6 +87,10 @@ def complain(message: str) -> None:
 
 def warn(message: Warning | str, *_: Any, **__: Any) -> None:
     errors_console.print(f"[bold yellow]warning[/]: {escape(str(message))}", soft_wrap=True, highlight=False)
+
+
+def note(message: str) -> None:
+    errors_console.print(f"[bold]note[/]: {escape(message)}", soft_wrap=True, highlight=False)
 
 
 @contextlib.contextmanager
@@ -160,6 +172,10 @@ def read_with_settings(path: Path, settings: list[str]) -> tuple[Scene, Scene, d
     faults: list[Fault] = []
     overrides: dict[str, float] = {}
     for text in settings:
+        misplaced = _run_setting(text)
+        if misplaced is not None:
+            faults.append(misplaced)
+            continue
         try:
             name, value = parse_override(read, text)
         except SceneError as error:
@@ -177,6 +193,27 @@ def read_with_settings(path: Path, settings: list[str]) -> tuple[Scene, Scene, d
             linkage = derive_linkage(asked.mechanism, DRIVER_ANGLE, symbol_of(asked.mechanism.driver.speed))
             check_assembly(linkage, {quantity.path: quantity.value for quantity in asked.quantities})
     return read, asked, overrides
+
+
+def _run_setting(text: str) -> Fault | None:
+    """A fault where ``--set`` names a line of the run table, which holds no parameters of the model."""
+    from raceway.derive.errors import Fault
+
+    path, _, value = (part.strip() for part in text.partition("="))
+    if not path.startswith("run."):
+        return None
+    option = RUN_OPTIONS.get(path)
+    if option is not None:
+        remedy = f"`raceway run` has {option} for it, as in {option} {value or 'VALUE'}"
+    else:
+        remedy = f"`raceway run` has {', '.join(RUN_OPTIONS.values())}; for the rest edit [run] in the scene"
+    return Fault(
+        key=path,
+        problem="is a setting of the run, not a parameter of the model",
+        given=text,
+        allowed="paths of numbers of mechanism, shaft, load and bearing",
+        remedy=remedy,
+    )
 
 
 def check_folder(folder: Path) -> None:

@@ -24,8 +24,9 @@ from raceway.runtime import clock
 from raceway.runtime.ensemble_driver import LANE_FAMILIES, STOPPED, EnsembleDriver
 from raceway.runtime.errors import RequestError
 from raceway.runtime.manifest import Manifest
-from raceway.runtime.members import Members, Span, Table, make_members, member_arrays
+from raceway.runtime.members import Members, Span, Table, make_members, member_arrays, read_table
 from raceway.runtime.parameters import real, unknown_name
+from raceway.runtime.printed import printed
 from raceway.runtime.reductions import (
     RunFailed,
     channel_names,
@@ -123,6 +124,17 @@ class EnsembleResult(Mapping[str, np.ndarray]):
     statistics: EnsembleStatistics
     manifest: Manifest = field(repr=False)
 
+    def __repr__(self) -> str:
+        count = len(next(iter(self.parameters.values())))
+        return (
+            f"EnsembleResult({self.manifest.scene}: {count} members, {len(self.failures)} without results"
+            f"{', interrupted' if self.interrupted else ''}; varied: {', '.join(self.parameters)}; "
+            f"observables: {', '.join(self.observables)})"
+        )
+
+    def __str__(self) -> str:
+        return printed(_render(self))
+
     def __getitem__(self, name: str) -> np.ndarray:
         try:
             return self.observables[name]
@@ -176,7 +188,7 @@ class _Work:
 def simulate_many(
     model: Model,
     table: Table,
-    observables: Sequence[str],
+    observables: str | Sequence[str],
     *,
     cycles: float | None,
     duration: float | None,
@@ -195,8 +207,10 @@ def simulate_many(
     family = choose_family(method or manifest.run.method)
     tolerance = check_rtol(manifest.run.rtol if rtol is None else rtol)
     workers = _threads(threads)
+    # the table first: a wrong one is told before the driver is compiled
+    columns = read_table(manifest, table)
     driver = model.ensemble_driver
-    members = make_members(model, table)
+    members = make_members(model, columns)
     skipped = manifest.run.transient_cycles if transient is None else real(transient)
     span = _span(model, members, cycles, duration, skipped)
     in_lanes = lanes and family in LANE_FAMILIES
@@ -342,10 +356,11 @@ def _chunk_one_by_one(work: _Work, chunk: np.ndarray) -> dict[str, int]:
     return counts
 
 
-def _observables(names: Sequence[str], aliases: Mapping[str, tuple[str, str]]) -> dict[str, tuple[str, str]]:
-    if isinstance(names, str) or not names:
+def _observables(names: str | Sequence[str], aliases: Mapping[str, tuple[str, str]]) -> dict[str, tuple[str, str]]:
+    names = [names] if isinstance(names, str) else list(names)
+    if not names:
         raise RequestError(
-            f"observables: a list of names is expected, not {names!r}. Example: ['max:ball.force', 'rms:inner.y']."
+            "observables: one name or more is expected, none was given. Example: ['max:ball.force', 'rms:inner.y']."
         )
     faults = [unknown_name("observable", name, aliases) for name in names if name not in aliases]
     if faults:
@@ -398,6 +413,36 @@ def _span(model: Model, members: Members, cycles: float | None, duration: float 
                 raise
             members.refused.update((int(member), str(fault)) for member in which)
     return Span(durations=durations, turns=turns, starts=starts)
+
+
+def _render(result: EnsembleResult) -> Any:
+    """Smallest, middle and largest value of each varied parameter and observable over the members."""
+    from rich import box
+    from rich.table import Table as Printed
+
+    count = len(next(iter(result.parameters.values())))
+    statistic = result.statistics
+    table = Printed(
+        title=f"{result.manifest.title}: {count} members",
+        caption=f"{len(result.failures)} without results; {statistic.threads} threads, rtol {statistic.rtol:g}, "
+        f"{statistic.wall_time:.3g} s",
+        title_justify="left",
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+    )
+    table.add_column("parameter or observable", no_wrap=True)
+    for head in ("min", "median", "max"):
+        table.add_column(head, justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    units = {info.name: info.unit for info in result.manifest.parameters}
+    aliases = observable_aliases(channel_names(result.manifest))
+    units |= {name: _unit(result.manifest, *aliases[name]) for name in result.observables}
+    for name, values in (*result.parameters.items(), *result.observables.items()):
+        known = values[np.isfinite(values)]
+        cells = [f"{f(known):.6g}" for f in (np.min, np.median, np.max)] if len(known) else ["", "", ""]
+        table.add_row(name, *cells, units[name])
+    return table
 
 
 def _unit(manifest: Manifest, kind: str, channel: str) -> str:

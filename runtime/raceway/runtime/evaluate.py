@@ -10,7 +10,8 @@ import numpy as np
 
 from raceway.runtime import clock
 from raceway.runtime.errors import RequestError
-from raceway.runtime.parameters import Numbers, Parameters, real, unknown_name, vector
+from raceway.runtime.parameters import Numbers, Parameters, real, vector
+from raceway.runtime.request import no_output
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -27,8 +28,7 @@ def evaluate_point(
     wanted = list(model.outputs) if outputs is None else list(outputs)
     for name in wanted:
         if name not in model.outputs:
-            hint = unknown_name("output", name, model.outputs)
-            raise RequestError(f"{hint} The scene's run.outputs says which are computed.")
+            raise RequestError(no_output(model.manifest, name, model.outputs))
     if not wanted:
         return {}
     kernel = model.kernel("outputs")

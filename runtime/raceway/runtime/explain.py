@@ -16,6 +16,9 @@ import numpy as np
 
 from raceway.runtime import clock
 from raceway.runtime.errors import RacewayError
+from raceway.runtime.evaluate import point
+from raceway.runtime.jacobian import rows_of
+from raceway.runtime.parameters import Numbers
 from raceway.runtime.scales import Scales
 from raceway.runtime.simulate import STIFF_RATIO, choose_method
 
@@ -41,7 +44,7 @@ class TimeScale:
 
     Attributes
     ----------
-    name : "lightest load" or "heaviest load"
+    name : "lightest load" or "heaviest load"; "at rest under the load" where the load is the same all the time
     time, angle : instant [s] and driver angle [rad]
     acceleration : of the unsupported ring at that instant: its load over its mass [m/s^2]
     decay : fastest decay, the largest -Re(eigenvalue) [1/s]
@@ -59,7 +62,10 @@ class TimeScale:
 
     @property
     def stiffness(self) -> float:
-        """Fastest decay over fastest natural frequency [1]; above about 3 steps are bounded by decay, not motion."""
+        """Fastest decay over fastest natural frequency in rad/s [1]; above about 3 steps are bounded by decay.
+
+        For a single mode that oscillates this is its damping ratio; above 1 it is not.
+        """
         return self.decay / self.frequency if self.frequency > 0.0 else math.inf if self.decay > 0.0 else 0.0
 
 
@@ -72,8 +78,8 @@ class Explanation:
     states, outputs : their names
     turn : time of a turn [s]; infinite where nothing turns
     breakpoints : of the first turn (of the run where nothing turns)
-    smoothness : pairs of law and smooth, kinked or discontinuous
-    scales : rates at the lightest and heaviest load; empty for a model without states
+    smoothness : pairs of law and the manifest's word, which `raceway.runtime.smoothness.WORDS` explains
+    scales : rates at the lightest and heaviest load, once under a load that does not change; empty for a model without states
     unsupported : instants without equilibrium, whose rates are not known
     method, reason : what ``auto`` takes, and why
     """
@@ -150,7 +156,13 @@ def _time_scales(
         u = clock.inputs_at(model.manifest.inputs, values, float(time))
         pull[k] = np.linalg.norm(model.kernel("rhs")({**point, "u": u})[half:])
     scales, unsupported = [], []
-    for name, k in (("lightest load", int(np.argmin(pull))), ("heaviest load", int(np.argmax(pull)))):
+    instants: tuple[tuple[str, int], ...] = (
+        ("lightest load", int(np.argmin(pull))),
+        ("heaviest load", int(np.argmax(pull))),
+    )
+    if _is_constant(model, numbers, times):
+        instants = (("at rest under the load", 0),)
+    for name, k in instants:
         time = float(times[k])
         angle = clock.crank_angle(model.manifest, values, time)
         try:
@@ -179,6 +191,16 @@ def _time_scales(
             )
         )
     return tuple(scales), tuple(unsupported)
+
+
+def _is_constant(model: Model, numbers: Numbers, times: np.ndarray) -> bool:
+    """Whether the load is the same at all these times, to rounding."""
+    if not any(info.name == "load.x" for info in model.manifest.quantities):
+        return False
+    (rows,) = rows_of(model, ["load.x", "load.y"])
+    kernel = model.kernel(rows.function)
+    loads = np.array([kernel(point(model, numbers, float(time), None))[rows.indices] for time in times])
+    return bool(np.max(np.ptp(loads, axis=0)) <= 1e-12 * np.max(np.abs(loads)))
 
 
 def _method(model: Model, scales: tuple[TimeScale, ...]) -> tuple[str, str]:

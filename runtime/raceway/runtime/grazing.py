@@ -9,6 +9,7 @@ towards it, and differ.  The same holds for the rate of deflection under a law t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,9 @@ Array = NDArray[np.float64]
 
 #: An extreme counts as grazing within this share of the largest deflection, or rate.
 TOLERANCE = 1e-4
+
+#: Moments nearer to each other than this share of the time are one.
+SAME = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,12 +44,35 @@ class Grazing:
     kink: str
 
     def __str__(self) -> str:
-        unit = "m" if self.kink == "contact" else "m/s"
-        what = "contact" if self.kink == "contact" else "the kink of one-sided damping"
-        return (
-            f"ball {self.ball} grazes {what} at t = {self.time:.6g} s, crank angle {np.degrees(self.crank_angle):.4g} "
-            f"deg, with {self.depth:.2e} {unit}"
-        )
+        return describe((self,))
+
+
+def describe(place: Sequence[Grazing]) -> str:
+    """One line for the balls that graze one kink at one moment."""
+    first = place[0]
+    unit = "m" if first.kink == "contact" else "m/s"
+    what = "contact" if first.kink == "contact" else "the kink of one-sided damping"
+    balls = " and ".join(str(item.ball) for item in place)
+    return (
+        f"{'balls' if len(place) > 1 else 'ball'} {balls} graze{'' if len(place) > 1 else 's'} {what} at t = "
+        f"{first.time:.6g} s, crank angle {np.degrees(first.crank_angle):.4g} deg, with {first.depth:.2e} {unit}"
+    )
+
+
+def merge_grazing(found: Sequence[Grazing]) -> list[tuple[Grazing, ...]]:
+    """Places in order of time: balls that graze one kind of kink at one moment, as opposite ones do, are one place."""
+    places: list[list[Grazing]] = []
+    for item in found:
+        same = [
+            place
+            for place in places
+            if place[0].kink == item.kink and abs(place[0].time - item.time) <= SAME * item.time
+        ]
+        if same:
+            same[0].append(item)
+        else:
+            places.append([item])
+    return [tuple(sorted(place, key=lambda item: item.ball)) for place in places]
 
 
 def find_grazing(

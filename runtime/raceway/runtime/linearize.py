@@ -21,12 +21,14 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 from rich import box
+from rich.console import Group
 from rich.table import Table
 
 from raceway.runtime.errors import RequestError, SimulationError
 from raceway.runtime.evaluate import point
 from raceway.runtime.jacobian import rows_of
 from raceway.runtime.parameters import Numbers
+from raceway.runtime.printed import printed
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -97,6 +99,14 @@ class Linearization:
     at_equilibrium: bool
     unbalanced: float
     notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        frequencies = ", ".join(f"{m.natural_frequency:.6g}" for m in self.modes)
+        where = "equilibrium" if self.at_equilibrium else "given state"
+        return f"Linearization({where} at t = {self.time:.6g} s; natural frequencies {frequencies} Hz)"
+
+    def __str__(self) -> str:
+        return printed(Group(render_linearization(self), render_matrices(self)))
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
@@ -280,9 +290,16 @@ def render_linearization(result: Linearization) -> Table:
         table.add_column(head, justify="right", no_wrap=True)
     for mode in result.modes:
         ratio = "" if mode.rigid else f"{mode.damping_ratio:.4g}"
-        shape = [f"{abs(z):.2f}∠{math.degrees(math.atan2(z.imag, z.real)):.0f}°" for z in mode.shape.tolist()]
+        shape = [_polar(z) for z in mode.shape.tolist()]
         table.add_row(f"{mode.natural_frequency:.6g}", f"{mode.damped_frequency:.6g}", ratio, *shape)
     return table
+
+
+def _polar(z: complex) -> str:
+    """Size and phase [deg]; what rounds to nothing has no phase."""
+    size = f"{abs(z):.2f}"
+    phase = round(math.degrees(math.atan2(z.imag, z.real)))
+    return "0" if float(size) == 0.0 else f"{size}∠{180 if phase == -180 else phase}°"
 
 
 def render_matrices(result: Linearization) -> Table:

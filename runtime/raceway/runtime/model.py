@@ -483,7 +483,7 @@ class Model:
     def simulate_many(
         self,
         parameters: Table,
-        observables: Sequence[str],
+        observables: str | Sequence[str],
         *,
         cycles: float | None = None,
         duration: float | None = None,
@@ -623,7 +623,8 @@ class Model:
 
         Parameters
         ----------
-        t, crank_angle : the instant: time [s], default 0, or angle of crank or shaft in the first turn [rad]
+        t, crank_angle : the instant: time [s], default 0, or angle of crank or shaft in the first turn in radians,
+            at most two turns
         parameters : overrides, SI
         load : on the inner ring, x and y [N], instead of the scene's
 
@@ -656,7 +657,8 @@ class Model:
 
         Parameters
         ----------
-        t, crank_angle : the instant: time [s], default 0, or angle of crank or shaft in the first turn [rad]
+        t, crank_angle : the instant: time [s], default 0, or angle of crank or shaft in the first turn in radians,
+            at most two turns
         x : state, shape (states,).  Default: static equilibrium under the load of that instant
         parameters : overrides, SI
 

@@ -1,7 +1,8 @@
 """The true peak of an output, between the samples.
 
 Ball forces have spikes narrower than a sample interval; samples alone read them low.  Around the largest samples the
-model is integrated once more on a grid 64 times as fine, from the sampled states.
+model is integrated once more on a grid 64 times as fine, from the sampled states; around the best of what that shows,
+again from there, until the value stays.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from raceway.runtime.errors import RequestError
 from raceway.runtime.integrators import GRID
 from raceway.runtime.parameters import Numbers
 from raceway.runtime.quasi_static import NAME as QUASI_STATIC
+from raceway.runtime.segments import time_resolution
 from raceway.runtime.simulate import fill
 from raceway.runtime.stepping import Cost
 from raceway.runtime.trajectory import Interrupted, evaluate_outputs, start_trajectory
@@ -23,6 +25,12 @@ from raceway.runtime.trajectory import Interrupted, evaluate_outputs, start_traj
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
     from raceway.runtime.solution import Solution
+
+#: A peak whose value changes by less than this, relative to itself, from one grid to the next is settled [1].
+SETTLED = 1e-9
+
+#: Narrowest interval that is looked at, in times that count as different.
+NARROWEST = 1e3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +49,29 @@ class Peak:
     time: float
     ball: int | None
     sampled: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Top:
+    """Best point of a grid.
+
+    Attributes
+    ----------
+    value : of the output, times the sign of the kind
+    time : [s]
+    column : ball, counted from 0
+    reach : how much higher the output may be between this point and its neighbours
+    begin, end : the neighbours [s]
+    x : state at the former
+    """
+
+    value: float
+    time: float
+    column: int
+    reach: float
+    begin: float
+    end: float
+    x: np.ndarray
 
 
 def refine_peak(
@@ -79,8 +110,16 @@ def refine_peak(
     k, column = divmod(int(np.argmax(samples)), samples.shape[1])
     best = (float(samples[k, column]), float(solution.t[k]), column)
     sampled = sign * best[0]
+    near = []
     for k in _tops(samples, candidates):
-        best = max(best, _closely(model, numbers, solution, name, sign, k))
+        low, high = max(k - 1, 0), min(k + 1, len(solution) - 1)
+        between = (float(solution.t[low]), float(solution.t[high]))
+        near.append(_closely(model, numbers, solution, name, sign, solution.x[low], between, GRID * (high - low)))
+    for top in sorted(near, key=lambda item: -item.value):
+        found = top
+        if top.value + top.reach > best[0]:
+            found = _settled(model, numbers, solution, name, sign, top)
+        best = max(best, (found.value, found.time, found.column))
     value, time, ball = best
     several = solution[name].ndim == 2
     return Peak(value=sign * value, time=time, ball=ball + 1 if several else None, sampled=sampled)
@@ -95,16 +134,35 @@ def _tops(samples: np.ndarray, count: int) -> list[int]:
     return [int(k) for k in order if np.isfinite(heights[k])]
 
 
+def _settled(model: Model, numbers: Numbers, solution: Solution, name: str, sign: float, top: _Top) -> _Top:
+    """The same peak on grids that get finer around it until its value stays, or time has no finer steps.
+
+    No curve is laid through the points: where a load jumps or two balls change rank, none would fit.
+    """
+    turn = clock.period(model.manifest, numbers.values)
+    while top.end - top.begin > NARROWEST * time_resolution(top.begin, top.end, turn):
+        finer = _closely(model, numbers, solution, name, sign, top.x, (top.begin, top.end), 2 * GRID)
+        if abs(finer.value - top.value) <= SETTLED * abs(top.value):
+            return finer
+        top = finer
+    return top
+
+
 def _closely(
-    model: Model, numbers: Numbers, solution: Solution, name: str, sign: float, k: int
-) -> tuple[float, float, int]:
-    """Largest value between the neighbours of sample `k`: value (times sign), time, column."""
-    low, high = max(k - 1, 0), min(k + 1, len(solution) - 1)
-    begin, end = float(solution.t[low]), float(solution.t[high])
-    count = GRID * (high - low)
+    model: Model,
+    numbers: Numbers,
+    solution: Solution,
+    name: str,
+    sign: float,
+    x: np.ndarray,
+    between: tuple[float, float],
+    count: int,
+) -> _Top:
+    """Largest value on a grid of `count` intervals between two times, from the state `x` at the first."""
+    begin, end = between
     times = begin + (end - begin) * (np.arange(count + 1) / count)
     turn = clock.period(model.manifest, numbers.values)
-    trajectory = start_trajectory(model, numbers, times, solution.x[low], (begin, end), turn, even=True)
+    trajectory = start_trajectory(model, numbers, times, x, (begin, end), turn, even=True)
     statistics = solution.statistics
     tolerance = statistics.rtol * np.array(statistics.magnitudes)
     try:
@@ -118,4 +176,14 @@ def _closely(
     found = evaluate_outputs(model, numbers, trajectory, (name,), lean=False, at_rest=at_rest)
     fine = sign * found[name].reshape(count + 1, -1)
     row, column = divmod(int(np.argmax(fine)), fine.shape[1])
-    return float(fine[row, column]), float(times[row]), column
+    low, high = max(row - 1, 0), min(row + 1, count)
+    value = float(fine[row, column])
+    return _Top(
+        value=value,
+        time=float(times[row]),
+        column=column,
+        reach=value - float(np.min(np.max(fine[[low, high]], axis=1))),
+        begin=float(times[low]),
+        end=float(times[high]),
+        x=trajectory.x[low],
+    )

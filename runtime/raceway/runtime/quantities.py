@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -273,14 +273,14 @@ KINDS: Mapping[str, Kind] = {
     "static_deflection": Kind(
         summary="distance of the inner ring's centre from its unloaded place, at rest under the load of one instant",
         evaluate=None,
-        place="a crank angle (240deg, 4.19rad) or a time (0.41s)",
+        place="a crank angle of the first turn (240deg, 4.19rad) or a time (0.41s)",
         unit="m",
         static=True,
     ),
     "static_peak_ball_force": Kind(
         summary="largest elastic force of any ball, at rest under the load of one instant",
         evaluate=None,
-        place="a crank angle (240deg, 4.19rad) or a time (0.41s)",
+        place="a crank angle of the first turn (240deg, 4.19rad) or a time (0.41s)",
         unit="N",
         static=True,
     ),
@@ -338,11 +338,7 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
             )
         return Quantity(name=text, kind=bare, channel=kind.channel, ball=None, place="", unit=kind.unit)
     if form is None:
-        known = [
-            *aliases,
-            *(f"{name}:{channel}" for name in KINDS for channel in channels if not KINDS[name].unit),
-            *_plain(),
-        ]
+        known = _usable(manifest, channels)
         raise RequestError(f"{unknown_name('quantity', text, known)} Its form is kind:output, as in max:ball.force.")
     name = _SYNONYMS.get(form["kind"], form["kind"])
     if name in _COUNTED:
@@ -380,14 +376,13 @@ def place_of(manifest: Manifest, numbers: Numbers, window: Window, quantity: Qua
     """Time at which a quantity with a place is taken, in the last turn [s], and how it moves."""
     if quantity.kind == "end":
         return window.duration, Place(kind="end", number=0.0)
-    form = _PLACE.fullmatch(quantity.place)
-    assert form is not None  # checked when read
-    number = float(form["number"])
-    if form["unit"] == "s":
+    asked = named_place(quantity)
+    if asked.kind == "time":
+        number = asked.number
         if not 0.0 <= number <= window.duration:
             raise RequestError(f"{quantity.name}: the run ends at {window.duration:g} s. Run longer, or ask earlier.")
-        return number, Place(kind="time", number=number)
-    angle = math.radians(number) if form["unit"] == "deg" else number
+        return number, asked
+    angle = asked.number
     speed = clock.shaft_speed(manifest, numbers.values)
     if speed == 0.0:
         raise RequestError(f"{quantity.name}: nothing turns (its speed is zero). Name a time instead, as in @0.41s.")
@@ -398,7 +393,7 @@ def place_of(manifest: Manifest, numbers: Numbers, window: Window, quantity: Qua
     time = (angle + clock.TURN * whole - start) / speed
     if time < 0.0:
         raise RequestError(f"{quantity.name}: the run is over before that angle is passed. Run longer.")
-    return min(time, window.duration), Place(kind="angle", number=angle)
+    return min(time, window.duration), asked
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -407,6 +402,16 @@ class Place:
 
     kind: str
     number: float
+
+
+def named_place(quantity: Quantity) -> Place:
+    """The place written behind ``@``: an angle or a time."""
+    form = _PLACE.fullmatch(quantity.place)
+    assert form is not None  # checked when read
+    number = float(form["number"])
+    if form["unit"] == "s":
+        return Place(kind="time", number=number)
+    return Place(kind="angle", number=math.radians(number) if form["unit"] == "deg" else number)
 
 
 def place_slope(
@@ -489,5 +494,17 @@ def _aliases(channels: Mapping[str, tuple[int, str]]) -> dict[str, str]:
     }
 
 
-def _plain() -> Sequence[str]:
-    return [name for name, kind in KINDS.items() if kind.unit]
+def _usable(manifest: Manifest, channels: Mapping[str, tuple[int, str]]) -> list[str]:
+    """Names that can be asked for as they stand, for suggestions."""
+    open_ = [name for name, kind in KINDS.items() if not kind.place and not kind.unit]
+    counted = tuple(f"{name}:" for name in _COUNTED)
+    alone = {name: kind for name, kind in KINDS.items() if kind.unit}
+    return [
+        *(alias for alias, meant in _aliases(channels).items() if not meant.startswith(counted)),
+        *(f"{name}:{channel}" for name in open_ for channel in channels),
+        *(
+            name
+            for name, kind in alone.items()
+            if (manifest.bearing is not None if kind.static else kind.channel in channels)
+        ),
+    ]

@@ -17,6 +17,7 @@ from raceway.runtime.errors import RequestError
 from raceway.runtime.parameters import Numbers, real, unknown_name, vector
 
 if TYPE_CHECKING:
+    from raceway.runtime.manifest import Manifest
     from raceway.runtime.model import Model
 
 #: Smallest and largest relative tolerance [1].
@@ -182,10 +183,27 @@ def output_names(model: Model, asked: Sequence[str] | None) -> tuple[str, ...]:
     if asked is None:
         return model.outputs
     names = (asked,) if isinstance(asked, str) else tuple(dict.fromkeys(asked))
-    faults = [unknown_name("output", name, model.outputs) for name in names if name not in model.outputs]
+    faults = [no_output(model.manifest, name, model.outputs) for name in names if name not in model.outputs]
     if faults:
-        raise RequestError("\n".join([*faults, "The scene's run.outputs says which are computed."]))
+        raise RequestError("\n".join(faults))
     return names
+
+
+def no_output(manifest: Manifest, name: object, known: Sequence[str], what: str = "output") -> str:
+    """Why a name is no output, and what to do: the scene may not ask for it, or there is no such thing.
+
+    Parameters
+    ----------
+    known : the names to choose from
+    what : word for them
+    """
+    if any(name == info.name for info in manifest.quantities):
+        part, dot, _ = str(name).rpartition(".")
+        return (
+            f"{name!r} is not among this scene's run.outputs: add \"{f'{part}.*' if dot else name}\" there; the model "
+            "is then derived anew."
+        )
+    return f"{unknown_name(what, name, known)} The scene's run.outputs says which are computed."
 
 
 def run_length(model: Model, request: Request, turn: float) -> float:

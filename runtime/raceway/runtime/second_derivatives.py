@@ -22,6 +22,7 @@ from raceway.runtime.evaluate import checked_time, point
 from raceway.runtime.jacobian import CRANK_ANGLE, RHS, TIME, directions_of, rows_of, turning_speed
 from raceway.runtime.manifest import InputInfo
 from raceway.runtime.parameters import Numbers
+from raceway.runtime.smoothness import WORDS
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -86,7 +87,7 @@ def hessian(
 
 
 def _refuse_unbounded(model: Model, labels: Sequence[str], functions: Sequence[str]) -> None:
-    rough = [f"{law}: {kind}" for law, kind in model.manifest.smoothness if kind != "twice smooth"]
+    rough = [f"{law}: {WORDS[kind]}" for law, kind in model.manifest.smoothness if kind != "twice smooth"]
     asked = [label for label in labels if label.startswith(_BY_LAW)] + ([RHS] if RHS in functions else [])
     if rough and asked:
         raise RequestError(

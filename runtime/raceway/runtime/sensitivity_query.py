@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -33,7 +34,7 @@ from raceway.runtime.scales import Scales
 from raceway.runtime.sensitivity_report import QuantityValue, Sensitivity, SensitivityReport, ratio_unit
 from raceway.runtime.simulate import STIFF_RATIO
 from raceway.runtime.stepper import METHODS, Family
-from raceway.runtime.study import Course, Span, Study
+from raceway.runtime.study import DEFLECTION, Course, Span, Study
 from raceway.runtime.track import Outlook, Stepping
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ class Query:
 
     Attributes
     ----------
-    of, wrt : names; None for the sensible ones, and for all parameters
+    of, wrt : names, in `wrt` shell-style patterns too; None for the sensible ones, and for all parameters
     span : how long to run
     method : of the derivatives: ``auto``, one of the stepper's, ``erk``
     direction : of ``erk``: "forward" or "adjoint"
@@ -185,10 +186,7 @@ def answer(model: Model, numbers: Numbers, query: Query) -> SensitivityReport:
     _refuse_jumps(manifest)
     check_assembly(model, numbers)
     quantities = [parse_quantity(manifest, name) for name in _listed("of", query.of, default_quantities(manifest))]
-    names = _listed("wrt", query.wrt, tuple(numbers.parameters))
-    for name in names:
-        if name not in numbers.parameters:
-            raise RequestError(unknown_name("parameter", name, numbers.parameters))
+    names = _chosen(_listed("wrt", query.wrt, tuple(numbers.parameters)), numbers.parameters)
     route = _check_route(query)
     study = Study(model, quantities, query.span, 4)
     window = study.window(numbers)
@@ -254,7 +252,8 @@ def answer(model: Model, numbers: Numbers, query: Query) -> SensitivityReport:
                     parameter_value=at,
                     derivative=derivative,
                     unit=ratio_unit(quantity.unit, units[name]),
-                    dimensionless=at * derivative / estimate.value if estimate.value != 0.0 else math.nan,
+                    dimensionless=at * derivative / estimate.value if at * estimate.value != 0.0 else math.nan,
+                    scale=float(difference_scales[column]),
                     uncertainty=float(own[row, column]) if route is not None else None,
                     check=check,
                 )
@@ -306,6 +305,17 @@ def _listed(option: str, given: Sequence[str] | None, default: Sequence[str]) ->
     if not names:
         raise RequestError(f"sensitivity: {option} names nothing. Name at least one.")
     return names
+
+
+def _chosen(patterns: Sequence[str], known: Mapping[str, float]) -> list[str]:
+    """Parameters by name or shell-style pattern, each once; those of a pattern in the scene's order."""
+    found: list[str] = []
+    for pattern in patterns:
+        matches = [pattern] if pattern in known else [name for name in known if fnmatchcase(name, pattern)]
+        if not matches:
+            raise RequestError(unknown_name("parameter", pattern, known))
+        found += matches
+    return list(dict.fromkeys(found))
 
 
 def _check_route(query: Query) -> str | None:
@@ -404,11 +414,11 @@ def _second(
 
 
 def _grazing(model: Model, numbers: Numbers, course: Course, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:
-    """Where the run grazes a kink; nothing where the scene does not compute the balls' deflections."""
+    """Where the run grazes a kink, whether or not the scene's outputs name the balls' deflections."""
     manifest, track = model.manifest, course.track
-    if track is None or "ball.deflection" not in model.outputs or manifest.bearing is None:
+    if track is None or manifest.bearing is None:
         return ()
-    deflection = Outlook(model, ["ball.deflection"]).look(track, numbers)["ball.deflection"].value
+    deflection = Outlook(model, [DEFLECTION]).look(track, numbers)[DEFLECTION].value
     order = np.lexsort((track.nodes.t, track.nodes.segment))
     times = track.nodes.t[order]
     angles = np.array([clock.crank_angle(manifest, numbers.values, float(time)) for time in times])

@@ -1,10 +1,11 @@
 """What a query of sensitivities answers: values, derivatives with their certificates, warnings.
 
-In: nothing but numbers.  Out: `SensitivityReport`, which prints as JSON (tables are in `sensitivity_table`).
+In: nothing but numbers.  Out: `SensitivityReport`, which gives JSON and prints the tables of `sensitivity_table`.
 """
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -37,7 +38,9 @@ class Sensitivity:
     quantity, parameter : names
     value, parameter_value : numbers
     derivative, unit : dQ/dp
-    dimensionless : (p/Q) dQ/dp; NaN where Q is zero
+    dimensionless : (p/Q) dQ/dp; NaN where p or Q is zero: there it says nothing of the parameter's effect
+    scale : change of the parameter that is a large one, in its unit: its value; for an angle a radian; where it is
+        zero, what positions move by in the run, or the largest value of its unit
     uncertainty : of the derivative, from a run at a looser tolerance, same unit; None where there was none
     check : the certificate
     """
@@ -49,11 +52,22 @@ class Sensitivity:
     derivative: float
     unit: str
     dimensionless: float
+    scale: float
     uncertainty: float | None
     check: Check
 
+    @property
+    def is_nothing(self) -> bool:
+        """Whether the check says no more than that the derivative is below what counts as nothing."""
+        return self.check.is_nothing(self.derivative)
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+    @property
+    def change(self) -> float:
+        """Change of the quantity per `scale` of the parameter, in the quantity's unit."""
+        return self.derivative * self.scale
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class SensitivityReport:
     """Answer to a query: every pair, with what it takes to judge them.
 
@@ -74,6 +88,24 @@ class SensitivityReport:
     grazing: tuple[Grazing, ...]
     settings: Mapping[str, Any]
 
+    def __repr__(self) -> str:
+        """One line."""
+        verdicts = ", ".join(f"{count} {verdict.value}" for verdict, count in self.verdicts.items() if count)
+        return (
+            f"SensitivityReport({self.scene!r}: {len(self.quantities)} quantities by {len(self.parameters)} "
+            f"parameters, {verdicts})"
+        )
+
+    def __str__(self) -> str:
+        """The tables of ``raceway sensitivity``, without colours."""
+        from rich.console import Console
+
+        from raceway.runtime.sensitivity_table import WIDTH, render_report
+
+        out = io.StringIO()
+        Console(file=out, width=WIDTH, color_system=None, highlight=False).print(render_report(self))
+        return "\n".join(line.rstrip() for line in out.getvalue().splitlines())
+
     def __getitem__(self, key: tuple[str, str]) -> Sensitivity:
         """The pair of a quantity and a parameter."""
         quantity, parameter = key
@@ -85,9 +117,12 @@ class SensitivityReport:
         return self.pairs[names.index(quantity) * len(self.parameters) + self.parameters.index(parameter)]
 
     def of(self, quantity: str) -> tuple[Sensitivity, ...]:
-        """Pairs of one quantity, ranked by the size of the dimensionless derivative."""
+        """Pairs of one quantity, ranked by the size of the dimensionless derivative.
+
+        Behind them those that have none, for parameter or quantity is zero, ranked by the change per `scale`.
+        """
         pairs = [self[quantity, name] for name in self.parameters]
-        return tuple(sorted(pairs, key=lambda pair: -_rank(pair.dimensionless)))
+        return tuple(sorted(pairs, key=_rank))
 
     @property
     def verdicts(self) -> dict[Verdict, int]:
@@ -125,6 +160,8 @@ class SensitivityReport:
                     "derivative": _plain(pair.derivative),
                     "unit": pair.unit,
                     "dimensionless": _plain(pair.dimensionless),
+                    "parameter_scale": pair.scale,
+                    "change_per_scale": _plain(pair.change),
                     "uncertainty": _plain(pair.uncertainty),
                     "certificate": {
                         "route": pair.check.route,
@@ -132,6 +169,9 @@ class SensitivityReport:
                         "uncertainty": _plain(pair.check.uncertainty),
                         "disagreement": _plain(pair.check.disagreement),
                         "verdict": pair.check.verdict.value,
+                        "nothing": pair.is_nothing,
+                        "within_bound_only": pair.check.bounded,
+                        "bound": _plain(pair.check.quantum),
                         "reason": pair.check.reason,
                     },
                 }
@@ -158,8 +198,11 @@ def ratio_unit(above: str, below: str) -> str:
     return f"{above or '1'}/{under}"
 
 
-def _rank(value: float) -> float:
-    return abs(value) if math.isfinite(value) else -1.0
+def _rank(pair: Sensitivity) -> tuple[bool, float]:
+    """Sort key: those with a dimensionless derivative first, larger ones first, what is no number last."""
+    has_one = math.isfinite(pair.dimensionless)
+    size = pair.dimensionless if has_one else pair.change
+    return not has_one, -abs(size) if math.isfinite(size) else 1.0
 
 
 def _plain(value: float | None) -> float | None:

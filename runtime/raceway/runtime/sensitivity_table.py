@@ -6,6 +6,7 @@ In: a `SensitivityReport`.  Out: things that rich prints.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from rich import box
 from rich.console import Group
@@ -14,10 +15,14 @@ from rich.table import Table
 from rich.text import Text
 
 from raceway.runtime.certificate import Verdict
+from raceway.runtime.grazing import describe, merge_grazing
 from raceway.runtime.sensitivity_report import Sensitivity, SensitivityReport
 
 #: Grazing places that are listed; the JSON has all.
-LISTED = 5
+LISTED = 3
+
+#: Characters of a line where nobody says how wide the paper is.
+WIDTH = 110
 
 #: Styles of the verdicts.
 _STYLES = {Verdict.VERIFIED: "green", Verdict.DISAGREES: "bold red", Verdict.NOT_CHECKED: "yellow"}
@@ -26,9 +31,11 @@ _STYLES = {Verdict.VERIFIED: "green", Verdict.DISAGREES: "bold red", Verdict.NOT
 def render_report(report: SensitivityReport, *, top: int | None = None) -> Group:
     """Tables of the report, a quantity each, parameters ranked by the size of the dimensionless derivative.
 
+    Parameters that are zero have none and stand apart, ranked by dQ/dp times a natural change of the parameter.
+
     Parameters
     ----------
-    top : most rows of each table; None for all.  Pairs that disagree are always there
+    top : most rows of each section; None for all.  Pairs that disagree are always there
     """
     parts: list[Table | Text] = []
     for quantity in report.quantities:
@@ -41,23 +48,34 @@ def render_report(report: SensitivityReport, *, top: int | None = None) -> Group
             box=box.SIMPLE_HEAD,
             padding=(0, 1, 0, 0),
         )
-        table.add_column("parameter", overflow="fold")
-        for name in ("p/Q dQ/dp", "dQ/dp", "apart"):
+        table.add_column("parameter", overflow="fold", min_width=22)
+        for name in ("p/Q dQ/dp", "dQ/dp"):
             table.add_column(name, justify="right", no_wrap=True)
+        table.add_column("unit", overflow="fold", min_width=7)
+        table.add_column("apart", justify="right", no_wrap=True)
         table.add_column("verdict", no_wrap=True)
         ranked = report.of(quantity.name)
-        shown = [
-            pair
-            for rank, pair in enumerate(ranked)
-            if top is None or rank < top or pair.check.verdict is Verdict.DISAGREES
-        ]
-        for pair in shown:
-            table.add_row(*_row(pair))
-        if len(shown) < len(ranked):
-            table.add_row(f"{len(ranked) - len(shown)} more, smaller", "", "", "", "", style="dim")
+        _add_rows(table, [pair for pair in ranked if math.isfinite(pair.dimensionless)], top)
+        without = [pair for pair in ranked if not math.isfinite(pair.dimensionless)]
+        if without:
+            what = "quantity" if quantity.value == 0.0 else "parameter"
+            table.add_section()
+            table.add_row(f"{what} is 0: no %/%, see dQ/dp", *[""] * 5, style="italic")
+            _add_rows(table, without, top)
         parts.append(table)
     parts += [Text.from_markup(line) for line in _remarks(report)]
     return Group(*parts)
+
+
+def _add_rows(table: Table, ranked: Sequence[Sensitivity], top: int | None) -> None:
+    """Rows of one section."""
+    shown = [
+        pair for rank, pair in enumerate(ranked) if top is None or rank < top or pair.check.verdict is Verdict.DISAGREES
+    ]
+    for pair in shown:
+        table.add_row(*_row(pair))
+    if len(shown) < len(ranked):
+        table.add_row(f"{len(ranked) - len(shown)} more, smaller", *[""] * 5, style="dim")
 
 
 def _title(report: SensitivityReport, name: str) -> str:
@@ -72,17 +90,18 @@ def _title(report: SensitivityReport, name: str) -> str:
 
 def _row(pair: Sensitivity) -> tuple[str, ...]:
     check = pair.check
-    relative = f"{pair.dimensionless:+.4f}" if math.isfinite(pair.dimensionless) else "-"
+    relative = f"{pair.dimensionless:+.4f}" if math.isfinite(pair.dimensionless) else "–"
     size = max(abs(pair.derivative), abs(check.value or 0.0))
     apart = "-" if check.disagreement is None else f"{check.disagreement / size:.0e}" if size > 0.0 else "0"
     style = _STYLES[check.verdict]
-    return (
-        escape(pair.parameter),
-        relative,
-        f"{pair.derivative:.4g}",
-        apart,
-        f"[{style}]{check.verdict.value}[/]",
-    )
+    number, words = f"{pair.derivative:.4g}", check.verdict.value
+    if pair.is_nothing:
+        # digits that nothing vouches for are not shown
+        relative = "~0" if math.isfinite(pair.dimensionless) else relative
+        number, apart, words = f"~0 (<{check.quantum:.0e})", "-", f"{words}: ~0"
+    elif check.bounded:
+        words += f" to ±{check.quantum:.0e}"
+    return (escape(pair.parameter), relative, number, escape(pair.unit), apart, f"[{style}]{words}[/]")
 
 
 def _remarks(report: SensitivityReport) -> list[str]:
@@ -90,7 +109,11 @@ def _remarks(report: SensitivityReport) -> list[str]:
     counts = report.verdicts
     words = ", ".join(f"{count} {verdict.value}" for verdict, count in counts.items() if count)
     route = next((pair.check.route for pair in report.pairs if pair.check.route != "none"), None)
+    nothing = sum(pair.is_nothing for pair in report.pairs)
+    if nothing:
+        words += f" ({nothing} of them ~0: both routes below the bound shown, and no digit of the derivative is verified)"
     lines = [f"{len(report.pairs)} pairs: {words}" + (f"; apart: relative distance to {route}" if route else "")]
+    lines.append("p/Q dQ/dp: % per %; dQ/dp in SI units, angles in radians")
     lines += [
         f"[bold red]disagrees[/]: d({escape(pair.quantity)})/d({escape(pair.parameter)}) is {pair.derivative:.9g}, by "
         f"{pair.check.route} {_number(pair.check.value)} ± {_number(pair.check.uncertainty)} {pair.unit}"
@@ -108,10 +131,11 @@ def _remarks(report: SensitivityReport) -> list[str]:
             reasons[kind] = reasons.get(kind, 0) + 1
     lines += [f"[yellow]not checked[/], {count} pairs: {escape(reason)}" for reason, count in reasons.items()]
     if report.grazing:
-        lines.append("[yellow]grazing[/]: derivatives are fragile, for a small change moves the motion over a kink")
-        lines += [f"  {escape(str(item))}" for item in report.grazing[:LISTED]]
-        if len(report.grazing) > LISTED:
-            lines.append(f"  and {len(report.grazing) - LISTED} more")
+        places = merge_grazing(report.grazing)
+        count = f"{len(places)} place{'s' if len(places) > 1 else ''}"
+        more = f"; the first {LISTED} here, --json lists all" if len(places) > LISTED else ""
+        lines.append(f"[yellow]grazing[/] at {count}: a small change moves the motion over a kink there{more}")
+        lines += [f"  {escape(describe(items))}" for items in places[:LISTED]]
     return lines
 
 

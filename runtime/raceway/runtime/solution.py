@@ -16,7 +16,7 @@ import numpy as np
 
 from raceway.runtime.errors import RequestError
 from raceway.runtime.manifest import Manifest, VariableInfo
-from raceway.runtime.parameters import unknown_name
+from raceway.runtime.request import no_output
 from raceway.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -105,10 +105,12 @@ class Solution:
         names = self.states
         if name in names:
             return self.x[:, names.index(name)]
-        hint = unknown_name("output or state", name, dict.fromkeys((*self.outputs, *names)))
-        raise RequestError(
-            f"{hint} The scene's run.outputs says which outputs there are, and simulate(outputs=...) which are kept."
-        )
+        if any(name == info.name for info in self.manifest.outputs):
+            raise RequestError(
+                f"{name!r} was not kept in this run: name it in simulate(outputs=...), or leave outputs away to keep all."
+            )
+        known = tuple(dict.fromkeys((*self.outputs, *names)))
+        raise RequestError(no_output(self.manifest, name, known, "output or state"))
 
     def __contains__(self, name: object) -> bool:
         return name in self.outputs or name in self.states
@@ -122,6 +124,11 @@ class Solution:
             f"Solution({self.manifest.scene}: {len(self.t)} samples, {span}; {self.statistics.method}, "
             f"rtol {self.statistics.rtol:g}; {self.status.name.lower()}; outputs: {', '.join(self.outputs) or 'none'})"
         )
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the samples, which is about the size of the file that `save` writes."""
+        return sum(array.nbytes for array in (self.t, self.x, *self.outputs.values()))
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -19,13 +19,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from rich import box
+from rich.table import Table
 from scipy.optimize import brentq
 
 from raceway.runtime import clock
 from raceway.runtime.errors import RequestError, SimulationError
 from raceway.runtime.evaluate import checked_time, point
 from raceway.runtime.jacobian import RHS, Rows, contract, directions_of, rows_of
-from raceway.runtime.parameters import Numbers
+from raceway.runtime.parameters import Numbers, real, vector
+from raceway.runtime.printed import printed
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -37,6 +40,9 @@ TOLERANCE = 1e-12
 
 #: Most Newton steps; a dozen are usual.
 ITERATIONS = 200
+
+#: Largest angle of crank or shaft that is taken for one in radians: who gives more means degrees [rad].
+LARGEST_ANGLE = 4.0 * math.pi
 
 #: Stiffness below this fraction of the largest counts as none.
 FREE = 1e-9
@@ -79,6 +85,16 @@ class StaticEquilibrium:
     model: Model = field(repr=False)
     numbers: Numbers = field(repr=False)
     load_is_given: bool = field(repr=False)
+
+    def __repr__(self) -> str:
+        places = ", ".join(f"{name} {q:.4g} m" for name, q in zip(self.coordinates, self.positions, strict=True))
+        return (
+            f"StaticEquilibrium({self.model.manifest.scene} at t = {self.time:.6g} s: {places}; "
+            f"peak ball force {self.peak_ball_force:.6g} N)"
+        )
+
+    def __str__(self) -> str:
+        return printed(_render(self))
 
     def __getitem__(self, name: str) -> float:
         """Position by name [m]."""
@@ -150,15 +166,20 @@ def instant(model: Model, numbers: Numbers, t: float | None, crank_angle: float 
     Raises
     ------
     RequestError
-        Both are given, one is no finite number, or nothing turns.
+        Both are given, one is no finite number, the angle is beyond two turns, or nothing turns.
     """
     if t is not None and crank_angle is not None:
         raise RequestError("Both t and crank_angle were given. Allowed: one of the two.")
     if crank_angle is None:
         return checked_time(0.0 if t is None else t)
-    angle = float(crank_angle)
+    angle = real(crank_angle)
     if not math.isfinite(angle):
         raise RequestError(f"crank_angle: a finite angle [rad] is expected, not {crank_angle!r}.")
+    if abs(angle) > LARGEST_ANGLE:
+        raise RequestError(
+            f"crank_angle: {crank_angle!r} rad is more than two turns. Were degrees meant? Allowed: radians from -4 pi "
+            f"to 4 pi; for degrees give math.radians({crank_angle!r})."
+        )
     speed = clock.shaft_speed(model.manifest, numbers.values)
     past = (angle - clock.crank_angle(model.manifest, numbers.values, 0.0)) * math.copysign(1.0, speed)
     if speed == 0.0:
@@ -190,7 +211,7 @@ def static_equilibrium(
     kernel, slopes = model.kernel("static_forces"), model.kernel("static_forces_jac_x")
     (rows,) = rows_of(model, ["load.x", "load.y"])
     own = model.kernel(rows.function)(there)[rows.indices]
-    applied = own if load is None else np.asarray(load, dtype=float)
+    applied = own if load is None else vector(load)
     if applied.shape != (2,) or not np.all(np.isfinite(applied)):
         raise RequestError(f"load: two finite numbers, x and y [N], are expected, not {load!r}.")
     extra = np.concatenate([applied - own, np.zeros(half - 2)])
@@ -241,6 +262,26 @@ def static_equilibrium(
         numbers=numbers,
         load_is_given=load is not None,
     )
+
+
+def _render(found: StaticEquilibrium) -> Table:
+    """Positions, load and balls as a table, a row for each."""
+    table = Table(
+        title=f"Static equilibrium at t = {found.time:.6g} s",
+        caption=f"load {found.load[0]:.6g} N, {found.load[1]:.6g} N; net force left {found.residual:.2g} N",
+        title_justify="left",
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+    )
+    table.add_column("position or ball", no_wrap=True)
+    for head in ("position or deflection, µm", "elastic force, N"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for name, q in zip(found.coordinates, found.positions.tolist(), strict=True):
+        table.add_row(name, f"{1e6 * q:.6g}", "")
+    for k, (deflection, force) in enumerate(zip(found.deflection.tolist(), found.ball_force.tolist(), strict=True)):
+        table.add_row(f"ball {k + 1}", f"{1e6 * deflection:.6g}", f"{force:.6g}")
+    return table
 
 
 def _force_rows(model: Model) -> Rows:

@@ -33,9 +33,19 @@ from raceway.runtime.nodes import (
     with_points,
 )
 from raceway.runtime.parameters import Numbers
-from raceway.runtime.quantities import KINDS, Estimate, Mark, Place, Quantity, View, place_of, place_slope
+from raceway.runtime.quantities import (
+    KINDS,
+    Estimate,
+    Mark,
+    Place,
+    Quantity,
+    View,
+    named_place,
+    place_of,
+    place_slope,
+)
 from raceway.runtime.sensitivity import Chain
-from raceway.runtime.statics import static_equilibrium
+from raceway.runtime.statics import instant, static_equilibrium
 from raceway.runtime.track import Outlook, Signal, Stepping, Track, follow
 
 if TYPE_CHECKING:
@@ -315,10 +325,10 @@ class Study:
         manifest = self.model.manifest
         time, moved = 0.0, np.zeros(0 if chain is None else len(chain.names))
         if quantity.place:
-            # any turn will do that lies within a run of its own: the last of two
-            turn = clock.period(manifest, numbers.values)
-            window = Window(duration=2.0 * turn, start=0.0, turn=turn, cycles=2.0, transient=0.0)
-            time, kind = place_of(manifest, numbers, window, quantity)
+            # an angle is that of the first turn, as in `Model.static_equilibrium`: the balls stand where they do there
+            kind = named_place(quantity)
+            by_angle = kind.kind == "angle"
+            time = instant(self.model, numbers, None if by_angle else kind.number, kind.number if by_angle else None)
             if chain is not None:
                 moved = place_slope(manifest, numbers, kind, time, moved, chain.derivative)
         rest = static_equilibrium(self.model, numbers, t=time)
@@ -377,7 +387,8 @@ class Study:
         manifest, nodes, edges = self.model.manifest, track.nodes, track.edges
         ranked = [item.channel for item in self._moving if item.channel.startswith("ball.") and item.ball is None]
         ranked = list(dict.fromkeys(ranked))
-        deflections = [DEFLECTION] if DEFLECTION in self.model.outputs else []
+        # among the quantities of every bearing, whether or not the scene's outputs name it
+        deflections = [DEFLECTION] if manifest.bearing is not None else []
         signals = Outlook(self.model, [*ranked, *deflections]).look(track, numbers)
         deflection = signals[DEFLECTION].value if deflections else np.zeros((len(nodes), 0))
         return find_kinks(

@@ -230,7 +230,7 @@ _TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
 _RUN = {
     "rtol": "rtol {}",
     "steps": "{} steps",
-    "wall_time": "{} s wall time",
+    "wall_time": "integrated in {} s",
     "cycle_length": "cycle {} s",
     "transient_cycles_dropped": "{} transient cycles dropped",
     "steady_cycles": "{} steady ones",

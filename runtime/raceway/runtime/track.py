@@ -9,7 +9,7 @@ not: it is one number for both sides of the edge.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from raceway.runtime import clock
 from raceway.runtime.errors import RequestError
+from raceway.runtime.jacobian import rows_of
 from raceway.runtime.kernel import Loop
 from raceway.runtime.nodes import Edges, Nodes
 from raceway.runtime.parameters import Numbers, unknown_name
@@ -193,7 +194,7 @@ class Outlook:
     Parameters
     ----------
     model : the model
-    channels : states and outputs
+    channels : states, outputs, and quantities that the scene's outputs do not name
 
     Raises
     ------
@@ -203,7 +204,7 @@ class Outlook:
 
     def __init__(self, model: Model, channels: Sequence[str]) -> None:
         self._model = model
-        known = list(dict.fromkeys((*model.states, *model.outputs)))
+        known = list(dict.fromkeys((*model.states, *model.outputs, *(q.name for q in model.manifest.quantities))))
         for name in channels:
             if name not in known:
                 hint = unknown_name("output", name, known)
@@ -211,6 +212,11 @@ class Outlook:
         self.channels = tuple(dict.fromkeys(channels))
         self._outputs = [info for info in model.manifest.outputs if info.name in self.channels]
         self._outputs = [info for info in self._outputs if info.name not in model.states]
+        own = {*model.states, *model.outputs}
+        self._more = [rows for name in self.channels if name not in own for rows in rows_of(model, name)]
+        self._columns = [(info.name, info.size) for info in self._outputs]
+        self._columns += [(name.partition("[")[0], len(rows.labels)) for rows in self._more for name in rows.labels[:1]]
+        self._values_of_more: Loop | None = None
         self._derivatives: Loop | None = None
 
     def look(self, track: Track, numbers: Numbers, chain: Chain | None = None) -> Mapping[str, Signal]:
@@ -221,7 +227,7 @@ class Outlook:
             if name in states:
                 k = states.index(name)
                 found[name] = Signal(value=track.x[:, [k]], slope=track.slope[:, [k]])
-        if self._outputs:
+        if self._columns:
             found |= self._values(track, numbers) if chain is None else self._differentiated(track, numbers, chain)
         return found
 
@@ -232,27 +238,38 @@ class Outlook:
         for name in self.channels:
             if name in states:
                 found[name] = np.tile(np.eye(len(states))[states.index(name)], (count, 1, 1))
-        if self._outputs:
+        if self._columns:
             if self._derivatives is None:
                 self._derivatives = self._loop()
             results = self._derivatives(count, self._given(track, numbers))
             rows = results["g"].shape[1]
             every = results["g_x"].reshape(count, -1, rows).transpose(0, 2, 1)
             column = 0
-            for info in self._outputs:
-                found[info.name] = every[:, column : column + info.size]
-                column += info.size
+            for name, size in self._columns:
+                found[name] = every[:, column : column + size]
+                column += size
         return found
 
     def _given(self, track: Track, numbers: Numbers) -> dict[str, Array]:
         return {"t": track.local, "x": track.x, "u": track.u, "p": numbers.p, "c": numbers.c}
 
     def _values(self, track: Track, numbers: Numbers) -> dict[str, Signal]:
+        found: dict[str, Signal] = {}
+        if self._more:
+            if self._values_of_more is None:
+                self._values_of_more = Loop(self._function(self._more_rows), ("t", "x", "u"))
+            every = self._values_of_more(len(track.nodes), self._given(track, numbers))["g"]
+            column = 0
+            for name, size in self._columns[len(self._outputs) :]:
+                found[name] = Signal(value=every[:, column : column + size], slope=np.zeros((len(every), size, 0)))
+                column += size
+        if not self._outputs:
+            return found
         infos = self._model.manifest.outputs
         loop = self._model.loop("outputs", ("t", "x", "u"))
         results = loop(len(track.nodes), self._given(track, numbers))
         columns = dict(zip((info.name for info in infos), results.values(), strict=True))
-        return {
+        return found | {
             info.name: Signal(value=columns[info.name], slope=np.zeros((*columns[info.name].shape, 0)))
             for info in self._outputs
         }
@@ -271,10 +288,10 @@ class Outlook:
             slopes.append(slope)
         value, slope = np.concatenate(values), np.concatenate(slopes)
         found, column = {}, 0
-        for info in self._outputs:
-            columns = slice(column, column + info.size)
-            found[info.name] = Signal(value=value[:, columns], slope=slope[:, columns])
-            column += info.size
+        for name, size in self._columns:
+            columns = slice(column, column + size)
+            found[name] = Signal(value=value[:, columns], slope=slope[:, columns])
+            column += size
         return found
 
     def _block(self, track: Track, numbers: Numbers, chain: Chain, moved: Array, part: slice) -> tuple[Array, Array]:
@@ -294,19 +311,42 @@ class Outlook:
         return values, slope + by("p") @ chain.p + by("c") @ chain.c
 
     def _loop(self) -> Loop:
-        """The outputs asked for and their derivatives by each argument, made from the expression graph."""
-        outputs = self._model.symbolic("outputs")
-        order = [info.name for info in self._model.manifest.outputs]
-        arguments = {name: casadi.SX.sym(name, outputs.size1_in(k)) for k, name in enumerate(outputs.name_in())}
-        results = outputs.call(list(arguments.values()))
-        wanted = casadi.vertcat(*(results[order.index(info.name)] for info in self._outputs))
-        inputs = {name: arguments.get(name, casadi.SX(0, 1)) for name in ("t", "x", "u", "p", "c")}
-        blocks = [casadi.vec(casadi.densify(casadi.jacobian(wanted, symbol))) for symbol in inputs.values()]
-        function = casadi.Function(
-            "outlook",
-            list(inputs.values()),
-            [casadi.densify(wanted), *blocks],
-            list(inputs),
-            ["g", *(f"g_{name}" for name in inputs)],
-        )
-        return Loop(function, ("t", "x", "u"))
+        """The channels asked for and their derivatives by each argument, made from the expression graph."""
+        return Loop(self._function(self._all_rows, derivatives=True), ("t", "x", "u"))
+
+    def _function(
+        self, rows: Callable[[Mapping[str, casadi.SX]], list[casadi.SX]], *, derivatives: bool = False
+    ) -> casadi.Function:
+        """Rows as a function of all five arguments; with their derivatives by each."""
+        manifest = self._model.manifest
+        sizes = {
+            "t": 1,
+            "x": len(self._model.states),
+            "u": len(manifest.inputs),
+            "p": len(manifest.parameters),
+            "c": len(manifest.constants),
+        }
+        inputs = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
+        wanted = casadi.vertcat(*rows(inputs))
+        results, names = [casadi.densify(wanted)], ["g"]
+        if derivatives:
+            results += [casadi.vec(casadi.densify(casadi.jacobian(wanted, symbol))) for symbol in inputs.values()]
+            names += [f"g_{name}" for name in inputs]
+        return casadi.Function("outlook", list(inputs.values()), results, list(inputs), names)
+
+    def _all_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
+        found = []
+        if self._outputs:
+            outputs = self._model.symbolic("outputs")
+            results = outputs.call([inputs[name] for name in outputs.name_in()])
+            order = [info.name for info in self._model.manifest.outputs]
+            found = [results[order.index(info.name)] for info in self._outputs]
+        return found + self._more_rows(inputs)
+
+    def _more_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
+        found = []
+        for rows in self._more:
+            group = self._model.symbolic(rows.function)
+            (every,) = group.call([inputs[name] for name in group.name_in()])
+            found.append(every[rows.indices.tolist()])
+        return found

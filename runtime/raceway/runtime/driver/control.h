@@ -1,4 +1,5 @@
-/* What single runs and ensembles decide alike: family of methods and first step size. */
+/* Family of methods and first step size.  Single runs and ensembles decide alike where a segment begins; within it single runs look at
+   how far their steps reach as well (judge_family in stepper.c). */
 #ifndef RACEWAY_CONTROL_H
 #define RACEWAY_CONTROL_H
 

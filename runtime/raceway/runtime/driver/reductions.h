@@ -1,17 +1,17 @@
 /* On-line reductions: extremes with their times, mean and mean square of channels, from the dense output of every accepted step.
 
    Channels are the states, then four quantities of the balls, each with its value of the most loaded ball at the moment: total force,
-   elastic force, damping force, deflection.  Every step is looked at in its quarters, theta = 0, 1/4, 1/2, 3/4, 1;
-   those of DOP853, whose output is of degree seven and not four, as two steps of half the size.
+   elastic force, damping force, deflection.  Every step is looked at in its quarters, theta = 0, 1/4, 1/2, 3/4, 1; those of DOP853, whose
+   output is of degree seven and not four, as two steps of half the size.
 
    Integrals are taken by Boole's rule; squares of states over the polynomial of degree four through the five values, which is exact for
    all methods but DOP853; squares of the balls' quantities by Boole's rule as well, for where these jump a polynomial swings.
 
-   Extremes: that polynomial is looked at for tops, all of them, wherever its hull reaches
-   beyond the extreme known so far; the channel is evaluated there from the dense output, and where it is not what the polynomial promised
-   the search climbs on from there.  For states and all methods but DOP853 the polynomial is the dense output itself, and no extreme is
-   missed.  An extreme is always a value that the solution takes, never an extrapolation across a kink.  At a kink it is met to a part of
-   a quarter step: the smallest value of the most loaded ball is such a place, for there two balls change rank.
+   Extremes: that polynomial is looked at for tops, all of them, wherever it may reach beyond the extreme known so far; the channel is
+   evaluated there from the dense output, and refined where it is not what the polynomial promised.  For states and all methods but
+   DOP853 the polynomial is the dense output itself, and no extreme is missed.  An extreme is always a value that the solution takes, never
+   an extrapolation across a kink.  At a kink it is met to a part of a quarter step: the smallest value of the most loaded ball is such a
+   place, for there two balls change rank.
 
    A reduction is a row of RW_REDUCTION numbers, which a run adds to: it can go on in another call. */
 #ifndef RACEWAY_REDUCTIONS_H
@@ -40,7 +40,7 @@ enum {
 };
 
 enum {
-    RW_REFINEMENTS = 12, /* evaluations spent on a top at most, besides the first three; one of a state takes one */
+    RW_REFINEMENTS = 12, /* evaluations spent on a top at most, besides the first; that of a state takes no more */
     RW_CELLS = 16        /* parts of a step in which the slope of a channel may change its sign */
 };
 
@@ -85,9 +85,9 @@ static inline void rw_channels(const rw_numbers *n, double t, const double *rest
     double q[RW_BALL_CHANNELS][RW_NB];
     rw_ball_quantities(n, t, x, q);
     for (int k = 0; k < RW_BALL_CHANNELS; k++) {
-        double most = q[k][0];
+        double most = -INFINITY;
 #pragma omp simd reduction(max : most)
-        for (int j = 1; j < RW_NB; j++) most = q[k][j] > most ? q[k][j] : most;
+        for (int j = 0; j < RW_NB; j++) most = q[k][j] > most ? q[k][j] : most;
         value[RW_NX + k] = most;
     }
 }
@@ -183,29 +183,25 @@ static inline double rw_probe(const rw_search *search, double theta)
     return found;
 }
 
-/* The top that is near theta, where `promised` was expected. */
-static inline void rw_climb(const rw_search *search, double theta, double promised)
+/* The top that is near theta, where `promised` was expected; u holds the channel at the quarters, with the sign of a maximum. */
+static inline void rw_climb(const rw_search *search, const double *u, double theta, double promised)
 {
+    const int part = theta < 1.0 ? (int)((RW_POINTS - 1) * theta) : RW_POINTS - 2;
     double b = theta, vb = rw_probe(search, b);
     /* the polynomial is the channel: there is its top */
     if (fabs(vb - promised) <= 1e-12 * (fabs(vb) + fabs(promised))) return;
-    const double side = 0.5 / RW_CELLS;
-    double a = b > side ? b - side : 0.0, c = b < 1.0 - side ? b + side : 1.0, va = rw_probe(search, a), vc = rw_probe(search, c);
-    for (int i = 0; i < RW_REFINEMENTS; i++) {
-        if (va > vb || vc > vb) {
-            /* not between the outer ones: go on uphill, with strides that double */
-            const double stride = 2.0 * (c - a);
-            if (vc > va) {
-                if (c >= 1.0) return;
-                a = b, va = vb, b = c, vb = vc;
-                c = c + stride < 1.0 ? c + stride : 1.0, vc = rw_probe(search, c);
-            } else {
-                if (a <= 0.0) return;
-                c = b, vc = vb, b = a, vb = va;
-                a = a > stride ? a - stride : 0.0, va = rw_probe(search, a);
-            }
-            continue;
-        }
+    double a = (double)part / (RW_POINTS - 1), c = (double)(part + 1) / (RW_POINTS - 1), va = u[part], vc = u[part + 1];
+    if (vc > vb && vc >= va) {
+        /* not between the quarters around it: uphill is the next one */
+        if (part + 2 >= RW_POINTS) return;
+        a = b, va = vb, b = c, vb = vc;
+        c = (double)(part + 2) / (RW_POINTS - 1), vc = u[part + 2];
+    } else if (va > vb) {
+        if (part == 0) return;
+        c = b, vc = vb, b = a, vb = va;
+        a = (double)(part - 1) / (RW_POINTS - 1), va = u[part - 1];
+    }
+    for (int i = 0; i < RW_REFINEMENTS && vb >= va && vb >= vc; i++) {
         /* what the next parabola promises on top; beside a jump of the force parabolas creep, and every other place is the middle of the
            larger part instead */
         const double range = va < vc ? vb - va : vb - vc, next = rw_top(a, va, b, vb, c, vc), move = (next - b) / (next < b ? b - a : c - b);
@@ -269,9 +265,9 @@ static inline void rw_extreme(double *reduction, int value, int channel, double 
             s = moved < low ? low : moved > high ? high : moved;
         }
         const double promised = q[0] + s * (q[1] + s * (q[2] + s * (q[3] + s * q[4])));
-        if (promised > sign * *best) rw_climb(&search, 0.25 * (s + 2.0), promised);
+        if (promised > sign * *best) rw_climb(&search, u, 0.25 * (s + 2.0), promised);
     }
-    if (channel >= RW_NX && above > sign * *best && place > 0.0 && place < 1.0) rw_climb(&search, place, above);
+    if (channel >= RW_NX && above > sign * *best && place > 0.0 && place < 1.0) rw_climb(&search, u, place, above);
 }
 
 /* Add an accepted step whose channels at the quarters are v. */

@@ -78,10 +78,13 @@ def tornado(report: SensitivityReport, quantity: str) -> Figure:
         if verdict in present
     ]
     axes.legend(handles=handles, loc="lower right" if right >= -left else "lower left")
-    hidden = len(report.parameters) - len(pairs)
+    zero = sum(not math.isfinite(pair.dimensionless) for pair in report.of(quantity))
+    hidden = len(report.parameters) - len(pairs) - zero
     words = f"{report.scene}: {quantity} = {found.value:.5g} {found.unit}."
     if hidden:
-        words += f" {hidden} parameters with smaller or no effect, or of value zero, are left out."
+        words += f" Left out: {hidden} with smaller or no effect."
+    if zero:
+        words += f" Parameters of value 0, which have no % per %: {zero}; see the table for them."
     words += " Sensitivities are local: they hold for small changes."
     if report.grazing:
         words += f" The motion grazes a kink at {len(report.grazing)} places, where derivatives are fragile."
