@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -18,9 +19,12 @@ ROOT = Path(__file__).resolve().parent.parent
 
 @pytest.fixture(scope="session", autouse=True)
 def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Compiled models of the suite stay out of the user's cache folder."""
+    """Compiled models of the suite stay out of the user's cache folder; the processes of one run share theirs."""
+    place = tmp_path_factory.getbasetemp()
+    cache = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "compiled"
+    cache.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("RACEWAY_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("RACEWAY_CACHE_DIR", str(cache))
         yield
 
 

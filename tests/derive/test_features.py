@@ -118,3 +118,27 @@ PLAIN = {
 def test_shipped_scenes_cost_what_they_cost(name: str) -> None:
     counts = count_operations(read_scene(ROOT / "scenes" / f"{name}.toml"))
     assert (counts["rhs"], counts["kernel.law"], counts["kernel.stage"]) == PLAIN[name]
+
+
+CONTACT = ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n')
+RATE = ('ratio = "0.25e-5 s*mm^0.5"\n', 'ratio = "0.25e-5 s*mm^0.5"\nsmoothing = "1 mm/s"\n')
+HARMONICS = ("balls = 8\n", "balls = 8\nload_harmonics = 4\n")
+
+
+@pytest.mark.parametrize(
+    ("path", "change", "others"),
+    [
+        ("bearing.contact.smoothing", CONTACT, ()),
+        ("bearing.damping.smoothing", RATE, (CONTACT,)),
+        ("bearing.load_harmonics", HARMONICS, ()),
+    ],
+)
+def test_optional_lines_of_the_bearing_are_features(
+    scene_text: Callable[..., str], path: str, change: tuple[str, str], others: tuple[tuple[str, str], ...]
+) -> None:
+    """Left out in memory, each costs what the scene file without its line costs."""
+    given = {f.path: f for f in features(press(scene_text, *others, change))}
+    without = given[path].without
+    assert without is not None
+    assert count_operations(without) == count_operations(press(scene_text, *others))
+    assert path not in {f.path for f in features(without)}

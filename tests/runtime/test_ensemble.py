@@ -312,3 +312,25 @@ def test_inputs_made_for_many_are_those_made_for_one(make_model: ModelMaker) -> 
     for row, (k, time) in enumerate(zip(owner, times, strict=True)):
         values = members.numbers(model, int(k)).values
         assert np.array_equal(found[row], clock.inputs_at(model.manifest.inputs, values, time, time + 1e-4))
+
+
+def test_one_observable_is_named_like_several(make_model: ModelMaker) -> None:
+    model, columns = press(make_model), table(3)
+    one = model.simulate_many(columns, "peak_ball_force", cycles=1, transient=0)
+    several = model.simulate_many(columns, ["peak_ball_force"], cycles=1, transient=0)
+    assert list(one) == ["peak_ball_force"]
+    assert same(one, several)
+    assert "\n" not in repr(one)
+    assert "3 members" in repr(one)
+    assert f"{one['peak_ball_force'].max():.6g}" in str(one)
+
+
+def test_a_wrong_table_is_told_before_anything_is_compiled(
+    make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def compiled(self: Model) -> None:
+        raise AssertionError("compiled before the table was read")
+
+    monkeypatch.setattr(Model, "ensemble_driver", property(compiled))
+    with pytest.raises(RequestError, match="finite number"):
+        press(make_model).simulate_many({"bearing.clearance": [math.nan]}, ["peak_ball_force"])

@@ -68,3 +68,35 @@ def test_command_names_the_line_that_asked(tmp_path: Path, monkeypatch: pytest.M
     assert not any("bearing.outer_ring" in text for text in report["not_modelled"])
     assert report["step"]["all"] == sum(v for k, v in report["step"].items() if k != "all")
     assert report["method"]["auto"] == "stepper"
+
+
+def test_a_constant_load_has_one_state_of_rest(make_model: Callable[..., Model]) -> None:
+    assert [s.name for s in make_model("varying_compliance").explain().scales] == ["at rest under the load"]
+    assert [s.name for s in make_model("punching_press").explain().scales] == ["lightest load", "heaviest load"]
+
+
+def test_shares_of_the_right_hand_side_and_the_rest_are_all_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the parts share nothing; gravity and the punch are within the mechanism."""
+    monkeypatch.chdir(tmp_path)
+    for name, inner in (("punching_press", ("gravity", "force punch")), ("varying_compliance", ())):
+        done = CliRunner().invoke(app, ["explain", str(ROOT / f"scenes/{name}.toml"), "--json"])
+        assert done.exit_code == 0, done.stderr
+        report = json.loads(done.stdout)
+        parts = {p["name"]: p for p in report["modelled"]}
+        rest = parts["ball contacts"]["rest"]
+        shares = [p["operations"].get("rhs", 0) for n, p in parts.items() if p["operations"] and n not in inner]
+        assert rest > 0
+        assert rest + sum(shares) == report["functions"]["rhs"]["operations"]
+
+
+def test_hertz_is_not_called_smooth_where_people_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["explain", str(ROOT / "scenes/varying_compliance.toml")])
+    assert done.exit_code == 0, done.stderr
+    words = " ".join(done.stdout.split())
+    assert "elastic: once continuously differentiable (second derivative unbounded at contact onset)" in words
+    assert "shaft angle" in words
+    assert "crank angle" not in words
+    assert "_quantities" not in words

@@ -75,7 +75,7 @@ def test_balls_that_graze_at_one_moment_are_one_place() -> None:
 
 
 def test_kinks_are_sought_whether_or_not_the_outputs_name_the_deflection(make_model: Callable[..., Model]) -> None:
-    """The mean force's derivative jumps at contact onset: both scenes must see the same places, and the same numbers."""
+    """The mean force's derivative jumps at contact onset: both scenes must see the same places and numbers."""
     asked = ["mean:ball.force", "load.force.x"]
     numbers = {"bearing.clearance": 20e-6, "bearing.initial.inner.x": 14e-6}
     options = {"cycles": 0.6, "transient": 0.0, "parameters": numbers, "check": False}

@@ -204,3 +204,30 @@ def test_what_cannot_be_in_equilibrium_is_refused(bearing_6204: Model, press: Mo
         bearing_6204.static_equilibrium(load=(1.0, math.nan))
     with pytest.raises(RequestError, match="one of the two"):
         press.static_equilibrium(0.1, crank_angle=1.0)
+
+
+def test_degrees_in_place_of_radians_are_asked_about(press: Model) -> None:
+    for ask in (press.static_equilibrium, press.linearize):
+        with pytest.raises(RequestError, match="Were degrees meant"):
+            ask(crank_angle=240)
+    two_turns_back = press.static_equilibrium(crank_angle=math.radians(240.0) - 4.0 * math.pi)
+    np.testing.assert_allclose(
+        two_turns_back.positions, press.static_equilibrium(crank_angle=math.radians(240.0)).positions, rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize("load", ["196 N", (1.0, 2.0, 3.0), ("196 N", "0 N"), 5.0])
+def test_a_load_that_is_no_pair_of_numbers_is_refused(press: Model, load: object) -> None:
+    with pytest.raises(RequestError, match="two finite numbers, x and y"):
+        press.static_equilibrium(load=load)  # type: ignore[arg-type]
+
+
+def test_one_line_says_what_it_is_and_print_shows_every_ball(press: Model) -> None:
+    found = press.static_equilibrium(crank_angle=4.2)
+    assert "\n" not in repr(found)
+    assert f"{found.peak_ball_force:.6g} N" in repr(found)
+    assert sum(line.strip().startswith("ball ") for line in str(found).splitlines()) == len(found.ball_force)
+    small = press.linearize(crank_angle=4.2)
+    assert "\n" not in repr(small)
+    assert f"{small.natural_frequencies[0]:.6g}" in repr(small)
+    assert "0.00∠" not in str(small)
