@@ -488,3 +488,28 @@ def test_without_a_compiler_a_warning_names_the_cost_and_the_numbers_agree(
     assert found["compiled"] is False
     # two methods at a relative tolerance of 1e-6 per step
     assert found["peak_ball_force"]["total"] == pytest.approx(compiled["peak_ball_force"]["total"], rel=1e-4)
+
+
+@pytest.mark.parametrize(("setting", "option"), [("run.cycles=3", "--cycles 3"), ("run.rtol=1e-8", "--rtol 1e-8")])
+def test_a_run_setting_given_as_a_parameter_is_told_its_option(
+    raceway: Callable[..., Result], tmp_path: Path, setting: str, option: str
+) -> None:
+    says_no(raceway(tmp_path, "run", SCENES / "varying_compliance.toml", "--set", setting), option)
+
+
+def test_a_large_file_is_told_before_it_is_written_and_its_size_behind(
+    site: Site, raceway: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a bound that a short run passes."""
+    words = ("run", SCENES / "varying_compliance.toml", "--no-figures", "--out", tmp_path / "out", "--cycles", "3")
+    quiet = raceway(site.folder, *words, "--transient", "1")
+    assert "note" not in quiet.stderr
+    monkeypatch.setattr("raceway.runtime.cli.LARGE", 1000)
+    told = raceway(site.folder, *words, "--transient", "1")
+    count = len(load_solution(tmp_path / "out" / "solution.nc"))
+    assert f"note: {count} samples, about " in told.stderr
+    size = (tmp_path / "out" / "solution.nc").stat().st_size
+    assert (
+        f"(solution.nc: {size / 1e6:.0f} MB)" in told.stdout or f"(solution.nc: {-(-size // 1000)} kB)" in told.stdout
+    )
+    assert "integrated in" in " ".join(told.stdout.split())

@@ -40,12 +40,31 @@ def test_the_report_is_printed_written_and_drawn(raceway: Callable[..., Result],
     assert "verified" in result.stdout
     assert "peak_ball_force" in result.stdout
     assert max(map(len, result.stdout.splitlines())) <= 100
+    assert "N/(m/s^2)" in result.stdout
     report = json.loads((folder / "out" / "sensitivity.json").read_text(encoding="utf-8"))
     assert report["verdicts"]["verified"] == 4
     for name in ("rms_inner_y", "peak_ball_force"):
         picture = imread(folder / "out" / f"tornado_{name}.png")
         assert picture.shape[1] >= 1100
         assert picture[..., :3].std() > 0.05
+
+
+def test_patterns_choose_parameters_and_the_table_says_where_one_is_zero(raceway: Callable[..., Result]) -> None:
+    words = [
+        *SHORT[:-2],
+        "--set",
+        "bearing.clearance=0 um",
+        "--of",
+        "static_deflection@240deg",
+        "--wrt",
+        "bearing.c[lo]*",
+    ]
+    result = raceway(*words, "--no-check")
+    assert result.exit_code == 0, result.output
+    before, _, behind = result.stdout.partition("parameter is 0")
+    assert "bearing.contact" in before
+    assert "bearing.clearance" in behind
+    assert "bearing.contact" not in behind
 
 
 def test_json_is_one_object_and_nothing_else(raceway: Callable[..., Result]) -> None:

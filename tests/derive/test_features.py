@@ -122,7 +122,7 @@ def test_shipped_scenes_cost_what_they_cost(name: str) -> None:
 
 CONTACT = ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n')
 RATE = ('ratio = "0.25e-5 s*mm^0.5"\n', 'ratio = "0.25e-5 s*mm^0.5"\nsmoothing = "1 mm/s"\n')
-HARMONICS = ("balls = 8\n", "balls = 8\nload_harmonics = 4\n")
+HARMONICS = ("balls = 8", "balls = 8\nload_harmonics = 4")
 
 
 @pytest.mark.parametrize(

@@ -164,3 +164,13 @@ def test_laws_whose_force_jumps_are_refused_with_what_is_allowed(make_model: Cal
     jumping = make_model("punching_press", ('law = "one-sided"', 'law = "two-sided-gated"'))
     with pytest.raises(RequestError, match=r"discontinuous.*tangent.*one-sided.*smoothing"):
         jumping.sensitivity("rms:inner.y", "bearing.clearance", 1, transient=0)
+
+
+def test_a_smoothed_contact_makes_a_gated_law_differentiable(make_model: Callable[..., Model]) -> None:
+    """Contacts open and close in this run: with Hertz's own onset the force would jump there."""
+    smooth = ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n')
+    model = make_model("punching_press", ('law = "one-sided"', 'law = "two-sided-gated"'), smooth)
+    report = model.sensitivity("rms:inner.y", "bearing.clearance", 0.7, transient=0)
+    (pair,) = report.pairs
+    assert pair.check.verdict is Verdict.VERIFIED
+    assert not pair.check.bounded

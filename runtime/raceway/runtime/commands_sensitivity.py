@@ -32,8 +32,8 @@ def sensitivity(
         typer.Option(
             metavar="Q",
             help="Quantity: max:ball.force (or peak_ball_force), rms:inner.y, value:inner.y@240deg, "
-            "amplitude:inner.y@bpfo, drive_work, static_deflection@240deg ... May be repeated. Peak ball force and motion of the rings if none "
-            "is given.",
+            "amplitude:inner.y@bpfo, drive_work, static_deflection@240deg ... May be repeated. Peak ball force and "
+            "motion of the rings if none is given.",
         ),
     ] = None,
     wrt: Annotated[

@@ -79,7 +79,8 @@ class Explanation:
     turn : time of a turn [s]; infinite where nothing turns
     breakpoints : of the first turn (of the run where nothing turns)
     smoothness : pairs of law and the manifest's word, which `raceway.runtime.smoothness.WORDS` explains
-    scales : rates at the lightest and heaviest load, once under a load that does not change; empty for a model without states
+    scales : rates at the lightest and heaviest load, once under a load that does not change; empty for a model without
+        states
     unsupported : instants without equilibrium, whose rates are not known
     method, reason : what ``auto`` takes, and why
     """

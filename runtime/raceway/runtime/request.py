@@ -200,7 +200,7 @@ def no_output(manifest: Manifest, name: object, known: Sequence[str], what: str 
     if any(name == info.name for info in manifest.quantities):
         part, dot, _ = str(name).rpartition(".")
         return (
-            f"{name!r} is not among this scene's run.outputs: add \"{f'{part}.*' if dot else name}\" there; the model "
+            f'{name!r} is not among this scene\'s run.outputs: add "{f"{part}.*" if dot else name}" there; the model '
             "is then derived anew."
         )
     return f"{unknown_name(what, name, known)} The scene's run.outputs says which are computed."

@@ -48,12 +48,12 @@ def render_report(report: SensitivityReport, *, top: int | None = None) -> Group
             box=box.SIMPLE_HEAD,
             padding=(0, 1, 0, 0),
         )
-        table.add_column("parameter", overflow="fold", min_width=22)
+        table.add_column("parameter", overflow="fold", min_width=20)
         for name in ("p/Q dQ/dp", "dQ/dp"):
             table.add_column(name, justify="right", no_wrap=True)
         table.add_column("unit", overflow="fold", min_width=7)
         table.add_column("apart", justify="right", no_wrap=True)
-        table.add_column("verdict", no_wrap=True)
+        table.add_column("verdict", min_width=12)
         ranked = report.of(quantity.name)
         _add_rows(table, [pair for pair in ranked if math.isfinite(pair.dimensionless)], top)
         without = [pair for pair in ranked if not math.isfinite(pair.dimensionless)]
@@ -111,7 +111,7 @@ def _remarks(report: SensitivityReport) -> list[str]:
     route = next((pair.check.route for pair in report.pairs if pair.check.route != "none"), None)
     nothing = sum(pair.is_nothing for pair in report.pairs)
     if nothing:
-        words += f" ({nothing} of them ~0: both routes below the bound shown, and no digit of the derivative is verified)"
+        words += f" ({nothing} of them ~0: both routes below the bound shown, no digit of the derivative is verified)"
     lines = [f"{len(report.pairs)} pairs: {words}" + (f"; apart: relative distance to {route}" if route else "")]
     lines.append("p/Q dQ/dp: % per %; dQ/dp in SI units, angles in radians")
     lines += [
@@ -133,6 +133,8 @@ def _remarks(report: SensitivityReport) -> list[str]:
     if report.grazing:
         places = merge_grazing(report.grazing)
         count = f"{len(places)} place{'s' if len(places) > 1 else ''}"
+        if len(places) < len(report.grazing):
+            count += f" ({len(report.grazing)} counting each ball)"
         more = f"; the first {LISTED} here, --json lists all" if len(places) > LISTED else ""
         lines.append(f"[yellow]grazing[/] at {count}: a small change moves the motion over a kink there{more}")
         lines += [f"  {escape(describe(items))}" for items in places[:LISTED]]

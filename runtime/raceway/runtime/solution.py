@@ -107,7 +107,8 @@ class Solution:
             return self.x[:, names.index(name)]
         if any(name == info.name for info in self.manifest.outputs):
             raise RequestError(
-                f"{name!r} was not kept in this run: name it in simulate(outputs=...), or leave outputs away to keep all."
+                f"{name!r} was not kept in this run: name it in simulate(outputs=...), or leave outputs away to keep "
+                "all."
             )
         known = tuple(dict.fromkeys((*self.outputs, *names)))
         raise RequestError(no_output(self.manifest, name, known, "output or state"))
