@@ -224,8 +224,7 @@ def test_wrong_tables_are_refused_before_anything_runs(
     [
         ({"observables": ["max:ball.forces"]}, "Did you mean 'max:ball.force'"),
         ({"observables": ["end:ball.force"]}, "no observable"),
-        ({"observables": "max:ball.force"}, "a list of names"),
-        ({"observables": []}, "a list of names"),
+        ({"observables": []}, "one name or more"),
         ({"threads": 0}, "threads"),
         ({"transient": 1}, "nothing is left"),
         ({"duration": 1.0}, "give one"),
