@@ -241,6 +241,24 @@ def test_an_interrupt_at_any_moment_ends_with_130_and_whole_files(
         assert not [path for path in tmp_path.rglob(".*") if path.suffix in (".tmp", ".new") or "writing" in path.name]
 
 
+def test_an_interrupt_after_the_work_is_done_takes_nothing_back() -> None:
+    """While the interpreter shuts down Python has given its handler away: the process ended by the signal, code -2."""
+    code = """
+        import os, signal
+        from raceway.runtime import cli
+
+        class Last:
+            def __del__(self, kill=os.kill, me=os.getpid(), number=signal.SIGINT):
+                kill(me, number)
+
+        last = Last()  # goes when modules are taken down
+        cli.app = lambda: None
+        cli.main()
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_an_interrupt_that_an_import_turns_into_something_else_is_one_still() -> None:
     """Python 3.11 wraps what `__set_name__` raises in a RuntimeError: once a traceback and exit code 1."""
     code = """

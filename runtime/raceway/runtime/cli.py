@@ -371,3 +371,7 @@ def main() -> None:
             raise
         complain(INTERRUPTED)
         sys.exit(130)
+    finally:
+        # what is done is done: while the interpreter shuts down it would end the process by the signal itself
+        if signal.getsignal(signal.SIGINT) is hear:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
