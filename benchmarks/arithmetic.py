@@ -21,9 +21,9 @@ import numpy as np
 from benchmarks.problem import BUILD, CASES, POINTS, Case, Member, errors, models, parameter_sets
 from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave, spread
+from raceway.runtime.accuracy.trade import compile_fast_math
+from raceway.runtime.integrate.stepper import End, Family, Stepper
 from raceway.runtime.model import Model
-from raceway.runtime.stepper import End, Family, Stepper
-from raceway.runtime.trade import compile_fast_math
 
 #: Tolerance of the runs [1].
 TOLERANCE = 1e-5

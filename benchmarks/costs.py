@@ -17,8 +17,8 @@ from benchmarks.problem import BUILD, ROOT, Case, Member, parameter_sets
 from benchmarks.timing import Entry, digits, interleave, spread
 from raceway.derive import generate
 from raceway.runtime import load
+from raceway.runtime.integrate.stepper import METHODS, Family
 from raceway.runtime.model import Model
-from raceway.runtime.stepper import METHODS, Family
 
 #: Tolerance of the runs that steps are counted in [1].
 TOLERANCE = 1e-5

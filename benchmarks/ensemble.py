@@ -25,9 +25,9 @@ import numpy as np
 from benchmarks.problem import CASES, Case, models, parameter_sets
 from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave
-from raceway.runtime.members import Span, make_members, member_arrays
+from raceway.runtime.ensembles.members import Span, make_members, member_arrays
+from raceway.runtime.integrate.stepper import Family, Segments
 from raceway.runtime.model import Model
-from raceway.runtime.stepper import Family, Segments
 
 CYCLES, TRANSIENT, RTOL = 2, 1, 1e-6
 

@@ -25,7 +25,7 @@ from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave, spread
 from raceway.derive import generate
 from raceway.runtime import Model, load
-from raceway.runtime.jacobian import rows_of
+from raceway.runtime.derivatives.jacobian import rows_of
 
 SCENE = "punching_press_tangent"
 

@@ -20,9 +20,9 @@ import casadi
 import numpy as np
 
 from benchmarks.problem import BUILD, POINTS, ROOT, Member
-from raceway.runtime.compile import compile_sources, find_compiler
-from raceway.runtime.kernel import Kernel
-from raceway.runtime.stepper import METHODS, End, Family
+from raceway.runtime.compiled.compile import compile_sources, find_compiler
+from raceway.runtime.compiled.kernel import Kernel
+from raceway.runtime.integrate.stepper import METHODS, End, Family
 
 DECADES = tuple(10.0**-k for k in range(2, 11))
 HALVES = tuple(10.0**-k for k in np.arange(1.5, 11.1, 0.5))
@@ -268,7 +268,7 @@ class CasadiIntegrators:
 
 
 def integrator(member: Member, plugin: str, segment: int, grid: list[float], jit: bool) -> casadi.Function:
-    """An integrator of the scaled states over a normalised segment, as in raceway.runtime.integrators."""
+    """An integrator of the scaled states over a normalised segment, as in raceway.runtime.integrate.integrators."""
     model, rhs = member.model, member.model.symbolic("rhs")
     manifest = model.manifest
     sizes = {"u": len(manifest.inputs), "p": len(manifest.parameters), "c": len(manifest.constants)}

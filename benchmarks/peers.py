@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 from benchmarks.own import HALVES, HAND_FLAGS, Contender, Kept, Unavailable, c_numbers
 from benchmarks.press import Press, make_load, make_loop_rate, make_vector_rate
 from benchmarks.problem import ROOT, Member
-from raceway.runtime.compile import compile_sources, find_compiler
+from raceway.runtime.compiled.compile import compile_sources, find_compiler
 
 
 def imported(name: str) -> Any:

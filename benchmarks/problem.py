@@ -19,10 +19,10 @@ import numpy as np
 from benchmarks.press import Press, press_numbers
 from raceway.derive import generate
 from raceway.runtime import load
+from raceway.runtime.integrate.segments import segment_edges
+from raceway.runtime.integrate.stepper import Segments
 from raceway.runtime.model import Model
 from raceway.runtime.parameters import Numbers
-from raceway.runtime.segments import segment_edges
-from raceway.runtime.stepper import Segments
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build" / "benchmarks"
@@ -127,7 +127,7 @@ class Member:
 
     def model_inputs(self, t: float, inside: float) -> np.ndarray:
         """Inputs with reference time `t`, gates as they are at `inside`."""
-        from raceway.runtime import clock
+        from raceway.runtime.integrate import clock
 
         return clock.inputs_at(self.model.manifest.inputs, self.numbers.values, t, inside)
 

@@ -25,11 +25,11 @@ from benchmarks.own import Unavailable, integrator
 from benchmarks.problem import BUILD, CASES, Case, Member, models, parameter_sets
 from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave, spread
-from raceway.runtime.compile import compile_sources, find_compiler
-from raceway.runtime.kernel import Kernel
+from raceway.runtime.compiled.compile import compile_sources, find_compiler
+from raceway.runtime.compiled.kernel import Kernel
+from raceway.runtime.derivatives.sensitivity import Chain, Directions
+from raceway.runtime.integrate.stepper import End, Family
 from raceway.runtime.model import Model
-from raceway.runtime.sensitivity import Chain, Directions
-from raceway.runtime.stepper import End, Family
 
 #: Tolerance of the runs, and of those that CasADi's derivatives are checked at [1].
 TOLERANCE = 1e-5

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from raceway.runtime.compile import find_compiler
+from raceway.runtime.compiled.compile import find_compiler
 
 ROOT = Path(__file__).resolve().parent.parent
 

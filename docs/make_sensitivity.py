@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from raceway.derive import generate
 from raceway.runtime import Model, load
+from raceway.runtime.derivatives.sensitivity_report import SensitivityReport
 from raceway.runtime.figures.canvas import FIRST, GREY, SECOND, caption, new_figure, save, styled
 from raceway.runtime.figures.tornado import tornado
-from raceway.runtime.sensitivity_report import SensitivityReport
 
 DOCS = Path(__file__).resolve().parent
 SCENE = DOCS.parent / "scenes" / "punching_press.toml"

@@ -20,8 +20,8 @@ from extremes.invariants import NO_LOAD
 from extremes.models import press, rotor
 from extremes.physics import SPEED
 from extremes.reference import TURN
-from raceway.runtime import clock
 from raceway.runtime.conditioning import BOUND, equilibrate
+from raceway.runtime.integrate import clock
 
 RESOLUTION = 130
 

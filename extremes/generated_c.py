@@ -19,8 +19,8 @@ from extremes.models import DAMPING, ROOT, SHIPPED_DAMPING, text_of
 from raceway.derive import generate
 from raceway.derive.read import scene_from_text
 from raceway.runtime import load
-from raceway.runtime.export import export_c
-from raceway.runtime.stepper import DRIVER
+from raceway.runtime.compiled.export import export_c
+from raceway.runtime.integrate.stepper import DRIVER
 
 GROUP = "Generated C"
 #: CasADi's function interface has arguments that a function need not use.

@@ -13,7 +13,8 @@ import numpy as np
 from extremes.case import Case, Finding
 from extremes.models import FIXED_RING, ROTOR_LOAD, STEP_TABLE, Change, press, rotor
 from extremes.reference import TURN, Machine
-from raceway.runtime import Model, clock
+from raceway.runtime import Model
+from raceway.runtime.integrate import clock
 
 GROUP = "Physics"
 SPEED = "mechanism.driver.speed"

@@ -1,6 +1,6 @@
 """Check the import contract: the runtime never needs the deriving half, SymPy or pint.
 
-Two routes: every import statement under runtime/ is read (the command line, `cli.py` and `commands_*.py`, serves both
+Two routes: every import statement under runtime/ is read (the command line, `cli.py` and `commands/`, serves both
 halves and may import `raceway.derive` inside functions), and a fresh interpreter that loads the runtime's modules is
 asked what it holds.
 """
@@ -38,7 +38,7 @@ def imports(path: Path) -> Iterator[tuple[int, str]]:
 def violations() -> list[str]:
     found = []
     for path in sorted((ROOT / "runtime").rglob("*.py")):
-        if path.name == "cli.py" or path.name.startswith("commands_"):
+        if path.name == "cli.py" or path.parent.name == "commands":
             continue
         for line, name in imports(path):
             if any(name == f or name.startswith(f + ".") for f in FORBIDDEN):

@@ -477,7 +477,7 @@ def test_results_are_replaced_file_by_file(site: Site, raceway: Callable[..., Re
 def test_without_a_compiler_a_warning_names_the_cost_and_the_numbers_agree(
     site: Site, raceway: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("raceway.runtime.compile.find_compiler", lambda command: None)
+    monkeypatch.setattr("raceway.runtime.compiled.compile.find_compiler", lambda command: None)
     words = ("run", SCENES / "punching_press.toml", "--json", "--no-figures", "--out", tmp_path)
     result = raceway(site.folder, *words)
     assert result.exit_code == 0, result.stderr

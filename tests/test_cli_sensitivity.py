@@ -12,7 +12,7 @@ from matplotlib.image import imread
 from typer.testing import CliRunner, Result
 
 from raceway.runtime.cli import app
-from raceway.runtime.study import Course, Study
+from raceway.runtime.quantities.study import Course, Study
 
 SCENE = Path(__file__).resolve().parent.parent / "scenes" / "punching_press_tangent.toml"
 SHORT = ["--cycles", "0.4", "--transient", "0", "--set", "bearing.clearance=-60 um"]

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from raceway.derive import read_scene
 from raceway.runtime import RequestError
 from raceway.runtime.cli import app
-from raceway.runtime.commands_trade import FILE_NAME, key_of, models_of, read_error, stored_trade
+from raceway.runtime.commands.trade import FILE_NAME, key_of, models_of, read_error, stored_trade
 
 ROOT = Path(__file__).resolve().parent.parent
 NAME = "varying_compliance"

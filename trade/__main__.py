@@ -16,14 +16,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from raceway.derive import read_scene
-from raceway.runtime.calibration import Calibration, calibrate
-from raceway.runtime.commands_shared import Stages, check_folder
-from raceway.runtime.commands_trade import FILE_NAME, MODELS, key_of, load_models
-from raceway.runtime.error_target import prefer
+from raceway.runtime.accuracy.calibration import Calibration, calibrate
+from raceway.runtime.accuracy.error_target import prefer
+from raceway.runtime.accuracy.trade import FULL, TARGETS, Configuration, Trade, compile_fast_math, measure_trade
+from raceway.runtime.accuracy.trade_report import milliseconds, percent, simplifications, table, to_plain
+from raceway.runtime.commands.shared import Stages, check_folder
+from raceway.runtime.commands.trade import FILE_NAME, MODELS, key_of, load_models
 from raceway.runtime.figures.canvas import save
 from raceway.runtime.figures.trade import draw_trade
-from raceway.runtime.trade import FULL, TARGETS, Configuration, Trade, compile_fast_math, measure_trade
-from raceway.runtime.trade_report import milliseconds, percent, simplifications, table, to_plain
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")

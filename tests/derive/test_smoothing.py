@@ -14,7 +14,7 @@ from raceway.derive.laws import RAMP_ERROR, SMOOTHED_HERTZ_ERROR
 from raceway.derive.read import scene_from_text
 from raceway.derive.system import System
 from raceway.runtime import Model
-from raceway.runtime.differences import richardson
+from raceway.runtime.derivatives.differences import richardson
 from raceway.runtime.errors import RequestError
 from raceway.runtime.manifest import read_manifest
 

@@ -9,16 +9,17 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from raceway.runtime import IntegrationError, Model, clock
+from raceway.runtime import IntegrationError, Model
 from raceway.runtime.conditioning import ConditioningWarning
 from raceway.runtime.errors import RequestError, SimulationError
-from raceway.runtime.limits import step_limit
-from raceway.runtime.magnitudes import model_scales
-from raceway.runtime.reductions import step_limit as reduced_step_limit
-from raceway.runtime.segments import LARGEST_PHASE, segment_edges
+from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.limits import step_limit
+from raceway.runtime.integrate.magnitudes import model_scales
+from raceway.runtime.integrate.reductions import step_limit as reduced_step_limit
+from raceway.runtime.integrate.segments import LARGEST_PHASE, segment_edges
+from raceway.runtime.integrate.whereabouts import whereabouts
 from raceway.runtime.status import Status
 from raceway.runtime.summary import render_summary, summarize
-from raceway.runtime.whereabouts import whereabouts
 
 ModelMaker = Callable[..., Model]
 OUTER = "bearing.outer_ring"
@@ -75,9 +76,9 @@ def test_an_explicit_method_on_a_stiff_model_is_given_up_after_bounded_work(
     # it took a hundred million steps, and Ctrl-C was not heard meanwhile
     model = needs_stepper(make_model("punching_press"))
     numbers = {"bearing.damping.ratio": 2.5e-4, f"{OUTER}.mass": 1e-3}
-    monkeypatch.setattr("raceway.runtime.stepping.step_limit", lambda duration, turn: 200_000)
-    monkeypatch.setattr("raceway.runtime.stepping.STEPS_A_CALL", 100_000)
-    monkeypatch.setattr("raceway.runtime.stepping.LEAST_PROGRESS", 0.0)
+    monkeypatch.setattr("raceway.runtime.integrate.stepping.step_limit", lambda duration, turn: 200_000)
+    monkeypatch.setattr("raceway.runtime.integrate.stepping.STEPS_A_CALL", 100_000)
+    monkeypatch.setattr("raceway.runtime.integrate.stepping.LEAST_PROGRESS", 0.0)
     with pytest.raises(IntegrationError, match=r"more steps than allowed.*explicit method crawls on a stiff") as caught:
         model.simulate(cycles=1, parameters=numbers, method="stepper-dp54", transient=0)
     assert caught.value.status is Status.TOO_MANY_STEPS

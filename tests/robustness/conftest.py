@@ -10,7 +10,7 @@ import pytest
 
 from raceway.derive import generate
 from raceway.derive.read import scene_from_text
-from raceway.runtime import compile as compiling
+from raceway.runtime.compiled import compile as compiling
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = ROOT / "scenes"

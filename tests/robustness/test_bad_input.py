@@ -28,7 +28,7 @@ from raceway.derive.read import parse_override, read_scene, scene_from_text, wit
 from raceway.derive.scene import Scene
 from raceway.runtime import Model, RequestError, load
 from raceway.runtime.cli import app
-from raceway.runtime.export import export_c
+from raceway.runtime.compiled.export import export_c
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")

@@ -20,8 +20,8 @@ from raceway.derive import check, generate
 from raceway.derive.read import scene_from_text
 from raceway.derive.replace_folder import GENERATED
 from raceway.runtime import CacheWarning, CompileError, RequestError, load, load_solution
-from raceway.runtime import compile as compiling
 from raceway.runtime.cli import app
+from raceway.runtime.compiled import compile as compiling
 from raceway.runtime.errors import ArtefactError
 from raceway.runtime.manifest import read_manifest
 

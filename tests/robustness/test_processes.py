@@ -29,7 +29,7 @@ from raceway.derive import generate
 from raceway.derive.read import scene_from_text
 from raceway.derive.replace_folder import replace_folder
 from raceway.runtime import CacheWarning, CompileError, RequestError, load, load_solution
-from raceway.runtime import compile as compiling
+from raceway.runtime.compiled import compile as compiling
 from raceway.runtime.errors import ArtefactError
 from raceway.runtime.manifest import read_artefact
 
@@ -135,7 +135,7 @@ def test_a_killed_compiler_leaves_no_library_or_a_whole_one(cache: Path, tmp_pat
     code = """
         import sys
         from pathlib import Path
-        from raceway.runtime import compile as compiling
+        from raceway.runtime.compiled import compile as compiling
         compiler = compiling.find_compiler()
         print("ready", flush=True)
         for k in range(100):

@@ -19,8 +19,11 @@ from profiles import LONG
 
 from raceway.derive import generate
 from raceway.derive.read import scene_from_text
-from raceway.runtime import Model, ensemble_driver, load, quasi_static, stepper
-from raceway.runtime.compile import compile_sources, find_compiler
+from raceway.runtime import Model, load
+from raceway.runtime.accuracy import quasi_static
+from raceway.runtime.compiled.compile import compile_sources, find_compiler
+from raceway.runtime.ensembles import ensemble_driver
+from raceway.runtime.integrate import stepper
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from raceway.runtime import Model, RequestError
-from raceway.runtime.certificate import Verdict, by_differences, compare, noise_of
-from raceway.runtime.study import Course, Study
+from raceway.runtime.derivatives.certificate import Verdict, by_differences, compare, noise_of
+from raceway.runtime.quantities.study import Course, Study
 
 PRELOADED = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.0}
 

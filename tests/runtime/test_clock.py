@@ -10,8 +10,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from raceway.runtime import clock
 from raceway.runtime.errors import RequestError
+from raceway.runtime.integrate import clock
 from raceway.runtime.manifest import InputInfo
 
 TURN = 2.0 * math.pi

@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 from artefact import write_folder
 
-from raceway.runtime import CacheWarning, CompileError, NoCompilerWarning, RequestError, compile, load
+from raceway.runtime import CacheWarning, CompileError, NoCompilerWarning, RequestError, load
+from raceway.runtime.compiled import compile
 
 SOURCE = "double twice(double x) { return 2.0 * x; }\n"
 

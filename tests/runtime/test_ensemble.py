@@ -8,10 +8,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from raceway.runtime import Model, RequestError, SimulationError, clock
-from raceway.runtime.ensemble import EnsembleResult
-from raceway.runtime.magnitudes import model_scales
-from raceway.runtime.members import Span, inputs_of, make_members, member_arrays
+from raceway.runtime import Model, RequestError, SimulationError
+from raceway.runtime.ensembles.ensemble import EnsembleResult
+from raceway.runtime.ensembles.members import Span, inputs_of, make_members, member_arrays
+from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.magnitudes import model_scales
 
 ModelMaker = Callable[..., Model]
 LAW = 'law = "one-sided"\nratio = "0.25e-5 s*mm^0.5"'

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from raceway.runtime import Model, RequestError
-from raceway.runtime.calibration import calibrate
-from raceway.runtime.error_target import LADDER, STIFF_LADDER, TargetMissed, meet_target
-from raceway.runtime.prepared import default_observables, prepare
-from raceway.runtime.trade import TARGETS
+from raceway.runtime.accuracy.calibration import calibrate
+from raceway.runtime.accuracy.error_target import LADDER, STIFF_LADDER, TargetMissed, meet_target
+from raceway.runtime.accuracy.prepared import default_observables, prepare
+from raceway.runtime.accuracy.trade import TARGETS
 
 MEMBERS = 12
 

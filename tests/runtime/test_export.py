@@ -21,7 +21,7 @@ from raceway.derive import generate
 from raceway.derive.read import scene_from_text
 from raceway.runtime import ArtefactError, Model, RequestError, load
 from raceway.runtime.cli import app
-from raceway.runtime.export import default_magnitudes, export_c
+from raceway.runtime.compiled.export import default_magnitudes, export_c
 
 SCENES = ("punching_press", "punching_press_tangent", "four_bar", "offset_slider", "varying_compliance")
 WARNINGS = "-Wall -Wextra -Wconversion -Wshadow -pedantic -Werror"

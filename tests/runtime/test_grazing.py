@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import brentq
 
 from raceway.runtime import Model
-from raceway.runtime.grazing import Grazing, describe, find_grazing, merge_grazing
-from raceway.runtime.sensitivity_report import SensitivityReport
+from raceway.runtime.derivatives.grazing import Grazing, describe, find_grazing, merge_grazing
+from raceway.runtime.derivatives.sensitivity_report import SensitivityReport
 
 TIMES = np.linspace(0.0, 1.0, 2001)
 ONE_PART = np.zeros(len(TIMES), dtype=int)

@@ -14,13 +14,14 @@ from scipy.integrate import quad
 from typer.testing import CliRunner
 from virtual import virtual_model
 
-from raceway.runtime import Model, jacobian_check
-from raceway.runtime.certificate import Verdict
+from raceway.runtime import Model
 from raceway.runtime.cli import app
-from raceway.runtime.differences import richardson
+from raceway.runtime.derivatives import jacobian_check
+from raceway.runtime.derivatives.certificate import Verdict
+from raceway.runtime.derivatives.differences import richardson
+from raceway.runtime.derivatives.jacobian import Directions, directions_of, output_tangents, quantity_values
+from raceway.runtime.derivatives.jacobian_check import checked_jacobian
 from raceway.runtime.errors import RequestError
-from raceway.runtime.jacobian import Directions, directions_of, output_tangents, quantity_values
-from raceway.runtime.jacobian_check import checked_jacobian
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 

@@ -15,8 +15,8 @@ from virtual import virtual_model
 
 from raceway.runtime import Model
 from raceway.runtime.cli import app
-from raceway.runtime.linearize import KinkWarning
-from raceway.runtime.statics import FreeRingWarning
+from raceway.runtime.derivatives.linearize import KinkWarning
+from raceway.runtime.derivatives.statics import FreeRingWarning
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 AT_REST = {"shaft.speed": 0.0}

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from raceway.runtime.errors import RequestError
-from raceway.runtime.observables import (
+from raceway.runtime.quantities.observables import (
     ball_angles,
     drive_work,
     kinematic_frequencies,
@@ -19,7 +19,7 @@ from raceway.runtime.observables import (
     stroboscopic_points,
     turns,
 )
-from raceway.runtime.spectrum import amplitude_spectrum, whole_cycles
+from raceway.runtime.quantities.spectrum import amplitude_spectrum, whole_cycles
 
 TURN = 2.0 * np.pi
 INCH = 25.4e-3

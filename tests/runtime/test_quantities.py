@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from raceway.runtime import Model, RequestError
-from raceway.runtime.quantities import KINDS, parse_quantity
+from raceway.runtime.quantities.quantities import KINDS, parse_quantity
 
 ENSEMBLE = [
     "peak_ball_force",

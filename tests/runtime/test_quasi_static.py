@@ -9,7 +9,7 @@ import pytest
 from scipy import optimize
 
 from raceway.runtime import IntegrationError, Model
-from raceway.runtime.quasi_static_runs import QuasiStaticFailed
+from raceway.runtime.accuracy.quasi_static_runs import QuasiStaticFailed
 from raceway.runtime.status import Status
 
 SCENES = ("varying_compliance", "punching_press", "four_bar", "offset_slider")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from raceway.runtime import Model, RequestError, SimulationError
-from raceway.runtime.reductions import Reduction
+from raceway.runtime.integrate.reductions import Reduction
 
 ModelMaker = Callable[..., Model]
 BALLS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")

@@ -14,9 +14,9 @@ from artefact import write_folder
 from test_simulate import exact
 
 from raceway.runtime import IntegrationError, Model, RequestError, Status, load_solution, read_manifest
-from raceway.runtime.kernel import Loop
-from raceway.runtime.observables import statistics
-from raceway.runtime.spectrum import amplitude_spectrum
+from raceway.runtime.compiled.kernel import Loop
+from raceway.runtime.quantities.observables import statistics
+from raceway.runtime.quantities.spectrum import amplitude_spectrum
 
 ModelMaker = Callable[..., Model]
 
@@ -203,7 +203,7 @@ def test_a_run_in_several_calls_within_a_segment_is_the_same_motion(
     run = {"cycles": 1, "method": method, "rtol": 1e-9, "samples_per_cycle": 300}
     whole = rotor.simulate(**run)
     slope = rotor.sensitivities("bearing.clearance", **run).x
-    monkeypatch.setattr("raceway.runtime.stepping.STEPS_A_CALL", 500)
+    monkeypatch.setattr("raceway.runtime.integrate.stepping.STEPS_A_CALL", 500)
     fractions: list[float] = []
     found = rotor.simulate(**run, progress=fractions.append)
     assert found.statistics.segments == whole.statistics.segments == 1
@@ -217,7 +217,7 @@ def test_a_run_in_several_calls_within_a_segment_is_the_same_motion(
 
 
 def test_an_interrupt_is_heard_within_a_segment(rotor: Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("raceway.runtime.stepping.STEPS_A_CALL", 200)
+    monkeypatch.setattr("raceway.runtime.integrate.stepping.STEPS_A_CALL", 200)
     heard: list[float] = []
 
     def interrupt(fraction: float) -> None:
@@ -245,7 +245,7 @@ def test_derivatives_do_not_depend_on_how_a_run_is_cut_into_calls(
     name = "mechanism.forces.punch.window.start"
     whole = model.sensitivities(name, cycles=3, rtol=1e-8)
     for segments in (1, 2, 4):  # edges of a turn: punch on, punch off, turn
-        monkeypatch.setattr("raceway.runtime.stepping.SEGMENTS_A_CALL", segments)
+        monkeypatch.setattr("raceway.runtime.integrate.stepping.SEGMENTS_A_CALL", segments)
         cut = model.sensitivities(name, cycles=3, rtol=1e-8)
         scale = np.max(np.abs(whole.x), axis=(0, 2))[:, None]
         assert np.max(np.abs(cut.x - whole.x) / scale) < 1e-3

@@ -11,11 +11,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from raceway.runtime import Model, RequestError, clock
-from raceway.runtime.direction_scales import direction_scales
-from raceway.runtime.evaluate import neighbour
-from raceway.runtime.sensitivity import Directions
-from raceway.runtime.stepper import End, Family, Outcome, Segments
+from raceway.runtime import Model, RequestError
+from raceway.runtime.derivatives.direction_scales import direction_scales
+from raceway.runtime.derivatives.sensitivity import Directions
+from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.evaluate import neighbour
+from raceway.runtime.integrate.stepper import End, Family, Outcome, Segments
 
 # preload: every ball stays in contact, and the motion is smooth in every parameter
 SMOOTH = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.2, "bearing.initial.inner.y": 2e-6}

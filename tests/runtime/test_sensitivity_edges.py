@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from raceway.runtime import Model
-from raceway.runtime.certificate import Verdict
-from raceway.runtime.sensitivity import Chain
+from raceway.runtime.derivatives.certificate import Verdict
+from raceway.runtime.derivatives.sensitivity import Chain
 
 # preload keeps every ball in contact: nothing but the punch's window makes a derivative jump
 PRELOADED = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.0}

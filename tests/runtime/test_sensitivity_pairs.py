@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from raceway.runtime import Model
-from raceway.runtime.certificate import Verdict
-from raceway.runtime.sensitivity_report import Sensitivity
+from raceway.runtime.derivatives.certificate import Verdict
+from raceway.runtime.derivatives.sensitivity_report import Sensitivity
 
 TABLE = Path(__file__).resolve().parents[2] / "build" / "sensitivity_pairs.md"
 

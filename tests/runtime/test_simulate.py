@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from artefact import DEFAULTS, write_folder
 
-from raceway.runtime import IntegrationError, Model, RequestError, Status, compile, load, load_solution
-from raceway.runtime.integrators import Frozen, GeneratedIntegrator, Method
+from raceway.runtime import IntegrationError, Model, RequestError, Status, load, load_solution
+from raceway.runtime.compiled import compile
+from raceway.runtime.integrate.integrators import Frozen, GeneratedIntegrator, Method
 
 METHODS = ("erk", "rosenbrock", "cvodes")
 TURN = 2.0 * math.pi
@@ -179,8 +180,8 @@ def test_integrator_that_returns_no_numbers_is_stopped_at_that_piece(
             return block * np.nan if frozen.u[1] else block
 
     broken = Method(make=lambda m: Failing(m, "erk"), required=())
-    monkeypatch.setattr("raceway.runtime.integrators.METHODS", {"broken": broken})
-    monkeypatch.setattr("raceway.runtime.simulate.METHODS", {"broken": broken})
+    monkeypatch.setattr("raceway.runtime.integrate.integrators.METHODS", {"broken": broken})
+    monkeypatch.setattr("raceway.runtime.integrate.simulate.METHODS", {"broken": broken})
     # the push starts at a quarter turn
     changes = {"driver.start_angle": 0.0, "push.window.start": TURN / 4, "push.window.end": TURN / 2}
     with pytest.raises(IntegrationError) as caught:

@@ -14,9 +14,9 @@ from scipy.optimize import minimize
 from virtual import virtual_model
 
 from raceway.runtime import Model
-from raceway.runtime.differences import richardson
+from raceway.runtime.derivatives.differences import richardson
+from raceway.runtime.derivatives.statics import FreeRingWarning
 from raceway.runtime.errors import RequestError, SimulationError
-from raceway.runtime.statics import FreeRingWarning
 
 GIVEN = 'stiffness = "13.34e9 N/m^1.5"'
 HERTZ = """inner_groove_radius = "4.1275 mm"

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from stepper_runs import ORDERS, edges_of, run, segments_between
 
-from raceway.runtime import IntegrationError, Model, RequestError, Status, clock
-from raceway.runtime.stepper import End, Family, Segments, Stepper
+from raceway.runtime import IntegrationError, Model, RequestError, Status
+from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.stepper import End, Family, Segments, Stepper
 
 TURN = 2.0 * np.pi
 
@@ -211,8 +212,8 @@ def test_run_of_too_many_steps_tells_and_keeps_its_samples(
     press: Model, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
     whole = press.simulate(1, method=method, samples_per_cycle=400)
-    monkeypatch.setattr("raceway.runtime.stepping.STEPS_A_CALL", 600)
-    monkeypatch.setattr("raceway.runtime.stepping.step_limit", lambda *_: 600)
+    monkeypatch.setattr("raceway.runtime.integrate.stepping.STEPS_A_CALL", 600)
+    monkeypatch.setattr("raceway.runtime.integrate.stepping.step_limit", lambda *_: 600)
     with pytest.raises(IntegrationError, match="600 steps for the last") as caught:
         press.simulate(1, method=method, samples_per_cycle=400)
     assert caught.value.status is Status.TOO_MANY_STEPS

@@ -11,12 +11,20 @@ import numpy as np
 import pytest
 
 from raceway.runtime import Model, RequestError
-from raceway.runtime.error_target import meet_target
+from raceway.runtime.accuracy.error_target import meet_target
+from raceway.runtime.accuracy.prepared import prepare
+from raceway.runtime.accuracy.trade import (
+    FULL,
+    Configuration,
+    Measured,
+    Trade,
+    make_reference,
+    measure_trade,
+    perturbed,
+)
+from raceway.runtime.accuracy.trade_report import from_plain, percent, to_plain, words
 from raceway.runtime.figures.canvas import save
 from raceway.runtime.figures.trade import draw_trade
-from raceway.runtime.prepared import prepare
-from raceway.runtime.trade import FULL, Configuration, Measured, Trade, make_reference, measure_trade, perturbed
-from raceway.runtime.trade_report import from_plain, percent, to_plain, words
 
 CONSTANT = (
     'type = "constant"                       # or "harmonic" (mean, amplitude, frequency, phase), or "table" '

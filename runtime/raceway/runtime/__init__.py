@@ -9,21 +9,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from raceway.runtime.compile import CacheWarning, NoCompilerWarning
-    from raceway.runtime.ensemble import EnsembleResult, EnsembleStatistics, MemberFailure
+    from raceway.runtime.compiled.compile import CacheWarning, NoCompilerWarning
+    from raceway.runtime.derivatives.jacobian_function import JacobianFunction
+    from raceway.runtime.derivatives.linearize import KinkWarning, Linearization, Mode
+    from raceway.runtime.derivatives.sensitivity import Sensitivities
+    from raceway.runtime.derivatives.sensitivity_report import SensitivityReport
+    from raceway.runtime.derivatives.statics import FreeRingWarning, StaticEquilibrium
+    from raceway.runtime.ensembles.ensemble import EnsembleResult, EnsembleStatistics, MemberFailure
     from raceway.runtime.errors import ArtefactError, CompileError, RacewayError, RequestError, SimulationError
     from raceway.runtime.explain import Explanation
-    from raceway.runtime.jacobian_function import JacobianFunction
-    from raceway.runtime.linearize import KinkWarning, Linearization, Mode
+    from raceway.runtime.integrate.reductions import Reduction, Reductions
     from raceway.runtime.manifest import Manifest, read_manifest
     from raceway.runtime.model import Model, load
     from raceway.runtime.parameters import Parameters
-    from raceway.runtime.peaks import Peak
-    from raceway.runtime.reductions import Reduction, Reductions
-    from raceway.runtime.sensitivity import Sensitivities
-    from raceway.runtime.sensitivity_report import SensitivityReport
+    from raceway.runtime.quantities.peaks import Peak
     from raceway.runtime.solution import Solution, Statistics, load_solution
-    from raceway.runtime.statics import FreeRingWarning, StaticEquilibrium
     from raceway.runtime.status import IntegrationError, Status
 
 __all__ = [
@@ -62,36 +62,36 @@ __all__ = [
 ]
 
 _HOME = {
-    "CacheWarning": "compile",
-    "NoCompilerWarning": "compile",
-    "EnsembleResult": "ensemble",
-    "EnsembleStatistics": "ensemble",
-    "MemberFailure": "ensemble",
+    "CacheWarning": "compiled.compile",
+    "NoCompilerWarning": "compiled.compile",
+    "EnsembleResult": "ensembles.ensemble",
+    "EnsembleStatistics": "ensembles.ensemble",
+    "MemberFailure": "ensembles.ensemble",
     "ArtefactError": "errors",
     "CompileError": "errors",
     "RacewayError": "errors",
     "RequestError": "errors",
     "SimulationError": "errors",
     "Explanation": "explain",
-    "JacobianFunction": "jacobian_function",
-    "KinkWarning": "linearize",
-    "Linearization": "linearize",
-    "Mode": "linearize",
+    "JacobianFunction": "derivatives.jacobian_function",
+    "KinkWarning": "derivatives.linearize",
+    "Linearization": "derivatives.linearize",
+    "Mode": "derivatives.linearize",
     "Manifest": "manifest",
     "read_manifest": "manifest",
     "Model": "model",
     "load": "model",
     "Parameters": "parameters",
-    "Peak": "peaks",
-    "Reduction": "reductions",
-    "Reductions": "reductions",
-    "Sensitivities": "sensitivity",
-    "SensitivityReport": "sensitivity_report",
+    "Peak": "quantities.peaks",
+    "Reduction": "integrate.reductions",
+    "Reductions": "integrate.reductions",
+    "Sensitivities": "derivatives.sensitivity",
+    "SensitivityReport": "derivatives.sensitivity_report",
     "Solution": "solution",
     "Statistics": "solution",
     "load_solution": "solution",
-    "FreeRingWarning": "statics",
-    "StaticEquilibrium": "statics",
+    "FreeRingWarning": "derivatives.statics",
+    "StaticEquilibrium": "derivatives.statics",
     "IntegrationError": "status",
     "Status": "status",
 }

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from raceway.runtime import clock
 from raceway.runtime.errors import RequestError
+from raceway.runtime.integrate import clock
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from raceway.runtime.commands_explain import explain
-from raceway.runtime.commands_jacobian import jacobian, linearize
-from raceway.runtime.commands_sensitivity import sensitivity
-from raceway.runtime.commands_shared import (
+from raceway.runtime.commands.explain import explain
+from raceway.runtime.commands.jacobian import jacobian, linearize
+from raceway.runtime.commands.sensitivity import sensitivity
+from raceway.runtime.commands.shared import (
     INTERRUPTED,
     SceneFile,
     Stages,
@@ -37,7 +37,7 @@ from raceway.runtime.commands_shared import (
     reported,
     warnings_shown,
 )
-from raceway.runtime.commands_trade import read_error, trade, usable_trade
+from raceway.runtime.commands.trade import read_error, trade, usable_trade
 from raceway.runtime.errors import RequestError
 
 if TYPE_CHECKING:
@@ -221,7 +221,7 @@ def export(
             generated = generate(read, progress=stages)
             stages("export")
             # here, for it brings CasADi
-            from raceway.runtime.export import export_c
+            from raceway.runtime.compiled.export import export_c
 
             export_c(generated, folder)
     typer.echo(str(folder))
@@ -238,11 +238,11 @@ def _check_request(
     scene: Scene, cycles: float | None, transient: float | None, rtol: float | None, method: str | None
 ) -> None:
     """Refuse options that no model can follow, before anything is derived or written."""
-    from raceway.runtime.integrators import METHODS
+    from raceway.runtime.accuracy.quasi_static import NAME as QUASI_STATIC
+    from raceway.runtime.integrate.integrators import METHODS
+    from raceway.runtime.integrate.stepper import METHODS as STEPPERS
     from raceway.runtime.parameters import unknown_name
-    from raceway.runtime.quasi_static import NAME as QUASI_STATIC
     from raceway.runtime.request import TOLERANCES
-    from raceway.runtime.stepper import METHODS as STEPPERS
 
     faults = []
     known = ("auto", *STEPPERS, QUASI_STATIC, *METHODS)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from raceway.runtime import clock
+from raceway.runtime.integrate import clock
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from raceway.runtime import clock
+from raceway.runtime.derivatives.jacobian import rows_of
 from raceway.runtime.errors import RacewayError
-from raceway.runtime.evaluate import point
-from raceway.runtime.jacobian import rows_of
+from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.evaluate import point
+from raceway.runtime.integrate.scales import Scales
+from raceway.runtime.integrate.simulate import STIFF_RATIO, choose_method
 from raceway.runtime.parameters import Numbers
-from raceway.runtime.scales import Scales
-from raceway.runtime.simulate import STIFF_RATIO, choose_method
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model

@@ -10,42 +10,42 @@ from typing import TYPE_CHECKING, Any, Literal
 import casadi
 import numpy as np
 
-from raceway.runtime import clock
+from raceway.runtime.accuracy.error_target import simulate_to_error
+from raceway.runtime.accuracy.quasi_static import NAME as QUASI_STATIC
+from raceway.runtime.accuracy.quasi_static import QuasiStatic
 from raceway.runtime.assembly import check_assembly
-from raceway.runtime.compile import CompiledLibrary, compile_model
-from raceway.runtime.drivers import Drivers
-from raceway.runtime.ensemble import EnsembleResult, simulate_many
-from raceway.runtime.ensemble_driver import EnsembleDriver
-from raceway.runtime.error_target import simulate_to_error
+from raceway.runtime.compiled.compile import CompiledLibrary, compile_model
+from raceway.runtime.compiled.drivers import Drivers
+from raceway.runtime.compiled.functions import Functions
+from raceway.runtime.compiled.kernel import Array, Kernel
+from raceway.runtime.compiled.loops import PointLoop
+from raceway.runtime.derivatives.jacobian import jacobian
+from raceway.runtime.derivatives.jacobian_function import JacobianFunction
+from raceway.runtime.derivatives.second_derivatives import hessian
+from raceway.runtime.derivatives.sensitivity import Sensitivities, sensitivities
+from raceway.runtime.ensembles.ensemble import EnsembleResult, simulate_many
+from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver
+from raceway.runtime.ensembles.members import Table
 from raceway.runtime.errors import RequestError
-from raceway.runtime.evaluate import checked_time, evaluate_point
 from raceway.runtime.explain import Explanation, explain
-from raceway.runtime.functions import Functions
-from raceway.runtime.integrators import available_methods
-from raceway.runtime.jacobian import jacobian
-from raceway.runtime.jacobian_function import JacobianFunction
-from raceway.runtime.kernel import Array, Kernel
-from raceway.runtime.loops import PointLoop
+from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.evaluate import checked_time, evaluate_point
+from raceway.runtime.integrate.integrators import available_methods
+from raceway.runtime.integrate.reductions import Reductions, reduce_run
+from raceway.runtime.integrate.simulate import simulate
+from raceway.runtime.integrate.stepper import METHODS as STEPPERS
+from raceway.runtime.integrate.stepper import Stepper
 from raceway.runtime.manifest import Manifest, read_artefact
-from raceway.runtime.members import Table
 from raceway.runtime.parameters import Numbers, Parameters, real, resolve_parameters, vector
-from raceway.runtime.peaks import Peak, refine_peak
-from raceway.runtime.quasi_static import NAME as QUASI_STATIC
-from raceway.runtime.quasi_static import QuasiStatic
-from raceway.runtime.reductions import Reductions, reduce_run
+from raceway.runtime.quantities.peaks import Peak, refine_peak
 from raceway.runtime.request import Request, run_length, start_state
-from raceway.runtime.second_derivatives import hessian
-from raceway.runtime.sensitivity import Sensitivities, sensitivities
-from raceway.runtime.simulate import simulate
-from raceway.runtime.stepper import METHODS as STEPPERS
-from raceway.runtime.stepper import Stepper
 
 if TYPE_CHECKING:
-    from raceway.runtime.linearize import Linearization
-    from raceway.runtime.sensitivity_report import SensitivityReport
+    from raceway.runtime.accuracy.trade import Trade
+    from raceway.runtime.derivatives.linearize import Linearization
+    from raceway.runtime.derivatives.sensitivity_report import SensitivityReport
+    from raceway.runtime.derivatives.statics import StaticEquilibrium
     from raceway.runtime.solution import Solution
-    from raceway.runtime.statics import StaticEquilibrium
-    from raceway.runtime.trade import Trade
 
 
 def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True) -> Model:
@@ -186,7 +186,7 @@ class Model:
     def sample_outputs(
         self, count: int, values: Mapping[str, Any], names: Sequence[str], *, lean: bool
     ) -> dict[str, Array]:
-        """Outputs at many points (see `raceway.runtime.functions`)."""
+        """Outputs at many points (see `raceway.runtime.compiled.functions`)."""
         return self._functions.sample_outputs(count, values, names, lean=lean)
 
     def symbolic(self, name: str) -> casadi.Function:
@@ -299,7 +299,7 @@ class Model:
         parameters : overrides of parameters, SI
         method : ``auto`` or one of `methods`.  ``auto`` takes ``stepper`` where there is a compiler, else
             ``rosenbrock`` for a stiff model and ``erk`` for others
-        rtol : error allowed per step, relative to the magnitudes of the states (`raceway.runtime.scales`)
+        rtol : error allowed per step, relative to the magnitudes of the states (`raceway.runtime.integrate.scales`)
         samples_per_cycle : samples in a turn; in the whole run where nothing turns
         times : times of the samples instead, increasing, within the run; where neither cycles nor duration is given,
             the run ends at the last one.  The stepper takes the same steps however a run of one length is sampled; the
@@ -311,7 +311,7 @@ class Model:
         progress : called with the finished fraction
         error : relative error wanted instead of `method` and `rtol`: the tool chooses them, estimates the error of
             this run and tightens until the estimate is within it; ``Solution.accuracy`` tells (see
-            `raceway.runtime.error_target`)
+            `raceway.runtime.accuracy.error_target`)
         of : quantities that `error` is about.  Default: peak ball force, rms and range of the inner ring's motion
         trade : a measurement of this scene (`raceway trade`), from which `error` begins its search
 
@@ -360,7 +360,7 @@ class Model:
         ----------
         wrt : names of parameters; any number in one pass
         sensitivity_rtol : error allowed per step in the derivatives, which then take part in the choice of step sizes,
-            relative to the states' magnitudes over the parameters' scales (`raceway.runtime.direction_scales`) or to
+            relative to the states' magnitudes over the parameters' scales (`derivatives/direction_scales.py`) or to
             the derivative itself where it is larger; None: the states alone choose the steps
         others : as for `simulate`
 
@@ -405,7 +405,7 @@ class Model:
 
         Parameters
         ----------
-        of : quantities (see `raceway.runtime.quantities`).  Default: peak ball force and motion of the rings
+        of : quantities (see `raceway.runtime.quantities.quantities`).  Default: peak ball force and motion of the rings
         wrt : parameters.  Default: all
         cycles, duration, transient, parameters : as for `simulate`
         method : of the derivatives: ``auto``, one of the stepper's, or ``erk``
@@ -423,7 +423,10 @@ class Model:
         SimulationError
             The computation failed.
         """
-        from raceway.runtime.sensitivity_query import answer, make_query  # SciPy takes longer to read than a run
+        from raceway.runtime.derivatives.sensitivity_query import (  # SciPy takes longer to read than a run
+            answer,
+            make_query,
+        )
 
         query = make_query(
             self.manifest,
@@ -537,7 +540,7 @@ class Model:
     def refine_peak(
         self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max", candidates: int = 6
     ) -> Peak:
-        """Peak of an output between the samples of a run of this model (see `raceway.runtime.peaks`)."""
+        """Peak of an output between the samples of a run of this model (see `raceway.runtime.quantities.peaks`)."""
         numbers = self.numbers(solution.parameters)
         return refine_peak(self, numbers, solution, name, kind=kind, candidates=candidates)
 
@@ -640,7 +643,7 @@ class Model:
         SimulationError
             Nothing holds the rings.
         """
-        from raceway.runtime.statics import instant, static_equilibrium  # with SciPy
+        from raceway.runtime.derivatives.statics import instant, static_equilibrium  # with SciPy
 
         numbers = self.numbers(parameters)
         return static_equilibrium(self, numbers, t=instant(self, numbers, t, crank_angle), load=load)
@@ -667,8 +670,8 @@ class Model:
         KinkWarning
             The damping law has no derivative at this state; the warning says which side is given.
         """
-        from raceway.runtime.linearize import linearize  # with SciPy
-        from raceway.runtime.statics import instant, static_equilibrium
+        from raceway.runtime.derivatives.linearize import linearize  # with SciPy
+        from raceway.runtime.derivatives.statics import instant, static_equilibrium
 
         numbers = self.numbers(parameters)
         time = instant(self, numbers, t, crank_angle)

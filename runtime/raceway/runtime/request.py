@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from raceway.runtime import clock
 from raceway.runtime.errors import RequestError
+from raceway.runtime.integrate import clock
 from raceway.runtime.parameters import Numbers, real, unknown_name, vector
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from raceway.runtime.status import Status
 if TYPE_CHECKING:
     import xarray
 
-    from raceway.runtime.error_target import Accuracy
+    from raceway.runtime.accuracy.error_target import Accuracy
 
 #: Number of the layout of saved files.
 FILE_SCHEMA = 1

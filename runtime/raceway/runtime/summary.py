@@ -19,10 +19,10 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
-from raceway.runtime.clock import breakpoints
 from raceway.runtime.conditioning import conditioning, has_reactions
 from raceway.runtime.errors import SimulationError
-from raceway.runtime.observables import drive_work, kinematic_frequencies, statistics, turns
+from raceway.runtime.integrate.clock import breakpoints
+from raceway.runtime.quantities.observables import drive_work, kinematic_frequencies, statistics, turns
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model

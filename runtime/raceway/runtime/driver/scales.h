@@ -1,4 +1,4 @@
-/* Magnitudes of the states of a run, from its most loaded moments: what raceway.runtime.scales does, for one member after another. */
+/* Magnitudes of the states of a run, from its most loaded moments: what raceway.runtime.integrate.scales does, for one member after another. */
 #ifndef RACEWAY_SCALES_H
 #define RACEWAY_SCALES_H
 

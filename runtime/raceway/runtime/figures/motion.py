@@ -10,8 +10,8 @@ from scipy.interpolate import CubicHermiteSpline
 
 from raceway.runtime.figures.canvas import GREY, INK, SAND, SIGNAL, caption, new_figure, styled
 from raceway.runtime.figures.record import Array, Record
-from raceway.runtime.observables import orbits, stroboscopic_points
-from raceway.runtime.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
+from raceway.runtime.quantities.observables import orbits, stroboscopic_points
+from raceway.runtime.quantities.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
 
 #: Points drawn between two samples where velocities are known: a resonance has but ten samples a period.
 _FINER = 8

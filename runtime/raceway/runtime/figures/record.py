@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raceway.runtime.manifest import force_components
-from raceway.runtime.observables import KinematicFrequencies, ball_angles, kinematic_frequencies, turns
+from raceway.runtime.quantities.observables import KinematicFrequencies, ball_angles, kinematic_frequencies, turns
 
 if TYPE_CHECKING:
     from raceway.runtime.manifest import Manifest

@@ -12,10 +12,10 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from raceway.runtime.certificate import Verdict
+from raceway.runtime.derivatives.certificate import Verdict
+from raceway.runtime.derivatives.sensitivity_report import Sensitivity, SensitivityReport
 from raceway.runtime.errors import RequestError
 from raceway.runtime.figures.canvas import GREY, INK, PALE, SAND, caption, new_figure, save, styled
-from raceway.runtime.sensitivity_report import Sensitivity, SensitivityReport
 
 #: Bars of a chart.
 BARS = 15

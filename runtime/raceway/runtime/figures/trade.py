@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from raceway.runtime.accuracy.quasi_static import NAME as QUASI_STATIC
+from raceway.runtime.accuracy.trade import FULL, Measured, Trade
 from raceway.runtime.figures.canvas import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
-from raceway.runtime.quasi_static import NAME as QUASI_STATIC
-from raceway.runtime.trade import FULL, Measured, Trade
 
 #: Marker, colour and edge of each method; shapes tell them apart in grey as well.
 _METHODS: dict[str, tuple[str, str]] = {

@@ -1,0 +1,200 @@
+"""The quasi-static model of a scene: the rings in equilibrium with the load at each instant.
+
+In: numbers and segments of a run.  Out: states at the requested times, on-line reductions.  The accelerations are the
+generated ones, those that every other method integrates, with the rings at rest; the driver (``driver/equilibrium.c``)
+finds where they vanish by Newton's method with the generated Jacobian and follows that position from instant to
+instant.  Velocities are its time derivative by the implicit function theorem.  Where the load jumps, so does the
+equilibrium; what the rings do between two equilibria (overshoot, vibration, impact) is what this model leaves out.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+
+import numpy as np
+
+from raceway.runtime.compiled.compile import CompiledLibrary, Compiler, compile_sources
+from raceway.runtime.ensembles.ensemble_driver import ENSEMBLE_HEADERS
+from raceway.runtime.errors import ArtefactError
+from raceway.runtime.integrate.stepper import DRIVER, FLAGS, Segments
+from raceway.runtime.manifest import Manifest
+from raceway.runtime.status import Status
+
+#: The name of the method.
+NAME = "quasi-static"
+
+#: Most instants of a run, accepted and rejected.
+MAX_STEPS = 100_000_000
+
+
+class End(IntEnum):
+    """How a run of the driver ended; the numbers are those of equilibrium.h."""
+
+    DONE = 0
+    TOO_MANY_STEPS = 1
+    NO_EQUILIBRIUM = 2
+    FREE_RING = 3
+    BAD_ARGUMENT = 4
+
+
+#: What the ways to end mean to people.
+STATUS_OF_END = {
+    End.TOO_MANY_STEPS: Status.TOO_MANY_STEPS,
+    End.NO_EQUILIBRIUM: Status.NO_EQUILIBRIUM,
+    End.FREE_RING: Status.FREE_RING,
+    End.BAD_ARGUMENT: Status.NOT_FINITE,
+}
+
+
+class _Options(ctypes.Structure):
+    _fields_ = (
+        ("max_steps", ctypes.c_long),
+        ("tolerance", ctypes.c_void_p),
+        ("reduction", ctypes.c_void_p),
+    )
+
+
+class _Result(ctypes.Structure):
+    _fields_ = (
+        ("status", ctypes.c_int),
+        ("segment", ctypes.c_long),
+        ("written", ctypes.c_long),
+        ("steps", ctypes.c_long),
+        ("rejected", ctypes.c_long),
+        ("iterations", ctypes.c_long),
+        ("jumps", ctypes.c_long),
+        ("time", ctypes.c_double),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What a run of the driver tells.
+
+    Attributes
+    ----------
+    end : how it ended
+    written : output times reached
+    steps, rejected : distances between instants
+    iterations : of Newton's method
+    jumps : instants within segments at which the equilibrium jumps
+    time : reached [s]
+    """
+
+    end: End
+    written: int
+    steps: int
+    rejected: int
+    iterations: int
+    jumps: int
+    time: float
+
+
+def compile_quasi_static(folder: Path, manifest: Manifest, compiler: Compiler) -> CompiledLibrary:
+    """Library with the driver of the quasi-static model.
+
+    Raises
+    ------
+    ArtefactError
+        The folder was written before reductions were.
+    CompileError
+        The compiler failed.
+    """
+    missing = [name for name in ENSEMBLE_HEADERS if not (folder / name).is_file()]
+    if missing:
+        raise ArtefactError(f"{folder}: has no {', '.join(missing)}. Write the folder again with `raceway derive`.")
+    return compile_sources(
+        (DRIVER / "equilibrium.c",),
+        compiler,
+        label=f"{manifest.scene}-equilibrium",
+        headers=[*sorted(DRIVER.glob("*.h")), *(folder.absolute() / name for name in ENSEMBLE_HEADERS)],
+        include=(folder.absolute(), DRIVER),
+        flags=FLAGS,
+    )
+
+
+class QuasiStatic:
+    """The compiled driver of one model.
+
+    Raises
+    ------
+    ArtefactError
+        The library's sizes are not those of the manifest.
+    """
+
+    def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
+        self.library = library
+        code = ctypes.CDLL(str(library.path))
+        sizes = (ctypes.c_int * 5)()
+        code.raceway_equilibrium_sizes(sizes)
+        self._inputs = max(len(manifest.inputs), 1)
+        expected = [len(manifest.states), self._inputs, len(manifest.parameters), len(manifest.constants)]
+        if list(sizes)[:4] != expected:
+            raise ArtefactError(
+                f"{library.path}: compiled for {list(sizes)[:4]} states, inputs, parameters and constants, the "
+                f"manifest has {expected}. Write the folder again."
+            )
+        self.row = int(sizes[4])
+        self._code = code
+        code.raceway_equilibria.restype = ctypes.c_int
+
+    def run(
+        self,
+        *,
+        tolerance: np.ndarray,
+        p: np.ndarray,
+        c: np.ndarray,
+        x: np.ndarray,
+        segments: Segments,
+        output_times: np.ndarray,
+        output_states: np.ndarray | None,
+        reduction: np.ndarray | None = None,
+        max_steps: int = MAX_STEPS,
+    ) -> Outcome:
+        """Follow the equilibrium over all segments.
+
+        Parameters
+        ----------
+        tolerance : error allowed between the instants, shape (states,)
+        p, c : parameters and derived constants
+        x : a state to start the search from, shape (states,); on return the last one
+        output_times : increasing, shape (n,) [s]
+        output_states : C-contiguous, shape (n, states), or None
+        reduction : row of on-line reductions to add to, or None
+        """
+        inputs = segments.inputs if segments.inputs.shape[1] else np.zeros((len(segments.inputs), self._inputs))
+        if reduction is not None and len(reduction) != self.row:
+            raise ValueError(f"a reduction of {self.row} numbers is expected, not of {len(reduction)}")
+        options = _Options(max_steps, _real(tolerance), None if reduction is None else _real(reduction))
+        result = _Result()
+        self._code.raceway_equilibria(
+            ctypes.byref(options),
+            _real(p),
+            _real(c),
+            _real(x),
+            ctypes.c_long(len(inputs)),
+            _real(segments.times),
+            _real(inputs),
+            ctypes.c_long(len(output_times)),
+            _real(output_times),
+            None if output_states is None else _real(output_states),
+            ctypes.byref(result),
+        )
+        return Outcome(
+            end=End(result.status),
+            written=result.written,
+            steps=result.steps,
+            rejected=result.rejected,
+            iterations=result.iterations,
+            jumps=result.jumps,
+            time=result.time,
+        )
+
+
+def _real(array: np.ndarray) -> ctypes.c_void_p:
+    if array.dtype != np.float64 or not array.flags.c_contiguous:
+        raise TypeError(f"a C-contiguous array of float64 is expected, not {array.dtype}, {array.flags}")
+    return ctypes.c_void_p(array.ctypes.data)

@@ -1,0 +1,246 @@
+"""What the commands of ``raceway`` share: errors as messages, stages on stderr, reading a scene with its settings.
+
+Like every module here it serves both halves and imports `raceway.derive` inside functions.  Messages and
+progress go to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 the request was wrong, 130
+interrupted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from raceway.runtime.errors import RacewayError, RequestError
+
+if TYPE_CHECKING:
+    from raceway.derive import Scene
+    from raceway.derive.errors import Fault
+    from raceway.runtime.model import Model
+
+errors_console = Console(stderr=True)
+
+SceneFile = Annotated[
+    Path,
+    typer.Argument(help="Scene file (TOML). The folder scenes/ has some to copy.", show_default=False),
+]
+
+#: What an interrupted command says.
+INTERRUPTED = "interrupted. Whatever files are there are whole."
+
+#: Lines of a scene's run table that have an option of ``raceway run``.
+RUN_OPTIONS = {
+    "run.cycles": "--cycles",
+    "run.transient_cycles": "--transient",
+    "run.rtol": "--rtol",
+    "run.method": "--method",
+}
+
+#: Names of the stages as they are announced.
+STAGES = {
+    "read": "reading the scene",
+    "derive": "deriving equations",
+    "lower": "building functions",
+    "emit": "generating C",
+    "check": "deriving to compare",
+    "compile": "compiling",
+    "export": "writing the C program",
+    "simulate": "simulating",
+    "draw": "drawing figures",
+    "write": "writing results",
+}
+
+
+@contextlib.contextmanager
+def reported() -> Iterator[None]:
+    """Turn errors raised on purpose into a message and an exit code; everything else is a defect and shows itself."""
+    try:
+        yield
+    except RacewayError as error:
+        complain(str(error))
+        raise typer.Exit(2 if isinstance(error, ValueError) else 1) from None
+    except BrokenPipeError:  # the reader has seen enough, as in `raceway equations SCENE | head`
+        raise
+    except OSError as error:
+        where = f" {os.fspath(error.filename)!r}" if error.filename else ""
+        why = error.strerror or str(error)
+        complain(f"cannot read or write{where}: {why}. Check the path, its permissions and the free space.")
+        raise typer.Exit(2) from None
+    except KeyboardInterrupt:
+        complain(INTERRUPTED)
+        raise typer.Exit(130) from None
+
+
+def complain(message: str) -> None:
+    errors_console.print(f"[bold red]error[/]: {escape(message)}", soft_wrap=True, highlight=False)
+
+
+def warn(message: Warning | str, *_: Any, **__: Any) -> None:
+    errors_console.print(f"[bold yellow]warning[/]: {escape(str(message))}", soft_wrap=True, highlight=False)
+
+
+def note(message: str) -> None:
+    errors_console.print(f"[bold]note[/]: {escape(message)}", soft_wrap=True, highlight=False)
+
+
+@contextlib.contextmanager
+def warnings_shown() -> Iterator[None]:
+    with warnings.catch_warnings():
+        warnings.showwarning = warn
+        yield
+
+
+class Stages:
+    """Progress on stderr: on a terminal bars that move, elsewhere one line when a stage begins."""
+
+    def __init__(self) -> None:
+        # rich's own answer is yes under FORCE_COLOR, also for a file
+        self._moving = sys.stderr.isatty() and errors_console.is_interactive
+        self._progress = Progress(
+            SpinnerColumn(),
+            TextColumn("{task.description:<20}"),
+            BarColumn(bar_width=30),
+            TimeElapsedColumn(),
+            console=errors_console,
+            disable=not self._moving,
+        )
+        self._begin = time.perf_counter()
+        self._task: Any = None
+
+    def __enter__(self) -> Stages:
+        self._progress.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        if error[0] is None:
+            self._finish()
+        elif self._task is not None:
+            self._progress.stop_task(self._task)
+        self._progress.__exit__(*error)
+
+    def _finish(self) -> None:
+        if self._task is not None:
+            self._progress.update(self._task, total=1.0, completed=1.0)
+
+    def __call__(self, name: str) -> None:
+        self._finish()
+        words = STAGES.get(name, name)
+        if self._moving:
+            self._task = self._progress.add_task(words, total=None)
+        else:
+            errors_console.print(
+                f"{time.perf_counter() - self._begin:7.1f} s  {words}", highlight=False, soft_wrap=True
+            )
+
+    def fraction(self, done: float) -> None:
+        if self._moving:
+            self._progress.update(self._task, total=1.0, completed=done)
+
+
+@contextlib.contextmanager
+def faults_of(source: Path | str) -> Iterator[None]:
+    """Say whose faults they are, where a later stage than reading finds them."""
+    from raceway.derive import SceneError
+
+    try:
+        yield
+    except SceneError as error:
+        if error.source is not None:
+            raise
+        raise SceneError(error.faults, source=source) from None
+
+
+def read_with_settings(path: Path, settings: list[str]) -> tuple[Scene, Scene, dict[str, float]]:
+    """The scene as the file has it, the scene as asked for, and the overrides in SI; checked as if in the file."""
+    from raceway.derive import SceneError, read_scene
+    from raceway.derive.linkage import check_assembly, derive_linkage
+    from raceway.derive.read import parse_override, with_values
+    from raceway.derive.system import DRIVER_ANGLE
+    from raceway.derive.terms import symbol_of
+
+    read = read_scene(path)
+    faults: list[Fault] = []
+    overrides: dict[str, float] = {}
+    for text in settings:
+        misplaced = _run_setting(text)
+        if misplaced is not None:
+            faults.append(misplaced)
+            continue
+        try:
+            name, value = parse_override(read, text)
+        except SceneError as error:
+            faults += error.faults
+        else:
+            overrides[name] = value
+    if faults:
+        raise SceneError(faults, source="--set")
+    if not overrides:
+        return read, read, {}
+    with faults_of("--set"):
+        asked = with_values(read, overrides)
+        if asked.mechanism is not None:
+            # here, so that nothing is written for a linkage that locks
+            linkage = derive_linkage(asked.mechanism, DRIVER_ANGLE, symbol_of(asked.mechanism.driver.speed))
+            check_assembly(linkage, {quantity.path: quantity.value for quantity in asked.quantities})
+    return read, asked, overrides
+
+
+def _run_setting(text: str) -> Fault | None:
+    """A fault where ``--set`` names a line of the run table, which holds no parameters of the model."""
+    from raceway.derive.errors import Fault
+
+    path, _, value = (part.strip() for part in text.partition("="))
+    if not path.startswith("run."):
+        return None
+    option = RUN_OPTIONS.get(path)
+    if option is not None:
+        remedy = f"`raceway run` has {option} for it, as in {option} {value or 'VALUE'}"
+    else:
+        remedy = f"`raceway run` has {', '.join(RUN_OPTIONS.values())}; for the rest edit [run] in the scene"
+    return Fault(
+        key=path,
+        problem="is a setting of the run, not a parameter of the model",
+        given=text,
+        allowed="paths of numbers of mechanism, shaft, load and bearing",
+        remedy=remedy,
+    )
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder of results that cannot be made or written, before the simulation instead of behind it."""
+    place = folder.absolute()
+    while not os.path.lexists(place):
+        place = place.parent
+    why = None
+    if not place.is_dir():
+        why = f"{place} is no folder"
+    elif not os.access(place, os.W_OK | os.X_OK):
+        why = f"{place} may not be written"
+    if why is not None:
+        raise RequestError(
+            f"The folder of the results, {folder}, cannot be written: {why}. Allowed: a folder that you may write, or "
+            "one that can be made. Give another: --out DIR."
+        )
+
+
+def load_model(scene: Scene, stages: Stages, method: str) -> Model:
+    from raceway.derive import generate
+    from raceway.runtime.integrate.stepper import METHODS as STEPPERS
+    from raceway.runtime.model import load
+
+    folder = generate(scene, progress=stages)
+    stages("compile")
+    model = load(folder)
+    if model.has_stepper and method in ("auto", *STEPPERS):
+        _ = model.stepper  # compiled here, where it is announced
+    return model

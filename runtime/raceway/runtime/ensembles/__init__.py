@@ -1,0 +1,1 @@
+"""Many parameter sets of one model at once."""

@@ -1,0 +1,217 @@
+"""The driver of ensembles: C of `driver/ensemble.c` compiled with a model's kernels and called through ctypes.
+
+In: numbers and segments of many members.  Out: their states at the end, on-line reductions, and how each ended.
+The library also holds the driver of single runs, there with reductions; plain runs pay for neither.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from raceway.runtime.compiled.compile import CompiledLibrary, Compiler, compile_sources
+from raceway.runtime.errors import ArtefactError
+from raceway.runtime.integrate.stepper import DRIVER, FLAGS, HEADERS, MAX_STEPS, Family, Stepper
+from raceway.runtime.manifest import Manifest
+
+#: Generated headers that the driver of ensembles includes.
+ENSEMBLE_HEADERS = (*HEADERS, "ensemble_kernels.h")
+
+#: Status of members that were under way when the caller asked to stop; the others are those of `stepper.End`.
+STOPPED = 5
+
+#: Head of a reduction, and what follows for every channel; the layout of driver/reductions.h.
+HEAD = ("from", "wanted", "duration")
+ROWS = ("max", "max_time", "max_ball", "min", "min_time", "min_ball", "integral", "square")
+
+#: Channels behind those of the states: values of the most loaded ball.
+BALL_CHANNELS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
+
+#: Families of methods that advance in lanes.
+LANE_FAMILIES = (Family.AUTO, Family.DP54, Family.RODAS5P)
+
+#: What is told of every member; the fields of raceway_result in stepper.h.
+RESULT = np.dtype(
+    {
+        "names": [
+            *("status", "method", "state", "segment", "written", "steps", "rejected", "evaluations"),
+            *("factorizations", "pivoted", "switches", "time", "step"),
+        ],
+        "formats": [ctypes.c_int] * 3 + [ctypes.c_long] * 8 + [ctypes.c_double] * 2,
+    },
+    align=True,
+)
+
+
+class _Options(ctypes.Structure):
+    _fields_ = (
+        ("method", ctypes.c_int),
+        ("max_steps", ctypes.c_long),
+        ("stop", ctypes.POINTER(ctypes.c_int)),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MemberArrays:
+    """Numbers of the members of one call, row after row.
+
+    Attributes
+    ----------
+    p, c : parameters and constants, shape (members, .)
+    first : first segment of each member, shape (members + 1,)
+    times : ends of the segments, one more than segments for each member, shape (segments + members,) [s]
+    inputs : of each segment at its start, shape (segments, inputs)
+    restarts : where the load jumps at a segment's start, shape (segments,)
+    """
+
+    p: np.ndarray
+    c: np.ndarray
+    first: np.ndarray
+    times: np.ndarray
+    inputs: np.ndarray
+    restarts: np.ndarray
+
+
+def compile_ensemble(folder: Path, manifest: Manifest, compiler: Compiler) -> CompiledLibrary:
+    """Library with the drivers of ensembles and of single runs with reductions.
+
+    Raises
+    ------
+    ArtefactError
+        The folder was written before ensembles were.
+    CompileError
+        The compiler failed.
+    """
+    missing = [name for name in ENSEMBLE_HEADERS if not (folder / name).is_file()]
+    if missing:
+        raise ArtefactError(f"{folder}: has no {', '.join(missing)}. Write the folder again with `raceway derive`.")
+    return compile_sources(
+        (DRIVER / "stepper.c", DRIVER / "ensemble.c"),
+        compiler,
+        label=f"{manifest.scene}-ensemble",
+        headers=[*sorted(DRIVER.glob("*.h")), *(folder.absolute() / name for name in ENSEMBLE_HEADERS)],
+        include=(folder.absolute(), DRIVER),
+        flags=(*FLAGS, "-DRACEWAY_REDUCTIONS"),
+    )
+
+
+class EnsembleDriver:
+    """The compiled drivers of one model.
+
+    Attributes
+    ----------
+    stepper : driver of single runs, with reductions
+    channels : names of the channels that can be reduced: states, then `BALL_CHANNELS`
+    lanes : members that advance together
+
+    Raises
+    ------
+    ArtefactError
+        The library's sizes are not those of the manifest or of this module.
+    """
+
+    def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
+        self.stepper = Stepper(library, manifest)
+        self.channels = (*(state.name for state in manifest.states), *BALL_CHANNELS)
+        code = ctypes.CDLL(str(library.path))
+        sizes = (ctypes.c_int * 3)()
+        code.raceway_ensemble_sizes(sizes)
+        self.row, channels, self.lanes = list(sizes)
+        expected = len(HEAD) + len(ROWS) * len(self.channels)
+        if (self.row, channels) != (expected, len(self.channels)):
+            raise ArtefactError(
+                f"{library.path}: reductions of {self.row} numbers and {channels} channels, {expected} and "
+                f"{len(self.channels)} are expected. Write the folder again."
+            )
+        self._inputs = max(len(manifest.inputs), 1)
+        self._code = code
+        code.raceway_ensemble_work.restype = ctypes.c_long
+        code.raceway_ensemble.restype = ctypes.c_int
+
+    def reductions(self, members: int, start: np.ndarray | float, channels: Collection[str]) -> np.ndarray:
+        """Empty rows of reductions of these channels that count from `start` on [s], shape (members, row)."""
+        rows = np.zeros((members, self.row))
+        rows[:, 0] = start
+        rows[:, 1] = sum(2**k for k, name in enumerate(self.channels) if name in channels)
+        return rows
+
+    def run(
+        self,
+        family: Family,
+        members: MemberArrays,
+        x: np.ndarray,
+        tolerance: np.ndarray,
+        reductions: np.ndarray | None,
+        stop: ctypes.c_int,
+        *,
+        max_steps: int = MAX_STEPS,
+    ) -> np.ndarray:
+        """Advance members in lanes.
+
+        Parameters
+        ----------
+        family : one of `LANE_FAMILIES`
+        x : states at the start, shape (members, states); on return those reached
+        tolerance : error allowed in a step, shape (members, states)
+        reductions : rows to add to, or None
+        stop : the call ends soon after this becomes nonzero
+
+        Returns
+        -------
+        array of `RESULT`, shape (members,)
+        """
+        if family not in LANE_FAMILIES:
+            raise ValueError(f"{family!r} does not advance in lanes: {', '.join(f.name for f in LANE_FAMILIES)} do.")
+        count = len(x)
+        results = np.zeros(count, dtype=RESULT)
+        work = np.empty(self._code.raceway_ensemble_work(ctypes.c_long(count)) // 8 + 1)
+        options = _Options(int(family), max_steps, ctypes.pointer(stop))
+        arrays = (members.p, members.c, tolerance, x, members.first, members.times, self._padded(members.inputs))
+        self._code.raceway_ensemble(
+            ctypes.byref(options),
+            ctypes.c_long(count),
+            *(_pointer(array) for array in arrays),
+            _pointer(members.restarts),
+            None if reductions is None else _pointer(reductions),
+            _pointer(work),
+            _pointer(results),
+        )
+        return results
+
+    def magnitudes(
+        self,
+        members: MemberArrays,
+        initial: np.ndarray,
+        first: np.ndarray,
+        inputs: np.ndarray,
+        horizons: np.ndarray,
+    ) -> np.ndarray:
+        """Magnitudes of the states of each member (see `raceway.runtime.integrate.scales`), shape (members, states).
+
+        Parameters
+        ----------
+        initial : states at the start, shape (members, states)
+        first : first moment of each member, shape (members + 1,)
+        inputs : inputs at the moments, shape (moments, inputs)
+        horizons : a turn, or the run, of each member [s]
+        """
+        found = np.empty_like(initial)
+        # named, for a pointer does not keep alive what it points to
+        arrays = (members.p, members.c, initial, first, self._padded(inputs), horizons, found)
+        pointers = [_pointer(array) for array in arrays]
+        self._code.raceway_ensemble_magnitudes(ctypes.c_long(len(initial)), *pointers)
+        return found
+
+    def _padded(self, inputs: np.ndarray) -> np.ndarray:
+        """The inputs; a column of zeros where a model has none, for C knows no arrays without entries."""
+        return inputs if inputs.shape[1] else np.zeros((len(inputs), self._inputs))
+
+
+def _pointer(array: np.ndarray) -> ctypes.c_void_p:
+    if not array.flags.c_contiguous:
+        raise TypeError(f"a C-contiguous array is expected, not one with strides {array.strides}")
+    return ctypes.c_void_p(array.ctypes.data)

@@ -1,0 +1,1 @@
+"""Integration of a model over time: segments, steps, samples, reductions."""

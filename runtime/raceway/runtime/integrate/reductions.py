@@ -1,0 +1,351 @@
+"""On-line reductions of a run: extremes with their times, mean and rms, without a stored trajectory.
+
+In: a model, numbers, a length of time.  Out: `Reductions`.  The driver looks at every accepted step in its quarters and
+refines extremes from its own dense output, so that what is found does not depend on an output grid, and a run of any
+length takes the same memory.
+
+Channels are the states and four quantities of the balls, each with its value of the most loaded ball at the moment:
+``ball.force``, ``ball.elastic_force``, ``ball.damping_force``, ``ball.deflection``.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from raceway.runtime.accuracy.quasi_static import NAME as QUASI_STATIC
+from raceway.runtime.accuracy.quasi_static_runs import reduce_quasi_static
+from raceway.runtime.ensembles.ensemble_driver import BALL_CHANNELS, HEAD, ROWS, EnsembleDriver
+from raceway.runtime.ensembles.members import edge_windows
+from raceway.runtime.errors import RequestError, SimulationError
+from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.magnitudes import stepper_magnitudes
+from raceway.runtime.integrate.stepper import METHODS as STEPPERS
+from raceway.runtime.integrate.stepper import End, Family, Segments
+from raceway.runtime.integrate.stepping import STATUS_OF_END
+from raceway.runtime.integrate.whereabouts import Whereabouts, whereabouts
+from raceway.runtime.manifest import Manifest
+from raceway.runtime.parameters import Numbers, unknown_name
+from raceway.runtime.request import tolerance
+
+if TYPE_CHECKING:
+    from raceway.runtime.model import Model
+
+
+#: Steps allowed in a turn, on average, and in any run: a motion that grows without bound crawls before it overflows.
+#: Less than a single run with samples may take (`limits`): an ensemble has many members.
+STEPS_A_TURN = 100_000
+STEPS_A_SECOND = 1_000_000
+STEPS_A_RUN = 1_000_000
+
+#: Turns of a run that are looked at for the magnitudes of its states.
+SCALED_TURNS = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reduction:
+    """What is kept of one channel.
+
+    Attributes
+    ----------
+    maximum, minimum : extremes, in the unit of the channel
+    maximum_time, minimum_time : when [s]
+    maximum_ball, minimum_ball : the ball, counted from 1; None for a state
+    mean : over time
+    rms : plain root mean square over time, with the mean in it
+    """
+
+    maximum: float
+    maximum_time: float
+    maximum_ball: int | None
+    minimum: float
+    minimum_time: float
+    minimum_ball: int | None
+    mean: float
+    rms: float
+
+    @property
+    def range(self) -> float:
+        """Maximum less minimum."""
+        return self.maximum - self.minimum
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reductions(Mapping[str, Reduction]):
+    """Reductions of a run by channel: ``reductions["ball.force"].maximum``.
+
+    Attributes
+    ----------
+    channels : what is reduced
+    start, duration : the time that counts, from the end of the transient on [s]
+    end : state at the end, by name
+    steps, rejected : of the whole run
+    cycle_length : time of a turn, None when nothing turns [s]
+    """
+
+    channels: Mapping[str, Reduction]
+    start: float
+    duration: float
+    end: Mapping[str, float]
+    steps: int
+    rejected: int
+    cycle_length: float | None
+
+    def __getitem__(self, name: str) -> Reduction:
+        try:
+            return self.channels[name]
+        except KeyError:
+            raise KeyError(unknown_name("channel", name, self.channels)) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.channels)
+
+    def __len__(self) -> int:
+        return len(self.channels)
+
+
+def channel_names(manifest: Manifest) -> tuple[str, ...]:
+    """Channels of a model in the driver's order; without damping there is no damping force."""
+    law = manifest.bearing.damping_law if manifest.bearing is not None else "none"
+    balls = tuple(name for name in BALL_CHANNELS if law != "none" or name != "ball.damping_force")
+    return (*(state.name for state in manifest.states), *balls)
+
+
+def column(driver: EnsembleDriver, row: str, channel: str) -> int:
+    """Place of an entry in a reduction."""
+    return len(HEAD) + ROWS.index(row) * len(driver.channels) + driver.channels.index(channel)
+
+
+def check_span(duration: float, turn: float, transient: float) -> float:
+    """Time from which on is reduced [s].
+
+    Raises
+    ------
+    RequestError
+        The transient is no number of turns from 0 on, nothing turns, or nothing is left of the run.
+    """
+    if not 0.0 <= transient < math.inf:
+        raise RequestError(f"transient: a number of cycles from 0 on is expected, not {transient!r}.")
+    if transient > 0.0 and not math.isfinite(turn):
+        raise RequestError("transient: its cycles are turns, and nothing turns in this model. Set it to 0.")
+    start = transient * turn if transient > 0.0 else 0.0
+    if start >= duration * (1.0 - 1e-9):
+        raise RequestError(
+            f"The run of {duration / turn:g} cycles lies within its {transient:g} transient cycles: nothing is left. "
+            "Run more cycles, or set fewer transient ones."
+        )
+    return start
+
+
+def check_rtol(rtol: float) -> float:
+    """A tolerance that the methods can keep."""
+    return tolerance("rtol", rtol)
+
+
+def choose_family(asked: str) -> Family:
+    """Family of the driver for a method's name.
+
+    Raises
+    ------
+    RequestError
+        Another method than the project's own stepper.
+    """
+    if asked == "auto":
+        return Family.AUTO
+    if asked not in STEPPERS:
+        raise RequestError(
+            f"method {asked!r}: reductions and ensembles are part of the project's own stepper. "
+            f"Take auto or one of {', '.join(STEPPERS)}; for other methods call simulate and reduce its samples."
+        )
+    return STEPPERS[asked]
+
+
+def reduce_run(
+    model: Model,
+    numbers: Numbers,
+    *,
+    initial: np.ndarray,
+    duration: float,
+    transient: float,
+    method: str,
+    rtol: float,
+    progress: Callable[[float], None] | None = None,
+) -> Reductions:
+    """Integrate from t = 0 and reduce.
+
+    Raises
+    ------
+    RequestError
+        A wrong request.
+    SimulationError
+        The computation failed.
+    """
+    turn = clock.period(model.manifest, numbers.values)
+    start = check_span(duration, turn, transient)
+    family = choose_family(method) if method != QUASI_STATIC else None
+    driver = model.ensemble_driver
+    looked_at = min(duration, SCALED_TURNS * turn)
+    tolerance = check_rtol(rtol) * stepper_magnitudes(model, driver.stepper, numbers, initial, looked_at, turn)
+    row = driver.reductions(1, start, channel_names(model.manifest))[0]
+    state = initial.copy()
+    if family is None:
+        steps, rejected = reduce_quasi_static(model, numbers, tolerance, state, row, (duration, turn, start))
+    else:
+        steps, rejected = integrate_reduced(
+            model, driver, numbers, family, tolerance, state, row, (duration, turn, start), progress=progress
+        )
+    names = channel_names(model.manifest)
+    return Reductions(
+        channels={name: _reduction(driver, row, name) for name in names},
+        start=start,
+        duration=float(row[HEAD.index("duration")]),
+        end=dict(zip(model.states, state.tolist(), strict=True)),
+        steps=steps,
+        rejected=rejected,
+        cycle_length=turn if math.isfinite(turn) else None,
+    )
+
+
+def integrate_reduced(
+    model: Model,
+    driver: EnsembleDriver,
+    numbers: Numbers,
+    family: Family,
+    tolerance: np.ndarray,
+    state: np.ndarray,
+    row: np.ndarray,
+    span: tuple[float, float, float],
+    *,
+    progress: Callable[[float], None] | None = None,
+    stop: ctypes.c_int | None = None,
+) -> tuple[int, int]:
+    """Integrate one run, adding to a reduction; `state` is brought to the end.  Returns steps, rejected steps.
+
+    Parameters
+    ----------
+    span : duration, time of a turn, time from which on is reduced [s]
+    stop : ends the run, with the reduction as it is, when it becomes nonzero
+
+    Raises
+    ------
+    RunFailed
+        The driver could not reach the end.
+    """
+    duration, turn, start = span
+    inputs = model.manifest.inputs
+    gates = [k for k, info in enumerate(inputs) if info.kind != "phase"]
+    before: np.ndarray | None = None
+    steps = rejected = 0
+    left = step_limit(duration, turn)
+    for edges in edge_windows(model, numbers, duration, turn, start):
+        u = np.array([clock.inputs_at(inputs, numbers.values, a, 0.5 * (a + b)) for a, b in pairwise(edges)])
+        u = u.reshape(len(edges) - 1, len(inputs))
+        first = before is None or not np.array_equal(before, u[0, gates])
+        restarts = np.concatenate([[first], np.any(np.diff(u[:, gates], axis=0) != 0.0, axis=1)])
+        before = u[-1, gates]
+        outcome = driver.stepper.run(
+            family=family,
+            tolerance=tolerance,
+            p=numbers.p,
+            c=numbers.c,
+            x=state,
+            segments=Segments(times=edges, inputs=np.ascontiguousarray(u), restarts=restarts),
+            output_times=np.zeros(0),
+            output_states=None,
+            reduction=row,
+            max_steps=left,
+        )
+        left = max(left - outcome.steps - outcome.rejected, 1)
+        steps += outcome.steps
+        rejected += outcome.rejected
+        if outcome.end is not End.DONE:
+            place = whereabouts(model.manifest, numbers, outcome.time, state)
+            raise RunFailed(outcome.end, outcome.time, outcome.step, place)
+        if progress is not None:
+            progress(float(edges[-1]) / duration)
+        if stop is not None and stop.value:
+            break
+    return steps, rejected
+
+
+def step_limit(duration: float, turn: float) -> int:
+    """Most steps of a run, accepted and rejected."""
+    return STEPS_A_RUN + STEPS_A_TURN * math.ceil(duration / turn) + math.ceil(min(STEPS_A_SECOND * duration, 1e15))
+
+
+class RunFailed(SimulationError):
+    """The driver could not reach the end of a run."""
+
+    def __init__(self, end: End, time: float, step: float, place: Whereabouts | None = None) -> None:
+        self.end, self.time, self.step, self.place = end, time, step, place
+        self.status = STATUS_OF_END[end]
+        angle = f", crank angle {math.degrees(place.crank_angle):.4f} deg" if place is not None else ""
+        words = f" {place.words}" if place is not None else ""
+        super().__init__(f"{self.status.value}\nt = {time:.9g} s{angle}, step size {step:.3g} s.{words}".rstrip())
+
+
+def _reduction(driver: EnsembleDriver, row: np.ndarray, channel: str) -> Reduction:
+    entry = {kind: float(row[column(driver, kind, channel)]) for kind in ROWS}
+    duration = float(row[HEAD.index("duration")])
+    of_ball = channel in BALL_CHANNELS
+    return Reduction(
+        maximum=entry["max"],
+        maximum_time=entry["max_time"],
+        maximum_ball=int(entry["max_ball"]) if of_ball else None,
+        minimum=entry["min"],
+        minimum_time=entry["min_time"],
+        minimum_ball=int(entry["min_ball"]) if of_ball else None,
+        mean=entry["integral"] / duration,
+        rms=math.sqrt(entry["square"] / duration),
+    )
+
+
+def observable_aliases(channels: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Every name of an observable: ``max:ball.force``, and ``peak_ball_force`` for people; -> (kind, channel)."""
+    found: dict[str, tuple[str, str]] = {}
+    for channel in channels:
+        plain = channel.replace(".", "_")
+        for kind in KINDS:
+            if kind == "end" and channel in BALL_CHANNELS:
+                continue
+            found[f"{kind}:{channel}"] = (kind, channel)
+            found[f"{kind}_{plain}"] = (kind, channel)
+        found[f"peak:{channel}"] = found[f"peak_{plain}"] = ("max", channel)
+    return found
+
+
+#: Kinds of observables.
+KINDS = ("max", "min", "mean", "rms", "range", "peak_time", "peak_ball", "min_time", "end")
+
+
+def observe(driver: EnsembleDriver, kind: str, channel: str, rows: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Values of an observable from reductions.
+
+    Parameters
+    ----------
+    rows : reductions, shape (members, .)
+    end : states at the end, shape (members, states)
+    """
+    if kind == "end":
+        return end[:, driver.channels.index(channel)].copy()
+
+    def of(row: str) -> np.ndarray:
+        values: np.ndarray = rows[:, column(driver, row, channel)]
+        return values
+
+    duration = rows[:, HEAD.index("duration")]
+    found: np.ndarray
+    if kind == "range":
+        found = of("max") - of("min")
+    elif kind in ("mean", "rms"):
+        with np.errstate(invalid="ignore", divide="ignore"):  # a member that never started has no duration
+            found = of("integral") / duration if kind == "mean" else np.sqrt(of("square") / duration)
+    else:
+        found = of({"peak_time": "max_time", "peak_ball": "max_ball"}.get(kind, kind)).copy()
+    return found

@@ -1,0 +1,352 @@
+"""The project's own stepper: generated kernels and the C driver, compiled together and called through ctypes.
+
+In: numbers and segments of a run.  Out: states at the requested times, and what the run cost.  One call integrates
+any number
+of segments; the interpreter is free meanwhile, and calls from several threads do not share anything.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+
+import numpy as np
+
+from raceway.runtime.compiled.compile import CompiledLibrary, Compiler, compile_sources
+from raceway.runtime.errors import ArtefactError
+from raceway.runtime.manifest import Manifest
+
+#: C sources of the driver, and the generated headers it includes.
+DRIVER = Path(__file__).parent.parent / "driver"
+HEADERS = ("kernels.h", "methods.h", "tangents.h")
+
+#: IEEE arithmetic throughout, without fused multiply-add: contact amplifies the last bit, and another compiler should
+#: give the same motion.  What is given up is errno and traps, and what is gained are vectors of square roots.
+#: Packing scalars of short dependent chains costs more than it saves.
+FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd", "-fno-tree-slp-vectorize")
+
+#: Most steps of a call, accepted and rejected, unless the caller says otherwise: some seconds, during which the
+#: interpreter is deaf to an interrupt.
+MAX_STEPS = 20_000_000
+
+
+class Family(IntEnum):
+    """Methods of the driver; the numbers are those of stepper.h."""
+
+    AUTO = 0
+    RODAS4 = 1
+    RODAS5P = 2
+    DP54 = 3
+    DOP853 = 4
+
+
+#: Names users give, and the driver's methods.  Plain ``stepper`` lets the driver choose.
+METHODS: Mapping[str, Family] = {
+    "stepper": Family.AUTO,
+    "stepper-rodas4": Family.RODAS4,
+    "stepper-rodas5p": Family.RODAS5P,
+    "stepper-dp54": Family.DP54,
+    "stepper-dop853": Family.DOP853,
+}
+
+
+class End(IntEnum):
+    """How a run of the driver ended; the numbers are those of stepper.h."""
+
+    DONE = 0
+    TOO_MANY_STEPS = 1
+    STEP_TOO_SMALL = 2
+    NOT_FINITE = 3
+    BAD_ARGUMENT = 4
+
+
+class _Options(ctypes.Structure):
+    _fields_ = (
+        ("method", ctypes.c_int),
+        ("max_steps", ctypes.c_long),
+        ("first_step", ctypes.c_double),
+        ("smallest_step", ctypes.c_double),
+        ("largest_step", ctypes.c_double),
+        ("tolerance", ctypes.c_void_p),
+        ("reduction", ctypes.c_void_p),
+    )
+
+
+class _Tangents(ctypes.Structure):
+    _fields_ = (
+        ("blocks", ctypes.c_long),
+        *((name, ctypes.c_void_p) for name in ("p", "c", "u", "shift", "x", "outputs", "work", "weight")),
+        ("rtol", ctypes.c_double),
+    )
+
+
+class _Result(ctypes.Structure):
+    _fields_ = (
+        ("status", ctypes.c_int),
+        ("method", ctypes.c_int),
+        ("state", ctypes.c_int),
+        ("segment", ctypes.c_long),
+        ("written", ctypes.c_long),
+        ("steps", ctypes.c_long),
+        ("rejected", ctypes.c_long),
+        ("evaluations", ctypes.c_long),
+        ("factorizations", ctypes.c_long),
+        ("pivoted", ctypes.c_long),
+        ("switches", ctypes.c_long),
+        ("time", ctypes.c_double),
+        ("step", ctypes.c_double),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segments:
+    """The run as the driver sees it.
+
+    Attributes
+    ----------
+    times : ends of the segments, shape (segments + 1,), increasing [s]
+    inputs : inputs of each segment at its start, shape (segments, inputs)
+    restarts : where the load jumps at a segment's start, shape (segments,)
+    """
+
+    times: np.ndarray
+    inputs: np.ndarray
+    restarts: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What a run of the driver tells.
+
+    Attributes
+    ----------
+    end : how it ended
+    family : method of the last segment
+    state : index of the state that ended it, -1 if none
+    written : output times reached
+    steps, rejected, evaluations, factorizations, pivoted, switches : counts
+    time : reached [s]
+    step : last step size tried [s]
+    """
+
+    end: End
+    family: Family
+    state: int
+    written: int
+    steps: int
+    rejected: int
+    evaluations: int
+    factorizations: int
+    pivoted: int
+    switches: int
+    time: float
+    step: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tangents:
+    """Directions along which a run is differentiated, in blocks of `Stepper.lanes`.
+
+    Attributes
+    ----------
+    p, c : derivatives of parameters and constants along the directions, shapes (blocks, parameters, lanes),
+        (blocks, constants, lanes)
+    u : of the inputs at each segment's start, shape (segments, blocks, inputs, lanes)
+    shift : of the time at which each segment starts, shape (segments, blocks, lanes) [s]
+    x : of the states at the start, on return at the end, shape (blocks, states, lanes)
+    outputs : filled with those at the output times, shape (outputs, blocks, states, lanes)
+    weight, rtol : where the derivatives take part in the choice of step sizes, 1 / error allowed in a step, shape
+        (blocks, states, lanes), zero for directions that do not count, and the relative tolerance that is in it; a
+        derivative that outgrows 1 / (rtol weight) is followed relative to its size
+    """
+
+    p: np.ndarray
+    c: np.ndarray
+    u: np.ndarray
+    shift: np.ndarray
+    x: np.ndarray
+    outputs: np.ndarray
+    weight: np.ndarray | None = None
+    rtol: float = 0.0
+
+
+def compile_stepper(
+    folder: Path, manifest: Manifest, compiler: Compiler, *, sensitivities: bool = False
+) -> CompiledLibrary:
+    """Library of driver and kernels of a generated folder; with the derivatives of its steps where asked for.
+
+    Raises
+    ------
+    CompileError
+        The compiler failed.
+    """
+    sources = (DRIVER / "stepper.c",)
+    headers = [*sorted(DRIVER.glob("*.h")), *(folder.absolute() / name for name in HEADERS)]
+    return compile_sources(
+        sources,
+        compiler,
+        label=f"{manifest.scene}-stepper",
+        headers=headers,
+        include=(folder.absolute(), DRIVER),
+        flags=(*FLAGS, "-DRACEWAY_SENSITIVITIES") if sensitivities else FLAGS,
+    )
+
+
+class Stepper:
+    """The compiled driver of one model.
+
+    Raises
+    ------
+    ArtefactError
+        The library's sizes are not those of the manifest.
+    """
+
+    def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
+        self.library = library
+        code = ctypes.CDLL(str(library.path))
+        sizes = (ctypes.c_int * 6)()
+        code.raceway_sizes(sizes)
+        inputs = max(len(manifest.inputs), 1)
+        expected = [len(manifest.states), inputs, len(manifest.parameters), len(manifest.constants)]
+        if list(sizes)[:4] != expected:
+            raise ArtefactError(
+                f"{library.path}: compiled for {list(sizes)[:4]} states, inputs, parameters and constants, the "
+                f"manifest has {expected}. Write the folder again."
+            )
+        self._inputs = inputs
+        #: directions that the driver differentiates along at once
+        self.lanes = int(sizes[5])
+        self._code = code
+        self._run = code.raceway_run
+        self._run.restype = ctypes.c_int
+        # addresses as numbers: making typed pointers would take as long as a hundred steps
+        address, long = ctypes.c_void_p, ctypes.c_long
+        self._run.argtypes = (
+            *(ctypes.POINTER(_Options), address, address, address, long, address, address, address),
+            *(long, address, address, ctypes.POINTER(_Result)),
+        )
+        self._magnitudes = code.raceway_magnitudes
+        self._magnitudes.restype = None
+        self._magnitudes.argtypes = (address, address, address, long, address, ctypes.c_double, address)
+
+    def run(
+        self,
+        *,
+        family: Family,
+        tolerance: np.ndarray,
+        p: np.ndarray,
+        c: np.ndarray,
+        x: np.ndarray,
+        segments: Segments,
+        output_times: np.ndarray,
+        output_states: np.ndarray | None,
+        tangents: Tangents | None = None,
+        reduction: np.ndarray | None = None,
+        max_steps: int = MAX_STEPS,
+        first_step: float = 0.0,
+        smallest_step: float = 0.0,
+        largest_step: float = np.inf,
+    ) -> Outcome:
+        """Integrate over all segments.
+
+        Parameters
+        ----------
+        tolerance : error allowed in a step, shape (states,)
+        p, c : parameters and derived constants
+        x : state at the start, shape (states,); on return that at the end
+        output_times : increasing, shape (n,) [s]
+        output_states : C-contiguous, shape (n, states), or None
+        tangents : directions to differentiate along; the library must have been compiled with sensitivities
+        reduction : row of on-line reductions to add to; the library must have been compiled with reductions
+        """
+        inputs = segments.inputs if segments.inputs.shape[1] else np.zeros((len(segments.inputs), self._inputs))
+        restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
+        reduced = None if reduction is None else _pointer("reduction", reduction)
+        options = _Options(
+            *(family, max_steps, first_step, smallest_step, largest_step, _pointer("tolerance", tolerance), reduced)
+        )
+        result = _Result()
+        call = self._run if tangents is None else self._differentiated(tangents)
+        call(
+            ctypes.byref(options),
+            _pointer("p", p),
+            _pointer("c", c),
+            _pointer("x", x),
+            len(restarts),
+            _pointer("times", segments.times),
+            _pointer("inputs", inputs),
+            restarts.ctypes.data,
+            len(output_times),
+            _pointer("output_times", output_times),
+            None if output_states is None else _pointer("output_states", output_states),
+            ctypes.byref(result),
+        )
+        return Outcome(
+            end=End(result.status),
+            family=Family(result.method),
+            state=result.state,
+            written=result.written,
+            steps=result.steps,
+            rejected=result.rejected,
+            evaluations=result.evaluations,
+            factorizations=result.factorizations,
+            pivoted=result.pivoted,
+            switches=result.switches,
+            time=result.time,
+            step=result.step,
+        )
+
+    def magnitudes(
+        self, p: np.ndarray, c: np.ndarray, initial: np.ndarray, inputs: np.ndarray, horizon: float
+    ) -> np.ndarray:
+        """Magnitudes of the states of a run (see `raceway.runtime.integrate.scales`), shape (states,).
+
+        Parameters
+        ----------
+        initial : state at the start, shape (states,)
+        inputs : inputs at moments spread over the run, shape (moments, inputs)
+        horizon : a turn, or the run [s]
+        """
+        # C knows no arrays without entries
+        padded = inputs if inputs.shape[1] else np.zeros((len(inputs), self._inputs))
+        found = np.empty_like(initial)
+        self._magnitudes(
+            *(_pointer(name, array) for name, array in (("p", p), ("c", c), ("initial", initial))),
+            len(padded),
+            _pointer("inputs", padded),
+            horizon,
+            _pointer("found", found),
+        )
+        return found
+
+    def _differentiated(self, tangents: Tangents) -> Callable[..., int]:
+        """The driver's call with derivatives, the directions bound."""
+        fields = ("p", "c", "u", "shift", "x", "outputs")
+        pointers = {name: _pointer(name, getattr(tangents, name)) for name in fields}
+        blocks = len(tangents.x)
+        self._code.raceway_tangent_work.restype = ctypes.c_long
+        work = np.empty(self._code.raceway_tangent_work(ctypes.c_long(blocks)) // 8 + 8)
+        weight = None if tangents.weight is None else _pointer("weight", tangents.weight)
+        bound = _Tangents(blocks=blocks, work=work.ctypes.data, weight=weight, rtol=tangents.rtol, **pointers)
+        run = self._code.raceway_run_tangents
+        run.restype = ctypes.c_int
+        run.argtypes = (*self._run.argtypes[:-1], ctypes.POINTER(_Tangents), self._run.argtypes[-1])
+
+        def call(*arguments: object) -> int:
+            *given, result = arguments
+            done: int = run(*given, ctypes.byref(bound), result)
+            assert work.size  # the driver's memory lives until here
+            return done
+
+        return call
+
+
+def _pointer(name: str, array: np.ndarray) -> int:
+    """Address of an array's numbers; the array must outlive its use."""
+    if array.dtype != np.float64 or not array.flags.c_contiguous:
+        raise TypeError(f"{name}: a C-contiguous array of float64 is expected, not {array.dtype}, {array.flags}")
+    address: int = array.ctypes.data
+    return address
