@@ -42,10 +42,21 @@ def violations(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) ->
     columns : values of all parameters by name: numbers, or arrays of one shape
     """
     for info in manifest.parameters:
-        bad = outside(info, columns[info.name])
-        if np.any(bad):
+        given = columns[info.name]
+        # arrays of one number each would take longer than a short run
+        bad = np.bool_(_number_outside(info, given)) if isinstance(given, float) else outside(info, given)
+        if bad.any():
             yield bad, f"{info.name}: allowed is a number {allowed(info)} [{info.unit}]"
     for name, factor, other in manifest.relations:
-        bad = ~(np.asarray(columns[name], dtype=float) > factor * np.asarray(columns[other], dtype=float))
-        if np.any(bad):
+        bad = np.logical_not(np.greater(columns[name], np.multiply(factor, columns[other])))
+        if bad.any():
             yield bad, f"{name}: allowed is a number above {factor:.9g} times {other}"
+
+
+def _number_outside(info: ParameterInfo, value: float) -> bool:
+    return not (
+        (info.above is None or value > info.above)
+        and (info.least is None or value >= info.least)
+        and (info.most is None or value <= info.most)
+        and (info.below is None or value < info.below)
+    )
