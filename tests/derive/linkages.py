@@ -246,30 +246,30 @@ def offset_slider(branch: str = "ahead") -> Machine:
     )
 
 
+def _four_bar_bodies(rocker_points: Mapping[str, Place]) -> dict[str, Any]:
+    """Bodies of the crank-rocker; the rocker with further points."""
+    return {
+        "crank": {"mass": 0.5, "inertia": 6e-4, "center": ("xy", 0.02, 0.006), "points": {"A": None, "B": 0.05}},
+        "coupler": {
+            "mass": 1.2,
+            "inertia": 5e-3,
+            "center": ("polar", 0.11, 0.3),
+            "points": {"B": None, "C": 0.19, "tool": ("xy", 0.1, 0.07)},
+        },
+        "rocker": {
+            "mass": 0.9,
+            "inertia": 3e-3,
+            "center": ("xy", 0.06, -0.02),
+            "points": {"D": None, "C": 0.13, **rocker_points},
+        },
+    }
+
+
 def four_bar(branch: str = "left") -> Machine:
     """Crank-rocker, centres of mass off the lines."""
     return build(
         frame={"A": None, "D": ("xy", 0.2, 0.03)},
-        bodies={
-            "crank": {
-                "mass": 0.5,
-                "inertia": 6e-4,
-                "center": ("xy", 0.02, 0.006),
-                "points": {"A": None, "B": 0.05},
-            },
-            "coupler": {
-                "mass": 1.2,
-                "inertia": 5e-3,
-                "center": ("polar", 0.11, 0.3),
-                "points": {"B": None, "C": 0.19, "tool": ("xy", 0.1, 0.07)},
-            },
-            "rocker": {
-                "mass": 0.9,
-                "inertia": 3e-3,
-                "center": ("xy", 0.06, -0.02),
-                "points": {"D": None, "C": 0.13, "E": ("xy", 0.12, 0.05)},
-            },
-        },
+        bodies=_four_bar_bodies({"E": ("xy", 0.12, 0.05)}),
         joints={
             "A": {"bodies": ("frame", "crank")},
             "B": {"bodies": ("crank", "coupler")},
@@ -289,19 +289,7 @@ def _extended(
     return build(
         frame={"A": None, "D": ("xy", 0.2, 0.03), **extra_frame},
         bodies={
-            "crank": {"mass": 0.5, "inertia": 6e-4, "center": ("xy", 0.02, 0.006), "points": {"A": None, "B": 0.05}},
-            "coupler": {
-                "mass": 1.2,
-                "inertia": 5e-3,
-                "center": ("polar", 0.11, 0.3),
-                "points": {"B": None, "C": 0.19, "tool": ("xy", 0.1, 0.07)},
-            },
-            "rocker": {
-                "mass": 0.9,
-                "inertia": 3e-3,
-                "center": ("xy", 0.06, -0.02),
-                "points": {"D": None, "C": 0.13, **rocker_points},
-            },
+            **_four_bar_bodies(rocker_points),
             **bodies,
         },
         # The second dyad stands first: the order of assembly is not the order of the file.

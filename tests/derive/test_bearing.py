@@ -4,20 +4,16 @@ hand."""
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 import sympy as sp
+from scene_texts import PRESS, ROTOR
 
 from raceway.derive.lower import Functions, lower
 from raceway.derive.read import scene_from_text
 from raceway.derive.system import System, derive
-
-SCENES = Path(__file__).resolve().parents[2] / "scenes"
-PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
-VARYING = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
 
 
 def symbol(name: str) -> sp.Symbol:
@@ -101,7 +97,7 @@ def test_equivalent_mass_equals_printed_eq_3(system: System) -> None:
 
 
 def test_a_fixed_outer_ring_has_no_coordinates() -> None:
-    derived = derive(scene_from_text(VARYING, "varying_compliance"))
+    derived = derive(scene_from_text(ROTOR, "varying_compliance"))
     assert [s.name for s in derived.states] == ["inner.x", "inner.y", "inner.vx", "inner.vy"]
     assert derived.mass.shape == (2, 2)
     assert not any("outer_ring" in p.name for p in derived.parameters)

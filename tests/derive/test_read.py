@@ -6,12 +6,12 @@ import copy
 import math
 import tomllib
 from dataclasses import FrozenInstanceError, fields, is_dataclass
-from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scene_texts import PRESS, ROTOR, SCENES, edited
 
 from raceway.derive.errors import SceneError
 from raceway.derive.read import parse_override, read_scene, scene_from_text, with_values
@@ -26,15 +26,7 @@ from raceway.derive.scene import (
 )
 from raceway.derive.units import parse_quantity
 
-SCENES = Path(__file__).parents[2] / "scenes"
 FILES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
-PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
-ROTOR = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
-
-
-def edited(text: str, old: str, new: str) -> str:
-    assert text.count(old) == 1, f"{old!r} occurs {text.count(old)} times"
-    return text.replace(old, new)
 
 
 def values(scene: Scene) -> dict[str, float]:

@@ -8,19 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from scene_texts import PRESS, ROTOR, SCENES, edited
 
 from raceway.derive.errors import SceneError
 from raceway.derive.read import read_scene, scene_from_text
 from raceway.runtime.errors import RacewayError
-
-SCENES = Path(__file__).parents[2] / "scenes"
-PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
-ROTOR = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
-
-
-def edited(text: str, old: str, new: str) -> str:
-    assert text.count(old) == 1, f"{old!r} occurs {text.count(old)} times"
-    return text.replace(old, new)
 
 
 def faults(text: str, name: str = "press") -> SceneError:

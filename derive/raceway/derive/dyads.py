@@ -111,11 +111,18 @@ def name_hinge(ledger: Ledger, mechanism: Mechanism, joint: Joint, host: Pose) -
 
 
 def name_joint(ledger: Ledger, joint: Joint, motion: Motion) -> Motion:
+    """The motion of a joint under the names ``joint.<name>.x`` and so on."""
     return ledger.name_motion(f"joint.{joint.name}", motion, f"joint {joint.name}", subscript(joint.name))
 
 
 def body_span(mechanism: Mechanism, body: str, outer: Joint, inner: Joint) -> tuple[Pair, Pair]:
-    """Point of the outer joint, and vector from it to the inner joint, in body axes [m]."""
+    """Point of the outer joint, and vector from it to the inner joint, in body axes [m].
+
+    Raises
+    ------
+    LinkageError
+        both joints sit on one and the same point.
+    """
     start = body_point(mechanism, body, point_name(outer, body))
     span = subtract(body_point(mechanism, body, point_name(inner, body)), start)
     if span[0].is_zero and span[1].is_zero:
@@ -204,6 +211,7 @@ def name_gap(ledger: Ledger, inner: Joint, order: str, gap: Pair, unit: str) -> 
 
 
 def placed_group(group: Group, spans: tuple[Pair, ...], determinant: sp.Expr, guide: Guide | None) -> Dyad:
+    """The group with what placing it has found: spans of its bodies [m], determinant of its loop, guide."""
     return Dyad(
         kind=group.kind,
         bodies=group.bodies,

@@ -7,6 +7,7 @@ kernels.h          the model cut into inline functions for the project's own ste
 tangents.h         derivatives of these along several directions at once, for sensitivities
 ensemble_kernels.h the kernels for several members of an ensemble at once, and what reductions need
 methods.h          the stepper's methods
+switches.h         where the laws have kinks, for runs whose steps end there; no such file where they have none
 model.casadi       the same functions serialised, for machines without a compiler
 jacobians.c, .h    all quantities, their derivatives and those of the right-hand side, compiled when first asked for
 jacobians.casadi   the quantities serialised
@@ -40,8 +41,10 @@ from raceway.derive.lower import Functions, lower, operations
 from raceway.derive.read import read_scene
 from raceway.derive.replace_folder import refuse_foreign, replace_folder
 from raceway.derive.scene import Scene
-from raceway.derive.system import Output, System, derive
+from raceway.derive.switch_kernels import switches_header
+from raceway.derive.system import System, derive
 from raceway.derive.values import value_bounds, value_relations
+from raceway.derive.variables import Output
 from raceway.runtime import manifest as mf
 from raceway.runtime.errors import ArtefactError
 
@@ -181,6 +184,8 @@ def _write(folder: Path, system: System, functions: Functions) -> None:
         (folder / "ensemble_kernels.h").write_text(lanes, encoding="utf-8", newline="\n")
         tangents = tangents_header(functions.kernels)
         (folder / "tangents.h").write_text(tangents, encoding="utf-8", newline="\n")
+    if functions.switches is not None:
+        (folder / "switches.h").write_text(switches_header(functions.switches), encoding="utf-8", newline="\n")
     _pack(folder / "model.casadi", functions.functions)
     # values only: where there is no compiler, the runtime makes their derivatives when they are asked for
     values = [entry for entry in functions.jacobians if not entry[0].name().endswith(DERIVATIVES)]

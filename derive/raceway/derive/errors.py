@@ -12,8 +12,9 @@ from pathlib import Path
 
 from raceway.runtime.errors import RacewayError
 
-#: Most characters of a key that a message shows.
+#: Most characters of a key that a message shows, and of each of its other parts.
 LONGEST_KEY = 400
+LONGEST_PART = 1200
 
 #: Most faults that a message lists.
 MOST_FAULTS = 100
@@ -42,13 +43,18 @@ class Fault:
 
     def render(self) -> str:
         """Text of the fault: a headline, then one indented line for each of given, allowed and remedy."""
-        # a key of the file may be any text: of any length, with escape sequences for the terminal
-        key = "".join(letter if letter.isprintable() else "?" for letter in self.key)
-        key = key if len(key) <= LONGEST_KEY else f"{key[:LONGEST_KEY]}..."
+        key = _shown(self.key, LONGEST_KEY)
         place = key if self.line is None else f"{key} (line {self.line})".lstrip()
-        headline = f"{place}: {self.problem}" if place else self.problem
+        problem = _shown(self.problem, LONGEST_PART)
+        headline = f"{place}: {problem}" if place else problem
         details = (("given", self.given), ("allowed", self.allowed), ("remedy", self.remedy))
-        return "\n".join([headline, *(f"  {word}: {text}" for word, text in details if text)])
+        return "\n".join([headline, *(f"  {word}: {_shown(text, LONGEST_PART)}" for word, text in details if text)])
+
+
+def _shown(text: str, most: int) -> str:
+    """A text for a terminal: names of the file may be of any length, with escape sequences in them."""
+    text = "".join(letter if letter.isprintable() else "?" for letter in text)
+    return text if len(text) <= most else f"{text[:most]}..."
 
 
 class SceneError(RacewayError, ValueError):

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import localcontext
 from fractions import Fraction
 
 from raceway.derive.order_conditions import (
-    PRECISION,
     OrderConditions,
     decimal_of,
     elementary_weights,
@@ -20,10 +18,10 @@ from raceway.derive.order_conditions import (
     vector,
 )
 from raceway.derive.tableaus import (
+    CheckedTableau,
     Row,
     Rows,
     nested_powers,
-    require_no_faults,
     row_of,
     row_sum_faults,
     rows_of,
@@ -48,7 +46,7 @@ class ErrorEstimate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ExplicitTableau:
+class ExplicitTableau(CheckedTableau):
     """An explicit Runge–Kutta pair with dense output.
 
     ``k_i = f(t + c_i h, y0 + h sum_j a_ij k_j)`` for s stages, ``y1 = y0 + h sum_i b_i k_i``.  Stage s + 1 is the end
@@ -97,12 +95,6 @@ class ExplicitTableau:
     dense_order: int
     rounding: Fraction
     source: str
-
-    def __post_init__(self) -> None:
-        require_no_faults(self.name, self._shape_faults())
-        with localcontext() as context:
-            context.prec = PRECISION
-            require_no_faults(self.name, self._order_faults())
 
     @property
     def stages(self) -> int:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from raceway.derive.system import Output
+from raceway.derive.variables import Output
 
 Described = tuple[ca.Function, str]
 

@@ -126,6 +126,7 @@ class Ledger:
 
     @property
     def definitions(self) -> tuple[Definition, ...]:
+        """What has been named so far; each uses earlier ones only."""
         return tuple(self._definitions)
 
     def define(self, name: str, expression: sp.Expr, unit: str, description: str, latex: str) -> sp.Symbol:

@@ -20,8 +20,10 @@ from raceway.derive.bearing import Ball
 from raceway.derive.jacobians import Described, Group, group_functions, partials, tangent
 from raceway.derive.kernels import KernelBuilder, Kernels
 from raceway.derive.load_harmonics import coefficients_of
-from raceway.derive.system import Output, System
+from raceway.derive.switch_kernels import SwitchKernels, switch_kernels
+from raceway.derive.system import System
 from raceway.derive.terms import TIME
+from raceway.derive.variables import Output
 from raceway.derive.visitor import Visitor
 
 #: Output intervals of one call of a generated integrator: single ones to land exactly, many for speed.
@@ -46,7 +48,7 @@ class Functions:
 
     `integrators` are kept apart: they go to C only; a machine without compiler makes them from ``rhs``.
     `jacobians` go to files of their own, read and compiled when a derivative is first asked for; `groups` says which
-    quantities they differentiate.
+    quantities they differentiate.  `switches` are None where the laws have no kinks.
     """
 
     constants: tuple[Constant, ...]
@@ -55,6 +57,7 @@ class Functions:
     jacobians: tuple[Described, ...]
     groups: tuple[Group, ...]
     kernels: Kernels | None
+    switches: SwitchKernels | None
 
     def __getitem__(self, name: str) -> ca.Function:
         for function, _ in (*self.functions, *self.integrators, *self.jacobians):
@@ -176,13 +179,30 @@ class _Lowering:
             for d in system.constants
         ]
         found = [Constant(name=f"h{k + 1}", unit="", description=str(e), latex="") for k, e in enumerate(self._hoisted)]
+        kernels = builder.kernels(c) if builder else None
         return Functions(
             constants=(*named, *found, *self._series_constants()),
             functions=tuple(made),
             integrators=tuple(integrators),
             jacobians=tuple(jacobians),
             groups=tuple(groups),
-            kernels=builder.kernels(c) if builder else None,
+            kernels=kernels,
+            switches=self._switches(c, kernels) if kernels is not None else None,
+        )
+
+    def _switches(self, c: ca.SX, kernels: Kernels) -> SwitchKernels | None:
+        assert self.system.bearing is not None
+        numbers = next(k.function for k in kernels.functions if k.function.name() == "law_numbers")
+        return switch_kernels(self.system.bearing.ball, self._adding_nothing(), self.p, c, numbers)
+
+    def _adding_nothing(self) -> Visitor:
+        """A visitor that uses the constants there are and adds none: what it alone would hoist is computed in place."""
+        plain = Visitor(self._values, self._definitions)
+        return Visitor(
+            self._values,
+            self._definitions,
+            constant=self._fixed,
+            hoist=lambda e: self._hoisted[e] if e in self._hoisted else plain(e),
         )
 
     def _kernel_builder(self) -> KernelBuilder:
@@ -234,16 +254,10 @@ class _Lowering:
     def _jacobians(self, rhs: ca.SX | None, arguments: Mapping[str, ca.SX]) -> tuple[list[Group], list[Described]]:
         """Derivatives of the right-hand side and of every quantity, also of those that no run reports.
 
-        They use the constants there are and add none: what they alone would hoist is computed in place.
+        They use the constants there are and add none.
         """
         system = self.system
-        plain = Visitor(self._values, self._definitions)
-        visit = Visitor(
-            self._values,
-            self._definitions,
-            constant=self._fixed,
-            hoist=lambda e: self._hoisted[e] if e in self._hoisted else plain(e),
-        )
+        visit = self._adding_nothing()
         balls = self._balls(system.bearing.ball, visit) if system.bearing else None
         made: list[Described] = []
         if rhs is not None:

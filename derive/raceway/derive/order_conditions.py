@@ -71,6 +71,11 @@ def rooted_trees(order: int, *, algebraic: bool = False) -> tuple[Tree, ...]:
     Returns
     -------
     200 trees for order 8; 17 for order 5, and 59 more with `algebraic`
+
+    Raises
+    ------
+    ValueError
+        `order` is below 1.
     """
     if order < 1:
         raise ValueError(f"the order of a tree is at least 1, given {order}")

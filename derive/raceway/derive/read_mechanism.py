@@ -27,6 +27,7 @@ _BRANCHES: tuple[Literal["left", "right", "ahead", "behind"], ...] = ("left", "r
 
 
 def words_of_gravity() -> VectorWords:
+    """Words of the acceleration of gravity; a single number points down."""
     return VectorWords(
         what="the acceleration of gravity",
         axis="Acceleration of gravity, along -y",

@@ -11,17 +11,15 @@ that do not match, which every reader refuses and the next derivation mends.  Fi
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
 import shutil
-import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 from raceway.runtime import manifest as mf
 from raceway.runtime.errors import ArtefactError, RequestError
+from raceway.runtime.folders import clear, permit, swap
 
 #: Every file that a derivation writes.
 GENERATED = (
@@ -36,14 +34,9 @@ GENERATED = (
     "model.c",
     "model.casadi",
     "model.h",
+    "switches.h",
     "tangents.h",
 )
-
-#: Folders of this age, made to be moved, were left by a process that was killed [s].
-LEFT_BEHIND = 86_400.0
-
-_AT_CWD, _RENAME_EXCHANGE = -100, 2  # fcntl.h, stdio.h of Linux
-_RENAME_SWAP = 2  # stdio.h of macOS
 
 
 def refuse_foreign(folder: Path) -> None:
@@ -81,11 +74,11 @@ def replace_folder(folder: Path, label: str, write: Callable[[Path], None]) -> N
     # of a link, what it points to: the link itself stays
     place = Path(os.path.realpath(folder))
     place.parent.mkdir(parents=True, exist_ok=True)
-    _clear(place.parent, label)
+    clear(place.parent, label, ".new")
     made = Path(tempfile.mkdtemp(prefix=f".{label}-", suffix=".new", dir=place.parent))
     try:
         write(made)
-        _permit(made, place)
+        permit(made, place)
         _put(made, place)
     finally:
         # what was made and could not be put there, or what was there before
@@ -98,7 +91,7 @@ def _put(made: Path, place: Path) -> None:
             os.rename(made, place)
             return
     foreign = _names(place) - _written(place)
-    if not foreign and _swap(made, place):
+    if not foreign and swap(made, place):
         return
     place.mkdir(exist_ok=True)
     new = _names(made)
@@ -118,34 +111,3 @@ def _written(place: Path) -> set[str]:
 
 def _names(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-
-
-def _permit(made: Path, place: Path) -> None:
-    """Give the new folder the permissions of the old one, or those of any new folder: mkdtemp's shut out colleagues."""
-    mask = os.umask(0)
-    os.umask(mask)
-    os.chmod(made, place.stat().st_mode & 0o7777 if place.is_dir() else 0o777 & ~mask)
-
-
-def _swap(first: Path, second: Path) -> bool:
-    """Exchange two folders of one file system in one step; False where the system cannot."""
-    names = (os.fsencode(first), os.fsencode(second))
-    try:
-        library = ctypes.CDLL(None, use_errno=True)
-        if sys.platform == "linux":
-            done: int = library.renameat2(_AT_CWD, names[0], _AT_CWD, names[1], ctypes.c_uint(_RENAME_EXCHANGE))
-        elif sys.platform == "darwin":
-            done = library.renamex_np(*names, ctypes.c_uint(_RENAME_SWAP))
-        else:
-            return False
-    except (AttributeError, OSError, TypeError):  # no such function in this C library
-        return False
-    return done == 0
-
-
-def _clear(parent: Path, label: str) -> None:
-    """Delete folders that processes which were killed left beside this one long ago."""
-    for path in parent.glob(f".{label}-*.new"):
-        with contextlib.suppress(OSError):
-            if time.time() - path.stat().st_mtime > LEFT_BEHIND:
-                shutil.rmtree(path, ignore_errors=True)

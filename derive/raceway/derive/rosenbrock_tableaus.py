@@ -23,10 +23,10 @@ from raceway.derive.order_conditions import (
     vector,
 )
 from raceway.derive.tableaus import (
+    CheckedTableau,
     Row,
     Rows,
     nested_powers,
-    require_no_faults,
     row_of,
     row_sum_faults,
     rows_of,
@@ -58,7 +58,7 @@ class ClassicalForm:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RosenbrockTableau:
+class RosenbrockTableau(CheckedTableau):
     """A linearly implicit pair with dense output, in the form that needs no product with the Jacobian.
 
     With ``u_i = h sum_j gamma_ij k_j``, stage i solves
@@ -112,12 +112,6 @@ class RosenbrockTableau:
     dense_rows: Rows
     rounding: Fraction
     source: str
-
-    def __post_init__(self) -> None:
-        require_no_faults(self.name, self._shape_faults())
-        with localcontext() as context:
-            context.prec = PRECISION
-            require_no_faults(self.name, self._order_faults())
 
     @property
     def stages(self) -> int:

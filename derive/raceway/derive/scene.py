@@ -55,6 +55,7 @@ class Vector:
     second: Quantity | None = None
 
     def quantities(self) -> tuple[Quantity, ...]:
+        """The numbers it is made of."""
         return tuple(q for q in (self.first, self.second) if q is not None)
 
 
@@ -81,6 +82,7 @@ class Body:
     points: tuple[NamedPoint, ...]
 
     def point(self, name: str) -> Vector:
+        """Place of a named point in body axes [m]."""
         return next(p.position for p in self.points if p.name == name)
 
 
@@ -167,9 +169,11 @@ class Mechanism:
     torques: tuple[AppliedTorque, ...]
 
     def body(self, name: str) -> Body:
+        """Moving body by name."""
         return next(b for b in self.bodies if b.name == name)
 
     def joint(self, name: str) -> Joint:
+        """Joint by name."""
         return next(j for j in self.joints if j.name == name)
 
 

@@ -37,6 +37,7 @@ class Collector:
     given: dict[str, str] = field(default_factory=dict)
 
     def fault(self, path: Path, problem: str, *, given: str = "", allowed: str = "", remedy: str) -> None:
+        """Note a fault, with its line where the file has one."""
         self.faults.append(
             Fault(
                 key=".".join(path),
@@ -168,6 +169,7 @@ class Table:
         self._known.extend(key for key in keys if key not in self._known)
 
     def has(self, key: str) -> bool:
+        """Whether the key is there; it belongs here from now on."""
         self.know(key)
         return key in self.data
 
@@ -232,6 +234,7 @@ class Table:
         return self.collector.quantity(path, self.data[key], unit, description, latex, wrong_dimension=wrong_dimension)
 
     def optional_quantity(self, key: str, unit: str, description: str, latex: str) -> Quantity | None:
+        """The quantity at `key`; None where there is none."""
         if not self.has(key):
             return None
         return self.quantity(key, unit, description, latex, example="")

@@ -9,81 +9,19 @@ Only what the scene names is derived: no mechanism, no linkage equations; a fixe
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
-from typing import Literal
 
 import sympy as sp
 
 from raceway.derive.bearing import BearingModel, derive_bearing, equivalent_mass
 from raceway.derive.errors import Fault, SceneError
 from raceway.derive.linkage import Linkage, derive_linkage
-from raceway.derive.load_harmonics import GatedPart, LoadSeries, load_series
+from raceway.derive.load_harmonics import LoadSeries
+from raceway.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
 from raceway.derive.reactions import Reactions, derive_reactions
-from raceway.derive.scene import (
-    FRAME,
-    AppliedForce,
-    AppliedTorque,
-    Bearing,
-    ConstantLoad,
-    EquivalentMass,
-    HarmonicLoad,
-    Mechanism,
-    Quantity,
-    Scene,
-    TableLoad,
-)
-from raceway.derive.terms import TIME, Definition, Smoothness, components, symbol_of
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Parameter:
-    """A run-time number: its scene path, SI unit, description, default [unit] and symbol."""
-
-    name: str
-    symbol: sp.Symbol
-    unit: str
-    description: str
-    latex: str
-    default: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Input:
-    """Held constant between breakpoints by whoever integrates; `kind` and fields as in `manifest.InputInfo`."""
-
-    name: str
-    symbol: sp.Symbol
-    kind: Literal["phase", "gate", "table", "table_rate"]
-    unit: str
-    description: str
-    latex: str
-    offset: str = ""
-    rate: str = ""
-    windows: tuple[tuple[str, str], ...] = ()
-    times: tuple[str, ...] = ()
-    values: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class State:
-    """A state variable: a position [m] or a velocity [m/s]."""
-
-    name: str
-    symbol: sp.Symbol
-    unit: str
-    description: str
-    latex: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Output:
-    """Something a run can report; `per_ball` outputs have one value per ball and use the generic ball's symbols."""
-
-    name: str
-    expression: sp.Expr
-    unit: str
-    description: str
-    per_ball: bool = False
+from raceway.derive.ring_load import ring_load
+from raceway.derive.scene import FRAME, AppliedForce, AppliedTorque, Bearing, EquivalentMass, Mechanism, Scene
+from raceway.derive.terms import TIME, Definition, Smoothness, symbol_of
+from raceway.derive.variables import DRIVER_ANGLE, Input, Output, Parameter, State, phase
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,9 +57,6 @@ class System:
         return len(self.states) // 2
 
 
-DRIVER_ANGLE = sp.Symbol("driver.angle", real=True)
-
-
 def derive(scene: Scene) -> System:
     """Derive the equations of a scene.
 
@@ -151,7 +86,7 @@ def derive(scene: Scene) -> System:
         moments = frozenset(
             j.name
             for j in mechanism.joints
-            if j.kind == "prismatic" and _asked(scene.outputs, f"reaction.{j.name}.moment")
+            if j.kind == "prismatic" and is_asked(scene.outputs, f"reaction.{j.name}.moment")
         )
         reactions = derive_reactions(mechanism, linkage, gates, moments)
         definitions += [*linkage.definitions, *reactions.definitions]
@@ -161,22 +96,15 @@ def derive(scene: Scene) -> System:
     load: tuple[sp.Expr, sp.Expr] = (sp.S.Zero, sp.S.Zero)
     series: LoadSeries | None = None
     if scene.bearing is not None:
-        inner_load = _inner_load(scene, reactions)
+        inner_load = ring_load(scene, reactions)
         load, series = inner_load.force, inner_load.series
         inputs += inner_load.inputs
         definitions += inner_load.definitions
         shaft = mechanism.driver.speed if mechanism is not None else scene.shaft.speed if scene.shaft else None
         assert shaft is not None  # the reader requires it
-        cage = Input(
-            name="phase.cage",
-            symbol=sp.Symbol("phase.cage", real=True),
-            kind="phase",
-            unit="rad",
-            description="Angle of ball 1 at the reference time",
-            latex=r"\psi_0",
-            offset=scene.bearing.ball_angle.path,
-            rate="bearing.cage_speed",
-        )
+        words = "Angle of ball 1 at the reference time"
+        start = scene.bearing.ball_angle.path
+        cage = phase("cage", words, r"\psi_0", offset=start, rate="bearing.cage_speed")
         inputs.append(cage)
         bearing = derive_bearing(
             scene.bearing,
@@ -187,7 +115,9 @@ def derive(scene: Scene) -> System:
         )
         constants = bearing.constants + inner_load.constants
 
-    quantities = _available(scene, linkage, reactions, bearing, load)
+    quantities = bearing_outputs(bearing, load) if bearing is not None else []
+    if mechanism is not None and linkage is not None and reactions is not None:
+        quantities += mechanism_outputs(mechanism, linkage, reactions)
     return System(
         scene=scene,
         parameters=tuple(
@@ -207,7 +137,7 @@ def derive(scene: Scene) -> System:
         reactions=reactions,
         bearing=bearing,
         quantities=tuple(quantities),
-        outputs=_select(quantities, scene.outputs),
+        outputs=select_outputs(quantities, scene.outputs),
         smoothness=bearing.smoothness if bearing else (),
         load_series=series,
     )
@@ -216,18 +146,8 @@ def derive(scene: Scene) -> System:
 def _driver_inputs(mechanism: Mechanism) -> list[Input]:
     """Phase of the driver, and a gate for each load that acts within windows only."""
     driver = mechanism.driver
-    out = [
-        Input(
-            name="phase.driver",
-            symbol=sp.Symbol("phase.driver", real=True),
-            kind="phase",
-            unit="rad",
-            description="Angle of the driven body at the reference time",
-            latex=r"\theta_{1,0}",
-            offset=driver.start_angle.path,
-            rate=driver.speed.path,
-        )
-    ]
+    words = "Angle of the driven body at the reference time"
+    out = [phase("driver", words, r"\theta_{1,0}", offset=driver.start_angle.path, rate=driver.speed.path)]
     loads: tuple[AppliedForce | AppliedTorque, ...] = (*mechanism.forces, *mechanism.torques)
     for load in loads:
         if load.windows:
@@ -245,121 +165,6 @@ def _driver_inputs(mechanism: Mechanism) -> list[Input]:
                 )
             )
     return out
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _InnerLoad:
-    """Force on the inner ring [N] and what it is made of."""
-
-    force: tuple[sp.Expr, sp.Expr]
-    inputs: tuple[Input, ...] = ()
-    constants: tuple[Definition, ...] = ()
-    definitions: tuple[Definition, ...] = ()
-    series: LoadSeries | None = None
-
-
-def _inner_load(scene: Scene, reactions: Reactions | None) -> _InnerLoad:
-    """Share of the joint's reaction, or the scene's own load."""
-    bearing, mechanism, load = scene.bearing, scene.mechanism, scene.load
-    assert bearing is not None
-    if reactions is not None:
-        assert mechanism is not None
-        assert bearing.joint is not None
-        assert bearing.share is not None
-        # what presses the inner ring into the bearing is the force of the driven body on the frame
-        fx, fy = reactions.joint_force[bearing.joint]
-        share = symbol_of(bearing.share)
-        sign = 1 if mechanism.joint(bearing.joint).bodies[0] == FRAME else -1
-        force = (sign * share * fx, sign * share * fy)
-        if bearing.load_harmonics is None:
-            return _InnerLoad(force=force)
-        series = load_series(bearing.load_harmonics, DRIVER_ANGLE, force, _gated_parts(mechanism))
-        return _InnerLoad(force=series.force, definitions=series.waves, series=series)
-    assert load is not None  # the reader requires a load where there is no mechanism
-    if isinstance(load, ConstantLoad):
-        return _InnerLoad(force=components(load.force))
-    if isinstance(load, HarmonicLoad):
-        return _harmonic(load)
-    return _table(load)
-
-
-def _gated_parts(mechanism: Mechanism) -> tuple[GatedPart, ...]:
-    loads: tuple[AppliedForce | AppliedTorque, ...] = (*mechanism.forces, *mechanism.torques)
-    return tuple(
-        GatedPart(
-            gate=sp.Symbol(f"gate.{load.name}", real=True),
-            windows=tuple((symbol_of(w.start), symbol_of(w.end)) for w in load.windows),
-        )
-        for load in loads
-        if load.windows
-    )
-
-
-def _harmonic(load: HarmonicLoad) -> _InnerLoad:
-    phase = Input(
-        name="phase.load",
-        symbol=sp.Symbol("phase.load", real=True),
-        kind="phase",
-        unit="rad",
-        description="Angle of the harmonic load at the reference time",
-        latex=r"\varphi_0",
-        offset=load.phase.path,
-        rate="load.angular_frequency",
-    )
-    angular = Definition(
-        symbol=sp.Symbol("load.angular_frequency", real=True),
-        expression=2 * sp.pi * symbol_of(load.frequency),
-        unit="rad/s",
-        description="Angular frequency of the load",
-        latex=r"\Omega",
-    )
-    wave = Definition(
-        symbol=sp.Symbol("load.wave", real=True),
-        expression=sp.cos(phase.symbol + angular.symbol * TIME),
-        unit="1",
-        description="Harmonic of the load",
-        latex="w",
-    )
-    mean, amplitude = components(load.mean), components(load.amplitude)
-    return _InnerLoad(
-        force=(mean[0] + amplitude[0] * wave.symbol, mean[1] + amplitude[1] * wave.symbol),
-        inputs=(phase,),
-        constants=(angular,),
-        definitions=(wave,),
-    )
-
-
-def _table(load: TableLoad) -> _InnerLoad:
-    inputs: list[Input] = []
-    times = tuple(q.path for q in load.time)
-
-    def column(axis: str, values: tuple[Quantity, ...]) -> sp.Expr:
-        names = tuple(q.path for q in values)
-        value = Input(
-            name=f"load.{axis}",
-            symbol=sp.Symbol(f"input.load.{axis}", real=True),
-            kind="table",
-            unit="N",
-            description=f"Value of the load table along {axis} at the reference time",
-            latex=rf"F_{{0,{axis}}}",
-            times=times,
-            values=names,
-        )
-        slope = Input(
-            name=f"load.{axis}_rate",
-            symbol=sp.Symbol(f"input.load.{axis}_rate", real=True),
-            kind="table_rate",
-            unit="N/s",
-            description=f"Slope of the load table along {axis} at the reference time",
-            latex=rf"\dot F_{{0,{axis}}}",
-            times=times,
-            values=names,
-        )
-        inputs.extend((value, slope))
-        return value.symbol + slope.symbol * TIME
-
-    force = (column("x", load.x), column("y", load.y))
-    return _InnerLoad(force=force, inputs=tuple(inputs))
 
 
 def _inner_mass(bearing: Bearing, mechanism: Mechanism | None) -> sp.Expr:
@@ -415,118 +220,3 @@ def _initial(bearing: Bearing | None) -> tuple[str, ...]:
     if bearing is None:
         return ()
     return tuple(q.path for q in (*bearing.initial.position, *bearing.initial.velocity))
-
-
-def _available(
-    scene: Scene,
-    linkage: Linkage | None,
-    reactions: Reactions | None,
-    bearing: BearingModel | None,
-    load: tuple[sp.Expr, sp.Expr],
-) -> list[Output]:
-    """Every output the scene's model could report, in the order they are listed."""
-    out: list[Output] = []
-    if bearing is not None:
-        for c in bearing.coordinates:
-            out.append(Output(name=c.name, expression=c.position, unit="m", description=f"Position {c.description}"))
-        for c in bearing.coordinates:
-            out.append(
-                Output(name=str(c.velocity), expression=c.velocity, unit="m/s", description=f"Velocity {c.description}")
-            )
-        ball = bearing.ball
-        per_ball = [
-            ("ball.deflection", ball.deflection, "m", "Deflection of each ball, Eq. (6)"),
-            ("ball.elastic_force", ball.elastic_force, "N", "Elastic force of each ball, Eq. (4)"),
-        ]
-        if ball.damping_force is not None:
-            per_ball.append(("ball.damping_force", ball.damping_force, "N", "Damping force of each ball, Eq. (10)"))
-        per_ball.append(("ball.force", ball.force, "N", "Elastic and damping force of each ball"))
-        out += [Output(name=n, expression=e, unit=u, description=d, per_ball=True) for n, e, u, d in per_ball]
-        for axis, total in zip("xy", ball.sums, strict=True):
-            out.append(
-                Output(
-                    name=f"ring_force.{axis}",
-                    expression=total.symbol,
-                    unit="N",
-                    description=f"Force of the inner ring on the balls along {axis}, Eqs. (8) and (9)",
-                )
-            )
-        for axis, force in zip("xy", load, strict=True):
-            out.append(
-                Output(
-                    name=f"load.{axis}",
-                    expression=force,
-                    unit="N",
-                    description=f"External load on the inner ring along {axis}",
-                )
-            )
-    if scene.mechanism is not None and reactions is not None and linkage is not None:
-        for joint in scene.mechanism.joints:
-            first, second = joint.bodies
-            for axis, force in zip("xy", reactions.joint_force[joint.name], strict=True):
-                out.append(
-                    Output(
-                        name=f"reaction.{joint.name}.{axis}",
-                        expression=force,
-                        unit="N",
-                        description=f"Force of the {second} on the {first} at {joint.name} along {axis}",
-                    )
-                )
-            if joint.name in reactions.joint_moment:
-                out.append(
-                    Output(
-                        name=f"reaction.{joint.name}.moment",
-                        expression=reactions.joint_moment[joint.name],
-                        unit="N*m",
-                        description=f"Moment of the {second} on the {first} at {joint.name}",
-                    )
-                )
-        out.append(
-            Output(
-                name="drive_torque",
-                expression=reactions.drive_torque,
-                unit="N*m",
-                description="Torque of the drive on the driven body, counter-clockwise",
-            )
-        )
-        out.append(
-            Output(
-                name="drive_angle",
-                expression=DRIVER_ANGLE,
-                unit="rad",
-                description="Angle of the driven body, within the turn",
-            )
-        )
-        for body in scene.mechanism.bodies:
-            pose = linkage.poses[body.name]
-            out.append(
-                Output(
-                    name=f"body.{body.name}.angle",
-                    expression=sp.atan2(pose.sin, pose.cos),
-                    unit="rad",
-                    description=f"Angle of the x axis of the {body.name} from +x",
-                )
-            )
-    return out
-
-
-def _asked(patterns: tuple[str, ...], name: str) -> bool:
-    return any(fnmatchcase(name, p) for p in patterns)
-
-
-def _select(available: list[Output], patterns: tuple[str, ...]) -> tuple[Output, ...]:
-    names = [o.name for o in available]
-    faults = [
-        Fault(
-            key="run.outputs",
-            problem="no output of this scene matches",
-            given=repr(pattern),
-            allowed=", ".join(names),
-            remedy="correct or remove the pattern",
-        )
-        for pattern in patterns
-        if not any(fnmatchcase(name, pattern) for name in names)
-    ]
-    if faults:
-        raise SceneError(faults)
-    return tuple(o for o in available if _asked(patterns, o.name))

@@ -11,11 +11,11 @@ See `explicit_tableaus.py` and `rosenbrock_tableaus.py` for the methods, `order_
 from __future__ import annotations
 
 from collections.abc import Sequence
-from decimal import Decimal
+from decimal import Decimal, localcontext
 from fractions import Fraction
 from typing import TypeAlias
 
-from raceway.derive.order_conditions import Figures
+from raceway.derive.order_conditions import PRECISION, Figures
 from raceway.runtime.errors import RacewayError
 
 Row: TypeAlias = tuple[Fraction, ...]
@@ -24,6 +24,27 @@ Rows: TypeAlias = tuple[Row, ...]
 
 class TableauError(RacewayError, ValueError):
     """The coefficients of a method do not have the properties its record claims; all faults are listed."""
+
+
+class CheckedTableau:
+    """A record of coefficients that raises `TableauError` when it is made and claims what does not hold."""
+
+    __slots__ = ()
+    name: str
+
+    def __post_init__(self) -> None:
+        require_no_faults(self.name, self._shape_faults())
+        with localcontext() as context:
+            context.prec = PRECISION
+            require_no_faults(self.name, self._order_faults())
+
+    def _shape_faults(self) -> list[str]:
+        """Rows that are too long or too short."""
+        raise NotImplementedError
+
+    def _order_faults(self) -> list[str]:
+        """Conditions of the claimed orders that do not hold, in decimals of `PRECISION` digits."""
+        raise NotImplementedError
 
 
 def row_of(text: str) -> Row:

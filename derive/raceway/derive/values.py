@@ -101,6 +101,8 @@ def value_relations(scene: Scene) -> tuple[tuple[str, float, str], ...]:
     ball, pitch = bearing.ball_diameter.path, bearing.pitch_diameter.path
     # the balls fit side by side on the pitch circle, a hair's breadth apart
     relations = [(pitch, (1.0 - 1e-12) / math.sin(math.pi / bearing.balls) if bearing.balls > 1 else 1.0, ball)]
+    clearance = bearing.clearance.path
+    relations += [(ball, 1.0, clearance), (clearance, -1.0, ball)]  # see `_check_clearance`
     if isinstance(bearing.contact, HertzContact):
         grooves = (bearing.contact.inner_groove_radius, bearing.contact.outer_groove_radius)
         relations += [(radius.path, 0.5, ball) for radius in grooves]
@@ -167,9 +169,8 @@ def parse_override(scene: Scene, text: str) -> tuple[str, float]:
                 )
             ]
         )
+    check_path(scene, path)
     units = {quantity.path: quantity.unit for quantity in scene.quantities}
-    if path not in units:
-        raise SceneError([_unknown_path(path, list(units))])
     try:
         return path, parse_quantity(value, units[path])
     except QuantityError as error:
@@ -177,11 +178,25 @@ def parse_override(scene: Scene, text: str) -> tuple[str, float]:
         raise SceneError([fault]) from None
 
 
+def check_path(scene: Scene, path: str) -> None:
+    """Refuse a path that is none of the scene's numbers.
+
+    Raises
+    ------
+    SceneError
+        The nearest paths are named; what decides the structure of the model is told from what does not exist.
+    """
+    known = [quantity.path for quantity in scene.quantities]
+    if path not in known:
+        raise SceneError([_unknown_path(path, known)])
+
+
 def _unknown_path(path: str, known: Sequence[str]) -> Fault:
     if path in _STRUCTURE or path.startswith("run."):
         return Fault(
             key=path,
-            problem="this is no number of the model",
+            problem="this is no number of the model"
+            + ("" if path.startswith("run.") else ": it decides which equations are derived"),
             given=show(path),
             allowed="paths of quantities",
             remedy="change it in the scene file" + ("" if path.startswith("run.") else " and derive the model again"),
@@ -322,6 +337,7 @@ def _check_bearing(checker: _Checker, bearing: Bearing) -> None:
     checker.positive(bearing.ball_diameter)
     checker.positive(bearing.pitch_diameter)
     _check_balls(checker, bearing)
+    _check_clearance(checker, bearing)
     if isinstance(bearing.contact, HertzContact):
         _check_hertz(checker, bearing.contact, bearing.ball_diameter)
     else:
@@ -369,6 +385,25 @@ def _check_balls(checker: _Checker, bearing: Bearing) -> None:
         )
 
 
+def _check_clearance(checker: _Checker, bearing: Bearing) -> None:
+    """Clearance and preload stay below a ball's diameter: far beyond any bearing, but beyond that there is none.
+
+    Rings pushed together by a clearance of a ball's diameter leave room for two balls, one above the other, on the far
+    side; a preload as large leaves no room for a ball anywhere.
+    """
+    ball, clearance = bearing.ball_diameter, bearing.clearance
+    if ball.value <= 0.0 or not abs(clearance.value) >= ball.value:
+        return
+    what = "clearance" if clearance.value > 0.0 else "preload (a negative clearance)"
+    checker.fault(
+        clearance.path,
+        f"the {what} is as large as a ball",
+        f"{checker.show(clearance)}, ball diameter {checker.show(ball)}",
+        f"a diametral clearance between -{ball.value:.9g} m and {ball.value:.9g} m, the ball diameter",
+        "check its unit: clearances are some micrometres, \"10 um\"",
+    )
+
+
 def _check_hertz(checker: _Checker, contact: HertzContact, ball: Quantity) -> None:
     for radius in (contact.inner_groove_radius, contact.outer_groove_radius):
         checker.positive(radius)
@@ -407,7 +442,7 @@ def _check_run(checker: _Checker, scene: Scene) -> None:
             "nothing turns, so there are no cycles",
             f"{speed.path} = {checker.show(speed)}",
             "a duration where the speed is zero",
-            'write duration = "0.5 s" instead of cycles, or give a speed',
+            'write duration = "0.5 s" instead of cycles (or run with --duration "0.5 s"), or give a speed',
         )
     if run.duration is None or not run.transient_cycles > 0.0:
         return
@@ -418,5 +453,5 @@ def _check_run(checker: _Checker, scene: Scene) -> None:
             "the transient cycles fill the whole run",
             f"{run.transient_cycles:g} cycles of {turns:g} in {run.duration:g} s",
             "fewer cycles than the run has",
-            "run longer, or drop fewer cycles",
+            "run longer, or drop fewer cycles (--transient 0)",
         )

@@ -25,7 +25,7 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -33,7 +33,8 @@ from pathlib import Path
 import platformdirs
 
 from raceway.runtime.errors import CompileError, RequestError
-from raceway.runtime.manifest import Manifest
+from raceway.runtime.interrupts import held
+from raceway.runtime.manifest import Manifest, check_unchanged
 
 #: Name of the C source in a generated folder.
 SOURCE = "model.c"
@@ -124,8 +125,13 @@ def compile_model(folder: str | Path, manifest: Manifest, compiler: str | None =
             stacklevel=3,
         )
         return None
-    # absolute: the compiler runs in the cache folder
-    return compile_sources((Path(folder).absolute() / SOURCE,), found, label=manifest.scene)
+    place = Path(folder).absolute()
+    return compile_sources((place / SOURCE,), found, label=manifest.scene, digests=digests_of(place, manifest))
+
+
+def digests_of(folder: Path, manifest: Manifest) -> dict[Path, str]:
+    """sha256 that the files of a generated folder had when its manifest was read, by path."""
+    return {folder / name: digest for name, digest in manifest.files}
 
 
 def find_compiler(command: str | None = None) -> Compiler | None:
@@ -186,48 +192,82 @@ def compile_sources(
     headers: Sequence[Path] = (),
     include: Sequence[Path] = (),
     flags: tuple[str, ...] = (),
+    digests: Mapping[Path, str] | None = None,
 ) -> CompiledLibrary:
     """Compile C sources together into one shared library, or find it in the cache.
+
+    Each file is read once: what is compiled is what gave the key, whoever writes the files anew meanwhile.
 
     Parameters
     ----------
     sources : C files, absolute; their order and content enter the key, their place does not
     compiler : see `find_compiler`
     label : start of the library's file name
-    headers : what the sources include, which enters the key as well
-    include : absolute folders in which headers are found
+    headers : what the sources include, which enters the key as well; no two files of one name
+    include : absolute folders in which further headers are found
     flags : further flags, behind the compiler's own
+    digests : sha256 that files must have, by path; those that are not named may have any
 
     Raises
     ------
+    ArtefactError
+        A file has another digest: the folder was written anew since its manifest was read.
     CompileError
         The compiler failed, took too long, or a source cannot be read; with command and output.
     """
     compiler = replace(compiler, flags=(*compiler.flags, *flags))
-    key = library_key((*sources, *headers), compiler)
+    contents = {path: _content(path, digests or {}) for path in (*sources, *headers)}
+    key = _key([contents[path] for path in (*sources, *headers)], compiler)
     name = f"{_file_name(label)}-{key[:32]}"
     ready = _find(_cache_folder(), name)
     if ready is not None:
         return CompiledLibrary(path=ready, key=key, compiler=compiler.identity, cached=True, seconds=0.0)
     folder = _writable_cache_folder()
     _clear(folder)
-    descriptor, temporary = tempfile.mkstemp(dir=folder, prefix=f".{name}-", suffix=".tmp")
-    os.close(descriptor)
     started = time.perf_counter()
+    made = Path(tempfile.mkdtemp(dir=folder, prefix=f".{name}-", suffix=".tmp"))
     try:
-        places = (f"-I{path}" for path in include)
-        names = (str(path) for path in sources)
-        command = (*compiler.command, *compiler.flags, *places, *names, "-o", temporary, "-lm")
-        _run(command, folder)
-        target = folder / f"{name}-{_digest(Path(temporary))}{_suffix()}"
-        os.chmod(temporary, 0o755)
-        _place(Path(temporary), target)
-        _open(target, command)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+        _write_copies(made, contents)
+        copies = tuple(str(made / path.name) for path in sources)
+        places = tuple(f"-I{path}" for path in include)
+        library = made / f"library{_suffix()}"
+        library.touch()
+        command = (*compiler.command, *compiler.flags, *places, *copies, "-o", str(library), "-lm")
+        shown = (*compiler.command, *compiler.flags, *places, *map(str, sources), "-o", library.name, "-lm")
+        _run(command, made, shlex.join(shown))
+        target = folder / f"{name}-{_digest(library)}{_suffix()}"
+        os.chmod(library, 0o755)
+        _place(library, target)
+        _open(target, shlex.join(shown))
+    finally:
+        with held():
+            shutil.rmtree(made, ignore_errors=True)
     seconds = time.perf_counter() - started
     return CompiledLibrary(path=target, key=key, compiler=compiler.identity, cached=False, seconds=seconds)
+
+
+def _content(path: Path, digests: Mapping[Path, str]) -> bytes:
+    try:
+        content = path.read_bytes()
+    except OSError as fault:
+        raise CompileError(f"{path}: cannot be read ({fault.strerror}). Write the folder again.") from fault
+    if path in digests:
+        check_unchanged(path, digests[path], content)
+    return content
+
+
+def _write_copies(folder: Path, contents: Mapping[Path, bytes]) -> None:
+    names = [path.name for path in contents]
+    if len(set(names)) < len(names):
+        raise ValueError(f"two files of one name are compiled together: {', '.join(sorted(names))}")
+    try:
+        for path, content in contents.items():
+            (folder / path.name).write_bytes(content)
+    except OSError as fault:
+        raise CompileError(
+            f"The cache {folder.parent} cannot be written ({fault.strerror}). Nothing was written. Free some space, or "
+            f"set {CACHE_VARIABLE} to another folder."
+        ) from fault
 
 
 def _find(folder: Path, name: str) -> Path | None:
@@ -264,14 +304,14 @@ def _place(temporary: Path, target: Path) -> None:
         ) from None
 
 
-def _open(path: Path, command: Sequence[str]) -> None:
+def _open(path: Path, command: str) -> None:
     """Open a library just compiled; it stays open."""
     try:
         _opened[path] = ctypes.CDLL(str(path))
     except OSError as fault:
         path.unlink(missing_ok=True)
         raise CompileError(
-            f"The C compiler ended well, but what it wrote cannot be loaded ({fault}).\n  {shlex.join(command)}\n"
+            f"The C compiler ended well, but what it wrote cannot be loaded ({fault}).\n  {command}\n"
             "Nothing is kept. Take a compiler that makes shared libraries for this machine: set CC."
         ) from fault
 
@@ -286,11 +326,15 @@ def _clear(folder: Path) -> None:
     for path in folder.glob(".*.tmp"):
         with contextlib.suppress(OSError):  # gone meanwhile, or of somebody else
             if time.time() - path.stat().st_mtime > LEFT_BEHIND:
-                path.unlink()
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 def library_key(sources: Sequence[Path], compiler: Compiler) -> str:
     """sha256 over content of the sources, compiler, flags, versions, system and processor."""
+    return _key([_content(path, {}) for path in sources], compiler)
+
+
+def _key(contents: Sequence[bytes], compiler: Compiler) -> str:
     digest = hashlib.sha256()
     facts = (
         compiler.identity,
@@ -303,11 +347,7 @@ def library_key(sources: Sequence[Path], compiler: Compiler) -> str:
     )
     for fact in facts:
         digest.update(fact.encode() + b"\0")
-    for path in sources:
-        try:
-            content = path.read_bytes()
-        except OSError as fault:
-            raise CompileError(f"{path}: cannot be read ({fault.strerror}). Write the folder again.") from fault
+    for content in contents:
         digest.update(str(len(content)).encode() + b"\0" + content)
     return digest.hexdigest()
 
@@ -335,8 +375,8 @@ def _ask(command: tuple[str, ...]) -> subprocess.CompletedProcess[str] | None:
         ) from fault
 
 
-def _run(command: tuple[str, ...], folder: Path) -> None:
-    shown = shlex.join(command)
+def _run(command: tuple[str, ...], folder: Path, shown: str) -> None:
+    """Run the compiler in `folder`; `shown` is the command as a user may repeat it."""
     try:
         done = _finish(command, folder, TIMEOUT)
     except subprocess.TimeoutExpired as fault:
@@ -350,6 +390,7 @@ def _run(command: tuple[str, ...], folder: Path) -> None:
         ) from fault
     if done.returncode != 0:
         output = "\n".join(text for text in (done.stdout.strip(), done.stderr.strip()) if text) or "(no output)"
+        output = output.replace(f"{folder}{os.sep}", "")
         raise CompileError(
             f"The C compiler failed with exit code {done.returncode}.\n  {shown}\n{output}\n"
             "Nothing was written. Check the compiler's installation, the free space of the cache and of the folder for "
@@ -363,22 +404,26 @@ def _finish(command: tuple[str, ...], folder: Path | None, timeout: float) -> su
     A compiler is a driver that starts the real one: ending the driver alone leaves a child that holds the pipes, and
     reading them would wait for it.
     """
-    process = subprocess.Popen(
-        command,
-        cwd=folder,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-        start_new_session=True,
-    )
-    with process:
-        try:
-            stdout, stderr = process.communicate(timeout=timeout)
-        except BaseException:
-            _end(process)
-            raise
+    process = None
+    try:
+        # an interrupt that arrives before the process has a name here would leave it running
+        with held():
+            process = subprocess.Popen(
+                command,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                errors="replace",
+                start_new_session=True,
+            )
+        stdout, stderr = process.communicate(timeout=timeout)
+    except BaseException:
+        if process is not None:
+            with held():
+                _end(process)
+        raise
     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
 
 

@@ -10,9 +10,10 @@ from pathlib import Path
 
 from raceway.runtime.accuracy.quasi_static import QuasiStatic, compile_quasi_static
 from raceway.runtime.compiled.compile import Compiler, find_compiler
+from raceway.runtime.compiled.driver_library import HEADERS, SWITCHES
 from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver, compile_ensemble
-from raceway.runtime.errors import RequestError
-from raceway.runtime.integrate.stepper import HEADERS, Stepper, compile_stepper
+from raceway.runtime.errors import ArtefactError, RequestError
+from raceway.runtime.integrate.stepper import Stepper, compile_locating_stepper, compile_stepper
 from raceway.runtime.manifest import Manifest
 
 
@@ -36,6 +37,7 @@ class Drivers:
         self._available: bool | None = None
         self._stepper: Stepper | None = None
         self._differentiating: Stepper | None = None
+        self._locating: Stepper | None = None
         self._ensemble: EnsembleDriver | None = None
         self._quasi_static: QuasiStatic | None = None
 
@@ -69,6 +71,26 @@ class Drivers:
             if self._differentiating is None:
                 self._differentiating = self._make_stepper(sensitivities=True)
             return self._differentiating
+
+    @property
+    def locating_stepper(self) -> Stepper:
+        """The driver of single runs whose steps end on kinks of the laws, with reductions; errors as for `stepper`.
+
+        Raises
+        ------
+        ArtefactError
+            The folder does not say where the kinks are.
+        """
+        with self._making:
+            if self._locating is None:
+                if not (self._folder / SWITCHES).is_file():
+                    raise ArtefactError(
+                        f"{self._folder}: has no {SWITCHES}, which says where the laws have kinks. Write the folder "
+                        "again with `raceway derive`, or leave kinks stepped-over."
+                    )
+                library = compile_locating_stepper(self._folder, self._manifest, self._find_compiler())
+                self._locating = Stepper(library, self._manifest)
+            return self._locating
 
     @property
     def ensemble(self) -> EnsembleDriver:

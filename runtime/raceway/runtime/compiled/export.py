@@ -19,10 +19,11 @@ import casadi
 import numpy as np
 
 from raceway.runtime.compiled.compile import FLAGS as BASE_FLAGS
+from raceway.runtime.compiled.driver_library import DRIVER, FLAGS, SWITCHES
 from raceway.runtime.errors import ArtefactError, RequestError
 from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.locating import has_kinks
 from raceway.runtime.integrate.magnitudes import default_magnitudes as run_magnitudes
-from raceway.runtime.integrate.stepper import DRIVER, FLAGS
 from raceway.runtime.integrate.stepper import METHODS as STEPPERS
 from raceway.runtime.manifest import InputInfo, Manifest, read_artefact
 from raceway.runtime.model import Model
@@ -89,7 +90,8 @@ def _texts(model: Model, folder: Path) -> dict[str, str]:
         "scene.c": _scene_source(manifest, default_magnitudes(model)),
         "constants.c": _constants(model),
     }
-    for source in (STANDALONE / "main.c", STANDALONE / "schedule.c", DRIVER / "stepper.c"):
+    located = (STANDALONE / "located.c",) if has_kinks(manifest) else ()
+    for source in (STANDALONE / "main.c", STANDALONE / "schedule.c", DRIVER / "stepper.c", *located):
         texts.update(_with_includes(source, (STANDALONE, DRIVER, folder), texts))
     objects = sorted(name for name in texts if name.endswith(".c"))
     headers = sorted(name for name in texts if name.endswith(".h"))
@@ -116,8 +118,8 @@ def _with_includes(source: Path, places: Sequence[Path], known: Iterable[str]) -
     """Text of a source and of all that it includes from `places`; what is in `known` is there already."""
     texts = {source.name: source.read_text(encoding="utf-8")}
     for name in _INCLUDE.findall(texts[source.name]):
-        if name in known or name in texts:
-            continue
+        if name in known or name in texts or (name == SWITCHES and not (places[-1] / SWITCHES).is_file()):
+            continue  # a scene without kinks has no file of them, and compiles nothing that includes it
         found = next((place / name for place in places if (place / name).is_file()), None)
         if found is None:
             raise ArtefactError(
@@ -134,8 +136,14 @@ def _scene_header(manifest: Manifest) -> str:
         "SCENE_INPUTS": len(manifest.inputs),
         "SCENE_PARAMETERS": len(manifest.parameters),
         "SCENE_CONSTANTS": len(manifest.constants),
+        "SCENE_RELATIONS": len(manifest.relations),
     }
     listed = ", ".join(f"{name} = {value}" for name, value in sizes.items())
+    kinks = (
+        "\n/* The laws have kinks, which located.c ends steps on. */\n#define SCENE_KINKS\n"
+        if has_kinks(manifest)
+        else ""
+    )
     return f"""{_NOTE}
 #ifndef SCENE_H
 #define SCENE_H
@@ -143,14 +151,22 @@ def _scene_header(manifest: Manifest) -> str:
 #include "schedule.h"
 
 enum {{ {listed} }};
-
+{kinks}
+/* A parameter in SI; a value must be above `above`, at least `least`, at most `most` and below `below`. */
 typedef struct {{
     const char *name, *unit, *description;
-    double value; /* SI */
+    double value, above, least, most, below;
 }} scene_parameter;
+
+/* A parameter that must be above `factor` times another one; places among the parameters. */
+typedef struct {{
+    int parameter, other;
+    double factor;
+}} scene_relation;
 
 extern const char *const scene_title;
 extern const scene_parameter scene_parameters[];
+extern const scene_relation scene_relations[];
 extern const char *const scene_constant_names[];
 extern const char *const scene_states[];
 extern const double scene_magnitudes[]; /* tolerances are relative to these */
@@ -183,9 +199,12 @@ def _scene_source(manifest: Manifest, magnitudes: np.ndarray) -> str:
     run = manifest.run
     method = run.method.removeprefix("stepper-") if run.method in STEPPERS and run.method != "stepper" else "auto"
     parameters = [
-        f"    {{{_string(p.name)}, {_string(p.unit)}, {_string(p.description)}, {p.default!r}}},"
+        f"    {{{_string(p.name)}, {_string(p.unit)}, {_string(p.description)}, {p.default!r}, "
+        f"{_bound(p.above, '-INFINITY')}, {_bound(p.least, '-INFINITY')}, {_bound(p.most, 'INFINITY')}, "
+        f"{_bound(p.below, 'INFINITY')}}},"
         for p in manifest.parameters
     ]
+    relations = [f"    {{{place[name]}, {place[other]}, {factor!r}}}," for name, factor, other in manifest.relations]
     indices, inputs = _inputs(manifest.inputs, place)
     return "\n".join(
         [
@@ -193,12 +212,17 @@ def _scene_source(manifest: Manifest, magnitudes: np.ndarray) -> str:
             "/* The scene's numbers. */",
             '#include "scene.h"',
             "",
+            "#include <math.h>",
             "#include <stddef.h>",
             "",
             f"const char *const scene_title = {_string(manifest.title)};",
             "",
             "const scene_parameter scene_parameters[] = {",
             *parameters,
+            "};",
+            "",
+            "const scene_relation scene_relations[] = {",
+            *(relations or ["    {0, 0, 0.0}, /* none */"]),  # C has no arrays of length zero
             "};",
             "",
             f"const char *const scene_constant_names[] = {{{_listed(_string(c.name) for c in manifest.constants)}}};",
@@ -327,7 +351,8 @@ $ ./{program} --list
 ```
 
 The columns of the CSV are the time [s] and the states in SI units: {", ".join(s.name for s in manifest.states)}.
-Parameters are given in SI units; `--list` prints them with units and meaning, `--help` the options.
+Parameters are given in SI units; `--list` prints them with units and meaning, `--help` the options. A value that the
+scene file could not have, as a mass of zero, is refused, with what is allowed.
 Exit codes: 0 done, 1 the computation failed (the rows so far are printed), 2 the request was wrong.
 
 | file | what it holds |
@@ -337,6 +362,7 @@ Exit codes: 0 done, 1 the computation failed (the rows so far are printed), 2 th
 | `kernels.h` | the model, generated from its equations |
 | `methods.h` | coefficients of the integration methods |
 | `stepper.c`, `stepper.h` and what they include | the integrator; `stepper.h` documents its one call, `raceway_run` |
+| `located.h`, and `located.c` where the laws have kinks | the same integrator, compiled so that steps end on kinks |
 | `schedule.c`, `schedule.h` | times at which loads switch, inputs in between |
 | `main.c` | command line and CSV |
 
@@ -353,6 +379,10 @@ def _string(text: str) -> str:
         plain = 32 <= byte < 127 and character not in '"\\?'
         out.append(character if plain else f"\\{byte:03o}")
     return '"' + "".join(out) + '"'
+
+
+def _bound(bound: float | None, none: str) -> str:
+    return none if bound is None else repr(float(bound))
 
 
 def _listed(items: Iterable[str]) -> str:

@@ -15,12 +15,12 @@ from typing import Any
 
 import casadi
 
-from raceway.runtime.compiled.compile import CompiledLibrary, Compiler, compile_sources, find_compiler
+from raceway.runtime.compiled.compile import CompiledLibrary, Compiler, compile_sources, digests_of, find_compiler
 from raceway.runtime.compiled.kernel import Array, Kernel, Loop
 from raceway.runtime.compiled.loops import CompiledLoop, LoopDriver, PointLoop
 from raceway.runtime.errors import ArtefactError, CompileError, RequestError
 from raceway.runtime.integrate.integrators import make_integrator
-from raceway.runtime.manifest import MODEL, Manifest
+from raceway.runtime.manifest import MODEL, Manifest, check_unchanged
 from raceway.runtime.parameters import unknown_name
 
 #: Arguments of a function of outputs that change from sample to sample.
@@ -157,13 +157,21 @@ class Functions:
         return CompiledLoop(self._loop_driver, library.path, function, varying)
 
     def symbolic(self, name: str) -> casadi.Function:
-        """CasADi function by name as an expression graph, which can be differentiated further."""
+        """CasADi function by name as an expression graph, which can be differentiated further.
+
+        Raises
+        ------
+        RequestError
+            The model has no such function.
+        ArtefactError
+            The folder has none, or was written anew since its manifest was read.
+        """
         self._require(name)
         where = self._where[name]
         path = self.folder / f"{where}.casadi"
         with self._making:
             if where not in self._read:
-                self._symbolic |= _read_functions(path)
+                self._symbolic |= self._read_file(path)
                 self._read.add(where)
             if name not in self._symbolic:
                 derivative, integrator = _DERIVATIVE.fullmatch(name), _INTEGRATOR.fullmatch(name)
@@ -175,6 +183,14 @@ class Functions:
                 else:
                     raise ArtefactError(f"{path}: has no function {name!r}. Write the folder again.")
             return self._symbolic[name]
+
+    def _read_file(self, path: Path) -> dict[str, casadi.Function]:
+        # before, for CasADi does not survive every torn file; behind, for it reads by name
+        digest = dict(self.manifest.files)[path.name]
+        check_unchanged(path, digest)
+        functions = _read_functions(path)
+        check_unchanged(path, digest)
+        return functions
 
     def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function:
         """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `integrators`)."""
@@ -193,7 +209,8 @@ class Functions:
             if where not in self._libraries:
                 compiler = self._find_compiler(f"{where}.c")
                 source, label = self.folder / f"{where}.c", f"{self.manifest.scene}_{where}"
-                self._libraries[where] = compile_sources((source,), compiler, label=label)
+                digests = digests_of(self.folder, self.manifest)
+                self._libraries[where] = compile_sources((source,), compiler, label=label, digests=digests)
             return self._libraries[where]
 
     def _find_compiler(self, source: str) -> Compiler:

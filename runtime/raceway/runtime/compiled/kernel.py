@@ -76,7 +76,7 @@ class Kernel:
             raise EvaluationError(f"{self.function.name()} reported failure")
 
     def output(self, name: str) -> Array:
-        """Copy of an output of the last evaluation, dense; a single column loses its second dimension."""
+        """Copy of an output of the last evaluation, dense, shape (rows, columns); (rows,) where there is one column."""
         memory = self._outputs[name]
         shape, positions = self._patterns[name]
         if positions is None:
@@ -125,19 +125,7 @@ class Loop:
     def __call__(
         self, count: int, values: Mapping[str, Any], wanted: Collection[str] | None = None
     ) -> dict[str, Array]:
-        """Outputs at `count` points.
-
-        Parameters
-        ----------
-        count : number of points
-        values : inputs by name; those that vary of shape (count,) or (count, rows), the others of shape (rows,);
-            further keys are ignored
-        wanted : names of outputs.  Default: all
-
-        Returns
-        -------
-        dict from output name to array, shape (count, rows)
-        """
+        """Outputs at `count` points, as `raceway.runtime.compiled.loops.PointLoop` says."""
         results = {
             name: np.empty((count, memory.shape[1]))
             for name, memory in self._outputs.items()

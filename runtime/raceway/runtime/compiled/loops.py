@@ -15,8 +15,8 @@ import casadi
 import numpy as np
 
 from raceway.runtime.compiled.compile import Compiler, compile_sources
+from raceway.runtime.compiled.driver_library import DRIVER
 from raceway.runtime.compiled.kernel import Array, EvaluationError
-from raceway.runtime.integrate.stepper import DRIVER
 
 _Pointers = ctypes.POINTER(ctypes.c_void_p)
 _Longs = ctypes.POINTER(ctypes.c_long)
@@ -31,7 +31,24 @@ class PointLoop(Protocol):
     def __call__(
         self, count: int, values: Mapping[str, Any], wanted: Collection[str] | None = None
     ) -> dict[str, Array]:
-        """Outputs at `count` points, each of shape (count, rows); see `CompiledLoop`."""
+        """Outputs at `count` points.
+
+        Parameters
+        ----------
+        count : number of points
+        values : inputs by name; those that vary of shape (count,) or (count, rows), the others of shape (rows,);
+            further keys are ignored
+        wanted : names of outputs.  Default: all
+
+        Returns
+        -------
+        dict from output name to array, shape (count, rows)
+
+        Raises
+        ------
+        EvaluationError
+            The function reports failure.
+        """
 
 
 class LoopDriver:
@@ -81,24 +98,7 @@ class CompiledLoop:
     def __call__(
         self, count: int, values: Mapping[str, Any], wanted: Collection[str] | None = None
     ) -> dict[str, Array]:
-        """Outputs at `count` points.
-
-        Parameters
-        ----------
-        count : number of points
-        values : inputs by name; those that vary of shape (count,) or (count, rows), the others of shape (rows,);
-            further keys are ignored
-        wanted : names of outputs.  Default: all
-
-        Returns
-        -------
-        dict from output name to array, shape (count, rows)
-
-        Raises
-        ------
-        EvaluationError
-            The function reports failure.
-        """
+        """Outputs at `count` points, as `PointLoop` says; one call of C."""
         held = [
             _entry(name, values[name], (count, rows) if varies else (rows,))
             for name, rows, varies in zip(self._names, self._rows, self._varying, strict=True)

@@ -1,5 +1,5 @@
-/* Family of methods and first step size.  Single runs and ensembles decide alike where a segment begins; within it single runs look at
-   how far their steps reach as well (judge_family in stepper.c). */
+/* Family of methods and first step size.  Single runs and ensembles decide alike, where a segment begins and within it
+   (family.h). */
 #ifndef RACEWAY_CONTROL_H
 #define RACEWAY_CONTROL_H
 
@@ -16,6 +16,10 @@ enum {
 /* Step size times fastest rate, in the mean over the looks.  Above the first an explicit method is held down by stability and not by
    accuracy.  Below the second an explicit step, of which more than three cost as much as a linearly implicit one, is not. */
 static const double RW_LIMITED = 2.6, RW_WORTH_SOLVING = 4.0;
+
+/* Where accuracy asks for steps far below the stability limit the higher order pays, although its step costs twice as much.  Below the
+   last the ring flies free. */
+static const double RW_HIGH_ORDER = 0.35, RW_LOW_ORDER = 1.2, RW_FREE = 1e-3;
 
 /* Logarithm of 1e-4: smaller errors of the step before do not tell the controller more. */
 static const double RW_LOG_SMALL_ERROR = -9.210340371976182;
@@ -41,19 +45,26 @@ static inline double rw_first_step(const rw_numbers *n, double t, const double *
     return h < longest ? h : longest;
 }
 
-/* Bound of the fastest rate of q'' = A q + B q' [1/s]: of decay or of oscillation. */
-static inline double rw_fastest_rate(const double *restrict A, const double *restrict B)
+/* Bounds of the fastest decay [1/s] and of the squared fastest frequency [1/s^2] of q'' = A q + B q': the largest row sums. */
+static inline void rw_bounds(const double *restrict A, const double *restrict B, double *decay, double *squared)
 {
-    double decay = 0.0, squared = 0.0;
+    *decay = *squared = 0.0;
     for (int i = 0; i < RW_NQ; i++) {
         double a = 0.0, b = 0.0;
         for (int j = 0; j < RW_NQ; j++) {
             a += fabs(A[i * RW_NQ + j]);
             b += fabs(B[i * RW_NQ + j]);
         }
-        decay = b > decay ? b : decay;
-        squared = a > squared ? a : squared;
+        *decay = b > *decay ? b : *decay;
+        *squared = a > *squared ? a : *squared;
     }
+}
+
+/* Bound of the fastest rate of q'' = A q + B q' [1/s]: of decay or of oscillation. */
+static inline double rw_fastest_rate(const double *restrict A, const double *restrict B)
+{
+    double decay, squared;
+    rw_bounds(A, B, &decay, &squared);
     const double half = 0.5 * decay, oscillation = sqrt(squared);
     return half > oscillation ? half + sqrt(half * half - squared) : oscillation;
 }
@@ -62,16 +73,8 @@ static inline double rw_fastest_rate(const double *restrict A, const double *res
    held down by stability and not by accuracy.  A = da/dq, B = da/dv. */
 static inline int rw_is_stiff(const double *restrict A, const double *restrict B)
 {
-    double decay = 0.0, squared = 0.0;
-    for (int i = 0; i < RW_NQ; i++) {
-        double a = 0.0, b = 0.0;
-        for (int j = 0; j < RW_NQ; j++) {
-            a += fabs(A[i * RW_NQ + j]);
-            b += fabs(B[i * RW_NQ + j]);
-        }
-        decay = b > decay ? b : decay;
-        squared = a > squared ? a : squared;
-    }
+    double decay, squared;
+    rw_bounds(A, B, &decay, &squared);
     return decay * decay > 2.0 * squared;
 }
 

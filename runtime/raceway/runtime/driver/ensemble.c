@@ -6,6 +6,7 @@
 
 #include <float.h>
 
+#include "family.h"
 #include "lanes.h"
 #include "reductions.h"
 #include "scales.h"
@@ -16,7 +17,9 @@ enum { RW_STOP_INTERVAL = 64 }; /* rounds between looks at the caller's wish to 
 /* A member outside the lanes. */
 typedef struct {
     double t, step, log_error; /* t counts from the segment's start */
-    int phase, method, begun;  /* begun: the segment is under way, it was left in its middle or before its first step */
+    int phase, method;
+    rw_family family;
+    rw_rates seen;
 } rw_member;
 
 typedef struct {
@@ -42,8 +45,11 @@ typedef struct {
     double h[RW_L] RW_ALIGNED, error[RW_L] RW_ALIGNED;
     /* flags, as numbers so that they live in lanes as well */
     double active[RW_L] RW_ALIGNED, last[RW_L] RW_ALIGNED, accepted[RW_L] RW_ALIGNED, rejected_last[RW_L] RW_ALIGNED;
-    double stiff[RW_L] RW_ALIGNED, small[RW_L] RW_ALIGNED, reducing[RW_L] RW_ALIGNED;
-    double steps[RW_L] RW_ALIGNED, rejected[RW_L] RW_ALIGNED; /* since the member entered its lane */
+    double small[RW_L] RW_ALIGNED, reducing[RW_L] RW_ALIGNED, changing[RW_L] RW_ALIGNED;
+    double steps[RW_L] RW_ALIGNED, rejected[RW_L] RW_ALIGNED, pivoted[RW_L] RW_ALIGNED; /* since the member entered its lane */
+    double allowed[RW_L] RW_ALIGNED; /* steps, accepted and rejected */
+    /* what rw_family_looks looks at: steps until the next look, and whether all are looked at */
+    double until_look[RW_L] RW_ALIGNED, at_limit[RW_L] RW_ALIGNED;
     rw_lane_explicit plain;
     rw_lane_linear linear;
     /* reductions */
@@ -57,6 +63,7 @@ typedef struct {
     int balls;          /* whether channels of the balls are reduced */
     unsigned long wanted; /* channels reduced, a bit each; all members have the same */
     rw_lane_numbers numbers;
+    rw_lane_angles angles; /* of the step tried */
 } rw_lane_block;
 
 static void put(double *lanes, int lane, const double *row, int count)
@@ -92,7 +99,7 @@ static void choose_start(const rw_job *job, long m)
     const rw_numbers n = member_numbers(job, m);
     double *x = job->x + m * RW_NX, weight[RW_NX];
     at->t = 0.0;
-    at->begun = 1;
+    at->family = (rw_family){0};
     if (!job->restarts[job->first[m] + result->segment] && at->step > 0.0) return;
     int method = job->options->method;
     if (method == RACEWAY_AUTO) {
@@ -118,6 +125,13 @@ static void begin_segment(const rw_job *job, long m)
     if (!(job->member[m].step > least)) job->member[m].step = least;
 }
 
+/* When the member in a lane is looked at next. */
+static void tell_looks(const rw_member *at, rw_lane_block *b, int lane)
+{
+    b->until_look[lane] = (double)((RW_STIFF_LOOK - at->family.steps % RW_STIFF_LOOK) % RW_STIFF_LOOK);
+    b->at_limit[lane] = at->family.stiff > 0 ? 1.0 : 0.0;
+}
+
 /* Put a member whose segment has begun into a lane, all that depends on the segment included. */
 static void enter_segment(const rw_job *job, rw_lane_block *b, int lane)
 {
@@ -133,7 +147,8 @@ static void enter_segment(const rw_job *job, rw_lane_block *b, int lane)
     b->t[lane] = at->t;
     b->step[lane] = at->step;
     b->log_error[lane] = at->log_error;
-    b->stiff[lane] = b->rejected_last[lane] = 0.0;
+    b->rejected_last[lane] = 0.0;
+    tell_looks(at, b, lane);
     if (b->linearly) {
         rw_stage_rate(at->t, n.u, n.p, n.c, w, wt);
         put(b->linear.w, lane, w, RW_NW);
@@ -157,7 +172,8 @@ static void enter_lane(const rw_job *job, rw_lane_block *b, int lane, long m)
     double weight[RW_NX];
     b->who[lane] = m;
     b->active[lane] = 1.0;
-    b->steps[lane] = b->rejected[lane] = 0.0;
+    b->steps[lane] = b->rejected[lane] = b->pivoted[lane] = 0.0;
+    b->allowed[lane] = (double)(job->options->max_steps - job->results[m].steps - job->results[m].rejected);
     put(b->p, lane, job->p + m * RW_NP, RW_NP);
     put(b->c, lane, job->c + m * RW_NC, RW_NC);
     put(b->x, lane, job->x + m * RW_NX, RW_NX);
@@ -188,6 +204,7 @@ static void leave_lane(const rw_job *job, rw_lane_block *b, int lane, int status
     result->rejected += rejected;
     result->evaluations += (steps + rejected) * (b->linearly ? RW_RODAS5P_STAGES : RW_DP54_STAGES);
     result->factorizations += b->linearly ? steps + rejected : 0;
+    result->pivoted += (long)b->pivoted[lane];
     result->status = status;
     result->method = b->linearly ? RACEWAY_RODAS5P : RACEWAY_DP54;
     result->step = b->step[lane];
@@ -196,11 +213,12 @@ static void leave_lane(const rw_job *job, rw_lane_block *b, int lane, int status
         get(b->integral, lane, row + RW_INTEGRAL, RW_CHANNELS);
         get(b->square, lane, row + RW_SQUARE, RW_CHANNELS);
     }
+    result->time = b->start[lane] + b->t[lane];
     at->t = b->t[lane];
     at->step = b->step[lane];
     at->log_error = b->log_error[lane];
     /* an idle lane goes on with numbers that do no harm */
-    b->active[lane] = b->reducing[lane] = b->t[lane] = 0.0;
+    b->active[lane] = b->reducing[lane] = b->t[lane] = b->small[lane] = b->changing[lane] = 0.0;
     b->length[lane] = 1.0;
     b->step[lane] = 1e-9;
     b->who[lane] = -1;
@@ -236,7 +254,7 @@ static void reduce(const rw_job *job, rw_lane_block *b)
     else rw_lane_explicit_dense(&b->plain, b->x, b->h, b->next, b->dense);
     for (int q = 1; q < RW_POINTS; q++) {
         const double theta = (double)q / (RW_POINTS - 1);
-        double *restrict y = b->sampled[q], time[RW_L] RW_ALIGNED;
+        double *restrict y = b->sampled[q];
         for (int k = 0; k < RW_NX; k++) {
             if (!b->balls && !(b->wanted >> k & 1)) continue;
             const int row = k * RW_L;
@@ -249,8 +267,7 @@ static void reduce(const rw_job *job, rw_lane_block *b)
             }
         }
         if (!b->balls) continue;
-        RW_EACH_LANE time[lane] = b->t[lane] + theta * b->h[lane];
-        rw_lane_ball_channels(&b->numbers, time, y, y + RW_NX * RW_L);
+        rw_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, y + RW_NX * RW_L);
     }
     for (int k = 0; k < RW_CHANNELS; k++) {
         if (!(b->wanted >> k & 1)) continue;
@@ -303,13 +320,37 @@ static void choose_steps(rw_lane_block *b)
     }
 }
 
+/* Ask the rule of families about the lanes in which a step is to be looked at. */
+static void look(const rw_job *job, rw_lane_block *b, const double *looking)
+{
+    double reach[RW_L] RW_ALIGNED;
+    if (!b->linearly) rw_lane_stiffness(&b->plain, b->h, b->next, b->weight, reach);
+    for (int lane = 0; lane < RW_L; lane++) {
+        if (looking[lane] == 0.0) continue;
+        rw_member *at = job->member + b->who[lane];
+        int method;
+        /* the lane has counted to the next look; of the steps only the rest by RW_STIFF_LOOK matters */
+        if (at->family.stiff == 0) at->family.steps = 1;
+        if (b->linearly) {
+            double A[RW_NQ * RW_NQ], B[RW_NQ * RW_NQ];
+            get(b->linear.A, lane, A, RW_NQ * RW_NQ);
+            get(b->linear.B, lane, B, RW_NQ * RW_NQ);
+            method = rw_after_linear(&at->family, &at->seen, at->method, rw_fastest_rate(A, B), b->h[lane]);
+        } else {
+            method = rw_after_explicit(&at->family, at->method, reach[lane], 0);
+        }
+        b->changing[lane] = method == at->method ? 0.0 : 1.0;
+        tell_looks(at, b, lane);
+    }
+}
+
 /* Accept or reject; propose the next step sizes by the PI controller (Hairer & Wanner II, section IV.2). */
-static void judge(rw_lane_block *b, int changeable)
+static void judge(const rw_job *job, rw_lane_block *b, int changeable)
 {
     const double exponent = 1.0 / (b->linearly ? rw_rodas5p.error_exponent : rw_dp54.error_exponent);
     const double log_least = -23.025850929940457; /* of 1e-10 */
     double beyond[RW_L] RW_ALIGNED, fine[RW_L] RW_ALIGNED, bounded[RW_L] RW_ALIGNED, log_error[RW_L] RW_ALIGNED;
-    double grow[RW_L] RW_ALIGNED, shrink[RW_L] RW_ALIGNED, log_grow[RW_L] RW_ALIGNED, log_shrink[RW_L] RW_ALIGNED;
+    double factor[RW_L] RW_ALIGNED, log_factor[RW_L] RW_ALIGNED;
     /* states beyond reach: no number, or so large that the tolerance is below their rounding (within_reach in stepper.c).  A comparison
        with what is no number is false */
     RW_EACH_LANE beyond[lane] = 0.0;
@@ -324,20 +365,20 @@ static void judge(rw_lane_block *b, int changeable)
     rw_lane_log(bounded, log_error);
     RW_EACH_LANE {
         log_error[lane] = log_error[lane] > log_least ? log_error[lane] : log_least;
-        log_grow[lane] = (0.4 * b->log_error[lane] - 0.7 * log_error[lane]) * exponent;
-        log_shrink[lane] = -log_error[lane] * exponent;
+        const double log_grow = (0.4 * b->log_error[lane] - 0.7 * log_error[lane]) * exponent;
+        const double accepted = b->error[lane] <= 1.0 && beyond[lane] == 0.0 ? b->active[lane] : 0.0;
+        b->accepted[lane] = accepted;
+        log_factor[lane] = accepted != 0.0 ? log_grow : -log_error[lane] * exponent;
     }
-    rw_lane_exp(log_grow, grow);
-    rw_lane_exp(log_shrink, shrink);
+    rw_lane_exp(log_factor, factor);
     RW_EACH_LANE {
-        double accepted = b->error[lane] <= 1.0 ? b->active[lane] : 0.0;
-        accepted = beyond[lane] == 0.0 ? accepted : 0.0;
-        double up = 0.9 * grow[lane];
+        const double accepted = b->accepted[lane];
+        double up = 0.9 * factor[lane];
         up = up > 6.0 ? 6.0 : up;
         up = up < 0.2 ? 0.2 : up;
         const double bound = b->rejected_last[lane] != 0.0 ? 1.0 : 6.0;
         up = up > bound ? bound : up;
-        double down = fine[lane] != 0.0 ? 0.9 * shrink[lane] : 0.1;
+        double down = fine[lane] != 0.0 ? 0.9 * factor[lane] : 0.1;
         down = down < 0.1 ? 0.1 : down;
         down = down > 0.9 ? 0.9 : down;
         /* a last step cut short says nothing against the size that was proposed */
@@ -347,7 +388,6 @@ static void judge(rw_lane_block *b, int changeable)
         b->step[lane] = accepted != 0.0 ? kept : tried;
         const double remembered = log_error[lane] > RW_LOG_SMALL_ERROR ? log_error[lane] : RW_LOG_SMALL_ERROR;
         b->log_error[lane] = accepted != 0.0 ? remembered : b->log_error[lane];
-        b->accepted[lane] = accepted;
         b->rejected_last[lane] = 1.0 - accepted;
         b->steps[lane] += accepted;
         b->rejected[lane] += b->active[lane] - accepted;
@@ -356,14 +396,19 @@ static void judge(rw_lane_block *b, int changeable)
         const double lasting = b->step[lane] * 1.0001 >= ahead ? b->active[lane] - accepted : b->active[lane];
         b->small[lane] = b->step[lane] <= b->resolution[lane] ? lasting : 0.0;
     }
-    if (changeable && !b->linearly) {
-        double reach[RW_L] RW_ALIGNED;
-        rw_lane_stiffness(&b->plain, b->h, b->next, b->weight, reach);
-        RW_EACH_LANE {
-            const double count = reach[lane] > 3.25 ? b->stiff[lane] + 1.0 : 0.0;
-            b->stiff[lane] = b->accepted[lane] != 0.0 ? count : b->stiff[lane];
-        }
+    if (b->linearly) RW_EACH_LANE b->pivoted[lane] += b->active[lane] * b->linear.pivoted[lane];
+    if (!changeable) return;
+    double looking[RW_L] RW_ALIGNED;
+    int any = 0;
+    RW_EACH_LANE {
+        /* rw_family_looks, for all lanes: steps are not counted while all are looked at */
+        const double due = b->until_look[lane] == 0.0 || b->at_limit[lane] != 0.0 ? b->accepted[lane] : 0.0;
+        const double counted = b->at_limit[lane] == 0.0 ? b->accepted[lane] : 0.0;
+        looking[lane] = due;
+        b->until_look[lane] -= due == 0.0 ? counted : 0.0;
     }
+    for (int lane = 0; lane < RW_L; lane++) any |= looking[lane] != 0.0;
+    if (any) look(job, b, looking);
 }
 
 /* Take over what accepted steps reached. */
@@ -411,6 +456,19 @@ static int worst_state(const rw_lane_block *b, int lane)
     return worst;
 }
 
+/* Whether anything happens in a lane beyond its step: the end of a segment, a change of family, or of the run. */
+static int eventful(const rw_lane_block *b)
+{
+    double happens[RW_L] RW_ALIGNED;
+    int any = 0;
+    RW_EACH_LANE {
+        const double over = b->steps[lane] + b->rejected[lane] >= b->allowed[lane] ? b->active[lane] : 0.0;
+        happens[lane] = b->accepted[lane] * b->last[lane] + over + b->small[lane] + b->changing[lane];
+    }
+    for (int lane = 0; lane < RW_L; lane++) any |= happens[lane] != 0.0;
+    return any;
+}
+
 /* What happens to a lane beyond a step: ends of segments, failures, changes of method.  Returns whether the lane has become free. */
 static int settle(const rw_job *job, rw_lane_block *b, int lane)
 {
@@ -418,11 +476,16 @@ static int settle(const rw_job *job, rw_lane_block *b, int lane)
     raceway_result *result = job->results + m;
     rw_member *at = job->member + m;
     int status = RACEWAY_DONE;
-    if (b->linearly) result->pivoted += b->linear.pivoted[lane];
-    result->time = b->start[lane] + b->t[lane];
+    const int changing = b->changing[lane] != 0.0;
+    if (changing) {
+        at->method = b->linearly ? RACEWAY_DP54 : RACEWAY_RODAS5P;
+        result->switches++;
+        if (b->linearly && b->step[lane] > at->family.stable) b->step[lane] = at->family.stable;
+        b->changing[lane] = 0.0;
+    }
     if (b->accepted[lane] != 0.0 && b->last[lane] != 0.0) {
         const long segments = job->first[m + 1] - job->first[m];
-        result->time = member_end(job, m);
+        const double reached = member_end(job, m);
         at->step = b->step[lane];
         at->log_error = b->log_error[lane];
         while (result->segment + 1 < segments) {
@@ -442,24 +505,19 @@ static int settle(const rw_job *job, rw_lane_block *b, int lane)
         }
         at->phase = RW_FINISHED;
         leave_lane(job, b, lane, RACEWAY_DONE);
-        return 1;
-    }
-    if (b->stiff[lane] >= (double)RW_STIFF_STEPS) {
-        at->method = RACEWAY_RODAS5P;
-        result->switches++;
-        leave_lane(job, b, lane, RACEWAY_DONE);
+        result->time = reached;
         return 1;
     }
     if (b->small[lane] != 0.0) {
         status = b->error[lane] <= DBL_MAX ? RACEWAY_STEP_TOO_SMALL : RACEWAY_NOT_FINITE;
         for (int k = 0; k < RW_NX; k++)
             if (!(fabs(b->next[k * RW_L + lane]) <= DBL_MAX)) status = RACEWAY_NOT_FINITE;
-    }
-    if (status == RACEWAY_DONE && result->steps + result->rejected + (long)b->steps[lane] + (long)b->rejected[lane] >= job->options->max_steps)
+    } else if (b->steps[lane] + b->rejected[lane] >= b->allowed[lane]) {
         status = RACEWAY_TOO_MANY_STEPS;
-    if (status == RACEWAY_DONE) return 0;
+    }
+    if (status == RACEWAY_DONE && !changing) return 0;
+    if (status != RACEWAY_DONE) at->phase = RW_FINISHED;
     if (b->small[lane] != 0.0) result->state = worst_state(b, lane);
-    at->phase = RW_FINISHED;
     leave_lane(job, b, lane, status);
     return 1;
 }
@@ -502,14 +560,15 @@ static int pass(const rw_job *job, rw_lane_block *b, int linearly)
     }
     for (long round = 0; filled > 0 && !stopped; round++) {
         choose_steps(b);
-        if (linearly) rw_lane_linear_step(&b->linear, &b->numbers, b->t, b->x, b->h, b->weight, b->next, b->error);
-        else rw_lane_explicit_step(&b->plain, &b->numbers, b->t, b->x, b->h, b->weight, b->next, b->error);
-        judge(b, changeable);
+        if (linearly) rw_lane_linear_step(&b->linear, &b->numbers, &b->angles, b->t, b->x, b->h, b->weight, b->next, b->error);
+        else rw_lane_explicit_step(&b->plain, &b->numbers, &b->angles, b->t, b->x, b->h, b->weight, b->next, b->error);
+        judge(job, b, changeable);
         double reducing = 0.0;
         for (int lane = 0; lane < RW_L; lane++) reducing += b->reducing[lane];
         if (reducing > 0.0) reduce(job, b);
         advance(b);
-        for (int lane = 0; lane < RW_L; lane++) {
+        const int happening = eventful(b);
+        for (int lane = 0; lane < RW_L && happening; lane++) {
             if (b->active[lane] == 0.0 || !settle(job, b, lane)) continue;
             if (waiting >= 0) {
                 enter_lane(job, b, lane, waiting);
@@ -539,6 +598,7 @@ int raceway_ensemble(const raceway_ensemble_options *options, long members, cons
         const double *own = times + first[m] + m;
         memset(result, 0, sizeof *result);
         memset(at, 0, sizeof *at);
+        at->seen.slowest = INFINITY;
         result->state = -1;
         result->time = own[0];
         result->status = RACEWAY_DONE;

@@ -8,6 +8,9 @@
 #include <math.h>
 
 #include "kernels.h"
+#ifdef RACEWAY_LOCATED
+#include "switches.h"
+#endif
 
 /* All states, and positions or velocities alone, as vectors of the compiler: short loops it would write out one number after another.
    There are two or four coordinates. */
@@ -21,7 +24,20 @@ typedef struct {
     const double *u;
     const double *p;
     const double *c;
+#ifdef RACEWAY_LOCATED
+    const double (*border)[RW_NSWITCHES]; /* sides of each ball, see kinks.h */
+#endif
 } rw_numbers;
+
+/* The law of a ball, and with its slopes; where kinks are located its sides are held. */
+#if defined(RACEWAY_LOCATED) && defined(RW_HELD)
+#define RW_BALL_FORCE(n, j, delta, rate, k, force) rw_ball_held_force(delta, rate, k, (n)->border[j], force)
+#define RW_BALL_SLOPES(n, j, delta, rate, k, force, by_delta, by_rate) \
+    rw_ball_held_slopes(delta, rate, k, (n)->border[j], force, by_delta, by_rate)
+#else
+#define RW_BALL_FORCE(n, j, delta, rate, k, force) rw_ball_force(delta, rate, k, force)
+#define RW_BALL_SLOPES(n, j, delta, rate, k, force, by_delta, by_rate) rw_ball_slopes(delta, rate, k, force, by_delta, by_rate)
+#endif
 
 /* Cosines and sines of the stage's angles at the times t + nodes[i] h, i = 0 ... RW_LANES - 1, nodes within [0, 1].  An angle that turns by
    little is turned on from its value at t. */
@@ -114,7 +130,7 @@ static inline void rw_sums(const rw_numbers *n, const double *restrict w, const 
         const double co = rw_cos[j] * cage_cos - rw_sin[j] * cage_sin;
         const double si = rw_sin[j] * cage_cos + rw_cos[j] * cage_sin;
         double force;
-        rw_ball_force(r[0] + r[1] * co + r[2] * si, r[3] * co + r[4] * si, k, &force);
+        RW_BALL_FORCE(n, j, r[0] + r[1] * co + r[2] * si, r[3] * co + r[4] * si, k, &force);
         sx[j] = force * co;
         sy[j] = force * si;
     }
@@ -134,7 +150,7 @@ static inline void rw_sums_and_slopes(const rw_numbers *n, const double *restric
         const double co = rw_cos[j] * cage_cos - rw_sin[j] * cage_sin;
         const double si = rw_sin[j] * cage_cos + rw_cos[j] * cage_sin;
         double force, by_delta, by_rate;
-        rw_ball_slopes(r[0] + r[1] * co + r[2] * si, r[3] * co + r[4] * si, k, &force, &by_delta, &by_rate);
+        RW_BALL_SLOPES(n, j, r[0] + r[1] * co + r[2] * si, r[3] * co + r[4] * si, k, &force, &by_delta, &by_rate);
         sx[j] = force * co;
         sy[j] = force * si;
         d0[j] = by_delta * co * co;

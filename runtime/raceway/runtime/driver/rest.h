@@ -5,7 +5,7 @@
 #include <float.h>
 #include <string.h>
 
-#include "model.h"
+#include "elimination.h"
 
 enum { RW_NEWTON_ITERATIONS = 16, RW_CONTINUATION_ITERATIONS = 400 };
 
@@ -27,49 +27,18 @@ static inline void rw_balance_at(const rw_numbers *n, double t, const double *q,
     memcpy(b->a, dx + RW_NQ, RW_NQ * sizeof *b->a);
 }
 
-static inline double rw_length(const double *v)
-{
-    double sum = 0.0;
-    for (int k = 0; k < RW_NQ; k++) sum += v[k] * v[k];
-    return sqrt(sum);
-}
-
-/* Solve (shift I - A) d = r by elimination with pivoting; returns 0 where it is singular. */
-static inline int rw_eliminate(const double *A, double shift, const double *r, double *d)
+/* Solve (shift I - A) d = r; returns 0 where it is singular.  Rows are scaled, so that a light and a heavy ring count alike. */
+static inline int rw_correction(const double *A, double shift, const double *r, double *d)
 {
     double rows[RW_NQ][RW_NQ + 1];
+    rw_shifted_rows(A, shift, r, rows);
     for (int i = 0; i < RW_NQ; i++) {
-        /* rows are scaled, so that a light and a heavy ring count alike */
         double most = 0.0;
-        for (int j = 0; j < RW_NQ; j++) {
-            rows[i][j] = (i == j ? shift : 0.0) - A[i * RW_NQ + j];
-            most = fabs(rows[i][j]) > most ? fabs(rows[i][j]) : most;
-        }
+        for (int j = 0; j < RW_NQ; j++) most = fabs(rows[i][j]) > most ? fabs(rows[i][j]) : most;
         if (!(most > 0.0 && most <= DBL_MAX)) return 0;
-        for (int j = 0; j < RW_NQ; j++) rows[i][j] /= most;
-        rows[i][RW_NQ] = r[i] / most;
+        for (int j = 0; j <= RW_NQ; j++) rows[i][j] /= most;
     }
-    for (int k = 0; k < RW_NQ; k++) {
-        int best = k;
-        for (int i = k + 1; i < RW_NQ; i++)
-            if (fabs(rows[i][k]) > fabs(rows[best][k])) best = i;
-        if (!(fabs(rows[best][k]) > RW_SINGULAR)) return 0;
-        for (int j = 0; j <= RW_NQ; j++) {
-            const double swap = rows[k][j];
-            rows[k][j] = rows[best][j];
-            rows[best][j] = swap;
-        }
-        for (int i = k + 1; i < RW_NQ; i++) {
-            const double factor = rows[i][k] / rows[k][k];
-            for (int j = k; j <= RW_NQ; j++) rows[i][j] -= factor * rows[k][j];
-        }
-    }
-    for (int i = RW_NQ - 1; i >= 0; i--) {
-        d[i] = rows[i][RW_NQ];
-        for (int j = i + 1; j < RW_NQ; j++) d[i] -= rows[i][j] * d[j];
-        d[i] /= rows[i][i];
-    }
-    return 1;
+    return rw_eliminate(rows, RW_SINGULAR, d);
 }
 
 /* Whether a correction is within what is allowed; a NaN is not. */
@@ -91,7 +60,7 @@ static inline int rw_newton(const rw_numbers *n, double t, const double *allowed
         const double reached = rw_length(b->a);
         if (!(reached <= 2.0 * size)) return 0;
         size = reached;
-        if (!rw_eliminate(b->A, 0.0, b->a, d)) return 0;
+        if (!rw_correction(b->A, 0.0, b->a, d)) return 0;
         const int small = rw_is_small(d, allowed);
         for (int k = 0; k < RW_NQ; k++) q[k] += d[k];
         if (small) return 1;
@@ -110,7 +79,7 @@ static inline int rw_rest(const rw_numbers *n, double t, const double *allowed, 
     rw_balance b, there;
     *is_free = 0;
     memcpy(start, q, sizeof start);
-    if (rw_newton(n, t, allowed, q, &b, iterations)) return rw_eliminate(b.A, 0.0, b.at, v);
+    if (rw_newton(n, t, allowed, q, &b, iterations)) return rw_correction(b.A, 0.0, b.at, v);
     memcpy(q, start, sizeof start);
     rw_balance_at(n, t, q, &b);
     double size = rw_length(b.a), most = 0.0;
@@ -124,7 +93,7 @@ static inline int rw_rest(const rw_numbers *n, double t, const double *allowed, 
     double tau = 1e-9 * (1.0 + most) / size;
     for (int i = 0; i < RW_CONTINUATION_ITERATIONS; i++) {
         double d[RW_NQ], trial[RW_NQ];
-        if (!rw_eliminate(b.A, 1.0 / tau, b.a, d)) return 0;
+        if (!rw_correction(b.A, 1.0 / tau, b.a, d)) return 0;
         for (int k = 0; k < RW_NQ; k++) trial[k] = q[k] + d[k];
         rw_balance_at(n, t, trial, &there);
         ++*iterations;
@@ -141,13 +110,13 @@ static inline int rw_rest(const rw_numbers *n, double t, const double *allowed, 
         size = reached;
         if (size <= 1e-4 * first) {
             memcpy(start, q, sizeof start);
-            if (rw_newton(n, t, allowed, q, &b, iterations)) return rw_eliminate(b.A, 0.0, b.at, v);
+            if (rw_newton(n, t, allowed, q, &b, iterations)) return rw_correction(b.A, 0.0, b.at, v);
             memcpy(q, start, sizeof start);
             rw_balance_at(n, t, q, &b);
             if (size <= 1e-12 * first) break;
         }
     }
-    *is_free = !rw_eliminate(b.A, 0.0, b.a, v) && size <= 1e-6 * first;
+    *is_free = !rw_correction(b.A, 0.0, b.a, v) && size <= 1e-6 * first;
     return 0;
 }
 

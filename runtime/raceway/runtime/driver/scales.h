@@ -5,7 +5,7 @@
 #include <float.h>
 #include <string.h>
 
-#include "model.h"
+#include "elimination.h"
 
 enum { RW_LOADED_MOMENTS = 3, RW_ITERATIONS = 80 };
 
@@ -18,13 +18,6 @@ static inline void rw_field(const rw_numbers *n, const double *x, double *a, dou
     rw_stage_rate(0.0, n->u, n->p, n->c, w, wt);
     rw_linearize(n, w, wt, x, dx, A, B, at);
     memcpy(a, dx + RW_NQ, RW_NQ * sizeof *a);
-}
-
-static inline double rw_size(const double *v)
-{
-    double sum = 0.0;
-    for (int k = 0; k < RW_NQ; k++) sum += v[k] * v[k];
-    return sqrt(sum);
 }
 
 static inline double rw_largest(const double *v)
@@ -60,38 +53,7 @@ static inline double rw_weighted(const double *mass, const double *a)
 {
     double force[RW_NQ];
     for (int k = 0; k < RW_NQ; k++) force[k] = mass[k] * a[k];
-    return rw_size(force);
-}
-
-/* Solve (I/tau - A) d = a by elimination with pivoting; returns 0 where it is singular. */
-static inline int rw_solve(const double *A, double tau, const double *a, double *d)
-{
-    double rows[RW_NQ][RW_NQ + 1];
-    for (int i = 0; i < RW_NQ; i++) {
-        for (int j = 0; j < RW_NQ; j++) rows[i][j] = (i == j ? 1.0 / tau : 0.0) - A[i * RW_NQ + j];
-        rows[i][RW_NQ] = a[i];
-    }
-    for (int k = 0; k < RW_NQ; k++) {
-        int best = k;
-        for (int i = k + 1; i < RW_NQ; i++)
-            if (fabs(rows[i][k]) > fabs(rows[best][k])) best = i;
-        if (rows[best][k] == 0.0) return 0;
-        for (int j = 0; j <= RW_NQ; j++) {
-            const double swap = rows[k][j];
-            rows[k][j] = rows[best][j];
-            rows[best][j] = swap;
-        }
-        for (int i = k + 1; i < RW_NQ; i++) {
-            const double factor = rows[i][k] / rows[k][k];
-            for (int j = k; j <= RW_NQ; j++) rows[i][j] -= factor * rows[k][j];
-        }
-    }
-    for (int i = RW_NQ - 1; i >= 0; i--) {
-        d[i] = rows[i][RW_NQ];
-        for (int j = i + 1; j < RW_NQ; j++) d[i] -= rows[i][j] * d[j];
-        d[i] /= rows[i][i];
-    }
-    return 1;
+    return rw_length(force);
 }
 
 /* Positions at rest with vanishing acceleration, by pseudo-transient continuation; returns 0 when nothing holds them, and -1 when it
@@ -104,10 +66,11 @@ static inline int rw_equilibrium(const rw_numbers *n, const double *mass, double
     const double first = size;
     if (size == 0.0) return 1;
     /* the first step moves by a nanometre: well inside any clearance */
-    double tau = 1e-9 * (1.0 + rw_largest(x)) / rw_size(a);
+    double tau = 1e-9 * (1.0 + rw_largest(x)) / rw_length(a);
     for (int i = 0; i < RW_ITERATIONS; i++) {
-        double trial[RW_NX];
-        if (!rw_solve(A, tau, a, d)) return -1;
+        double trial[RW_NX], rows[RW_NQ][RW_NQ + 1];
+        rw_shifted_rows(A, 1.0 / tau, a, rows);
+        if (!rw_eliminate(rows, 0.0, d)) return -1;
         memcpy(trial, x, sizeof trial);
         for (int k = 0; k < RW_NQ; k++) trial[k] += d[k];
         rw_field(n, trial, there, slopes);
@@ -184,10 +147,14 @@ static inline void rw_magnitudes(const double *p, const double *c, const double 
         found = 1;
         position = rw_largest(x) > position ? rw_largest(x) : position;
     }
-    /* nothing holds the body: what it travels in the time at hand */
-    if (!found && highest > 0.0) position = highest * (horizon / turn) * (horizon / turn);
+    /* nothing holds the body: what it travels in the time at hand, pushed by its load and carried by its initial velocity */
+    if (!found || highest == 0.0) {
+        const double carried = rw_largest(initial + RW_NQ) * (horizon / turn);
+        if (!found && highest > 0.0) position = highest * (horizon / turn) * (horizon / turn);
+        if (carried > position) position = carried;
+    }
     if (rw_largest(initial) > position) position = rw_largest(initial);
-    if (apart > 0.0 && position > RW_SOFT * apart) position = RW_SOFT * apart;
+    if (RW_NQ > 2 && apart > 0.0 && position > RW_SOFT * apart) position = RW_SOFT * apart;
     speed = sqrt(highest * position);
     if (rw_largest(initial + RW_NQ) > speed) speed = rw_largest(initial + RW_NQ);
     /* a model at rest without load: any magnitude will do */

@@ -6,8 +6,13 @@
 
 #include "control.h"
 #include "explicit.h"
+#include "family.h"
 #include "rosenbrock.h"
+#ifdef RACEWAY_LOCATED
+#include "kinks.h"
+#else
 #include "scales.h"
+#endif
 #ifdef RACEWAY_SENSITIVITIES
 #include "sensitivity.h"
 #endif
@@ -23,7 +28,7 @@ typedef struct {
     double *x;
     double next[RW_NX];
     double step;           /* proposal for the next step; 0 where it has to be estimated */
-    double fastest, slowest; /* rates seen by the linearly implicit methods [1/s] */
+    rw_rates seen;
     double last_error;     /* logarithm of that of the last accepted step, for the PI controller */
     int method;
     long outputs;
@@ -42,6 +47,9 @@ typedef struct {
 #ifdef RACEWAY_REDUCTIONS
     double *reduction; /* or NULL where nothing is reduced in the present segment */
     double sampled[RW_POINTS][RW_CHANNELS];
+#endif
+#ifdef RACEWAY_LOCATED
+    rw_sides sides;
 #endif
 } rw_run;
 
@@ -224,12 +232,15 @@ static void write_outputs(rw_run *run, double start, double t, double h, double 
     }
 }
 
-#ifdef RACEWAY_REDUCTIONS
-/* An accepted step, for the reductions: its dense output is ready.  They look at its part from `from` over `span` of it. */
-typedef struct {
-    const rw_run *run;
-    double t, h, from, span;
-} rw_step_taken;
+#if defined(RACEWAY_REDUCTIONS) || defined(RACEWAY_LOCATED)
+/* Prepare the dense output of the step from (t, x) to (t + h, next). */
+static void prepare_dense(rw_run *run, double t, double h)
+{
+    if (run->method == RACEWAY_DP54) rw_explicit_dense(&rw_dp54, &run->plain, &run->numbers, t, run->x, h, run->next, run->dense);
+    else if (run->method == RACEWAY_DOP853) rw_explicit_dense(&rw_dop853, &run->plain, &run->numbers, t, run->x, h, run->next, run->dense);
+    else if (run->method == RACEWAY_RODAS4) rw_rosenbrock_dense(&rw_rodas4, &run->linear, run->dense);
+    else rw_rosenbrock_dense(&rw_rodas5p, &run->linear, run->dense);
+}
 
 static void state_at(const rw_run *run, double theta, double *y)
 {
@@ -239,6 +250,14 @@ static void state_at(const rw_run *run, double theta, double *y)
     else if (run->method == RACEWAY_RODAS4) rw_rosenbrock_at(&rw_rodas4, dense, run->x, run->next, theta, y);
     else rw_rosenbrock_at(&rw_rodas5p, dense, run->x, run->next, theta, y);
 }
+#endif
+
+#ifdef RACEWAY_REDUCTIONS
+/* An accepted step, for the reductions: its dense output is ready.  They look at its part from `from` over `span` of it. */
+typedef struct {
+    const rw_run *run;
+    double t, h, from, span;
+} rw_step_taken;
 
 static double channel_at(const void *source, int channel, double theta, int *ball)
 {
@@ -259,10 +278,7 @@ static void reduce_start(rw_run *run, double start)
 static void reduce_step(rw_run *run, double start, double t, double h)
 {
     if (run->reduction == NULL) return;
-    if (run->method == RACEWAY_DP54) rw_explicit_dense(&rw_dp54, &run->plain, &run->numbers, t, run->x, h, run->next, run->dense);
-    else if (run->method == RACEWAY_DOP853) rw_explicit_dense(&rw_dop853, &run->plain, &run->numbers, t, run->x, h, run->next, run->dense);
-    else if (run->method == RACEWAY_RODAS4) rw_rosenbrock_dense(&rw_rodas4, &run->linear, run->dense);
-    else rw_rosenbrock_dense(&rw_rodas5p, &run->linear, run->dense);
+    prepare_dense(run, t, h);
     /* the output of DOP853 is of degree seven, more than five points tell: its steps are taken in halves */
     const int parts = run->method == RACEWAY_DOP853 ? 2 : 1;
     for (int part = 0; part < parts; part++) {
@@ -341,47 +357,168 @@ static void linearize(rw_run *run, double t, int fresh)
     run->result->evaluations++;
 }
 
-/* What a segment has shown about the families so far. */
-typedef struct {
-    double sum;    /* of the reach of the steps looked at */
-    double stable; /* step at which an explicit method is at its limit, where the last look was at a linearly implicit one [s] */
-    int looks, stiff, changes;
-    long steps;
-} rw_family;
+enum { NO_KINK = 0, CUT = 1, AT_ONCE = 2 }; /* what a step met: nothing; it was cut to end on a kink; there is one at its start */
 
-/* The family for the next step, from the accepted one.  The reach of a step is its size times the fastest rate. */
+#ifdef RACEWAY_LOCATED
+/* The step tried, at a part of it: the cubic through its ends and their slopes where these are known, else its dense output. */
+static void glance_at(const rw_run *run, double theta, double *y)
+{
+    if (is_explicit(run->method)) {
+        const rw_state inner = RW_STATE(run->dense[0]) + theta * RW_STATE(run->dense[1]);
+        *(rw_state *)y = RW_STATE(run->x) + theta * (RW_STATE(run->next) - RW_STATE(run->x) + (1.0 - theta) * inner);
+    } else {
+        state_at(run, theta, y);
+    }
+}
+
+/* Look at the step tried, before its end by `at`; whether a side changes. */
+static int look(rw_run *run, double t, double h, void (*at)(const rw_run *, double, double *))
+{
+    int changed = 0;
+    for (int i = 1; i <= RW_LOOKS; i++) {
+        const double theta = (double)i / RW_LOOKS;
+        double y[RW_NX];
+        if (i < RW_LOOKS) at(run, theta, y);
+        rw_switch_values(&run->numbers, t + theta * h, i < RW_LOOKS ? y : run->next, run->sides.seen[i]);
+        changed |= rw_changed(&run->sides, i);
+    }
+    return changed;
+}
+
+/* A switching function of a ball within the step tried. */
+static double switch_at(const rw_run *run, double t, double h, double theta, int i, int j)
+{
+    double y[RW_NX], g[RW_NSWITCHES][RW_NB];
+    if (theta < 1.0) state_at(run, theta, y);
+    rw_switch_values(&run->numbers, t + theta * h, theta < 1.0 ? y : run->next, g);
+    return g[i][j];
+}
+
+/* Where a ball changes its side that is found changed at a look: the first root in front of it, by regula falsi (Illinois). */
+static double root_before(const rw_run *run, double t, double h, int before, int i, int j)
+{
+    const rw_sides *s = &run->sides;
+    const double side = s->side[i][j];
+    int behind = before;
+    while (before > 0 && !(side * s->seen[before - 1][i][j] > 0.0)) behind = --before;
+    if (before == 0) return 0.0;
+    before--;
+    double a = (double)before / RW_LOOKS, b = (double)behind / RW_LOOKS, fa = side * s->seen[before][i][j], fb = side * s->seen[behind][i][j];
+    double root = b;
+    int kept = 0; /* end that the last iteration kept: -1 the first, 1 the last */
+    for (int k = 0; k < RW_ROOT_ITERATIONS && fb < 0.0; k++) {
+        const double next = k % 8 == 7 ? 0.5 * (a + b) : b - fb * (b - a) / (fb - fa), moved = fabs(next - root);
+        if (!(next > a && next < b)) break;
+        root = next;
+        if (!(moved > DBL_EPSILON * root)) break;
+        const double f = side * switch_at(run, t, h, root, i, j);
+        if (f == 0.0) break;
+        if (f > 0.0) {
+            fb *= kept > 0 ? 0.5 : 1.0;
+            a = root, fa = f, kept = 1;
+        } else {
+            fa *= kept < 0 ? 0.5 : 1.0;
+            b = root, fb = f, kept = -1;
+        }
+    }
+    return root;
+}
+
+/* Whether the step tried changes a side.  Then it is repeated with a length that ends on the first kink, and `h` is that length; the sides
+   to turn there are marked. */
+static int locate(rw_run *run, double t, double *h, double *error, double resolution)
+{
+    rw_sides *s = &run->sides;
+    raceway_result *result = run->result;
+    const double tried = *h;
+    if (is_explicit(run->method)) {
+        const int end = run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES;
+        const rw_state delta = RW_STATE(run->next) - RW_STATE(run->x), first = tried * RW_STATE(run->plain.k[0]);
+        *(rw_state *)run->dense[0] = first - delta;
+        *(rw_state *)run->dense[1] = 2.0 * delta - (first + tried * RW_STATE(run->plain.k[end]));
+    } else {
+        prepare_dense(run, t, tried);
+    }
+    if (!look(run, t, tried, glance_at)) return NO_KINK;
+    if (is_explicit(run->method)) {
+        prepare_dense(run, t, tried);
+        if (!look(run, t, tried, state_at)) return NO_KINK;
+    }
+    double theta = 2.0, scale = 0.0;
+    int which = 0, ball = 0;
+    unsigned char changed[RW_NSWITCHES][RW_NB] = {{0}};
+    for (int i = 0; i < RW_NSWITCHES; i++)
+        for (int j = 0; j < RW_NB; j++)
+            for (int k = 1; k <= RW_LOOKS && !changed[i][j]; k++) {
+                if (!(s->side[i][j] * s->seen[k][i][j] < -s->band[i])) continue;
+                changed[i][j] = 1;
+                const double root = root_before(run, t, tried, k, i, j);
+                if (root < theta) theta = root, which = i, ball = j;
+            }
+    for (int j = 0; j < RW_NB; j++) scale = fabs(s->seen[0][which][j]) > scale ? fabs(s->seen[0][which][j]) : scale;
+    double reach = theta * tried;
+    const double band = s->band[which], least = 1e-6 * band, rounding = 4.0 * DBL_EPSILON * scale;
+    /* behind a branch point of the law its slope is unbounded: a linearly implicit step starts in front of it */
+    const int in_front = rw_branch_point[which] > 0.0 && !is_explicit(run->method);
+    const double aim = in_front ? (least > rounding ? least : rounding) : 0.0;
+    result->rejected++;
+    for (int k = 0; k < RW_REPEATS; k++) {
+        if (!(reach > resolution)) {
+            s->turn[which][ball] = 1;
+            return AT_ONCE;
+        }
+        result->rejected += k > 0;
+        const double again = try_step(run, t, reach);
+        if (!(again >= 0.0 && again <= 1.0 && within_reach(run))) {
+            *h = reach;
+            *error = again;
+            return NO_KINK;
+        }
+        rw_switch_values(&run->numbers, t + reach, run->next, s->seen[RW_LOOKS]);
+        const double left = s->seen[RW_LOOKS][which][ball];
+        if (fabs(left) <= band && !(in_front && left > 0.0)) break;
+        prepare_dense(run, t, reach);
+        const double back = 1.0 / 64.0, slope = (left - switch_at(run, t, reach, 1.0 - back, which, ball)) / (back * reach);
+        const double moved = reach - (left + aim) / slope;
+        if (!(moved > 0.0 && moved <= tried)) break;
+        if (k + 1 < RW_REPEATS) reach = moved;
+    }
+    for (int i = 0; i < RW_NSWITCHES; i++)
+        for (int j = 0; j < RW_NB; j++)
+            s->turn[i][j] = changed[i][j] && s->side[i][j] * s->seen[RW_LOOKS][i][j] <= s->band[i];
+    s->turn[which][ball] = 1;
+    *h = reach;
+    return CUT;
+}
+
+/* Turn the sides marked: the slopes at (t, x) are new. */
+static void turn_sides(rw_run *run, double time, double step)
+{
+    rw_turn_sides(&run->sides, time, step);
+    run->result->kinks++;
+}
+
+static void sides_start(rw_run *run, double t)
+{
+    rw_sides_start(&run->sides, &run->numbers, t, run->x, run->weight);
+    run->numbers.border = (const double(*)[RW_NSWITCHES])run->sides.border;
+}
+
+static void sides_move_on(rw_run *run) { rw_sides_move_on(&run->sides); }
+#else
+#define locate(run, t, h, error, resolution) NO_KINK
+#define turn_sides(run, time, step) ((void)(time), (void)(step))
+#define sides_start(run, t) ((void)0)
+#define sides_move_on(run) ((void)0)
+#endif
+
+/* The method for the next step, from the accepted one. */
 static int judge_family(rw_run *run, rw_family *family, double h)
 {
-    const int explicitly = is_explicit(run->method), looking = family->stiff > 0 || family->steps++ % RW_STIFF_LOOK == 0;
-    if (!looking) return run->method;
-    if (explicitly) {
-        const int dp54 = run->method == RACEWAY_DP54;
-        const double limit = dp54 ? 3.25 : 6.1;
-        const double reach = rw_explicit_stiffness(&run->plain, dp54 ? RW_DP54_STAGES : RW_DOP853_STAGES, h, run->next, run->weight);
-        family->stiff = reach > limit ? family->stiff + 1 : 0;
-        if (family->stiff >= RW_STIFF_STEPS) {
-            *family = (rw_family){.changes = family->changes + 1};
-            return RACEWAY_RODAS5P;
-        }
-        family->sum += reach < limit ? reach : limit;
-    } else {
-        /* the fastest of the run: balls that are off now come back.  Before rates have changed no ball has landed yet, and they say
-           nothing; a ring that is always loaded has shown at the start what it is */
-        const double rate = rw_fastest_rate(run->linear.A, run->linear.B);
-        run->fastest = rate > run->fastest ? rate : run->fastest;
-        run->slowest = rate < run->slowest ? rate : run->slowest;
-        if (!(run->fastest > 2.0 * run->slowest)) return run->method;
-        family->stable = RW_LIMITED / run->fastest;
-        family->sum += h * run->fastest;
-    }
-    if (++family->looks < RW_FAMILY_LOOKS) return run->method;
-    const double mean = family->sum / family->looks;
-    family->sum = 0.0;
-    family->looks = 0;
-    if (family->changes >= RW_FAMILY_CHANGES || (explicitly ? !(mean > RW_LIMITED) : !(mean < RW_WORTH_SOLVING))) return run->method;
-    family->changes++;
-    family->stiff = 0;
-    return explicitly ? RACEWAY_RODAS5P : RACEWAY_DP54;
+    if (!rw_family_looks(family)) return run->method;
+    if (!is_explicit(run->method)) return rw_after_linear(family, &run->seen, run->method, rw_fastest_rate(run->linear.A, run->linear.B), h);
+    const int stages = run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES;
+    return rw_after_explicit(family, run->method, rw_explicit_stiffness(&run->plain, stages, h, run->next, run->weight), 1);
 }
 
 /* Integrate one segment from `start` to `end`; its clock starts at zero. */
@@ -394,6 +531,7 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
     const double resolution = DBL_EPSILON * (fabs(start) > fabs(end) ? fabs(start) : fabs(end));
     double t = 0.0;
     if (!(length > 0.0)) return RACEWAY_DONE;
+    if (run->step == 0.0) sides_start(run, t);
     if (restart || run->step == 0.0) {
         if (changeable) {
             const int chosen = choose_method(run, t);
@@ -436,6 +574,15 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
         double error = try_step(run, t, h);
         const double q = error_exponent(run->method);
         if (error >= 0.0 && error <= 1.0 && within_reach(run)) error = tangent_step(run, t, h, error);
+        const double tried = h;
+        const int met = error >= 0.0 && error <= 1.0 && within_reach(run) ? locate(run, t, &h, &error, resolution) : NO_KINK;
+        if (met == AT_ONCE) {
+            turn_sides(run, start + t, tried);
+            if (is_explicit(run->method)) first_slope(run, t);
+            else linearize(run, t, 1);
+            continue;
+        }
+        if (met == CUT) last = 0;
         if (error >= 0.0 && error <= 1.0 && within_reach(run)) {
             /* PI controller (Hairer & Wanner II, section IV.2) */
             const double log_error = log(error > 1e-10 ? error : 1e-10);
@@ -446,11 +593,18 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
             result->steps++;
             write_outputs(run, start, t, h, last ? end : start + (t + h));
             reduce_step(run, start, t, h);
-            const int chosen = changeable ? judge_family(run, &family, h) : run->method;
+            /* a step that was cut says nothing about the families */
+            const int chosen = changeable && met == NO_KINK ? judge_family(run, &family, h) : run->method;
             tangent_accept(run);
             memcpy(run->x, run->next, sizeof run->next);
             t = last ? length : t + h;
-            if (!last || factor < 1.0) run->step = h * factor;
+            if (met == CUT) {
+                if (factor < 1.0) run->step = tried * factor;
+                turn_sides(run, start + t, tried);
+            } else if (!last || factor < 1.0) {
+                run->step = h * factor;
+            }
+            sides_move_on(run);
             rejected_last = 0;
             if (chosen != run->method) {
                 run->method = chosen;
@@ -462,6 +616,8 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
                 } else {
                     linearize(run, t, 1);
                 }
+            } else if (met == CUT && is_explicit(run->method)) {
+                first_slope(run, t);
             } else if (is_explicit(run->method)) {
                 const int stages = run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES;
                 memcpy(run->plain.k[0], run->plain.k[stages], sizeof run->plain.k[0]);
@@ -501,8 +657,7 @@ static int run_all(rw_run *run, const raceway_options *options, const double *p,
     run->x = x;
     run->step = 0.0;
     run->last_error = RW_LOG_SMALL_ERROR;
-    run->fastest = 0.0;
-    run->slowest = INFINITY;
+    run->seen = (rw_rates){0.0, INFINITY};
     run->method = options->method;
     run->outputs = outputs;
     run->output_times = output_times;
@@ -567,11 +722,13 @@ int raceway_run_tangents(const raceway_options *options, const double *p, const 
 long raceway_tangent_work(long blocks) { return blocks * (long)sizeof(rw_tangent_block); }
 #endif
 
+#ifndef RACEWAY_LOCATED
 void raceway_magnitudes(const double *p, const double *c, const double *initial, long moments, const double *inputs, double horizon,
                         double *magnitude)
 {
     rw_magnitudes(p, c, initial, moments, inputs, horizon, magnitude);
 }
+#endif
 
 void raceway_sizes(int *sizes)
 {

@@ -3,6 +3,8 @@
    A segment is a stretch of time within which the inputs u are constant; its clock starts at zero.  The driver lands on every
    segment's end exactly, so that a load that switches there never hides inside a step.
 
+   Compiled with RACEWAY_LOCATED, no step straddles a kink of the law (kinks.h); without, error control steps over them.
+
    No static state, no allocation: callable from many threads at once. */
 #ifndef RACEWAY_STEPPER_H
 #define RACEWAY_STEPPER_H
@@ -51,6 +53,7 @@ typedef struct {
     long factorizations; /* of the iteration matrix */
     long pivoted;        /* of these, with pivoting */
     long switches;       /* changes of method */
+    long kinks;          /* located: steps that end on one, and turns of a side where a step began */
     double time;         /* reached [s] */
     double step;         /* last step size tried [s] */
 } raceway_result;
@@ -100,8 +103,10 @@ RACEWAY_EXPORT long raceway_tangent_work(long blocks);
 
    inputs       u at so many moments spread over the run, row after row
    horizon      a turn, or the run: bounds the travel of a body that nothing holds [s] */
+#ifndef RACEWAY_LOCATED
 RACEWAY_EXPORT void raceway_magnitudes(const double *p, const double *c, const double *initial, long moments, const double *inputs,
                                        double horizon, double *magnitude);
+#endif
 
 /* Sizes the library was compiled for: states, inputs, parameters, constants, balls, lanes. */
 RACEWAY_EXPORT void raceway_sizes(int *sizes);

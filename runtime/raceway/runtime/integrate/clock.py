@@ -34,11 +34,15 @@ def period(manifest: Manifest, values: Values) -> float:
 
 def shaft_speed(manifest: Manifest, values: Values) -> float:
     """Speed of the driver, else of the shaft, counter-clockwise [rad/s]; 0 when the model has neither."""
+    name = speed_name(manifest)
+    return 0.0 if name is None else values[name]
+
+
+def speed_name(manifest: Manifest) -> str | None:
+    """Parameter or constant that holds this speed; None when the model has neither."""
     if manifest.mechanism is not None:
-        return values[manifest.mechanism.speed]
-    if manifest.bearing is not None:
-        return values[manifest.bearing.shaft_speed]
-    return 0.0
+        return manifest.mechanism.speed
+    return None if manifest.bearing is None else manifest.bearing.shaft_speed
 
 
 def crank_angle(manifest: Manifest, values: Values, t: float) -> float:

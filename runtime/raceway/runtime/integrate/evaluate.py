@@ -10,7 +10,7 @@ import numpy as np
 
 from raceway.runtime.errors import RequestError
 from raceway.runtime.integrate import clock
-from raceway.runtime.parameters import Numbers, Parameters, real, vector
+from raceway.runtime.parameters import Numbers, Parameters, real, unchecked_numbers, vector
 from raceway.runtime.request import no_output
 
 if TYPE_CHECKING:
@@ -24,7 +24,13 @@ def evaluate_point(
     x: Sequence[float] | np.ndarray | None,
     outputs: Sequence[str] | None,
 ) -> dict[str, float | np.ndarray]:
-    """Outputs at one time and state; see `raceway.runtime.Model.evaluate`."""
+    """Outputs at one time and state; see `raceway.runtime.Model.evaluate`.
+
+    Raises
+    ------
+    RequestError
+        No such output, a time that is not finite, or a state of another shape.
+    """
     wanted = list(model.outputs) if outputs is None else list(outputs)
     for name in wanted:
         if name not in model.outputs:
@@ -45,10 +51,7 @@ def neighbour(model: Model, numbers: Numbers, change: Mapping[str, float]) -> Nu
     """Numbers beside those of a run.  Bounds do not hold: a difference looks a hair beyond a value at its bound."""
     manifest = model.manifest
     parameters = Parameters(manifest.parameters, {**numbers.parameters, **change})
-    p = np.array(list(parameters.values()), dtype=float)
-    c = model.kernel("constants")({"p": p}) if manifest.constants else np.zeros(0)
-    constants = {info.name: float(value) for info, value in zip(manifest.constants, c, strict=True)}
-    return Numbers(parameters=parameters, p=p, c=c, values={**parameters, **constants})
+    return unchecked_numbers(manifest, parameters, lambda p: model.kernel("constants")({"p": p}))
 
 
 def point(
@@ -72,7 +75,7 @@ def point(
 
 
 def checked_time(t: float) -> float:
-    """A finite time [s]."""
+    """A finite time [s]; RequestError for anything else."""
     value = real(t)
     if not math.isfinite(value):
         raise RequestError(f"t: a finite time [s] is expected, not {t!r}.")

@@ -13,7 +13,9 @@ A further method is a class with `pieces` and `advance`, and a line in `METHODS`
 
 from __future__ import annotations
 
+import io
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -71,7 +73,7 @@ class Frozen:
     c: np.ndarray
 
     def pack(self, start: float, step: float) -> np.ndarray:
-        """The integrators' parameter vector: start, step, scale, u, p, c."""
+        """The integrators' parameter vector: start, step, scale, u, p, c one behind the other, shape (n,)."""
         return np.concatenate([(start, step), self.scale, self.u, self.p, self.c])
 
 
@@ -91,9 +93,11 @@ class GeneratedIntegrator:
 
     @staticmethod
     def required(name: str) -> tuple[str, ...]:
+        """Functions that a model must have for a method of that name."""
         return (f"{name}_1", f"{name}_{GRID}")
 
     def pieces(self, intervals: int) -> list[int]:
+        """Powers of two, as many of `GRID` as there are."""
         sizes = []
         size = GRID
         while intervals:
@@ -103,6 +107,7 @@ class GeneratedIntegrator:
         return sizes
 
     def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
+        """As `Integrator` says."""
         grid = 1 if intervals == 1 else GRID
         values = {"x0": state / frozen.scale, "p": frozen.pack(start, step)}
         name = f"{self._name}_{grid}"
@@ -129,13 +134,16 @@ class CvodesIntegrator:
 
     @staticmethod
     def required(name: str) -> tuple[str, ...]:
+        """Functions that a model must have for this method."""
         return ("rhs",)
 
     def pieces(self, intervals: int) -> list[int]:
+        """All at once."""
         # a multistep method starts with tiny steps: as few starts as possible
         return [intervals] if intervals else []
 
     def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
+        """As `Integrator` says."""
         if intervals not in self._made:
             self._made[intervals] = self._model.virtual_integrator("cvodes", intervals)
         function = self._made[intervals]
@@ -212,24 +220,30 @@ def _call(function: casadi.Function, values: Mapping[str, Any]) -> np.ndarray:
 
 @contextmanager
 def _interrupts_kept() -> Iterator[None]:
-    """Let Ctrl-C be Ctrl-C: CasADi's integrators report it as a right-hand side that failed."""
+    """Let Ctrl-C be Ctrl-C: CasADi's integrators report it as a right-hand side that failed, and print that."""
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):
         yield
         return
     noted = False
+    written, words = sys.stderr, io.StringIO()
 
     def note(number: int, frame: FrameType | None) -> None:
         nonlocal noted
         noted = True
+        sys.stderr = words  # what CasADi writes from here on is of the interrupt
         before(number, frame)
 
     signal.signal(signal.SIGINT, note)
     try:
         yield
-    except RuntimeError:
-        if noted:
-            raise KeyboardInterrupt from None
-        raise
+    except (RuntimeError, KeyboardInterrupt):
+        if not noted:
+            raise
+        words.truncate(0)
+        raise KeyboardInterrupt from None
     finally:
         signal.signal(signal.SIGINT, before)
+        sys.stderr = written
+        if words.getvalue():
+            written.write(words.getvalue())

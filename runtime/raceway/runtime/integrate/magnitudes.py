@@ -53,7 +53,13 @@ def default_magnitudes(model: Model, numbers: Numbers, initial: np.ndarray, dura
 
 
 def model_scales(model: Model, numbers: Numbers, initial: np.ndarray, duration: float, turn: float) -> Scales:
-    """Magnitudes and stiffness of a run, by Python."""
+    """Magnitudes and stiffness of a run, by Python.
+
+    Parameters
+    ----------
+    initial : state at the start, shape (states,)
+    duration, turn : of the run, and of a turn, infinite where nothing turns [s]
+    """
     inputs, horizon = _moments(model, numbers, duration, turn)
     fixed = {"t": 0.0, "p": numbers.p, "c": numbers.c}
     rhs, jacobian = model.kernel("rhs"), model.kernel("rhs_jac_x")

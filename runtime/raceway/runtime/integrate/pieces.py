@@ -71,10 +71,20 @@ def _segment(
         except EvaluationError as fault:
             raise Interrupted(Status.INTEGRATOR_FAILED, now, str(fault)) from fault
         if not np.isfinite(block).all():
-            trajectory.finished = k
             raise Interrupted(Status.NOT_FINITE, now, "")
         now, state = until, block[-1]
         return block
+
+    def fill(size: int) -> None:
+        """The next `size` samples, which one call can take."""
+        nonlocal k
+        last = float(times[k + size - 1])
+        if last > now + near:
+            trajectory.x[k : k + size] = go(last, size)
+        else:
+            trajectory.x[k : k + size] = state
+        k += size
+        trajectory.finished = k
 
     if k < stop:
         if times[k] > now + near:
@@ -84,12 +94,14 @@ def _segment(
         trajectory.finished = k
         # within a piece the samples lie evenly
         for size in integrator.pieces(stop - k) if trajectory.even else [1] * (stop - k):
-            if times[k + size - 1] > now + near:
-                trajectory.x[k : k + size] = go(float(times[k + size - 1]), size)
-            else:
-                trajectory.x[k : k + size] = state
-            k += size
-            trajectory.finished = k
+            try:
+                fill(size)
+            except Interrupted:
+                if size == 1:
+                    raise
+                # a call that fails gives nothing: walk through it again, to keep the samples before its failure
+                for _ in range(size):
+                    fill(1)
     if right > now + near:
         go(right, 1)
     return state

@@ -25,14 +25,15 @@ from raceway.runtime.ensembles.ensemble_driver import BALL_CHANNELS, HEAD, ROWS,
 from raceway.runtime.ensembles.members import edge_windows
 from raceway.runtime.errors import RequestError, SimulationError
 from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.locating import LOCATED, choose_kinks, has_kinks
 from raceway.runtime.integrate.magnitudes import stepper_magnitudes
 from raceway.runtime.integrate.stepper import METHODS as STEPPERS
-from raceway.runtime.integrate.stepper import End, Family, Segments
+from raceway.runtime.integrate.stepper import End, Family, Segments, Stepper
 from raceway.runtime.integrate.stepping import STATUS_OF_END
 from raceway.runtime.integrate.whereabouts import Whereabouts, whereabouts
 from raceway.runtime.manifest import Manifest
-from raceway.runtime.parameters import Numbers, unknown_name
-from raceway.runtime.request import tolerance
+from raceway.runtime.parameters import Numbers, real, unknown_name
+from raceway.runtime.request import Request, run_length, start_state, tolerance
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -166,18 +167,8 @@ def choose_family(asked: str) -> Family:
     return STEPPERS[asked]
 
 
-def reduce_run(
-    model: Model,
-    numbers: Numbers,
-    *,
-    initial: np.ndarray,
-    duration: float,
-    transient: float,
-    method: str,
-    rtol: float,
-    progress: Callable[[float], None] | None = None,
-) -> Reductions:
-    """Integrate from t = 0 and reduce.
+def reduce_run(model: Model, numbers: Numbers, request: Request) -> Reductions:
+    """Integrate from t = 0 and reduce; what the request leaves open is as the scene's run settings say.
 
     Raises
     ------
@@ -186,9 +177,16 @@ def reduce_run(
     SimulationError
         The computation failed.
     """
+    run = model.manifest.run
+    method, rtol = request.method or run.method, run.rtol if request.rtol is None else request.rtol
+    initial = start_state(model, numbers, request.initial)
     turn = clock.period(model.manifest, numbers.values)
+    duration = run_length(model, request, turn)
+    transient = run.transient_cycles if request.transient_cycles is None else real(request.transient_cycles)
     start = check_span(duration, turn, transient)
     family = choose_family(method) if method != QUASI_STATIC else None
+    named = "stepper" if family is not None and method == "auto" else method
+    chosen = choose_kinks(request.kinks, named, model.manifest, check_rtol(rtol))
     driver = model.ensemble_driver
     looked_at = min(duration, SCALED_TURNS * turn)
     tolerance = check_rtol(rtol) * stepper_magnitudes(model, driver.stepper, numbers, initial, looked_at, turn)
@@ -197,8 +195,11 @@ def reduce_run(
     if family is None:
         steps, rejected = reduce_quasi_static(model, numbers, tolerance, state, row, (duration, turn, start))
     else:
+        stepper = model.locating_stepper if chosen == LOCATED and has_kinks(model.manifest) else driver.stepper
         steps, rejected = integrate_reduced(
-            model, driver, numbers, family, tolerance, state, row, (duration, turn, start), progress=progress
+            *(model, driver, numbers, family, tolerance, state, row, (duration, turn, start)),
+            progress=request.progress,
+            stepper=stepper,
         )
     names = channel_names(model.manifest)
     return Reductions(
@@ -224,6 +225,7 @@ def integrate_reduced(
     *,
     progress: Callable[[float], None] | None = None,
     stop: ctypes.c_int | None = None,
+    stepper: Stepper | None = None,
 ) -> tuple[int, int]:
     """Integrate one run, adding to a reduction; `state` is brought to the end.  Returns steps, rejected steps.
 
@@ -231,6 +233,7 @@ def integrate_reduced(
     ----------
     span : duration, time of a turn, time from which on is reduced [s]
     stop : ends the run, with the reduction as it is, when it becomes nonzero
+    stepper : another driver of single runs with reductions
 
     Raises
     ------
@@ -249,7 +252,7 @@ def integrate_reduced(
         first = before is None or not np.array_equal(before, u[0, gates])
         restarts = np.concatenate([[first], np.any(np.diff(u[:, gates], axis=0) != 0.0, axis=1)])
         before = u[-1, gates]
-        outcome = driver.stepper.run(
+        outcome = (stepper or driver.stepper).run(
             family=family,
             tolerance=tolerance,
             p=numbers.p,

@@ -117,11 +117,12 @@ def _find_scales(
         loaded.append((inputs[k], *(end or (rest, False))))
 
     travel = [float(np.max(np.abs(x[:half]))) for _, x, held in loaded if held]
-    if not travel and acceleration > 0.0:
-        travel = [reach]
+    if not travel or acceleration == 0.0:
+        # its load pushes the body, and its initial velocity carries it
+        travel += [reach, float(np.max(np.abs(initial[half:]))) * horizon / (2.0 * math.pi)]
     position = max([*travel, float(np.max(np.abs(initial[:half])))])
     apart = max(_apart(x) for x in (initial, *(x for _, x, _ in loaded)))
-    if apart > 0.0:
+    if half > 2 and apart > 0.0:
         position = min(position, SOFT * apart)
     speed = max(math.sqrt(acceleration * position), float(np.max(np.abs(initial[half:]))))
     # a model at rest without load: any magnitude will do

@@ -32,7 +32,7 @@ def time_resolution(begin: float, end: float, turn: float) -> float:
 
 
 def segment_edges(model: Model, numbers: Numbers, begin: float, end: float, turn: float) -> np.ndarray:
-    """Begin, breakpoints, whole turns and end, increasing, none twice [s]."""
+    """Begin, breakpoints, whole turns and end, increasing, none twice, shape (segments + 1,) [s]."""
     cuts = clock.breakpoints(model.manifest.inputs, numbers.values, begin, end)
     if math.isfinite(turn):
         near = time_resolution(begin, end, turn)

@@ -22,6 +22,7 @@ from raceway.runtime.accuracy.quasi_static import NAME as QUASI_STATIC
 from raceway.runtime.errors import RequestError
 from raceway.runtime.integrate.integrators import METHODS, available_methods
 from raceway.runtime.integrate.limits import refuse_crawl
+from raceway.runtime.integrate.locating import STEPPED_OVER, Kinks, choose_kinks
 from raceway.runtime.integrate.magnitudes import model_scales, stepper_magnitudes
 from raceway.runtime.integrate.pieces import integrate
 from raceway.runtime.integrate.scales import Scales
@@ -61,20 +62,70 @@ def simulate(
     interval = (0.0, plan.duration)
     trajectory = start_trajectory(model, numbers, plan.times, plan.initial, interval, plan.turn, even=plan.even)
     method, reason, magnitude = _choose(model, numbers, request.method, plan, trajectory)
+    # derivatives are those of steps that go over kinks
+    kinks = choose_kinks(request.kinks, method, model.manifest, plan.rtol) if prepare is None else STEPPED_OVER
     failure = None
     cost = Cost()
     try:
         directions = prepare(len(plan.times)) if prepare is not None else None
         if directions is not None and plan.sensitivity_rtol is not None:
             directions.control(plan.sensitivity_rtol, magnitude)
-        fill(model, numbers, method, plan.rtol * magnitude, trajectory, cost, request.progress, directions)
+        fill(model, numbers, method, plan.rtol * magnitude, trajectory, cost, request.progress, directions, kinks)
     except Interrupted as end:
         failure = end
     if cost.families:
         reason = f"{reason}; {', '.join(dict.fromkeys(cost.families))} at the end"
 
+    solution = to_solution(
+        model,
+        numbers,
+        plan,
+        trajectory,
+        cost,
+        method=method,
+        reason=reason,
+        magnitude=magnitude,
+        started=started,
+        status=Status.DONE if failure is None else failure.status,
+    )
+    if failure is not None:
+        state = trajectory.x[max(trajectory.finished - 1, 0)] if failure.state is None else failure.state
+        place = whereabouts(model.manifest, numbers, failure.time, state)
+        raise IntegrationError(
+            failure.status,
+            time=failure.time,
+            crank_angle=place.crank_angle,
+            ball=place.ball,
+            method=method,
+            detail=f"{failure.detail} {place.words}".strip(),
+            partial=solution,
+        )
+    return solution
+
+
+def to_solution(
+    model: Model,
+    numbers: Numbers,
+    plan: Plan,
+    trajectory: Trajectory,
+    cost: Cost,
+    *,
+    method: str,
+    reason: str,
+    magnitude: np.ndarray,
+    started: float,
+    status: Status,
+) -> Solution:
+    """The solution of a trajectory that has been filled, with the outputs that the plan names.
+
+    Parameters
+    ----------
+    reason : why that method
+    magnitude : of the states, which the tolerance is relative to, shape (states,)
+    started : reading of `time.perf_counter` when the run began [s]
+    """
     done = trajectory.finished
-    solution = Solution(
+    return Solution(
         t=trajectory.t[:done],
         x=trajectory.x[:done],
         outputs=evaluate_outputs(model, numbers, trajectory, plan.outputs, at_rest=method == QUASI_STATIC),
@@ -90,26 +141,15 @@ def simulate(
             magnitudes=tuple(magnitude.tolist()),
             steps=cost.steps,
             rejected=cost.rejected,
+            kinks=cost.kinks,
+            located=cost.located,
             segments=trajectory.passed,
             calls=trajectory.calls,
             wall_time=clocks.perf_counter() - started,
             compiled=model.compiled and method != "cvodes",
         ),
-        status=Status.DONE if failure is None else failure.status,
+        status=status,
     )
-    if failure is not None:
-        state = trajectory.x[max(done - 1, 0)] if failure.state is None else failure.state
-        place = whereabouts(model.manifest, numbers, failure.time, state)
-        raise IntegrationError(
-            failure.status,
-            time=failure.time,
-            crank_angle=place.crank_angle,
-            ball=place.ball,
-            method=method,
-            detail=f"{failure.detail} {place.words}".strip(),
-            partial=solution,
-        )
-    return solution
 
 
 def fill(
@@ -121,6 +161,7 @@ def fill(
     cost: Cost,
     progress: Callable[[float], None] | None = None,
     directions: Directions | None = None,
+    kinks: Kinks = STEPPED_OVER,
 ) -> None:
     """Fill the samples of `trajectory` by a method of that name ("none" for a model without states); notes the cost.
 
@@ -130,7 +171,7 @@ def fill(
         The method could not reach the end.
     """
     if method in STEPPERS:
-        step_through(model, numbers, STEPPERS[method], tolerance, trajectory, cost, progress, directions)
+        step_through(model, numbers, STEPPERS[method], tolerance, trajectory, cost, progress, directions, kinks)
         return
     if method == QUASI_STATIC:
         from raceway.runtime.accuracy.quasi_static_runs import fill_quasi_static  # it builds on this module

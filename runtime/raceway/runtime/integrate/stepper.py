@@ -15,18 +15,17 @@ from pathlib import Path
 
 import numpy as np
 
-from raceway.runtime.compiled.compile import CompiledLibrary, Compiler, compile_sources
-from raceway.runtime.errors import ArtefactError
+from raceway.runtime.compiled.compile import CompiledLibrary, Compiler
+from raceway.runtime.compiled.driver_library import (
+    HEADERS,
+    LOCATING_HEADERS,
+    address,
+    check_sizes,
+    compile_driver,
+    input_columns,
+    padded,
+)
 from raceway.runtime.manifest import Manifest
-
-#: C sources of the driver, and the generated headers it includes.
-DRIVER = Path(__file__).parent.parent / "driver"
-HEADERS = ("kernels.h", "methods.h", "tangents.h")
-
-#: IEEE arithmetic throughout, without fused multiply-add: contact amplifies the last bit, and another compiler should
-#: give the same motion.  What is given up is errno and traps, and what is gained are vectors of square roots.
-#: Packing scalars of short dependent chains costs more than it saves.
-FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd", "-fno-tree-slp-vectorize")
 
 #: Most steps of a call, accepted and rejected, unless the caller says otherwise: some seconds, during which the
 #: interpreter is deaf to an interrupt.
@@ -96,6 +95,7 @@ class _Result(ctypes.Structure):
         ("factorizations", ctypes.c_long),
         ("pivoted", ctypes.c_long),
         ("switches", ctypes.c_long),
+        ("kinks", ctypes.c_long),
         ("time", ctypes.c_double),
         ("step", ctypes.c_double),
     )
@@ -127,7 +127,7 @@ class Outcome:
     family : method of the last segment
     state : index of the state that ended it, -1 if none
     written : output times reached
-    steps, rejected, evaluations, factorizations, pivoted, switches : counts
+    steps, rejected, evaluations, factorizations, pivoted, switches, kinks : counts
     time : reached [s]
     step : last step size tried [s]
     """
@@ -142,6 +142,7 @@ class Outcome:
     factorizations: int
     pivoted: int
     switches: int
+    kinks: int
     time: float
     step: float
 
@@ -183,15 +184,21 @@ def compile_stepper(
     CompileError
         The compiler failed.
     """
-    sources = (DRIVER / "stepper.c",)
-    headers = [*sorted(DRIVER.glob("*.h")), *(folder.absolute() / name for name in HEADERS)]
-    return compile_sources(
-        sources,
-        compiler,
-        label=f"{manifest.scene}-stepper",
-        headers=headers,
-        include=(folder.absolute(), DRIVER),
-        flags=(*FLAGS, "-DRACEWAY_SENSITIVITIES") if sensitivities else FLAGS,
+    flags = ("-DRACEWAY_SENSITIVITIES",) if sensitivities else ()
+    return compile_driver(folder, manifest, compiler, ("stepper.c",), kind="stepper", headers=HEADERS, flags=flags)
+
+
+def compile_locating_stepper(folder: Path, manifest: Manifest, compiler: Compiler) -> CompiledLibrary:
+    """Library of the driver whose steps end on the kinks of the laws, with reductions.
+
+    Raises
+    ------
+    CompileError
+        The compiler failed.
+    """
+    flags = ("-DRACEWAY_LOCATED", "-DRACEWAY_REDUCTIONS")
+    return compile_driver(
+        folder, manifest, compiler, ("stepper.c",), kind="locating", headers=LOCATING_HEADERS, flags=flags
     )
 
 
@@ -209,28 +216,19 @@ class Stepper:
         code = ctypes.CDLL(str(library.path))
         sizes = (ctypes.c_int * 6)()
         code.raceway_sizes(sizes)
-        inputs = max(len(manifest.inputs), 1)
-        expected = [len(manifest.states), inputs, len(manifest.parameters), len(manifest.constants)]
-        if list(sizes)[:4] != expected:
-            raise ArtefactError(
-                f"{library.path}: compiled for {list(sizes)[:4]} states, inputs, parameters and constants, the "
-                f"manifest has {expected}. Write the folder again."
-            )
-        self._inputs = inputs
+        check_sizes(library, list(sizes)[:4], manifest)
+        self._inputs = input_columns(manifest)
         #: directions that the driver differentiates along at once
         self.lanes = int(sizes[5])
         self._code = code
         self._run = code.raceway_run
         self._run.restype = ctypes.c_int
         # addresses as numbers: making typed pointers would take as long as a hundred steps
-        address, long = ctypes.c_void_p, ctypes.c_long
+        pointer, long = ctypes.c_void_p, ctypes.c_long
         self._run.argtypes = (
-            *(ctypes.POINTER(_Options), address, address, address, long, address, address, address),
-            *(long, address, address, ctypes.POINTER(_Result)),
+            *(ctypes.POINTER(_Options), pointer, pointer, pointer, long, pointer, pointer, pointer),
+            *(long, pointer, pointer, ctypes.POINTER(_Result)),
         )
-        self._magnitudes = code.raceway_magnitudes
-        self._magnitudes.restype = None
-        self._magnitudes.argtypes = (address, address, address, long, address, ctypes.c_double, address)
 
     def run(
         self,
@@ -262,26 +260,26 @@ class Stepper:
         tangents : directions to differentiate along; the library must have been compiled with sensitivities
         reduction : row of on-line reductions to add to; the library must have been compiled with reductions
         """
-        inputs = segments.inputs if segments.inputs.shape[1] else np.zeros((len(segments.inputs), self._inputs))
+        inputs = padded(segments.inputs, self._inputs)
         restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
-        reduced = None if reduction is None else _pointer("reduction", reduction)
+        reduced = None if reduction is None else address("reduction", reduction)
         options = _Options(
-            *(family, max_steps, first_step, smallest_step, largest_step, _pointer("tolerance", tolerance), reduced)
+            *(family, max_steps, first_step, smallest_step, largest_step, address("tolerance", tolerance), reduced)
         )
         result = _Result()
         call = self._run if tangents is None else self._differentiated(tangents)
         call(
             ctypes.byref(options),
-            _pointer("p", p),
-            _pointer("c", c),
-            _pointer("x", x),
+            address("p", p),
+            address("c", c),
+            address("x", x),
             len(restarts),
-            _pointer("times", segments.times),
-            _pointer("inputs", inputs),
+            address("times", segments.times),
+            address("inputs", inputs),
             restarts.ctypes.data,
             len(output_times),
-            _pointer("output_times", output_times),
-            None if output_states is None else _pointer("output_states", output_states),
+            address("output_times", output_times),
+            None if output_states is None else address("output_states", output_states),
             ctypes.byref(result),
         )
         return Outcome(
@@ -295,6 +293,7 @@ class Stepper:
             factorizations=result.factorizations,
             pivoted=result.pivoted,
             switches=result.switches,
+            kinks=result.kinks,
             time=result.time,
             step=result.step,
         )
@@ -304,32 +303,36 @@ class Stepper:
     ) -> np.ndarray:
         """Magnitudes of the states of a run (see `raceway.runtime.integrate.scales`), shape (states,).
 
+        The library that locates kinks has none: they are those of the plain one.
+
         Parameters
         ----------
         initial : state at the start, shape (states,)
         inputs : inputs at moments spread over the run, shape (moments, inputs)
         horizon : a turn, or the run [s]
         """
-        # C knows no arrays without entries
-        padded = inputs if inputs.shape[1] else np.zeros((len(inputs), self._inputs))
+        moments = padded(inputs, self._inputs)
         found = np.empty_like(initial)
-        self._magnitudes(
-            *(_pointer(name, array) for name, array in (("p", p), ("c", c), ("initial", initial))),
-            len(padded),
-            _pointer("inputs", padded),
+        magnitudes, pointer = self._code.raceway_magnitudes, ctypes.c_void_p
+        magnitudes.restype = None
+        magnitudes.argtypes = (pointer, pointer, pointer, ctypes.c_long, pointer, ctypes.c_double, pointer)
+        magnitudes(
+            *(address(name, array) for name, array in (("p", p), ("c", c), ("initial", initial))),
+            len(moments),
+            address("inputs", moments),
             horizon,
-            _pointer("found", found),
+            address("found", found),
         )
         return found
 
     def _differentiated(self, tangents: Tangents) -> Callable[..., int]:
         """The driver's call with derivatives, the directions bound."""
         fields = ("p", "c", "u", "shift", "x", "outputs")
-        pointers = {name: _pointer(name, getattr(tangents, name)) for name in fields}
+        pointers = {name: address(name, getattr(tangents, name)) for name in fields}
         blocks = len(tangents.x)
         self._code.raceway_tangent_work.restype = ctypes.c_long
         work = np.empty(self._code.raceway_tangent_work(ctypes.c_long(blocks)) // 8 + 8)
-        weight = None if tangents.weight is None else _pointer("weight", tangents.weight)
+        weight = None if tangents.weight is None else address("weight", tangents.weight)
         bound = _Tangents(blocks=blocks, work=work.ctypes.data, weight=weight, rtol=tangents.rtol, **pointers)
         run = self._code.raceway_run_tangents
         run.restype = ctypes.c_int
@@ -342,11 +345,3 @@ class Stepper:
             return done
 
         return call
-
-
-def _pointer(name: str, array: np.ndarray) -> int:
-    """Address of an array's numbers; the array must outlive its use."""
-    if array.dtype != np.float64 or not array.flags.c_contiguous:
-        raise TypeError(f"{name}: a C-contiguous array of float64 is expected, not {array.dtype}, {array.flags}")
-    address: int = array.ctypes.data
-    return address

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from raceway.runtime.integrate.limits import STEPS_A_SECOND, STEPS_A_TURN, step_limit
+from raceway.runtime.integrate.locating import LOCATED, STEPPED_OVER, Kinks, stepper_for
 from raceway.runtime.integrate.segments import part_of, rest_of
 from raceway.runtime.integrate.stepper import End, Family, Outcome
 from raceway.runtime.integrate.trajectory import Interrupted, Trajectory
@@ -45,10 +46,13 @@ STATUS_OF_END = {
 
 @dataclass(slots=True, kw_only=True)
 class Cost:
-    """What an integration took: steps where the method tells, and the families the stepper ended with."""
+    """What an integration took: steps where the method tells, what it did at kinks and how many of them it located, and
+    the families the stepper ended with."""
 
     steps: int | None = 0
     rejected: int | None = 0
+    kinks: Kinks | None = None
+    located: int | None = None
     families: list[str] = field(default_factory=list)
 
 
@@ -61,6 +65,7 @@ def step_through(
     cost: Cost,
     progress: Callable[[float], None] | None = None,
     directions: Directions | None = None,
+    kinks: Kinks = STEPPED_OVER,
 ) -> None:
     """Fill the samples of `trajectory`; with derivatives along `directions`.
 
@@ -69,7 +74,8 @@ def step_through(
     Interrupted
         The stepper could not reach the end.
     """
-    stepper = model.stepper if directions is None else model.differentiating_stepper
+    cost.kinks, cost.located = kinks, 0 if kinks == LOCATED else None
+    stepper = stepper_for(model, kinks) if directions is None else model.differentiating_stepper
     inputs = model.manifest.inputs
     state = trajectory.initial.copy()
     span = trajectory.end - trajectory.begin
@@ -141,6 +147,8 @@ def _calls(restarts: np.ndarray, *, whole: bool) -> Iterator[tuple[int, int]]:
 def _note(cost: Cost, outcome: Outcome, family: Family) -> None:
     cost.steps = (cost.steps or 0) + outcome.steps
     cost.rejected = (cost.rejected or 0) + outcome.rejected
+    if cost.located is not None:
+        cost.located += outcome.kinks
     if family is Family.AUTO:
         cost.families.append(outcome.family.name.lower())
 

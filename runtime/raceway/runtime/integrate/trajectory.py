@@ -74,7 +74,16 @@ def start_trajectory(
     *,
     even: bool,
 ) -> Trajectory:
-    """Memory for samples at `times`, and the segments of the `interval` [s]."""
+    """Memory for samples, and the segments they lie in.
+
+    Parameters
+    ----------
+    times : of the samples, increasing, shape (samples,) [s]
+    initial : state at the start, shape (states,)
+    interval : begin and end of the run [s]
+    turn : time of a turn, infinite where nothing turns [s]
+    even : whether the samples are the ends of equal intervals of the whole run
+    """
     begin, end = interval
     segments = make_segments(model.manifest.inputs, numbers, segment_edges(model, numbers, begin, end, turn))
     near = time_resolution(begin, end, turn)

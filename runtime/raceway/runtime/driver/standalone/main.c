@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "located.h"
 #include "scene.h"
 #include "stepper.h"
 
@@ -33,6 +34,7 @@ typedef struct {
     double rtol;
     long samples; /* in a turn; in the whole run where nothing turns */
     int method;
+    int located; /* whether steps end on the kinks of the laws */
 } request;
 
 static void help(const char *program)
@@ -43,6 +45,7 @@ static void help(const char *program)
     printf("  --rtol R         error allowed in a step, relative to the magnitudes of the states; default %g\n", scene_rtol);
     printf("  --samples N      samples in a turn (in the whole run where nothing turns); default %ld\n", scene_samples);
     printf("  --method M       auto, rodas4, rodas5p, dp54, dop853; default %s\n", scene_method);
+    printf("  --kinks HOW      stepped-over, or located: steps end where a law has a kink or jump; default stepped-over\n");
     printf("  --list           print parameters with values, units and meaning, and stop\n\n");
     printf("Values of parameters are numbers in SI units.\n");
 }
@@ -67,6 +70,35 @@ static int refuse(const char *what, const char *given, const char *allowed)
     return EXIT_REQUEST;
 }
 
+/* Says which values are outside the scene's bounds, all of them, and what is allowed; returns how many. */
+static int refuse_outside(const double *values)
+{
+    int faults = 0;
+    for (int i = 0; i < SCENE_PARAMETERS; i++) {
+        const scene_parameter *info = &scene_parameters[i];
+        const double value = values[i];
+        /* not a number is no pass */
+        if (value > info->above && value >= info->least && value <= info->most && value < info->below) continue;
+        fprintf(stderr, "error: %s: %.9g was given. Allowed: a number", info->name, value);
+        if (info->above > -INFINITY) fprintf(stderr, " above %g", info->above);
+        if (info->least > -INFINITY) fprintf(stderr, " from %g", info->least);
+        if (info->most < INFINITY) fprintf(stderr, " to %g", info->most);
+        if (info->below < INFINITY) fprintf(stderr, " below %g", info->below);
+        fprintf(stderr, " [%s].\n", info->unit);
+        faults++;
+    }
+    for (int k = 0; k < SCENE_RELATIONS; k++) {
+        const scene_relation *rule = &scene_relations[k];
+        const double least = rule->factor * values[rule->other];
+        if (values[rule->parameter] > least) continue;
+        fprintf(stderr, "error: %s: %.9g was given. Allowed: a number above %.9g times %s, which is %.9g [%s].\n",
+                scene_parameters[rule->parameter].name, values[rule->parameter], rule->factor, scene_parameters[rule->other].name, least,
+                scene_parameters[rule->parameter].unit);
+        faults++;
+    }
+    return faults;
+}
+
 static int set_option(request *asked, const char *name, const char *text)
 {
     double value;
@@ -77,6 +109,10 @@ static int set_option(request *asked, const char *name, const char *text)
                 return 0;
             }
         return refuse(name, text, "auto, rodas4, rodas5p, dp54, dop853.");
+    }
+    if (!strcmp(name, "--kinks")) {
+        asked->located = !strcmp(text, "located");
+        return asked->located || !strcmp(text, "stepped-over") ? 0 : refuse(name, text, "stepped-over, located.");
     }
     if (!number(text, &value) || value <= 0.0) return refuse(name, text, "a number above 0.");
     if (!strcmp(name, "--cycles")) {
@@ -109,7 +145,7 @@ static int set_parameter(double *values, const char *text)
 
 static int known_option(const char *name)
 {
-    static const char *const options[] = {"--cycles", "--duration", "--rtol", "--samples", "--method"};
+    static const char *const options[] = {"--cycles", "--duration", "--rtol", "--samples", "--method", "--kinks"};
     for (int k = 0; k < (int)(sizeof options / sizeof *options); k++)
         if (!strcmp(name, options[k])) return 1;
     return 0;
@@ -143,6 +179,7 @@ static int read_request(int count, char **arguments, request *asked, double *val
         if (fault) return fault;
     }
     if (listed) {
+        if (refuse_outside(values)) return EXIT_REQUEST;
         list(values);
         return -1;
     }
@@ -175,6 +212,7 @@ static int print_rows(const double *times, const double *states, long rows)
 typedef struct {
     double *times, *edges, *inputs, *wanted, *states;
     unsigned char *restarts;
+    int located;
 } memory;
 
 static void release(memory *m)
@@ -213,6 +251,10 @@ static int run_part(memory *m, long first, long count, int whole, long from, lon
         for (int k = 0; k < SCENE_INPUTS; k++)
             if (scene_inputs[k].kind != SCHEDULE_PHASE && past && u[k] != past[k]) m->restarts[i] = 1;
     }
+#ifdef SCENE_KINKS
+    if (m->located)
+        return raceway_run_located(options, values, values + SCENE_PARAMETERS, x, count, edges, m->inputs, m->restarts, samples, wanted, states, result);
+#endif
     return raceway_run(options, values, values + SCENE_PARAMETERS, x, count, edges, m->inputs, m->restarts, samples, wanted, states, result);
 }
 
@@ -229,10 +271,12 @@ static int simulate(const request *asked, const double *values)
         tolerance[i] = asked->rtol * scene_magnitudes[i];
         x[i] = values[scene_initial[i]];
     }
+    /* far above what any method needs that fits the model: what meets it crawls */
+    const double steps = 2e7 + 1e7 * ceil(duration / turn) + 1e6 * duration;
     const raceway_options options = {
-        .method = asked->method, .max_steps = 1000000000L, .largest_step = INFINITY, .tolerance = tolerance};
+        .method = asked->method, .max_steps = steps < 2e9 ? (long)steps : 2000000000L, .largest_step = INFINITY, .tolerance = tolerance};
     const size_t inputs = SCENE_INPUTS > 0 ? SCENE_INPUTS : 1;
-    memory m = {NULL, NULL, NULL, NULL, NULL, NULL};
+    memory m = {NULL, NULL, NULL, NULL, NULL, NULL, asked->located};
     m.times = malloc((size_t)(count + 1) * sizeof *m.times);
     m.inputs = malloc(SEGMENTS_A_CALL * inputs * sizeof *m.inputs);
     m.restarts = malloc(SEGMENTS_A_CALL);
@@ -283,7 +327,7 @@ static int simulate(const request *asked, const double *values)
 int main(int argc, char **argv)
 {
     static double values[SCENE_PARAMETERS + SCENE_CONSTANTS];
-    request asked = {scene_cycles, scene_duration, scene_rtol, scene_samples, 0};
+    request asked = {scene_cycles, scene_duration, scene_rtol, scene_samples, 0, 0};
     int sizes[16] = {0};
     raceway_sizes(sizes);
     if (sizes[0] != SCENE_STATES || sizes[2] != SCENE_PARAMETERS || sizes[3] != SCENE_CONSTANTS) {
@@ -295,6 +339,7 @@ int main(int argc, char **argv)
         if (!strcmp(scene_method, METHODS[k])) asked.method = k;
     const int fault = read_request(argc, argv, &asked, values);
     if (fault) return fault < 0 ? EXIT_SUCCESS : fault;
+    if (refuse_outside(values)) return EXIT_REQUEST;
     const double *p = values;
     double *c = values + SCENE_PARAMETERS;
     scene_constants(p, c);

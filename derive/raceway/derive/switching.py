@@ -1,0 +1,180 @@
+"""Where the laws of a ball are not smooth: switching functions, and the law with its sides held.
+
+In: the ball's elastic and damping force over deflection and rate.  Out: `Switching`: one function for each place at
+which a force, or its first or second derivative, jumps or is unbounded, and the force as a function of sides.
+
+Every case distinction of the laws is looked at.  It has two branches; what counts is with which power of the distance
+from the place where they meet their difference grows, along the quantity that decides (deflection or rate).  Smoothed
+laws also distinguish cases, but their branches meet smoothly, and those are no kinks.
+
+A branch that can be continued beyond its place (the damping force c_b times rate, both ways) is *held*: its condition
+z > z0 becomes z - z0 > b with a border b for each ball, minus infinity to hold it true, infinity to hold it false, 0 to
+leave it as it is.  Hertz's law cannot, for it has a branch point at zero: it keeps its condition, and only the step
+ends there.
+
+Balls of an even number stand in opposite pairs, with opposite rates and directions.  Where a force depends on the rate
+alone, the pair pushes with F(z) - F(-z), and what F(z) has in common with F(-z) drops out: the damping force
+c_b max(z, 0) of each ball has a kink, their sum c_b z has none, and there is nothing to locate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mpmath
+import sympy as sp
+from sympy.core.relational import Relational
+
+#: A law is smooth enough where this derivative is continuous: its branches differ by a higher power of the distance.
+KINK_ORDER = 2
+
+#: Values of the quantity that does not decide, in units of what the other numbers are: far and near on both sides.
+_ELSEWHERE = (sp.Integer(-30), sp.Rational(-1, 7), sp.Rational(2, 11), sp.Integer(40))
+
+#: Distances from the meeting place, as decimals, and digits to compute with; what is below the last number is rounding.
+_DISTANCES, _DIGITS, _ZERO = ("1e-12", "1e-11"), 100, 1e-80
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Switch:
+    """A place at which a law switches.
+
+    Attributes
+    ----------
+    function : positive on one side, negative on the other: deflection or rate less a constant of the run
+    of_rate : whether it is a rate [m/s]; else a deflection [m]
+    branch_point : whether some law ends there and cannot be continued
+    jumps : whether a force jumps there
+    border : symbol that the function is compared with in the held law
+    """
+
+    function: sp.Expr
+    of_rate: bool
+    branch_point: bool
+    jumps: bool
+    border: sp.Symbol
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Switching:
+    """The switches of a ball's force, and the force with held sides; `holds` tells whether it differs from the law."""
+
+    switches: tuple[Switch, ...]
+    force: sp.Expr
+    holds: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Place:
+    kink: bool
+    branch_point: bool
+    jumps: bool
+
+
+def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Symbol, *, pairs: bool) -> Switching:
+    """Switches of the sum of `parts`, each a force over `deflection` and `rate`.
+
+    Parameters
+    ----------
+    pairs : whether the balls stand opposite each other
+
+    Raises
+    ------
+    TypeError
+        A condition is not of the form deflection or rate against a constant of the run.
+    """
+    found: dict[tuple[bool, sp.Expr], list[_Place]] = {}
+    held: list[dict[sp.Basic, tuple[bool, sp.Expr]]] = []
+    for part in parts:
+        borders: dict[sp.Basic, tuple[bool, sp.Expr]] = {}
+        for condition in sp.ordered(part.atoms(Relational)):
+            of_rate, start = _border(condition, deflection, rate)
+            decides, other = (rate, deflection) if of_rate else (deflection, rate)
+            paired = pairs and of_rate and start == 0 and deflection not in part.free_symbols
+            place = _look(part, condition, decides, start, other, paired=paired)
+            if not place.kink:
+                continue
+            found.setdefault((of_rate, start), []).append(place)
+            if not place.branch_point:
+                borders[condition] = (of_rate, start)
+        held.append(borders)
+    order = sorted(found, key=lambda key: (key[0], sp.default_sort_key(key[1])))
+    names = {key: sp.Symbol(f"ball.border_{k}", real=True) for k, key in enumerate(order)}
+    switches = tuple(
+        Switch(
+            function=(rate if key[0] else deflection) - key[1],
+            of_rate=key[0],
+            branch_point=any(place.branch_point for place in found[key]),
+            jumps=any(place.jumps for place in found[key]),
+            border=names[key],
+        )
+        for key in order
+    )
+    functions = dict(zip(order, (switch.function for switch in switches), strict=True))
+    force = sum(
+        (
+            part.xreplace({c: sp.StrictGreaterThan(functions[key], names[key]) for c, key in borders.items()})
+            for part, borders in zip(parts, held, strict=True)
+        ),
+        start=sp.S.Zero,
+    )
+    return Switching(switches=switches, force=force, holds=any(held))
+
+
+def _border(condition: Relational, deflection: sp.Symbol, rate: sp.Symbol) -> tuple[bool, sp.Expr]:
+    """Whether a condition is one of the rate, and the value above which it holds."""
+    larger = sp.expand(condition.gts - condition.lts)
+    for symbol, other in ((deflection, rate), (rate, deflection)):
+        start = symbol - larger
+        if symbol in larger.free_symbols and not start.free_symbols & {symbol, other}:
+            return symbol == rate, start
+    raise TypeError(f"the condition {condition} is expected to compare deflection or rate with a constant of the run")
+
+
+def _look(
+    part: sp.Expr, condition: Relational, decides: sp.Symbol, start: sp.Expr, other: sp.Symbol, *, paired: bool
+) -> _Place:
+    """How the two branches of a condition meet, tried with exact numbers of about one for everything else.
+
+    Parameters
+    ----------
+    paired : whether an opposite ball has the same force with the opposite sign of what decides
+    """
+    rest = sorted((part.free_symbols | start.free_symbols) - {decides, other}, key=sp.default_sort_key)
+    numbers = {symbol: sp.Rational(sp.prime(k + 10), 37) for k, symbol in enumerate(rest)}
+    meets = start.xreplace(numbers)
+    kink = branch = jumps = False
+    for elsewhere in _ELSEWHERE if other in part.free_symbols else _ELSEWHERE[:1]:
+        branches = []
+        for side in (sp.true, sp.false):
+            piece = part.xreplace({condition: side}).xreplace(numbers).xreplace({other: elsewhere})
+            # the other conditions are what they are there
+            branches.append(piece.xreplace({c: c.xreplace({decides: meets}) for c in piece.atoms(Relational)}))
+        difference = sp.sympify(branches[0] - branches[1])
+        if paired:
+            difference += difference.xreplace({decides: -decides})
+        order, real = _order(difference, decides, meets)
+        kink = kink or order <= KINK_ORDER
+        jumps = jumps or order == 0
+        branch = branch or not real
+    return _Place(kink=kink, branch_point=branch, jumps=jumps)
+
+
+def _order(difference: sp.Expr, decides: sp.Symbol, meets: sp.Expr) -> tuple[float, bool]:
+    """Power of the distance from the meeting place with which a difference grows, and whether it is real on both sides.
+
+    Values at two small distances tell, in so many digits that nothing is rounded away.
+    """
+    value = sp.lambdify(decides, difference, "mpmath")
+    order, real = math.inf, True
+    with mpmath.workdps(_DIGITS):
+        place = mpmath.mpf(meets.p) / meets.q
+        for side in (1, -1):
+            near, far = (mpmath.mpmathify(value(place + side * distance)) for distance in map(mpmath.mpf, _DISTANCES))
+            real = real and near.imag == 0 and far.imag == 0
+            if abs(near) > _ZERO:
+                power = mpmath.log(abs(far) / abs(near)) / mpmath.log(10)
+                order = min(order, round(2.0 * float(power)) / 2.0)
+    return order, real

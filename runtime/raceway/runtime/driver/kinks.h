@@ -1,0 +1,135 @@
+/* Kinks of the law, located: which side of each every ball is on, where a step changes it, and when to leave one alone.
+
+   switches.h is generated with the scene from the conditions of its laws: switching functions g of a ball's deflection and rate, zero at
+   the kinks, and the law with its sides held.  A step is tried with the sides that its start has; where the law can be continued, it is
+   smooth within the step whatever the step does.  The step is looked at in RW_LOOKS places: a side changes where g is beyond zero by more
+   than a band, which is a part RW_BAND of the error allowed in a step.  Below that a kink does not matter, and a ring that rests on one
+   does not count as crossing it by rounding.  The step is then repeated so that it ends where g is zero on its dense output, and the
+   sides are turned there.  What visits the other side between two looks is stepped over.
+
+   Work is bounded.  A step is repeated RW_REPEATS times at most for one kink.  A ball may turn its side back at the very place where it
+   turned; the RW_TURNS-th time it is let go.  A crossing that follows the last one of the same ball by less than RW_BRIEF times the step
+   tried is brief: such steps do not resolve what crosses (an explicit method at the limit of its stability zigzags about rest), and
+   RW_CHATTER brief ones in a row let go as well.  A ball let go obeys the law as it is, stepped over, for RW_REST steps. */
+#ifndef RACEWAY_KINKS_H
+#define RACEWAY_KINKS_H
+
+#include <string.h>
+
+#include "ensemble_kernels.h"
+#include "model.h"
+
+enum { RW_LOOKS = 4, RW_REPEATS = 4, RW_TURNS = 2, RW_CHATTER = 4, RW_REST = 64, RW_ROOT_ITERATIONS = 60 };
+
+static const double RW_BAND = 0.01, RW_BRIEF = 1.5;
+
+typedef struct {
+    double border[RW_NB][RW_NSWITCHES]; /* in place of the zero of g in the held law: -infinity, infinity, or 0 for a ball let go */
+    double side[RW_NSWITCHES][RW_NB];   /* 1 where g > 0, else -1; 0 for a ball let go */
+    double seen[RW_LOOKS + 1][RW_NSWITCHES][RW_NB]; /* g at the start of the step and at its looks */
+    double last[RW_NSWITCHES][RW_NB];   /* time of the last crossing [s] */
+    double band[RW_NSWITCHES];
+    unsigned char turn[RW_NSWITCHES][RW_NB]; /* sides to turn behind the step */
+    unsigned char brief[RW_NSWITCHES][RW_NB], still[RW_NSWITCHES][RW_NB]; /* brief crossings in a row, those without a step between */
+    unsigned char rest[RW_NSWITCHES][RW_NB]; /* steps for which a ball is let go */
+    int resting; /* balls let go */
+} rw_sides;
+
+/* Switching functions of all balls at a state and time.  One ball a lane. */
+static inline void rw_switch_values(const rw_numbers *n, double t, const double *restrict x, double g[RW_NSWITCHES][RW_NB])
+{
+    double w[RW_NW], r[5], k[RW_NK];
+    rw_cage(t, n->u, n->p, n->c, w);
+    rw_relative(x, n->u, n->p, n->c, w, r);
+    rw_law_numbers(n->p, n->c, k);
+    const double cage_cos = w[0], cage_sin = w[1];
+#pragma omp simd
+    for (int j = 0; j < RW_NB; j++) {
+        const double co = rw_cos[j] * cage_cos - rw_sin[j] * cage_sin;
+        const double si = rw_sin[j] * cage_cos + rw_cos[j] * cage_sin;
+        double at[RW_NSWITCHES];
+        rw_ball_switches(r[0] + r[1] * co + r[2] * si, r[3] * co + r[4] * si, k, at);
+        for (int i = 0; i < RW_NSWITCHES; i++) g[i][j] = at[i];
+    }
+}
+
+static inline void rw_set_side(rw_sides *s, int i, int j, double side)
+{
+    s->side[i][j] = side;
+    s->border[j][i] = side > 0.0 ? -INFINITY : side < 0.0 ? INFINITY : 0.0;
+}
+
+/* Sides at the start of a run; `weight` is 1 over the error allowed in a step. */
+static inline void rw_sides_start(rw_sides *restrict s, const rw_numbers *n, double t, const double *restrict x, const double *restrict weight)
+{
+    memset(s, 0, sizeof *s);
+    for (int i = 0; i < RW_NSWITCHES; i++) {
+        double least = INFINITY; /* weight: of the coarsest state */
+        for (int k = 0; k < RW_NQ; k++) {
+            const double of = weight[rw_switch_of_rate[i] > 0.0 ? RW_NQ + k : k];
+            least = of < least ? of : least;
+        }
+        s->band[i] = RW_BAND / least;
+    }
+    rw_switch_values(n, t, x, s->seen[0]);
+    for (int i = 0; i < RW_NSWITCHES; i++)
+        for (int j = 0; j < RW_NB; j++) {
+            rw_set_side(s, i, j, s->seen[0][i][j] > 0.0 ? 1.0 : -1.0);
+            s->last[i][j] = -INFINITY;
+        }
+}
+
+/* Whether any ball is on its other side at a look. */
+static inline int rw_changed(const rw_sides *restrict s, int look)
+{
+    int changed = 0;
+    for (int i = 0; i < RW_NSWITCHES; i++) {
+        const double band = -s->band[i];
+        int any = 0;
+#pragma omp simd reduction(| : any)
+        for (int j = 0; j < RW_NB; j++) any |= s->side[i][j] * s->seen[look][i][j] < band;
+        changed |= any;
+    }
+    return changed;
+}
+
+/* A ball that leaves its side alone for some time. */
+static inline void rw_let_go(rw_sides *s, int i, int j)
+{
+    if (s->side[i][j] != 0.0) s->resting++;
+    rw_set_side(s, i, j, 0.0);
+    s->rest[i][j] = RW_REST;
+    s->brief[i][j] = 0;
+}
+
+/* Turn the sides marked, at a time; `step` is the step tried. */
+static inline void rw_turn_sides(rw_sides *s, double time, double step)
+{
+    for (int i = 0; i < RW_NSWITCHES; i++)
+        for (int j = 0; j < RW_NB; j++) {
+            if (!s->turn[i][j]) continue;
+            s->turn[i][j] = 0;
+            const double since = time - s->last[i][j];
+            s->brief[i][j] = (unsigned char)(since < RW_BRIEF * step ? s->brief[i][j] + 1 : 0);
+            s->still[i][j] = (unsigned char)(since > 0.0 ? 0 : s->still[i][j] + 1);
+            s->last[i][j] = time;
+            if (s->brief[i][j] >= RW_CHATTER || s->still[i][j] >= RW_TURNS) rw_let_go(s, i, j);
+            else rw_set_side(s, i, j, -s->side[i][j]);
+        }
+}
+
+/* Behind an accepted step: its end is the next start, and balls let go come back in time. */
+static inline void rw_sides_move_on(rw_sides *s)
+{
+    memcpy(s->seen[0], s->seen[RW_LOOKS], sizeof s->seen[0]);
+    if (!s->resting) return;
+    for (int i = 0; i < RW_NSWITCHES; i++)
+        for (int j = 0; j < RW_NB; j++) {
+            if (s->side[i][j] != 0.0 || --s->rest[i][j] > 0) continue;
+            /* the side that the law takes by itself: nothing jumps */
+            rw_set_side(s, i, j, s->seen[0][i][j] > 0.0 ? 1.0 : -1.0);
+            s->resting--;
+        }
+}
+
+#endif

@@ -1,0 +1,302 @@
+"""Claims about runs whose steps end on the kinks of the laws: times, orders, work, and who pays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from stepper_runs import ORDERS, segments_between
+
+from raceway.runtime import Model, load_solution
+from raceway.runtime.errors import RequestError
+from raceway.runtime.integrate.stepper import Family, Outcome, Stepper
+from raceway.runtime.summary import render_summary, summarize
+
+Make = Callable[..., Model]
+
+#: A ring of 20 kg in 8 balls that stand still, the outer ring fixed, no damping but that of the balls.
+STANDING = (
+    ('speed = "393.1540342298 rpm"', 'speed = "0 rpm"'),
+    ('damping = "200 N*s/m"  ', '#damping = "0 N*s/m"'),
+    ("cycles = 24 ", 'duration = "0.02 s" #'),
+    ("transient_cycles = 20", "transient_cycles = 0"),
+)
+LAW = 'law = "none"'
+GATED = (LAW, 'law = "two-sided-gated"\ncoefficient = "4000 N*s/m"')
+ONE_SIDED = (LAW, 'law = "one-sided"\ncoefficient = "2000 N*s/m"')
+SEVEN = ("balls = 8", "balls = 7")
+MASS, LOAD, CLEARANCE = 20.0, 196.0, 40e-6
+
+
+@pytest.fixture(scope="module")
+def hertz(make_model: Make) -> Model:
+    return make_model("varying_compliance", *STANDING)
+
+
+@pytest.fixture(scope="module")
+def gated(make_model: Make) -> Model:
+    return make_model("varying_compliance", *STANDING, GATED)
+
+
+@pytest.fixture(scope="module")
+def preloaded(make_model: Make) -> Model:
+    """Seven balls that never leave their raceways, damped one way only: kinks of the rate, and no others."""
+    return make_model(
+        "varying_compliance", *STANDING[1:], ONE_SIDED, SEVEN, ('clearance = "0 um"', 'clearance = "-20 um"')
+    )
+
+
+def call(
+    model: Model,
+    stepper: Stepper,
+    start: np.ndarray,
+    end: float,
+    *,
+    family: Family = Family.DP54,
+    tolerance: float = 1e-9,
+    overrides: dict[str, float] | None = None,
+    **options: float,
+) -> tuple[Outcome, np.ndarray]:
+    """One raw call without samples; the tolerance is relative to micrometres and millimetres a second."""
+    numbers = model.numbers(overrides)
+    x = np.array(start, dtype=float)
+    half = len(x) // 2
+    outcome = stepper.run(
+        family=family,
+        tolerance=tolerance * np.repeat([1e-6, 1e-3], half),
+        p=numbers.p,
+        c=numbers.c,
+        x=x,
+        segments=segments_between(model, numbers, np.array([0.0, end])),
+        output_times=np.zeros(0),
+        output_states=None,
+        **options,  # type: ignore[arg-type]
+    )
+    return outcome, x
+
+
+def time_of_kink(model: Model, start: np.ndarray, end: float, family: Family, overrides: dict[str, float]) -> float:
+    """End of the first step that ends on a kink [s]."""
+    for most in range(1, 200):
+        outcome, _ = call(model, model.locating_stepper, start, end, family=family, overrides=overrides, max_steps=most)
+        if outcome.kinks:
+            return outcome.time
+    raise AssertionError("no kink was located")
+
+
+@pytest.mark.parametrize("family", list(ORDERS))
+@pytest.mark.parametrize("law", ["hertz", "gated"])
+def test_a_falling_ring_meets_its_ball_when_the_parabola_says(
+    request: pytest.FixtureRequest, law: str, family: Family
+) -> None:
+    """From rest in the middle of the clearance: delta = F t^2 / (2 m) - P_d / 2."""
+    model: Model = request.getfixturevalue(law)
+    located = time_of_kink(model, np.zeros(4), 0.02, family, {"bearing.clearance": CLEARANCE})
+    assert located == pytest.approx(np.sqrt(CLEARANCE * MASS / LOAD), rel=1e-12)
+
+
+#: Length of a run of the preloaded ring, and numbers of equal steps at which the order shows, far from rounding.
+SPANS = {
+    Family.RODAS4: (2.5e-3, (40, 80, 160)),
+    Family.RODAS5P: (2.5e-3, (28, 40, 56, 80)),
+    Family.DP54: (2.5e-3, (40, 80, 160)),
+    Family.DOP853: (3.7e-3, (14, 20, 28, 40)),
+}
+
+
+@pytest.mark.parametrize("family", list(ORDERS))
+def test_located_kinks_restore_the_order_of_the_method(preloaded: Model, family: Family) -> None:
+    """With steps of one size: stepped over, kinks leave about the second order; located, the method has its own."""
+    start = np.array([3e-6, -1e-6, 0.0, 0.0])
+    end, counts = SPANS[family]
+    fine = {"family": Family.DOP853, "tolerance": 1e-6, "largest_step": end / 800}
+    _, reference = call(preloaded, preloaded.locating_stepper, start, end, **fine)
+    orders, last = [], []
+    for stepper in (preloaded.locating_stepper, preloaded.stepper):
+        errors = []
+        for count in counts:
+            size = {"largest_step": end / count, "first_step": end / count}
+            outcome, x = call(preloaded, stepper, start, end, family=family, tolerance=0.03, **size)
+            assert outcome.rejected == outcome.kinks, "the tolerance took part"
+            errors.append(float(np.max(np.abs(x - reference) / np.repeat([1e-6, 1e-3], 2))))
+        orders.append(-np.polyfit(np.log(counts), np.log(errors), 1)[0])
+        last.append(errors[-1])
+    assert orders[0] > ORDERS[family][0] - 0.35
+    assert orders[1] < 3.3
+    assert last[0] < 0.02 * last[1]
+
+
+def bounce(model: Model, start: np.ndarray, end: float, parameters: dict[str, float]) -> np.ndarray:
+    """State at the end by SciPy with an event at each contact, the equations written here; restarted behind each."""
+    cage = model.constants(parameters)["bearing.cage_speed"]
+    angles = 2.0 * np.pi * np.arange(8) / 8.0
+
+    def deflection(t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        co, si = np.cos(cage * t + angles), np.sin(cage * t + angles)
+        rate = x[2] * co + x[3] * si + cage * (x[1] * co - x[0] * si)
+        return co, si, x[0] * co + x[1] * si - 0.5 * CLEARANCE, rate
+
+    def motion(t: float, x: np.ndarray, touching: np.ndarray) -> list[float]:
+        co, si, delta, rate = deflection(t, x)
+        force = 13.34e9 * np.maximum(delta, 0.0) ** 1.5 + np.where(touching, 4000.0 * rate, 0.0)
+        return [x[2], x[3], (LOAD - force @ co) / MASS, -(force @ si) / MASS]
+
+    t, x = 0.0, start
+    touching = deflection(t, x)[2] > 0.0
+    while t < end:
+        events = []
+        for ball in range(8):
+
+            def event(t: float, x: np.ndarray, _: np.ndarray, ball: int = ball) -> float:
+                return float(deflection(t, x)[2][ball])
+
+            event.terminal, event.direction = True, -1.0 if touching[ball] else 1.0  # type: ignore[attr-defined]
+            events.append(event)
+        part = solve_ivp(
+            motion,
+            (t, end),
+            x,
+            method="DOP853",
+            rtol=1e-13,
+            atol=np.array([1e-18, 1e-18, 1e-15, 1e-15]),
+            events=events,
+            args=(touching,),
+        )
+        t, x = float(part.t[-1]), part.y[:, -1]
+        for ball in range(8):
+            touching[ball] ^= len(part.t_events[ball]) > 0
+    return x
+
+
+@pytest.mark.parametrize("method", ["stepper-dp54", "stepper-rodas5p", "stepper-dop853", "stepper-rodas4"])
+def test_a_force_that_jumps_agrees_with_events_of_scipy(gated: Model, method: str) -> None:
+    """A ring falls through its clearance and bounces on turning balls, whose damping begins and ends with a jump.
+
+    To 1e-9 at rtol 1e-11, to ten tolerances at 1e-6, and with fewer steps than stepping over takes.
+    """
+    start, parameters = np.array([0.0, 1e-6, 0.0, 0.0]), {"bearing.clearance": CLEARANCE, "shaft.speed": 41.17}
+    expected = bounce(gated, start, 0.06, parameters)
+    for rtol, allowed in ((1e-6, 1e-5), (1e-11, 1e-9)):
+        tried = {}
+        for kinks in ("located", "stepped-over"):
+            solution = gated.simulate(
+                duration=0.06, method=method, rtol=rtol, kinks=kinks, initial=start, parameters=parameters, outputs=[]
+            )
+            run = solution.statistics
+            tried[kinks] = run.steps + run.rejected
+            if kinks == "located":
+                assert run.located == 16
+                assert np.max(np.abs(solution.x[-1] - expected) / run.magnitudes) < allowed
+        assert tried["located"] < tried["stepped-over"]
+
+
+@pytest.mark.parametrize("family", list(ORDERS))
+@pytest.mark.parametrize("above", [0.0, 1e-20, -1e-20, 1e-15, -1e-15, 1e-12, -1e-12, 1e-9])
+def test_grazing_ends(gated: Model, family: Family, above: float) -> None:
+    """A ring thrown so high that it touches a ball at rest, or stops a hair before or behind."""
+    pull = LOAD / MASS
+    start = np.array([0.0, 0.0, -np.sqrt(2.0 * pull * (0.5 * CLEARANCE + above)), 0.0])
+    given = {"family": family, "overrides": {"bearing.clearance": CLEARANCE}, "max_steps": 20_000}
+    located, over = (
+        call(gated, stepper, start, 2.5 * -start[2] / pull, **given)[0]  # type: ignore[arg-type]
+        for stepper in (gated.locating_stepper, gated.stepper)
+    )
+    assert located.end.name == "DONE"
+    assert located.steps + located.rejected <= 1.5 * (over.steps + over.rejected) + 20
+
+
+@pytest.mark.parametrize("family", list(ORDERS))
+@pytest.mark.parametrize("load", [LOAD, -LOAD, 0.0])
+def test_a_start_on_the_kink_ends(gated: Model, family: Family, load: float) -> None:
+    for place in (0.5 * CLEARANCE, -0.5 * CLEARANCE, np.nextafter(0.5 * CLEARANCE, 1.0)):
+        overrides = {"bearing.clearance": CLEARANCE, "load.force.x": load}
+        given = {"family": family, "overrides": overrides, "max_steps": 20_000}
+        start = np.array([place, 0.0, 0.0, 0.0])
+        located, x = call(gated, gated.locating_stepper, start, 5e-3, **given)  # type: ignore[arg-type]
+        over, expected = call(gated, gated.stepper, start, 5e-3, **given)  # type: ignore[arg-type]
+        assert located.end.name == "DONE"
+        assert located.steps + located.rejected <= 1.5 * (over.steps + over.rejected) + 20
+        assert np.abs(x - expected).max() < 1e-6 * np.abs(expected).max() + 1e-15
+
+
+@pytest.mark.parametrize("family", list(ORDERS))
+def test_a_ring_at_rest_does_not_chatter(preloaded: Model, family: Family) -> None:
+    """Rates are rounding, or what an explicit method at the limit of its stability makes of it: work stays bounded."""
+    rest = preloaded.static_equilibrium(0.0).x
+    overrides = {"shaft.speed": 0.0}
+    located, x = call(preloaded, preloaded.locating_stepper, rest, 0.2, family=family, overrides=overrides)
+    over, _ = call(preloaded, preloaded.stepper, rest, 0.2, family=family, overrides=overrides)
+    assert located.end.name == "DONE"
+    assert located.steps + located.rejected <= 3 * (over.steps + over.rejected) + 20
+    assert np.abs(x - rest)[:2].max() < 1e-12
+
+
+def test_balls_that_meet_their_raceway_at_once_are_one_kink(hertz: Model) -> None:
+    """The load points between two balls, which stay each other's mirror image."""
+    overrides = {"bearing.clearance": CLEARANCE, "bearing.ball_angle": np.pi / 8.0}
+    outcome, x = call(hertz, hertz.locating_stepper, np.zeros(4), 2.5e-3, overrides=overrides)
+    assert outcome.kinks == 1
+    assert abs(x[1]) < 1e-9 * abs(x[0])
+
+
+def test_smoothed_laws_have_no_kinks_and_pay_for_none(make_model: Make, tmp_path: Path) -> None:
+    smoothing = ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n')
+    model = make_model("varying_compliance", smoothing)
+    assert all(name != "switches.h" for name, _ in model.manifest.files)
+    located, plain = (model.simulate(2, transient=0, kinks=kinks) for kinks in ("located", None))
+    assert np.array_equal(located.x, plain.x)
+    assert (located.statistics.kinks, located.statistics.located) == ("located", 0)
+
+
+def test_opposite_balls_take_the_kink_of_one_sided_damping_out_of_the_motion(make_model: Make) -> None:
+    """Preloaded, eight balls have nothing to locate, seven do."""
+    changes = (*STANDING[1:], ONE_SIDED, ('clearance = "0 um"', 'clearance = "-20 um"'))
+    found = {}
+    for count in (8, 7):
+        model = make_model("varying_compliance", *changes, ("balls = 8", f"balls = {count}"))
+        found[count] = model.simulate(duration=0.02, kinks="located").statistics.located
+    assert found[8] == 0
+    assert found[7] > 50
+
+
+def test_runs_say_what_they_did_at_kinks(gated: Model, tmp_path: Path) -> None:
+    given = {"duration": 0.01, "parameters": {"bearing.clearance": CLEARANCE}}
+    plain, over, located = (gated.simulate(**given, kinks=kinks) for kinks in (None, "stepped-over", "located"))  # type: ignore[arg-type]
+    assert np.array_equal(plain.x, over.x)
+    assert (over.statistics.kinks, over.statistics.located) == ("stepped-over", None)
+    assert located.statistics.located is not None
+    assert located.statistics.located > 0
+    read = load_solution(located.save(tmp_path / "located.nc"))
+    assert read.statistics == located.statistics
+    summary = summarize(gated, located)
+    assert summary["located_kinks"] == {"value": located.statistics.located, "unit": "1"}
+    assert f"{located.statistics.located} kinks located" in str(render_summary(summary).caption)
+    assert "located_kinks" not in summarize(gated, over)
+    assert gated.simulate(**given, method="erk").statistics.kinks is None  # type: ignore[arg-type]
+
+
+def test_reductions_locate_as_runs_do(gated: Model) -> None:
+    given = {"duration": 0.01, "parameters": {"bearing.clearance": CLEARANCE}, "kinks": "located"}
+    solution = gated.simulate(**given)  # type: ignore[arg-type]
+    reduced = gated.reduce(**given)  # type: ignore[arg-type]
+    assert reduced.steps == solution.statistics.steps
+    assert [reduced.end[name] for name in gated.states] == pytest.approx(solution.x[-1].tolist(), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"kinks": "locate"}, "Did you mean 'located'"),
+        ({"kinks": "located", "method": "cvodes"}, "Take one of these, or leave kinks stepped-over"),
+        ({"kinks": "located", "method": "erk"}, "stepper-dp54"),
+        ({"kinks": "located", "method": "rosenbrock"}, "stepper-rodas5p"),
+        ({"kinks": "located", "method": "quasi-static"}, "cannot end its steps"),
+        ({"kinks": "located", "error": 0.01}, "Leave kinks out"),
+    ],
+)
+def test_what_cannot_locate_is_refused_with_a_remedy(gated: Model, given: dict[str, object], said: str) -> None:
+    with pytest.raises(RequestError, match=said):
+        gated.simulate(duration=0.01, **given)  # type: ignore[arg-type]
