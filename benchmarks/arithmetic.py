@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.problem import BUILD, CASES, POINTS, Case, Member, errors, models, parameter_sets
+from benchmarks.own import stepper_run
+from benchmarks.problem import BUILD, CASES, Case, Member, errors, models, parameter_sets
 from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave, spread
 from raceway.runtime.accuracy.trade import compile_fast_math
@@ -64,17 +65,7 @@ def _call(ensemble: list[Member], stepper: Stepper) -> Callable[[int], object]:
 
 
 def _states(member: Member, stepper: Stepper) -> np.ndarray:
-    states = np.empty((POINTS, len(member.start)))
-    outcome = stepper.run(
-        family=Family.AUTO,
-        tolerance=TOLERANCE * member.magnitude,
-        p=member.numbers.p,
-        c=member.numbers.c,
-        x=member.start.copy(),
-        segments=member.segments,
-        output_times=member.times,
-        output_states=states,
-    )
+    states, outcome = stepper_run(member, TOLERANCE, Family.AUTO, stepper=stepper)
     if outcome.end is not End.DONE:
         raise RuntimeError(f"{member.case.key}: the stepper ended early: {outcome.end.name}")
     return states

@@ -25,7 +25,8 @@ import numpy as np
 from benchmarks.problem import CASES, Case, models, parameter_sets
 from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave
-from raceway.runtime.ensembles.members import Span, make_members, member_arrays
+from raceway.runtime.ensembles.member_segments import member_arrays
+from raceway.runtime.ensembles.members import Span, make_members
 from raceway.runtime.integrate.stepper import Family, Segments
 from raceway.runtime.model import Model
 

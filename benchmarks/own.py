@@ -22,7 +22,8 @@ import numpy as np
 from benchmarks.problem import BUILD, POINTS, ROOT, Member
 from raceway.runtime.compiled.compile import compile_sources, find_compiler
 from raceway.runtime.compiled.kernel import Kernel
-from raceway.runtime.integrate.stepper import METHODS, End, Family
+from raceway.runtime.integrate.locating import choose_kinks, stepper_for
+from raceway.runtime.integrate.stepper import METHODS, End, Family, Stepper
 
 DECADES = tuple(10.0**-k for k in range(2, 11))
 HALVES = tuple(10.0**-k for k in np.arange(1.5, 11.1, 0.5))
@@ -71,10 +72,15 @@ class Kept:
 # ------------------------------------------------------------------------------------------------------ the project's
 
 
-def stepper_run(member: Member, tolerance: float, family: Family, *, outputs: bool = True) -> tuple[np.ndarray, Any]:
-    """One raw call of the stepper; states and outcome."""
+def stepper_run(
+    member: Member, tolerance: float, family: Family, *, outputs: bool = True, stepper: Stepper | None = None
+) -> tuple[np.ndarray, Any]:
+    """One raw call of the stepper that `model.simulate` takes, or of another one; states and outcome."""
+    if stepper is None:
+        model, named = member.model, "stepper" if family is Family.AUTO else f"stepper-{family.name.lower()}"
+        stepper = stepper_for(model, choose_kinks(None, named, model.manifest, tolerance))
     states = np.empty((POINTS, len(member.start)))
-    outcome = member.model.stepper.run(
+    outcome = stepper.run(
         family=family,
         tolerance=tolerance * member.magnitude,
         p=member.numbers.p,

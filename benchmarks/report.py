@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks import arithmetic, ensemble, figures, jacobians, sensitivity_cost, sensitivity_error
 from benchmarks.curves import LEVELS, curve, lower, time_at
-from benchmarks.problem import SPREAD
+from benchmarks.problem import CASES, SPREAD
 from benchmarks.tables import milliseconds, table
 from benchmarks.targets import targets
 
@@ -143,7 +143,7 @@ def _case(case: Result, images: Path) -> list[str]:
         "stepper": "stepper (auto)",
         "hand-best": "by hand in C, best",
     }
-    figures.work_precision(images / f"bench_{case['case']}.png", case["words"], curves, labels)
+    figures.work_precision(images / f"bench_{case['case']}.png", case["words"], curves)
     base = {level: time_at(curves["stepper"], level) for level in LEVELS}
     rows = []
     for c in contenders:
@@ -160,6 +160,9 @@ def _case(case: Result, images: Path) -> list[str]:
         f"### Damping {case['words']}",
         "",
         f"![Time against error, damping {case['words']}](images/bench_{case['case']}.png)",
+        "",
+        "*In the figure a library stands for the best of its methods at every error; all that were measured are in the "
+        "table.*",
         "",
         *table(head, rows),
         "",
@@ -238,13 +241,20 @@ def _balls(result: Result, images: Path) -> list[str]:
     ]
 
 
-def _regeneration(result: Result, _: Path) -> list[str]:
+def _regeneration(result: Result, images: Path) -> list[str]:
     words = {
         "cold": "Nothing there: everything is derived, written and compiled",
         "warm": "Everything there",
         "number": "A number in the scene has changed",
     }
+    # what reads a changed number reads the scene again: its stage "read" is not counted twice
+    counted = {
+        how: {stage: value for stage, value in stages.items() if stage != "read" or how != "number"}
+        for how, stages in result["stages"].items()
+    }
+    figures.regeneration(images / "bench_regeneration.png", counted, words)
     lines = ["## From scene to model", "", f"Each time a new process; medians over {result['repeats']}, in ms.", ""]
+    lines += ["![Time of each stage from a scene to its first cycle](images/bench_regeneration.png)", ""]
     for how, stages in result["stages"].items():
         rows = [[stage, milliseconds(value["median"])] for stage, value in stages.items()]
         total = sum(value["median"] for stage, value in stages.items() if stage != "read" or how != "number")
@@ -257,7 +267,8 @@ def _regeneration(result: Result, _: Path) -> list[str]:
 
 
 def _sensitivity_cost(result: Result, images: Path) -> list[str]:
-    figures.sensitivity_costs(images / "bench_sensitivity_cost.png", result["rows"])
+    words = {case.key: case.words for case in CASES}[figures.COST_CASE]
+    figures.sensitivity_costs(images / "bench_sensitivity_cost.png", result["rows"], words)
     fits = [
         f"- {fit['way']}, `{fit['case']}`: {fit['without']:.3g} plain runs, and {fit['a_block']:.3g} for every eight "
         f"parameters begun; every point within {100 * fit['largest_deviation']:.0f} % of this line."
@@ -302,7 +313,8 @@ def _sensitivity_error(result: Result, images: Path) -> list[str]:
     ]
 
 
-def _ensemble(result: Result, _: Path) -> list[str]:
+def _ensemble(result: Result, images: Path) -> list[str]:
+    figures.ensembles(images / "bench_ensemble.png", result)
     return [
         "## Ensembles",
         "",
@@ -312,6 +324,8 @@ def _ensemble(result: Result, _: Path) -> list[str]:
         "included; with reductions of states (`rms:`, `range:`), and of balls as well (`max:ball.force`). *Lanes*: "
         "single run over lanes. *Threads*: wall time on one thread over that on two; *possible*: the same for two "
         "threads that only hash bytes, which is what the machine lets two threads gain.",
+        "",
+        "![Throughput of ensembles against lanes and threads](images/bench_ensemble.png)",
         "",
         *ensemble.lines(result),
     ]

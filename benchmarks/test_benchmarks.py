@@ -70,22 +70,29 @@ def test_all_methods_converge_to_the_same_cycle(quick: Path) -> None:
 
 
 def test_stepper_takes_the_steps_of_the_same_method_by_hand(quick: Path) -> None:
-    """Sums over the balls are rounded in another order: at tight tolerances a few steps of thousands fall elsewhere,
-    and with them the places where steps meet a contact that opens, on which the error hangs."""
+    """Sums over the balls are rounded in another order: at tight tolerances a few steps of thousands fall elsewhere.
+
+    An error hangs on where in a step the contacts open; where steps fall elsewhere it is another draw, up or down.  So
+    errors are one where the steps are, and on the average over the tolerances everywhere.
+    """
     contenders = {c["key"]: c for c in _result(quick, "work_precision_onesided")["contenders"]}
-    same_steps = 0
+    same_steps, ratios = 0, []
     for method in ("dp54", "rodas4", "rodas5p"):
         own, hand = (contenders[f"{who}-{method}"]["runs"] for who in ("stepper", "hand"))
         for mine, theirs in zip(own, hand, strict=True):
-            steps, by_hand = mine["counts"]["steps"], theirs["counts"]["steps"]
-            assert steps == pytest.approx(by_hand, rel=0.05)
             error, expected = mine["error"]["worst"]["median"], theirs["error"]["worst"]["median"]
-            if 1e-6 < expected < 1e-2 and steps == by_hand:
+            if expected > 1e-2:
+                continue  # nothing is resolved there, steps neither
+            steps, by_hand = mine["counts"]["steps"], theirs["counts"]["steps"]
+            assert steps == pytest.approx(by_hand, rel=0.01)
+            ratios.append(error / expected)
+            if expected > 1e-6 and steps == by_hand:
                 same_steps += 1
-                assert error == pytest.approx(expected, rel=0.1)
-            elif expected < 1e-2:
-                assert 1 / 3 < error / expected < 3
+                assert error == pytest.approx(expected, rel=0.05)
     assert same_steps >= 4
+    assert len(ratios) >= 15
+    assert max(*ratios, *(1 / ratio for ratio in ratios)) < 3
+    assert np.exp(np.mean(np.log(ratios))) == pytest.approx(1.0, abs=0.15)
 
 
 def test_two_references_agree_and_right_hand_sides_are_one_model(quick: Path) -> None:
@@ -127,11 +134,19 @@ def test_derivatives_of_casadi_and_of_the_stepper_are_one(quick: Path) -> None:
 
 
 def test_control_of_derivatives_lowers_their_error_over_the_ensemble(quick: Path) -> None:
+    """In every row, and on the average over the rows by far; the two members of a quick run tell no more of one row."""
     for case in _result(quick, "sensitivity_error")["cases"]:
+        gains = []
         for row in case["rows"]:
             free, controlled = row["states alone"], row["with derivatives"]
-            assert controlled["derivative"]["median"] < 0.2 * free["derivative"]["median"]
+            gains.append(controlled["derivative"]["median"] / free["derivative"]["median"])
             assert controlled["state"]["median"] < free["state"]["median"]
+        assert max(gains) < 1.0
+        assert np.exp(np.mean(np.log(gains))) < 0.3
+    full = json.loads((ROOT / "benchmarks" / "results" / "sensitivity_error.json").read_text(encoding="utf-8"))
+    for case in full["cases"]:  # as measured for the page
+        for row in case["rows"]:
+            assert row["with derivatives"]["derivative"]["median"] < 0.2 * row["states alone"]["derivative"]["median"]
 
 
 def test_an_unknown_part_is_refused() -> None:

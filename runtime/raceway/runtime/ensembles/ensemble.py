@@ -21,7 +21,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from raceway.runtime.ensembles.ensemble_driver import LANE_FAMILIES, STOPPED, EnsembleDriver
-from raceway.runtime.ensembles.members import Members, Span, Table, make_members, member_arrays, read_table
+from raceway.runtime.ensembles.member_segments import member_arrays
+from raceway.runtime.ensembles.members import Members, Span, Table, make_members, read_table
 from raceway.runtime.errors import RequestError
 from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.reductions import (
@@ -399,6 +400,13 @@ def _span(model: Model, members: Members, cycles: float | None, duration: float 
     speed = mechanism.speed if mechanism is not None else bearing.shaft_speed if bearing is not None else None
     speeds = np.abs(members.columns[speed]) if speed is not None else np.zeros(count)
     np.divide(clock.TURN, speeds, out=turns, where=speeds > 0.0)
+    # where there is a run for everybody, in one go; the rules of `check_span`
+    if 0.0 <= transient < math.inf and (duration is not None or np.all(np.isfinite(turns))):
+        durations = np.full(count, float(duration)) if duration is not None else float(cycles or 0.0) * turns
+        starts = transient * turns if transient > 0.0 else starts
+        if np.all(starts < durations * (1.0 - 1e-9)):
+            return Span(durations=durations, turns=turns, starts=starts)
+    durations, starts = np.zeros(count), np.zeros(count)
     for turn in np.unique(turns):
         which = np.flatnonzero(turns == turn)
         try:

@@ -6,6 +6,7 @@ The library also holds the driver of single runs, there with reductions; plain r
 
 from __future__ import annotations
 
+import copy
 import ctypes
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -13,13 +14,17 @@ from pathlib import Path
 
 import numpy as np
 
-from raceway.runtime.compiled.compile import CompiledLibrary, Compiler, compile_sources
+from raceway.runtime.compiled.compile import CompiledLibrary, Compiler
+from raceway.runtime.compiled.driver_library import (
+    ENSEMBLE_HEADERS,
+    check_headers,
+    compile_driver,
+    input_columns,
+    padded,
+)
 from raceway.runtime.errors import ArtefactError
-from raceway.runtime.integrate.stepper import DRIVER, FLAGS, HEADERS, MAX_STEPS, Family, Stepper
+from raceway.runtime.integrate.stepper import MAX_STEPS, Family, Stepper
 from raceway.runtime.manifest import Manifest
-
-#: Generated headers that the driver of ensembles includes.
-ENSEMBLE_HEADERS = (*HEADERS, "ensemble_kernels.h")
 
 #: Status of members that were under way when the caller asked to stop; the others are those of `stepper.End`.
 STOPPED = 5
@@ -39,9 +44,9 @@ RESULT = np.dtype(
     {
         "names": [
             *("status", "method", "state", "segment", "written", "steps", "rejected", "evaluations"),
-            *("factorizations", "pivoted", "switches", "time", "step"),
+            *("factorizations", "pivoted", "switches", "kinks", "time", "step"),
         ],
-        "formats": [ctypes.c_int] * 3 + [ctypes.c_long] * 8 + [ctypes.c_double] * 2,
+        "formats": [ctypes.c_int] * 3 + [ctypes.c_long] * 9 + [ctypes.c_double] * 2,
     },
     align=True,
 )
@@ -86,17 +91,9 @@ def compile_ensemble(folder: Path, manifest: Manifest, compiler: Compiler) -> Co
     CompileError
         The compiler failed.
     """
-    missing = [name for name in ENSEMBLE_HEADERS if not (folder / name).is_file()]
-    if missing:
-        raise ArtefactError(f"{folder}: has no {', '.join(missing)}. Write the folder again with `raceway derive`.")
-    return compile_sources(
-        (DRIVER / "stepper.c", DRIVER / "ensemble.c"),
-        compiler,
-        label=f"{manifest.scene}-ensemble",
-        headers=[*sorted(DRIVER.glob("*.h")), *(folder.absolute() / name for name in ENSEMBLE_HEADERS)],
-        include=(folder.absolute(), DRIVER),
-        flags=(*FLAGS, "-DRACEWAY_REDUCTIONS"),
-    )
+    check_headers(folder, ENSEMBLE_HEADERS)
+    sources, flags = ("stepper.c", "ensemble.c"), ("-DRACEWAY_REDUCTIONS",)
+    return compile_driver(folder, manifest, compiler, sources, kind="ensemble", headers=ENSEMBLE_HEADERS, flags=flags)
 
 
 class EnsembleDriver:
@@ -127,10 +124,16 @@ class EnsembleDriver:
                 f"{library.path}: reductions of {self.row} numbers and {channels} channels, {expected} and "
                 f"{len(self.channels)} are expected. Write the folder again."
             )
-        self._inputs = max(len(manifest.inputs), 1)
+        self._inputs = input_columns(manifest)
         self._code = code
         code.raceway_ensemble_work.restype = ctypes.c_long
         code.raceway_ensemble.restype = ctypes.c_int
+
+    def with_stepper(self, stepper: Stepper) -> EnsembleDriver:
+        """The same with another driver of single runs, which must have reductions."""
+        found = copy.copy(self)
+        found.stepper = stepper
+        return found
 
     def reductions(self, members: int, start: np.ndarray | float, channels: Collection[str]) -> np.ndarray:
         """Empty rows of reductions of these channels that count from `start` on [s], shape (members, row)."""
@@ -170,7 +173,8 @@ class EnsembleDriver:
         results = np.zeros(count, dtype=RESULT)
         work = np.empty(self._code.raceway_ensemble_work(ctypes.c_long(count)) // 8 + 1)
         options = _Options(int(family), max_steps, ctypes.pointer(stop))
-        arrays = (members.p, members.c, tolerance, x, members.first, members.times, self._padded(members.inputs))
+        inputs = padded(members.inputs, self._inputs)
+        arrays = (members.p, members.c, tolerance, x, members.first, members.times, inputs)
         self._code.raceway_ensemble(
             ctypes.byref(options),
             ctypes.c_long(count),
@@ -201,14 +205,10 @@ class EnsembleDriver:
         """
         found = np.empty_like(initial)
         # named, for a pointer does not keep alive what it points to
-        arrays = (members.p, members.c, initial, first, self._padded(inputs), horizons, found)
+        arrays = (members.p, members.c, initial, first, padded(inputs, self._inputs), horizons, found)
         pointers = [_pointer(array) for array in arrays]
         self._code.raceway_ensemble_magnitudes(ctypes.c_long(len(initial)), *pointers)
         return found
-
-    def _padded(self, inputs: np.ndarray) -> np.ndarray:
-        """The inputs; a column of zeros where a model has none, for C knows no arrays without entries."""
-        return inputs if inputs.shape[1] else np.zeros((len(inputs), self._inputs))
 
 
 def _pointer(array: np.ndarray) -> ctypes.c_void_p:

@@ -1,7 +1,6 @@
-"""Members of an ensemble: their numbers, checked; their segments and inputs, made for many at once.
+"""Members of an ensemble: a table of parameters read, checked, and completed by derived constants.
 
-In: a table of parameters.  Out: `Members`, and for the driver `MemberArrays` with the moments that magnitudes are
-taken from.
+In: a table of parameters.  Out: `Members`, the `Span` of their runs, and the edges of one run's segments.
 """
 
 from __future__ import annotations
@@ -16,12 +15,10 @@ import numpy as np
 
 from raceway.runtime.assembly import check_assembly
 from raceway.runtime.bounds import violations
-from raceway.runtime.ensembles.ensemble_driver import MemberArrays
 from raceway.runtime.errors import RequestError
 from raceway.runtime.integrate import clock
-from raceway.runtime.integrate.magnitudes import MOMENTS
 from raceway.runtime.integrate.segments import segment_edges
-from raceway.runtime.manifest import InputInfo, Manifest
+from raceway.runtime.manifest import Manifest
 from raceway.runtime.parameters import Numbers, Parameters, scalar, unknown_name
 
 if TYPE_CHECKING:
@@ -140,6 +137,9 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
 def _plain(given: object) -> bool:
     """Whether these are numbers: NumPy takes truth values and texts for some."""
     if isinstance(given, list | tuple):
+        kinds = dict.fromkeys(map(type, given))
+        if all(issubclass(kind, float | int | np.floating | np.integer) and kind is not bool for kind in kinds):
+            return True
         return all(scalar(item) is not None or isinstance(item, list | tuple | np.ndarray) for item in given)
     return np.asarray(given).dtype.kind in "iufO"
 
@@ -202,7 +202,7 @@ def _check_assembly(model: Model, members: Members) -> None:
         if name in function.name_in() and rows.shape[1]:
             used = set(function.jac_sparsity(0, function.name_in().index(name)).get_col())
             parts.append(rows[:, sorted(used.difference(timing) if name == "p" else used)])
-    for group in _groups(np.column_stack(parts)):
+    for group in groups(np.column_stack(parts)):
         member = int(group[0])
         if member in members.refused:
             continue
@@ -212,8 +212,8 @@ def _check_assembly(model: Model, members: Members) -> None:
             members.refused.update((int(other), str(fault)) for other in group)
 
 
-def _groups(rows: np.ndarray) -> list[np.ndarray]:
-    """Members with equal rows, each group in order."""
+def groups(rows: np.ndarray) -> list[np.ndarray]:
+    """Places of equal rows, each group in order."""
     if not rows.shape[1]:
         return [np.arange(len(rows))]
     _, inverse = np.unique(rows, axis=0, return_inverse=True)
@@ -253,126 +253,3 @@ def edge_windows(model: Model, numbers: Numbers, duration: float, turn: float, s
         else:
             edges = segment_edges(model, numbers, left, right, turn)
             yield np.where(np.abs(edges - start) <= near, start, edges)
-
-
-def member_arrays(
-    model: Model, members: Members, span: Span, which: np.ndarray
-) -> tuple[MemberArrays, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Segments of some members, and the moments of theirs: (first moment of each, inputs there, horizons)."""
-    manifest = model.manifest
-    edges: list[np.ndarray] = [np.zeros(0)] * len(which)
-    names = _timing(manifest.inputs)
-    timing = np.column_stack(
-        [
-            *(members.columns[name][which] for name in names),
-            *(values[which] for values in (span.durations, span.turns, span.starts)),
-        ]
-    )
-    for group in _groups(timing):
-        member = int(which[group[0]])
-        lengths = (float(values[member]) for values in (span.durations, span.turns, span.starts))
-        windows = list(edge_windows(model, members.timing(model, names, member), *lengths))
-        found = np.concatenate([windows[0], *(window[1:] for window in windows[1:])])
-        for place in group:
-            edges[place] = found
-    counts = np.array([len(found) - 1 for found in edges])
-    owner = np.repeat(which, counts)
-    left = np.concatenate([found[:-1] for found in edges])
-    right = np.concatenate([found[1:] for found in edges])
-    inputs = inputs_of(manifest.inputs, members.columns, owner, left, 0.5 * (left + right))
-    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int_)
-    gates = [k for k, info in enumerate(manifest.inputs) if info.kind != "phase"]
-    restarts = np.ones(len(left), dtype=np.uint8)
-    restarts[1:] = np.any(np.diff(inputs[:, gates], axis=0) != 0.0, axis=1)
-    restarts[first[:-1]] = 1
-    arrays = MemberArrays(
-        p=np.ascontiguousarray(members.p[which]),
-        c=np.ascontiguousarray(members.c[which]),
-        first=first,
-        times=np.concatenate(edges),
-        inputs=inputs,
-        restarts=restarts,
-    )
-    return arrays, _moments(manifest, members, span, which, edges)
-
-
-def _moments(
-    manifest: Manifest, members: Members, span: Span, which: np.ndarray, edges: list[np.ndarray]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The moments that `raceway.runtime.integrate.magnitudes` looks at, for each member."""
-    horizons = np.minimum(span.durations, span.turns)[which]
-    even = (np.arange(MOMENTS) + 0.5) / MOMENTS
-    times = []
-    for found, horizon in zip(edges, horizons, strict=True):
-        middles = 0.5 * (found[:-1] + found[1:])
-        picked = np.unique(np.linspace(0, len(middles) - 1, MOMENTS).astype(int))
-        times += [middles[picked], horizon * even]
-    counts = np.array([len(a) + len(b) for a, b in zip(times[::2], times[1::2], strict=True)])
-    moments = np.concatenate(times)
-    inputs = inputs_of(manifest.inputs, members.columns, np.repeat(which, counts), moments, moments)
-    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int_), inputs, horizons
-
-
-def _timing(inputs: Sequence[InputInfo]) -> list[str]:
-    """Parameters and constants that decide when loads switch."""
-    names: list[str] = []
-    for item in inputs:
-        if item.kind == "gate":
-            names += [item.offset, item.rate, *(name for window in item.windows for name in window)]
-        elif item.kind in ("table", "table_rate"):
-            names += (*item.times, *item.values)
-        elif item.kind == "phase":
-            names.append(item.rate)  # segments end before a phase gets large
-    return list(dict.fromkeys(names))
-
-
-def inputs_of(
-    inputs: Sequence[InputInfo],
-    columns: Mapping[str, np.ndarray],
-    owner: np.ndarray,
-    t: np.ndarray,
-    inside: np.ndarray,
-) -> np.ndarray:
-    """`clock.inputs_at` for many times of many members.
-
-    Parameters
-    ----------
-    columns : parameters and constants by name, shape (members,)
-    owner : member of each time, shape (n,)
-    t, inside : reference times, and times for which gates and slopes hold, shape (n,) [s]
-
-    Returns
-    -------
-    array, shape (n, inputs)
-    """
-    found = np.empty((len(t), len(inputs)))
-    for k, item in enumerate(inputs):
-        if item.kind == "phase":
-            found[:, k] = (columns[item.offset][owner] + columns[item.rate][owner] * t) % clock.TURN
-        elif item.kind == "gate":
-            angle = columns[item.offset][owner] + columns[item.rate][owner] * inside
-            found[:, k] = _covered(angle, item, columns, owner)
-        else:
-            names = (*item.times, *item.values)
-            for member in np.unique(owner):
-                values = {name: float(columns[name][member]) for name in names}
-                for row in np.flatnonzero(owner == member):
-                    found[row, k] = clock.inputs_at((item,), values, float(t[row]), float(inside[row]))[0]
-    return found
-
-
-def _covered(angle: np.ndarray, item: InputInfo, columns: Mapping[str, np.ndarray], owner: np.ndarray) -> np.ndarray:
-    """1 where an angle lies in one of the windows, edges hit by rounding counted as exact; the rules of `clock`."""
-    near = clock.ANGLE_RESOLUTION
-    covered = np.zeros(len(angle), dtype=bool)
-    for begin, finish in item.windows:
-        start, end = columns[begin], columns[finish]
-        width = end - start
-        wrapped = width % clock.TURN
-        wrapped = np.where(clock.TURN - wrapped < near, 0.0, wrapped)
-        width = np.where(width < 0.0, wrapped, np.where(width > clock.TURN - near, clock.TURN, width))[owner]
-        past = (angle - (start % clock.TURN)[owner]) % clock.TURN
-        past = np.where(clock.TURN - past < near, 0.0, past)
-        partly = (width > 0.0) & (width < clock.TURN)
-        covered |= np.where(partly, past < width - near, width >= clock.TURN)
-    return covered.astype(float)

@@ -58,8 +58,19 @@ def peak_moment(record: Record) -> Figure:
     if with_mechanism:
         when += f", crank angle {np.degrees(record.crank_angle()[sample]) % 360.0:.1f}°"
     subject = "Mechanism and bearing" if with_mechanism and with_bearing else "Bearing" if with_bearing else "Mechanism"
-    caption(figure, f"{subject} at the {reason}", f"{when}. {text}{record.settings()}.")
+    title = f"{subject} at the {reason}" + (_between_samples(record) if with_bearing else "")
+    caption(figure, title, f"{when}. {text}{record.settings()}.")
     return figure
+
+
+def _between_samples(record: Record) -> str:
+    """For the title: the peak between the samples, as a summary tells it, where the samples miss some of it."""
+    if len(record.solution) < 3:
+        return ""
+    name = "ball.force" if record.has("ball.force") else "ball.elastic_force"
+    peak = record.model.refine_peak(record.solution, name)
+    shown, true = f"{peak.sampled:.4g}", f"{peak.value:.4g}"
+    return "" if shown == true else f"\n{shown} N; between the samples it reaches {true} N"
 
 
 def _moment(record: Record) -> tuple[int, str]:

@@ -35,13 +35,14 @@ def _path(record: Record, window: slice, axis: str) -> tuple[Array, Array, Array
 
 @styled
 def orbit(record: Record) -> Figure:
-    """Path of the inner ring's centre: the last turn dark, the steady turns before it light."""
+    """Path of the inner ring's centre: the last turn dark, the steady turns before it light and wide under it."""
     last = record.last_turns(1)
     figure = new_figure(5.4)
     axes = figure.add_subplot()
     if last.start > 0:
         x, y = (1e6 * _path(record, slice(0, last.start + 1), axis)[1] for axis in "xy")
-        axes.plot(x, y, color=SAND, linewidth=0.8, label="steady turns before it")
+        # wide, to be seen where the last turn covers it
+        axes.plot(x, y, color=SAND, linewidth=2.4, label="steady turns before it")
     (t, x, _), (_, y, _) = (_path(record, last, axis) for axis in "xy")
     x, y = 1e6 * x, 1e6 * y
     axes.plot(x, y, color=INK, linewidth=1.1, label="last turn" if record.turns else "path")

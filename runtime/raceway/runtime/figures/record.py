@@ -43,6 +43,7 @@ class Record:
 
     @property
     def manifest(self) -> Manifest:
+        """Of the model that ran."""
         return self.solution.manifest
 
     @property

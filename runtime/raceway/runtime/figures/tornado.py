@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from raceway.runtime.derivatives.certificate import Verdict
+from raceway.runtime.derivatives.grazing import merge_grazing
 from raceway.runtime.derivatives.sensitivity_report import Sensitivity, SensitivityReport
 from raceway.runtime.errors import RequestError
 from raceway.runtime.figures.canvas import GREY, INK, PALE, SAND, caption, new_figure, save, styled
@@ -87,7 +88,8 @@ def tornado(report: SensitivityReport, quantity: str) -> Figure:
         words += f" Parameters of value 0, which have no % per %: {zero}; see the table for them."
     words += " Sensitivities are local: they hold for small changes."
     if report.grazing:
-        words += f" The motion grazes a kink at {len(report.grazing)} places, where derivatives are fragile."
+        count = len(merge_grazing(report.grazing))
+        words += f" The motion grazes a kink at {count} place{'s' if count > 1 else ''}, where derivatives are fragile."
     caption(figure, f"What moves {quantity}", words)
     return figure
 

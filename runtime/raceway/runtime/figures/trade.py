@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from raceway.runtime.accuracy.quasi_static import NAME as QUASI_STATIC
-from raceway.runtime.accuracy.trade import FULL, Measured, Trade
+from raceway.runtime.accuracy.trade import FAST_MATH, FULL, KINKS_LOCATED, Measured, Trade
 from raceway.runtime.figures.canvas import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
 
 #: Marker, colour and edge of each method; shapes tell them apart in grey as well.
@@ -26,8 +26,20 @@ _METHODS: dict[str, tuple[str, str]] = {
     "cvodes": ("v", GREY),
 }
 
-#: Markers of simpler models and of the switch.
-_OTHERS = ("P", "X", "<", "d", ">")
+#: Markers and faces of simpler models (filled) and of switches (open): the same in every figure.
+_OTHERS: dict[str, tuple[str, str]] = {
+    "the outer ring fixed": ("P", SAND),
+    "4 harmonics of the load": ("X", SAND),
+    "16 harmonics of the load": ("<", SAND),
+    FAST_MATH: ("o", "white"),
+    KINKS_LOCATED: ("s", "white"),
+}
+
+#: Markers of models that have none above, in the order they were measured.
+_SPARE = (">", "h", "8", "d")
+
+#: Decades the axis is lengthened at most to show where the reference is uncertain.
+_DECADES = 4.0
 
 
 @styled
@@ -39,14 +51,15 @@ def draw_trade(trade: Trade, quantity: str | None = None) -> Figure:
     for one in trade.measured:
         if math.isfinite(one.time) and math.isfinite(trade.error(one, quantity)) and trade.error(one, quantity) > 0.0:
             groups.setdefault(_group(one), []).append(one)
-    others = iter(_OTHERS)
+    spare = iter(_SPARE)
     for name, ones in groups.items():
         ones.sort(key=lambda m: -m.configuration.rtol)
         if name in _METHODS:
             marker, colour = _METHODS[name]
             looks: dict[str, Any] = {"markersize": 10 if name == QUASI_STATIC else 6}
         else:
-            marker, colour, looks = next(others, "."), SAND, {"markersize": 7}
+            marker, colour = _OTHERS[name] if name in _OTHERS else (next(spare, "."), SAND)
+            looks = {"markersize": 7}
         axes.plot(
             [1e3 * m.time for m in ones],
             [100.0 * trade.error(m, quantity) for m in ones],
@@ -72,19 +85,21 @@ def draw_trade(trade: Trade, quantity: str | None = None) -> Figure:
         label="best of all",
     )
     floor = 100.0 * (max(trade.uncertainty.values()) if quantity is None else trade.uncertainty[quantity])
-    _axes(axes, floor)
+    shaded = _axes(axes, floor)
     name = "the worst of all quantities" if quantity is None else quantity
     caption(
         figure,
         f"{trade.title}: what accuracy costs",
         f"Relative error of {name}, 95 % point over {trade.members} parameter sets within {100 * trade.spread:g} % of "
         f"the scene's, against the time of the integration, {trade.cycles:g} cycles a run. A line joins the tolerances "
-        f"of a method. In the shaded part nothing is known: the reference is uncertain by {floor:.1g} %.",
+        f"of a method. {'Hatched: below what is known, for the' if shaded else 'The'} reference is uncertain by "
+        f"{floor:.1g} %.",
     )
     return figure
 
 
-def _axes(axes: Axes, floor: float) -> None:
+def _axes(axes: Axes, floor: float) -> bool:
+    """Scales, ticks and legend; whether the part below the reference's uncertainty [%] is shown."""
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("time a cycle [ms]")
@@ -94,10 +109,13 @@ def _axes(axes: Axes, floor: float) -> None:
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())
     low, high = axes.get_ylim()
+    shown = bool(floor > low * 10.0**-_DECADES)
+    if shown:
+        low = min(low, floor / 10.0)
+        axes.axhspan(low, floor, facecolor=PALE, edgecolor=GREY, hatch="///", linewidth=0.0, zorder=0)
     axes.set_ylim(low, min(high, 1e3))
-    if floor > low:
-        axes.axhspan(low, floor, color=PALE, zorder=0)
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return shown
 
 
 def _group(one: Measured) -> str:
