@@ -109,10 +109,11 @@ def test_a_named_error_takes_the_quasi_static_model_where_it_is_right_and_only_t
     assert taken.companion[0] != "quasi-static"
     assert taken.estimate < 0.01
     assert meet_target(prepare(step), 0.01, [PEAK], step_trade).method != "quasi-static"
-    # a ranking that was measured elsewhere does not hold here: the estimate finds out
+    # what a simpler model was found to leave out elsewhere says nothing here: it is not taken
     misled = meet_target(prepare(step), 0.01, [PEAK], slow_trade)
     assert misled.method != "quasi-static"
-    assert [method for method, _, estimate in misled.tried if estimate > 0.5] == ["quasi-static"]
+    true = step.reduce(method="stepper-rodas5p", rtol=1e-9)["ball.force"].maximum
+    assert misled.values[PEAK] == pytest.approx(true, rel=0.01)
 
 
 def test_the_reference_is_more_certain_than_any_error_that_is_told(step_trade: Trade) -> None:

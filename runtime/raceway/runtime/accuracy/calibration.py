@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from raceway.runtime.accuracy.error_target import Accuracy, TargetMissed, Way, meet_target
+from raceway.runtime.accuracy.error_target import Accuracy, Search, TargetMissed, meet_target
 from raceway.runtime.accuracy.prepared import prepare
-from raceway.runtime.accuracy.trade import SPREAD, TARGETS, Trade, make_reference, perturbed
+from raceway.runtime.accuracy.trade import FULL, SPREAD, TARGETS, Trade, make_reference, perturbed
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -30,6 +30,7 @@ class Calibration:
     Attributes
     ----------
     target : relative error asked for [1]
+    measured : whether a trade of the scene chose, else the ladder
     of : quantities; the error is that of the worst one
     runs : parameter sets
     missed : runs that were refused
@@ -37,10 +38,12 @@ class Calibration:
     within : part of the other runs whose true error is within the target [1]
     near : part of them whose estimate is within a factor of ten of the true error [1]
     time, total_time : medians of the chosen integration and of all that was integrated, of a cycle [s]
-    ways : methods and tolerances that were chosen, and how often
+    share : median of the time of all else that was integrated over that of the chosen integration [1]
+    ways : models, methods and tolerances that were chosen, and how often
     """
 
     target: float
+    measured: bool
     of: tuple[str, ...]
     runs: int
     missed: int
@@ -49,7 +52,8 @@ class Calibration:
     near: float
     time: float
     total_time: float
-    ways: tuple[tuple[Way, int], ...]
+    share: float
+    ways: tuple[tuple[tuple[str, str, float], int], ...]
 
 
 def calibrate(
@@ -59,7 +63,8 @@ def calibrate(
     members: int = 200,
     spread: float = SPREAD,
     seed: int = 3,
-    trade: Trade | None = None,
+    trades: Sequence[Trade | None] = (None,),
+    simpler: Mapping[str, Model] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[Calibration]:
     """Ask for each target on every member, and compare with the reference.
@@ -67,6 +72,8 @@ def calibrate(
     Parameters
     ----------
     groups : each a list of quantities that are asked for together
+    trades : what chooses: a trade of the scene, or None for the ladder; each in turn
+    simpler : models besides the full one that may be taken where the trade says so, by name
 
     Raises
     ------
@@ -75,19 +82,26 @@ def calibrate(
     """
     names = tuple(dict.fromkeys(name for group in groups for name in group))
     say = progress or (lambda _: None)
+    others = {name: one for name, one in (simpler or {}).items() if name != FULL}
     sets = perturbed(model, members, spread, seed)
     reference = make_reference(model, sets, names, lambda f: say(0.5 * f))
-    wishes = [(tuple(group), target) for group in groups for target in targets]
+    wishes = [(trade, tuple(group), target) for trade in trades for group in groups for target in targets]
     found: list[list[tuple[Accuracy, float, float]]] = [[] for _ in wishes]
     missed = [0] * len(wishes)
     turns = 1.0
     for member in range(members):
-        run = prepare(model, {name: float(values[member]) for name, values in sets.items()})
+        numbers = {name: float(values[member]) for name, values in sets.items()}
+        run = prepare(model, numbers)
         turns = run.cycles
-        for k, (of, target) in enumerate(wishes):
+        simple = {
+            name: prepare(one, {path: value for path, value in numbers.items() if path in one.parameters})
+            for name, one in others.items()
+        }
+        for k, (trade, of, target) in enumerate(wishes):
             columns = [names.index(name) for name in of]
             try:
-                one = meet_target(run, target, of, trade)
+                search = Search(run=run, simpler=simple.__getitem__)
+                one = meet_target(run, target, of, trade, models=(FULL, *others), search=search)
             except TargetMissed:
                 missed[k] += 1
                 continue
@@ -97,7 +111,10 @@ def calibrate(
             )
             found[k].append((one, true, float(reference.doubt[member, columns].max())))
         say(0.5 + 0.5 * (member + 1) / members)
-    return [_counted(target, of, members, missed[k], found[k], turns) for k, (of, target) in enumerate(wishes)]
+    return [
+        _counted(target, of, members, missed[k], found[k], turns, measured=trade is not None)
+        for k, (trade, of, target) in enumerate(wishes)
+    ]
 
 
 def _counted(
@@ -107,11 +124,14 @@ def _counted(
     missed: int,
     found: Sequence[tuple[Accuracy, float, float]],
     turns: float,
+    *,
+    measured: bool,
 ) -> Calibration:
     known = [(one, true) for one, true, doubt in found if true > doubt]
-    chosen = Counter((one.method, one.rtol) for one, _, _ in found)
+    chosen = Counter((one.model, one.method, one.rtol) for one, _, _ in found)
     return Calibration(
         target=target,
+        measured=measured,
         of=names,
         runs=members,
         missed=missed,
@@ -120,6 +140,7 @@ def _counted(
         near=_part([1.0 / NEAR <= one.estimate / true <= NEAR for one, true in known]),
         time=statistics.median(one.time for one, _, _ in found) / turns if found else 0.0,
         total_time=statistics.median(one.time + one.companion_time for one, _, _ in found) / turns if found else 0.0,
+        share=statistics.median(one.companion_time / one.time for one, _, _ in found) if found else 0.0,
         ways=tuple(chosen.most_common()),
     )
 

@@ -1,44 +1,40 @@
-"""Let the user name the error: choose method and tolerance, run, estimate the error of that very run, tighten.
+"""Let the user name the error: choose model, method and tolerance, run, estimate the error of that very run, tighten.
 
 In: a prepared run, quantities, a relative error.  Out: an `Accuracy`: choice, values, estimate, cost.
 
-Ways to compute are ranked from cheap to accurate, by a stored trade of the scene where there is one, else by a ladder
-that was measured on the shipped scenes.  A candidate is integrated, and so is a companion that is at least five times
-as accurate where both behave as ranked; their difference is the estimate of the candidate's error.  It estimates the
-error of this run, not of runs like it: contact makes the error of a single run a lottery, and a companion that is less
-accurate (a looser tolerance, scaled) would draw another ticket.  Where the estimate is above the target, the next
-candidate that can be enough follows; integrations are kept, so that a companion may become a candidate at no cost.
+Candidates come from `candidates`, cheapest first.  One is integrated, in parts; a companion, which is more accurate,
+integrates a part of the run again from the run's own state (`companion`), and the difference is the estimate.  Where a
+trade of the scene was measured, the errors it found for that way weigh in: a single difference may be small by luck.
+Where the estimate is above the target, the next candidate that can be enough follows.  The samples of a solution are
+written by the integration that is judged: nothing is integrated again for them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from raceway.runtime.accuracy.prepared import Integrated, Prepared, check_observables, default_observables, prepare
-from raceway.runtime.accuracy.trade import FULL, Measured, Trade
+from raceway.runtime.accuracy.candidates import DIFFERENT, Candidate, prefer, rungs
+from raceway.runtime.accuracy.companion import check
+from raceway.runtime.accuracy.ladder import Way
+from raceway.runtime.accuracy.parts import InParts, integrate_parts, values_of
+from raceway.runtime.accuracy.prepared import Observable, Prepared, check_observables
+from raceway.runtime.accuracy.trade import FULL, Trade
 from raceway.runtime.errors import RequestError, SimulationError
 from raceway.runtime.integrate.magnitudes import model_scales
-from raceway.runtime.integrate.simulate import simulate
-
-if TYPE_CHECKING:
-    from raceway.runtime.model import Model
-    from raceway.runtime.parameters import Numbers
-    from raceway.runtime.request import Request
-    from raceway.runtime.solution import Solution
-
-#: An estimate must be this much below the target: the companion has an error as well.
-SAFETY = 1.2
-
-#: A companion from a trade is at least this much more accurate than the candidate.
-FINER = 0.2
+from raceway.runtime.integrate.trajectory import Trajectory
+from raceway.runtime.parameters import real
+from raceway.runtime.request import start_state
 
 #: Where fastest decay over fastest natural frequency is above, explicit methods are held down by stability.
 STIFF = 2.0
+
+#: Fastest oscillations in a turn above which they are as well: vibrations that have died out would still be stepped.
+MANY_OSCILLATIONS = 5000.0
 
 #: Errors that may be asked for [1].
 SMALLEST, LARGEST = 1e-8, 0.5
@@ -47,27 +43,11 @@ SMALLEST, LARGEST = 1e-8, 0.5
 #: tight takes twice the steps; a way that takes far more is stuck at the resolution of numbers.
 GROWTH, SPARE = 20, 100_000
 
-#: Method and tolerance.
-Way = tuple[str, float]
+#: Weight of the difference in an estimate, the rest is that of the trade's median error, in logarithms [1].
+WEIGHT = 0.6
 
-
-def _ladder(fine: str) -> tuple[Way, ...]:
-    return (
-        ("stepper-rodas4", 1e-1),
-        ("stepper-rodas4", 1e-2),
-        *((fine, 10.0**decade) for decade in (-3, -4, -5, -6, -7, -8, -9, -10)),
-        ("stepper-rodas5p", 1e-11),
-    )
-
-
-#: Ways from cheap to accurate, where nothing was measured on the scene: for models that are not stiff, and stiff ones.
-LADDER, STIFF_LADDER = _ladder("stepper-dop853"), _ladder("stepper-rodas5p")
-
-#: How many rungs higher on a ladder a companion stands.
-RUNGS = 2
-
-#: Where on a ladder to start for a target: the error that each rung is expected to keep.
-EXPECTED = (0.1, 0.01, 0.001, 0.0001)
+#: A difference below this part of the trade's median error is luck, and counts as that much [1].
+LUCK = 0.03
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,9 +61,11 @@ class Accuracy:
     of : quantities
     values : of the quantities, in SI
     estimates : of each quantity [1]
+    model : chosen, ``full`` or the name of a simpler one
     method, rtol : chosen
-    companion : method and tolerance of the run that the estimate is the difference to
-    tried : ways that were integrated and did not meet the target, with their estimates
+    companion : method and tolerance that the estimate was made with
+    part : of the run that the companion integrated: begin and end [s]
+    tried : models, methods and tolerances that were integrated and did not meet the target, with their estimates
     reason : why the search began where it did
     time, companion_time : of the chosen integration, and of everything else that was integrated [s]
     """
@@ -93,10 +75,12 @@ class Accuracy:
     of: tuple[str, ...]
     values: dict[str, float]
     estimates: dict[str, float]
+    model: str
     method: str
     rtol: float
     companion: Way
-    tried: tuple[tuple[str, float, float], ...]
+    part: tuple[float, float]
+    tried: tuple[tuple[str, str, float, float], ...]
     reason: str
     time: float
     companion_time: float
@@ -111,11 +95,15 @@ class Accuracy:
     def words(self) -> str:
         """One paragraph for people."""
         worst = max(self.estimates, key=lambda name: self.estimates[name])
-        other = f"{self.companion[0]} at rtol {self.companion[1]:g}"
+        chosen = self.method if self.model == FULL else f"{self.model}, {self.method}"
+        begin, end = self.part
+        values = ", ".join(f"{name} = {value:.7g}" for name, value in self.values.items())
         return (
+            f"{values} (SI, extremes between samples included): "
             f"error asked for {100 * self.target:g} %, estimated {100 * self.estimate:.2g} % (worst of "
-            f"{', '.join(self.of)}: {worst}): {self.method} at rtol {self.rtol:g}, {self.reason}. Integrated in "
-            f"{1e3 * self.time:.3g} ms; {1e3 * self.companion_time:.3g} ms more went into the estimate, by {other}"
+            f"{', '.join(self.of)}: {worst}): {chosen} at rtol {self.rtol:g}, {self.reason}. Integrated in "
+            f"{1e3 * self.time:.3g} ms; {1e3 * self.companion_time:.3g} ms more went into the estimate, by "
+            f"{self.companion[0]} at rtol {self.companion[1]:g} from t = {begin:.4g} to {end:.4g} s"
             + (f", after {len(self.tried)} other ways." if self.tried else ".")
         )
 
@@ -129,37 +117,83 @@ class TargetMissed(SimulationError):
 
 
 @dataclass(slots=True, kw_only=True)
-class _Search:
-    """Integrations so far, by way."""
+class Search:
+    """A search under way.
+
+    Attributes
+    ----------
+    run : of the full model
+    simpler : runs of simpler models, by name, prepared when first asked for
+    recorder : makes memory for the samples of a run, where they are wanted
+    progress : called with the finished fraction of the candidate that is integrated
+    record : samples of the last candidate
+    fault : why the last way that failed did
+    longest : steps of the longest candidate
+    """
 
     run: Prepared
-    observables: tuple[tuple[str, str], ...]
-    done: dict[Way, Integrated | None] = field(default_factory=dict)
-
-    def __call__(self, way: Way) -> Integrated | None:
-        if way not in self.done:
-            try:
-                longest = max((one.steps or 0 for one in self.done.values() if one is not None), default=0)
-                limit = max(GROWTH * longest, math.ceil(SPARE * self.run.cycles))
-                self.done[way] = self.run.run(self.observables, *way, max_steps=limit)
-            except SimulationError:
-                # one way that fails is no reason to give up: the next one is tighter
-                self.done[way] = None
-        return self.done[way]
+    simpler: Callable[[str], Prepared] | None = None
+    recorder: Callable[[Prepared], Trajectory] | None = None
+    progress: Callable[[float], None] | None = None
+    record: Trajectory | None = None
+    done: InParts | None = None
+    fault: SimulationError | None = None
+    seconds: float = 0.0
+    longest: int = field(default=0)
 
     @property
-    def seconds(self) -> float:
-        return sum(one.seconds for one in self.done.values() if one is not None)
+    def limit(self) -> int:
+        return max(GROWTH * self.longest, math.ceil(SPARE * self.run.cycles))
+
+    def prepared(self, model: str) -> Prepared:
+        """The run of a model."""
+        if model == FULL or self.simpler is None:
+            return self.run
+        return self.simpler(model)
+
+    def integrate(self, candidate: Candidate, run: Prepared, observables: Sequence[Observable]) -> InParts:
+        """Integrate all of a run, with its samples.
+
+        Raises
+        ------
+        SimulationError
+            The way could not reach the end.
+        """
+        self.record = self.recorder(run) if self.recorder is not None else None
+        self.done = integrate_parts(
+            run,
+            observables,
+            *candidate.way,
+            max_steps=self.limit,
+            trajectory=self.record,
+            progress=self.progress,
+        )
+        self.seconds += self.done.seconds
+        self.longest = max(self.longest, self.done.steps)
+        return self.done
 
 
-def meet_target(run: Prepared, target: float, of: Sequence[str], trade: Trade | None = None) -> Accuracy:
+def meet_target(
+    run: Prepared,
+    target: float,
+    of: Sequence[str],
+    trade: Trade | None = None,
+    *,
+    models: Sequence[str] = (FULL,),
+    quasi_static: bool = True,
+    search: Search | None = None,
+) -> Accuracy:
     """Find a way that keeps a relative error on all quantities, and integrate by it.
 
     Parameters
     ----------
+    run : of the full model
     target : relative error [1]
     of : quantities
     trade : a measurement of this scene, whose ranking is used
+    models : names of the models that may be taken; those of simpler ones must be known to the search
+    quasi_static : whether the quasi-static model may be taken
+    search : keeps what was integrated last, for the caller
 
     Raises
     ------
@@ -169,148 +203,133 @@ def meet_target(run: Prepared, target: float, of: Sequence[str], trade: Trade | 
         No way meets the target; the message says what the best one keeps.
     """
     names = (of,) if isinstance(of, str) else tuple(of)
-    if isinstance(target, bool) or not isinstance(target, int | float) or not SMALLEST <= target <= LARGEST:
+    if not SMALLEST <= real(target) <= LARGEST:
         raise RequestError(
-            f"error: a relative error from {SMALLEST:g} to {LARGEST:g} is expected, not {target!r}. "
+            f"The error asked for is {target!r:.80}. Allowed: a relative error from {SMALLEST:g} to {LARGEST:g}. "
             "Example: error=0.01 for 1 %."
         )
-    search = _Search(run=run, observables=check_observables(run.model, names))
-    pairs, reason = _pairs(run, target, names, trade)
-    tried: list[tuple[str, float, float]] = []
+    target = real(target)
+    observables = check_observables(run.model, names)
+    search = search or Search(run=run)
+    scales = model_scales(run.model, run.numbers, run.initial, run.duration, run.turn)
+    oscillations = scales.frequency * min(run.turn, run.duration) / (2.0 * math.pi)
+    stiff = scales.stiffness > STIFF or oscillations > MANY_OSCILLATIONS
+    preferred = None
+    if trade is not None and like_those_measured(run, trade):
+        preferred = prefer(trade, target, names, models, quasi_static=quasi_static)
+    elif trade is not None:
+        # the ranking may still be right, the errors need not; and what a simpler model leaves out, a companion over a
+        # part of the run need not meet
+        preferred = prefer(trade, target, names, quasi_static=False)
+        if preferred is not None:
+            reason = f"{preferred.reason} (measured with other numbers, or length)"
+            preferred = replace(preferred, median={}, promised={}, reason=reason)
+    # what was measured on other parameters may not hold for these: then the ladder goes on from there
+    waiting = [*([preferred] if preferred is not None else []), *rungs(target, observables, stiff=stiff)]
+    tried: list[tuple[str, str, float, float]] = []
     best: Accuracy | None = None
     place = 0
-    while place < len(pairs):
-        way, companion = pairs[place]
+    while place < len(waiting):
+        candidate = waiting[place]
         place += 1
-        found, other = search(way), search(companion)
-        if found is None or other is None:
+        reached = _judged(search, candidate, observables, names, target, tried)
+        if reached is None:
             continue
-        estimates = _differences(found, other)
-        estimate = max(estimates)
-        reached = Accuracy(
-            target=float(target),
-            estimate=estimate,
-            of=names,
-            values=dict(zip(names, found.values, strict=True)),
-            estimates=dict(zip(names, estimates, strict=True)),
-            method=way[0],
-            rtol=way[1],
-            companion=companion,
-            tried=tuple(tried),
-            reason=reason,
-            time=found.seconds,
-            companion_time=search.seconds - found.seconds,
-        )
-        if SAFETY * estimate <= target:
+        if candidate.safety * reached.estimate <= target:
             return reached
-        tried.append((*way, estimate))
+        tried.append((candidate.model, *candidate.way, reached.estimate))
         # a rung is a decade of tolerance, and about a decade of error: those that cannot be enough are left out
-        if 1 < place < len(pairs) and estimate < math.inf:
-            place = min(place + max(0, math.floor(math.log10(SAFETY * estimate / target))), len(pairs) - 1)
-        if best is None or estimate < best.estimate:
+        if place < len(waiting) and (preferred is None or place > 1) and reached.estimate < math.inf:
+            skipped = max(0, math.floor(math.log10(candidate.safety * reached.estimate / target)))
+            place = min(place + skipped, len(waiting) - 1)
+        if best is None or reached.estimate < best.estimate:
             best = reached
-    raise TargetMissed(_refusal(target, names, best), best)
+    raise TargetMissed(_refusal(target, names, best, search.fault), best)
 
 
-def _differences(found: Integrated, other: Integrated) -> list[float]:
-    """Relative differences; infinite for a quantity that is zero or no number."""
-    out = []
-    for value, reference in zip(found.values, other.values, strict=True):
-        difference = abs(value - reference) / abs(reference) if reference != 0.0 else math.inf
-        # two runs that agree to the last bit still round
-        out.append(max(difference, np.finfo(float).eps) if not math.isnan(difference) else math.inf)
-    return out
+def like_those_measured(run: Prepared, trade: Trade) -> bool:
+    """Whether a run is one of those that a trade was measured on: numbers near the scene's, its start and length."""
+    model = run.model
+    asked = model.manifest.run.transient_cycles * run.turn if math.isfinite(run.turn) else 0.0
+    return (
+        all(
+            abs(value - model.parameters[name]) <= 2.0 * trade.spread * abs(model.parameters[name])
+            for name, value in run.numbers.parameters.items()
+        )
+        and math.isclose(run.cycles, trade.cycles, rel_tol=2.0 * trade.spread)
+        and math.isclose(run.start, asked, rel_tol=1e-9)
+        and bool(np.all(run.initial == start_state(model, run.numbers, None)))
+    )
 
 
-def _pairs(
-    run: Prepared, target: float, names: tuple[str, ...], trade: Trade | None
-) -> tuple[list[tuple[Way, Way]], str]:
-    """Candidates with their companions, from where the search begins to the most accurate, and why there."""
-    stiffness = model_scales(run.model, run.numbers, run.initial, run.duration, run.turn).stiffness
-    ladder = STIFF_LADDER if stiffness > STIFF else LADDER
-    rungs = [(ladder[k], ladder[k + RUNGS]) for k in range(len(ladder) - RUNGS)]
-    first = next((k for k, expected in enumerate(EXPECTED) if expected <= target), len(EXPECTED) - 1)
-    preferred = prefer(trade, target, names) if trade is not None else None
-    if preferred is None:
-        kind = "a stiff model" if ladder is STIFF_LADDER else "a model that is not stiff"
-        return rungs[first:], f"the ladder for {kind}, as no trade of this scene was measured"
-    # what was measured on other parameters may not hold for these: then the ladder goes on from there
-    way, companion = ((one.configuration.method, one.configuration.rtol) for one in preferred)
-    return [(way, companion), *rungs[first:]], "the cheapest that the scene's trade allows"
-
-
-def prefer(trade: Trade, target: float, of: Sequence[str]) -> tuple[Measured, Measured] | None:
-    """Cheapest way of a trade that keeps the target on all quantities, and a companion that is more accurate by far.
-
-    None where the trade has no such pair, or was not measured of these quantities.  Models with another structure are
-    not taken: they are the user's to choose.
-    """
-    if any(name not in trade.quantities for name in of):
+def _judged(
+    search: Search,
+    candidate: Candidate,
+    observables: Sequence[Observable],
+    names: tuple[str, ...],
+    target: float,
+    tried: Sequence[tuple[str, str, float, float]],
+) -> Accuracy | None:
+    """A candidate, integrated and compared; None where it or its companion could not reach the end."""
+    run = search.prepared(candidate.model)
+    try:
+        done = search.integrate(candidate, run, observables)
+        # a trade has measured errors over whole runs, with all that the motion remembers
+        own = None if candidate.promised else candidate.way
+        verdict = check(run, done, observables, search.run, candidate.companion, candidate.rate, search.limit, own)
+    except SimulationError as fault:
+        # one way that fails is no reason to give up: the next one is tighter
+        search.fault = fault
         return None
-    ways = [
-        one
-        for one in trade.measured
-        if one.configuration.model == FULL
-        and not one.configuration.switch
-        and one.configuration.method.startswith(("stepper", "quasi"))
-        and one.failures == 0
+    search.seconds += verdict.seconds
+    values = values_of(run, observables, done.rows)
+    allowed = DIFFERENT * target if candidate.simple else 0.0
+    estimates = [
+        estimated(difference, candidate.median.get(name), candidate.promised.get(name), allowed)
+        for name, difference in zip(names, verdict.differences, strict=True)
     ]
-    # with room for the companion's error where there is such a way, else without: the estimate has the last word
-    fits = ([w for w in ways if all(room * w.promised[name] <= target for name in of)] for room in (SAFETY, 1.0))
-    fit = next((found for found in fits if found), None)
-    if fit is None:
-        return None
-    chosen = min(fit, key=lambda m: m.time)
-    worst = max(chosen.median[name] for name in of)
-    finer = [one for one in ways if all(one.promised[name] <= FINER * worst for name in of)]
-    return (chosen, min(finer, key=lambda m: m.time)) if finer else None
+    return Accuracy(
+        target=float(target),
+        estimate=max(estimates),
+        of=names,
+        values=dict(zip(names, values.tolist(), strict=True)),
+        estimates=dict(zip(names, estimates, strict=True)),
+        model=candidate.model,
+        method=candidate.way[0],
+        rtol=candidate.way[1],
+        companion=candidate.companion,
+        part=(verdict.begin, verdict.end),
+        tried=tuple(tried),
+        reason=candidate.reason,
+        time=done.seconds,
+        companion_time=search.seconds - done.seconds,
+    )
 
 
-def _refusal(target: float, names: tuple[str, ...], best: Accuracy | None) -> str:
+def estimated(difference: float, median: float | None, promised: float | None, allowed: float = 0.0) -> float:
+    """Estimate of an error from the difference to a companion, and what a trade found for the way.
+
+    Parameters
+    ----------
+    difference : relative, over a part of this run [1]
+    median, promised : error of the way over the trade's ensemble, median and 95 % point; None where nothing was
+        measured [1]
+    allowed : a difference up to this does not speak against what was measured [1]
+    """
+    if median is None or promised is None or not median > 0.0 or not difference <= max(promised, allowed):
+        # nothing measured, or a run that is not like those measured: the difference alone
+        return difference
+    difference = min(max(difference, LUCK * median), promised)
+    return math.exp(WEIGHT * math.log(difference) + (1.0 - WEIGHT) * math.log(median))
+
+
+def _refusal(target: float, names: tuple[str, ...], best: Accuracy | None, fault: SimulationError | None) -> str:
     asked = f"An error of {100 * target:g} % on {', '.join(names)} cannot be met"
     if best is None:
-        return f"{asked}: no method could integrate this run. Check initial state, damping and parameters."
+        why = f" The last one said: {fault}" if fault is not None else ""
+        return f"{asked}: no method could integrate this run. Check initial state, damping and parameters.{why}"
     return (
         f"{asked}. The best is {100 * best.estimate:.2g} %, by {best.method} at rtol {best.rtol:g}. Where tightening "
         "does not help, the motion amplifies rounding (chaos), or the quantity is nearly zero: ask for a shorter run, "
         "a statistic (mean, rms) instead of an extreme, or a larger error."
     )
-
-
-def simulate_to_error(
-    model: Model,
-    numbers: Numbers,
-    request: Request,
-    target: float,
-    of: str | Sequence[str] | None,
-    trade: Trade | None,
-) -> Solution:
-    """Simulate with the error of quantities named instead of method and tolerance; see `meet_target`.
-
-    Raises
-    ------
-    RequestError
-        A wrong request: method or tolerance named besides, a model without states.
-    TargetMissed
-        No way meets the target.
-    """
-    if request.method is not None or request.rtol is not None:
-        raise RequestError(
-            "error was given, and method or rtol as well: with an error named, the tool chooses both. Give one or the "
-            "other."
-        )
-    if not model.states:
-        raise RequestError("error: this model has no states; its outputs follow from time alone, without an error.")
-    names = default_observables(model) if of is None else (of,) if isinstance(of, str) else tuple(of)
-    run = prepare(
-        model,
-        numbers.parameters,
-        cycles=request.cycles,
-        duration=request.duration if request.times is None else float(np.asarray(request.times)[-1]),
-        transient=request.transient_cycles,
-        initial=request.initial,
-    )
-    found = meet_target(run, target, names, trade)
-    solution = simulate(model, numbers, replace(request, method=found.method, rtol=found.rtol))
-    statistics = replace(solution.statistics, reason=found.words)
-    return replace(solution, statistics=statistics, accuracy=found)

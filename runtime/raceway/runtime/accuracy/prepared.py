@@ -16,10 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from raceway.runtime.accuracy.parts import integrate_parts, part_times, values_of
 from raceway.runtime.accuracy.quasi_static import NAME as QUASI_STATIC
-from raceway.runtime.accuracy.quasi_static import STATUS_OF_END as STATUS_AT_REST
-from raceway.runtime.accuracy.quasi_static import End as EndAtRest
-from raceway.runtime.accuracy.quasi_static_runs import QuasiStaticFailed
 from raceway.runtime.assembly import check_assembly
 from raceway.runtime.ensembles.ensemble_driver import BALL_CHANNELS, EnsembleDriver
 from raceway.runtime.ensembles.members import edge_windows
@@ -28,18 +26,18 @@ from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.magnitudes import stepper_magnitudes
 from raceway.runtime.integrate.reductions import (
     SCALED_TURNS,
-    RunFailed,
     channel_names,
     check_span,
     observable_aliases,
     observe,
     step_limit,
 )
+from raceway.runtime.integrate.segments import make_segments, segment_edges
 from raceway.runtime.integrate.simulate import fill
 from raceway.runtime.integrate.stepper import METHODS as STEPPERS
-from raceway.runtime.integrate.stepper import End, Segments
+from raceway.runtime.integrate.stepper import Segments
 from raceway.runtime.integrate.stepping import Cost
-from raceway.runtime.integrate.trajectory import Interrupted, evaluate_outputs, start_trajectory
+from raceway.runtime.integrate.trajectory import Interrupted, Trajectory, evaluate_outputs, start_trajectory
 from raceway.runtime.parameters import unknown_name
 from raceway.runtime.request import Request, run_length, start_state
 
@@ -81,6 +79,8 @@ class Prepared:
     magnitude : of the states, shape (states,)
     duration, turn, start : length, time of a turn, time from which on is reduced [s]
     segments : of the whole run
+    parts : first segment of each part of the run, and behind them the number of segments (see
+        `raceway.runtime.accuracy.parts`)
     """
 
     model: Model
@@ -91,11 +91,22 @@ class Prepared:
     turn: float
     start: float
     segments: Segments
+    parts: tuple[int, ...]
 
     @property
     def cycles(self) -> float:
         """Turns of the run; 1 where nothing turns."""
         return self.duration / self.turn if math.isfinite(self.turn) else 1.0
+
+    @property
+    def step_limit(self) -> int:
+        """Most steps that an integration may take, accepted and rejected."""
+        return step_limit(self.duration, self.turn)
+
+    @staticmethod
+    def now() -> float:
+        """The clock that integrations are timed by [s]."""
+        return _now()
 
     def run(
         self,
@@ -105,7 +116,7 @@ class Prepared:
         driver: EnsembleDriver | None = None,
         max_steps: int | None = None,
     ) -> Integrated:
-        """Integrate and reduce.
+        """Integrate and reduce, in parts as `--error` does: where parts begin, steps do, and errors depend on that.
 
         Parameters
         ----------
@@ -120,58 +131,9 @@ class Prepared:
         """
         if method not in STEPPERS and method != QUASI_STATIC:
             return self._sampled(observables, method, rtol)
-        driver = driver or self.model.ensemble_driver
-        row = driver.reductions(1, self.start, {channel for _, channel in observables})[0]
-        state = self.initial.copy()
-        tolerance = rtol * self.magnitude
-        if method == QUASI_STATIC:
-            seconds, steps = self._at_rest(tolerance, state, row)
-        else:
-            begin = _now()
-            outcome = driver.stepper.run(
-                family=STEPPERS[method],
-                tolerance=tolerance,
-                p=self.numbers.p,
-                c=self.numbers.c,
-                x=state,
-                segments=self.segments,
-                output_times=np.zeros(0),
-                output_states=None,
-                reduction=row,
-                max_steps=max_steps if max_steps is not None else step_limit(self.duration, self.turn),
-            )
-            seconds, steps = _now() - begin, outcome.steps
-            if outcome.end is not End.DONE:
-                raise RunFailed(outcome.end, outcome.time, outcome.step)
-        found = tuple(float(observe(driver, *one, row[None], state[None])[0]) for one in observables)
-        return Integrated(values=found, seconds=seconds, steps=steps)
-
-    def _at_rest(self, tolerance: np.ndarray, state: np.ndarray, row: np.ndarray) -> tuple[float, int]:
-        model, numbers = self.model, self.numbers
-        driver = model.quasi_static
-        # an equilibrium has no transient: what lies before the time that counts need not be followed
-        first = int(np.searchsorted(self.segments.times, self.start))
-        kept = Segments(
-            times=self.segments.times[first:].copy(),
-            inputs=self.segments.inputs[first:].copy(),
-            restarts=self.segments.restarts[first:].copy(),
-        )
-        begin = _now()
-        outcome = driver.run(
-            tolerance=tolerance,
-            p=numbers.p,
-            c=numbers.c,
-            x=state,
-            segments=kept,
-            output_times=np.zeros(0),
-            output_states=None,
-            reduction=row,
-        )
-        seconds = _now() - begin
-        if outcome.end is not EndAtRest.DONE:
-            angle = clock.crank_angle(model.manifest, numbers.values, outcome.time)
-            raise QuasiStaticFailed(STATUS_AT_REST[outcome.end], outcome.time, angle)
-        return seconds, outcome.steps
+        done = integrate_parts(self, observables, method, rtol, driver=driver, max_steps=max_steps)
+        found = tuple(values_of(self, observables, done.rows).tolist())
+        return Integrated(values=found, seconds=done.seconds, steps=done.steps)
 
     def _sampled(self, observables: Sequence[Observable], method: str, rtol: float) -> Integrated:
         """By one of CasADi's methods, from samples: these methods have no reductions on their way."""
@@ -191,10 +153,51 @@ class Prepared:
         counted = trajectory.t >= self.start * (1.0 - 1e-12)
         names = [state.name for state in model.manifest.states]
         found = []
+        first = int(np.argmax(counted))
         for kind, channel in observables:
             series = outputs[channel].max(axis=1) if channel in wanted else trajectory.x[:, names.index(channel)]
-            found.append(_of_samples(kind, series[counted]))
+            value = _of_samples(kind, series[counted])
+            if kind in EXTREMES:
+                value = self._between(kind, channel, trajectory, series, first, value)
+            found.append(value)
         return Integrated(values=tuple(found), seconds=seconds, steps=cost.steps)
+
+    def _between(
+        self, kind: str, channel: str, trajectory: Trajectory, series: np.ndarray, first: int, value: float
+    ) -> float:
+        """An extreme, sought between the samples: from the sampled states, by a way that adds no error of its own.
+
+        Parameters
+        ----------
+        series : the samples, of which those from `first` on count
+        value : what the samples show
+        """
+        driver = self.model.ensemble_driver
+        rows = driver.reductions(1, 0.0, {channel})
+        last = len(series) - 1
+        peaks = [] if kind == "min" else _tops(series[first:])
+        dips = [] if kind == "max" else _tops(-series[first:])
+        for k in sorted({first + k for k in (*peaks, *dips)}):
+            low, high = max(k - 1, first), min(k + 1, last)
+            edges = segment_edges(self.model, self.numbers, trajectory.t[low], trajectory.t[high], self.turn)
+            method, rtol = CLOSELY
+            driver.stepper.run(
+                family=STEPPERS[method],
+                tolerance=rtol * self.magnitude,
+                p=self.numbers.p,
+                c=self.numbers.c,
+                x=trajectory.x[low].copy(),
+                segments=make_segments(self.model.manifest.inputs, self.numbers, edges),
+                output_times=np.zeros(0),
+                output_states=None,
+                reduction=rows[0],
+            )
+        end = np.zeros((1, len(self.initial)))
+        seen = {what: float(observe(driver, what, channel, rows, end)[0]) for what in ("max", "min")}
+        if kind == "range":
+            counted = series[first:]
+            return max(seen["max"], float(counted.max())) - min(seen["min"], float(counted.min()))
+        return max(seen["max"], value) if kind == "max" else min(seen["min"], value)
 
 
 def prepare(
@@ -222,6 +225,7 @@ def prepare(
     state = start_state(model, numbers, initial)
     driver = model.ensemble_driver.stepper
     looked_at = min(length, SCALED_TURNS * turn)
+    segments, parts = _segments(model, numbers, length, turn, start)
     return Prepared(
         model=model,
         numbers=numbers,
@@ -230,19 +234,28 @@ def prepare(
         duration=length,
         turn=turn,
         start=start,
-        segments=_segments(model, numbers, length, turn, start),
+        segments=segments,
+        parts=parts,
     )
 
 
-def _segments(model: Model, numbers: Numbers, duration: float, turn: float, start: float) -> Segments:
+def _segments(
+    model: Model, numbers: Numbers, duration: float, turn: float, start: float
+) -> tuple[Segments, tuple[int, ...]]:
+    """Segments of a run, and where its parts begin among them."""
     windows = [*edge_windows(model, numbers, duration, turn, start)]
     edges = np.concatenate([windows[0], *(window[1:] for window in windows[1:])])
+    times = part_times(duration, turn, start)
+    near = 1e-9 * min(turn, duration)
+    closest = np.abs(edges[:, None] - times[None]).min(axis=0) if len(edges) * len(times) else np.zeros(0)
+    edges = np.sort(np.concatenate([edges, times[closest > near]]))
+    parts = tuple(int(np.argmin(np.abs(edges - time))) for time in times)
     inputs = model.manifest.inputs
     u = np.array([clock.inputs_at(inputs, numbers.values, a, 0.5 * (a + b)) for a, b in pairwise(edges)])
     u = np.ascontiguousarray(u.reshape(len(edges) - 1, len(inputs)))
     gates = [k for k, info in enumerate(inputs) if info.kind != "phase"]
     restarts = np.concatenate([[True], np.any(np.diff(u[:, gates], axis=0) != 0.0, axis=1)])
-    return Segments(times=edges, inputs=u, restarts=restarts)
+    return Segments(times=edges, inputs=u, restarts=restarts), parts
 
 
 def check_observables(model: Model, names: Sequence[str]) -> tuple[Observable, ...]:
@@ -255,12 +268,26 @@ def check_observables(model: Model, names: Sequence[str]) -> tuple[Observable, .
     """
     aliases = observable_aliases(channel_names(model.manifest))
     known = {name: found for name, found in aliases.items() if found[0] in KINDS}
-    faults = [unknown_name("quantity", name, known) for name in names if name not in known]
+    faults = [_fault(model, name, known) for name in names if name not in known]
     if isinstance(names, str) or not names or faults:
         raise RequestError(
             "\n".join(faults) or f"A list of quantities is expected, not {names!r}. Example: ['peak_ball_force']."
         )
     return tuple(known[name] for name in names)
+
+
+def _fault(model: Model, name: str, known: Mapping[str, Observable]) -> str:
+    """Why there is no error of a quantity."""
+    channel = str(name).rpartition(":")[2]
+    offered = ", ".join(dict.fromkeys(channel for _, channel in known.values()))
+    if channel.startswith(("reaction.", "drive_torque", "body.", "load.")) and any(
+        channel in (info.name, info.name.rpartition(".")[0]) for info in model.manifest.quantities
+    ):
+        return (
+            f"{name!r}: {channel} follows from time alone, by the kinematics of the mechanism; it has no error of "
+            f"integration at any tolerance. Errors are measured of: {offered}."
+        )
+    return unknown_name("quantity", name, known)
 
 
 #: Kinds of observables whose relative error means something.
@@ -271,6 +298,20 @@ def default_observables(model: Model) -> tuple[str, ...]:
     """Peak ball force, rms and range of the inner ring's motion."""
     rings = [state.name for state in model.manifest.states if state.name in ("inner.x", "inner.y")]
     return ("peak_ball_force", *(f"{kind}_{name.replace('.', '_')}" for kind in ("rms", "range") for name in rings))
+
+
+#: Kinds that samples read too small.
+EXTREMES = ("max", "min", "range")
+
+#: So many of the largest samples are looked at closely, and how: what this adds to an error is below all others.
+CANDIDATES, CLOSELY = 3, ("stepper-dop853", 1e-11)
+
+
+def _tops(series: np.ndarray) -> list[int]:
+    """Indices of the largest samples that no neighbour exceeds."""
+    padded = np.pad(series, 1, constant_values=-np.inf)
+    top = np.flatnonzero((series >= padded[:-2]) & (series >= padded[2:]))
+    return [int(k) for k in top[np.argsort(-series[top], kind="stable")[:CANDIDATES]]]
 
 
 def _of_samples(kind: str, values: np.ndarray) -> float:

@@ -16,10 +16,17 @@ from pathlib import Path
 
 import numpy as np
 
-from raceway.runtime.compiled.compile import CompiledLibrary, Compiler, compile_sources
-from raceway.runtime.ensembles.ensemble_driver import ENSEMBLE_HEADERS
-from raceway.runtime.errors import ArtefactError
-from raceway.runtime.integrate.stepper import DRIVER, FLAGS, Segments
+from raceway.runtime.compiled.compile import CompiledLibrary, Compiler
+from raceway.runtime.compiled.driver_library import (
+    ENSEMBLE_HEADERS,
+    address,
+    check_headers,
+    check_sizes,
+    compile_driver,
+    input_columns,
+    padded,
+)
+from raceway.runtime.integrate.stepper import Segments
 from raceway.runtime.manifest import Manifest
 from raceway.runtime.status import Status
 
@@ -103,17 +110,8 @@ def compile_quasi_static(folder: Path, manifest: Manifest, compiler: Compiler) -
     CompileError
         The compiler failed.
     """
-    missing = [name for name in ENSEMBLE_HEADERS if not (folder / name).is_file()]
-    if missing:
-        raise ArtefactError(f"{folder}: has no {', '.join(missing)}. Write the folder again with `raceway derive`.")
-    return compile_sources(
-        (DRIVER / "equilibrium.c",),
-        compiler,
-        label=f"{manifest.scene}-equilibrium",
-        headers=[*sorted(DRIVER.glob("*.h")), *(folder.absolute() / name for name in ENSEMBLE_HEADERS)],
-        include=(folder.absolute(), DRIVER),
-        flags=FLAGS,
-    )
+    check_headers(folder, ENSEMBLE_HEADERS)
+    return compile_driver(folder, manifest, compiler, ("equilibrium.c",), kind="equilibrium", headers=ENSEMBLE_HEADERS)
 
 
 class QuasiStatic:
@@ -130,16 +128,16 @@ class QuasiStatic:
         code = ctypes.CDLL(str(library.path))
         sizes = (ctypes.c_int * 5)()
         code.raceway_equilibrium_sizes(sizes)
-        self._inputs = max(len(manifest.inputs), 1)
-        expected = [len(manifest.states), self._inputs, len(manifest.parameters), len(manifest.constants)]
-        if list(sizes)[:4] != expected:
-            raise ArtefactError(
-                f"{library.path}: compiled for {list(sizes)[:4]} states, inputs, parameters and constants, the "
-                f"manifest has {expected}. Write the folder again."
-            )
+        check_sizes(library, list(sizes)[:4], manifest)
+        self._inputs = input_columns(manifest)
         self.row = int(sizes[4])
-        self._code = code
-        code.raceway_equilibria.restype = ctypes.c_int
+        self._run = code.raceway_equilibria
+        self._run.restype = ctypes.c_int
+        pointer, long = ctypes.c_void_p, ctypes.c_long
+        self._run.argtypes = (
+            *(ctypes.POINTER(_Options), pointer, pointer, pointer, long, pointer, pointer),
+            *(long, pointer, pointer, ctypes.POINTER(_Result)),
+        )
 
     def run(
         self,
@@ -165,22 +163,23 @@ class QuasiStatic:
         output_states : C-contiguous, shape (n, states), or None
         reduction : row of on-line reductions to add to, or None
         """
-        inputs = segments.inputs if segments.inputs.shape[1] else np.zeros((len(segments.inputs), self._inputs))
+        inputs = padded(segments.inputs, self._inputs)
         if reduction is not None and len(reduction) != self.row:
             raise ValueError(f"a reduction of {self.row} numbers is expected, not of {len(reduction)}")
-        options = _Options(max_steps, _real(tolerance), None if reduction is None else _real(reduction))
+        reduced = None if reduction is None else address("reduction", reduction)
+        options = _Options(max_steps, address("tolerance", tolerance), reduced)
         result = _Result()
-        self._code.raceway_equilibria(
+        self._run(
             ctypes.byref(options),
-            _real(p),
-            _real(c),
-            _real(x),
-            ctypes.c_long(len(inputs)),
-            _real(segments.times),
-            _real(inputs),
-            ctypes.c_long(len(output_times)),
-            _real(output_times),
-            None if output_states is None else _real(output_states),
+            address("p", p),
+            address("c", c),
+            address("x", x),
+            len(inputs),
+            address("times", segments.times),
+            address("inputs", inputs),
+            len(output_times),
+            address("output_times", output_times),
+            None if output_states is None else address("output_states", output_states),
             ctypes.byref(result),
         )
         return Outcome(
@@ -192,9 +191,3 @@ class QuasiStatic:
             jumps=result.jumps,
             time=result.time,
         )
-
-
-def _real(array: np.ndarray) -> ctypes.c_void_p:
-    if array.dtype != np.float64 or not array.flags.c_contiguous:
-        raise TypeError(f"a C-contiguous array of float64 is expected, not {array.dtype}, {array.flags}")
-    return ctypes.c_void_p(array.ctypes.data)

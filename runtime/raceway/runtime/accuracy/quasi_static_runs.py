@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +15,7 @@ from raceway.runtime.accuracy.quasi_static import STATUS_OF_END, End
 from raceway.runtime.ensembles.members import edge_windows
 from raceway.runtime.errors import SimulationError
 from raceway.runtime.integrate import clock
-from raceway.runtime.integrate.stepper import Segments
+from raceway.runtime.integrate.segments import make_segments
 from raceway.runtime.integrate.stepping import Cost
 from raceway.runtime.integrate.trajectory import Interrupted, Trajectory
 from raceway.runtime.status import Status
@@ -50,7 +49,7 @@ def fill_quasi_static(
         p=numbers.p,
         c=numbers.c,
         x=trajectory.initial.copy(),
-        segments=segments_of(model, numbers, edges),
+        segments=make_segments(model.manifest.inputs, numbers, edges),
         output_times=wanted,
         output_states=trajectory.x,
     )
@@ -99,7 +98,7 @@ def reduce_quasi_static(
             p=numbers.p,
             c=numbers.c,
             x=state,
-            segments=segments_of(model, numbers, kept),
+            segments=make_segments(model.manifest.inputs, numbers, kept),
             output_times=np.zeros(0),
             output_states=None,
             reduction=row,
@@ -123,14 +122,3 @@ class QuasiStaticFailed(SimulationError):
     def __init__(self, status: Status, time: float, crank_angle: float) -> None:
         self.status, self.time = status, time
         super().__init__(f"{status.value}\nt = {time:.9g} s, crank angle {math.degrees(crank_angle):.4f} deg.")
-
-
-def segments_of(model: Model, numbers: Numbers, edges: np.ndarray) -> Segments:
-    """Segments between edges, with the inputs that hold in them; loads may jump at each."""
-    inputs = model.manifest.inputs
-    u = np.array([clock.inputs_at(inputs, numbers.values, a, 0.5 * (a + b)) for a, b in pairwise(edges)])
-    return Segments(
-        times=np.ascontiguousarray(edges),
-        inputs=np.ascontiguousarray(u.reshape(len(edges) - 1, len(inputs))),
-        restarts=np.ones(len(edges) - 1, dtype=bool),
-    )

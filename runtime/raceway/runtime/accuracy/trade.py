@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +25,7 @@ from raceway.runtime.bounds import outside, violations
 from raceway.runtime.compiled.compile import find_compiler
 from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver, compile_ensemble
 from raceway.runtime.errors import RequestError, SimulationError
+from raceway.runtime.integrate.locating import has_kinks
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -34,6 +35,9 @@ FULL = "full"
 
 #: Name of the switch that lets the compiler reorder arithmetic.
 FAST_MATH = "fast-math"
+
+#: Name of the switch that ends steps on the kinks of the laws.
+KINKS_LOCATED = "kinks located"
 
 #: The reference and the second opinion on it: method and tolerance.
 REFERENCE = ("stepper-rodas5p", 1e-11)
@@ -103,6 +107,7 @@ class Trade:
     spread : half the width of the interval they are drawn from [1]
     cycles : turns of a run
     measured : all configurations
+    folders : generated folders of the models it was measured with, by name, where they were kept
     """
 
     scene: str
@@ -114,6 +119,21 @@ class Trade:
     spread: float
     cycles: float
     measured: tuple[Measured, ...]
+    folders: Mapping[str, Path] = field(default_factory=dict, compare=False)
+
+    def model(self, name: str) -> Model:
+        """A model that was kept with the measurement.
+
+        Raises
+        ------
+        RequestError
+            There is none of that name.
+        """
+        from raceway.runtime.model import load  # it builds on this module
+
+        if name not in self.folders:
+            raise RequestError(f"trade: no model {name!r} was kept with it. Kept: {', '.join(self.folders) or 'none'}.")
+        return load(self.folders[name])
 
     def error(self, one: Measured, quantity: str | None = None) -> float:
         """95 % point of a quantity's error; of the worst quantity where none is named."""
@@ -168,6 +188,25 @@ def switched_configurations() -> tuple[Configuration, ...]:
     return tuple(replace(one, switch=FAST_MATH) for one in simple_configurations(FULL))
 
 
+def located_configurations(model: Model) -> tuple[Configuration, ...]:
+    """Methods and tolerances with kinks located, for a model whose motion has some."""
+    if not (model.has_stepper and has_kinks(model.manifest)):
+        return ()
+    return tuple(
+        Configuration(model=FULL, method=method, rtol=rtol, switch=KINKS_LOCATED)
+        for method in ("stepper", "stepper-rodas5p")
+        for rtol in (1e-3, 1e-5, 1e-7)
+    )
+
+
+#: What ``-ffast-math`` does to arithmetic, but NaN stays NaN.  The flag itself would have the linker add code that
+#: turns off subnormal numbers in the whole process as soon as the library is loaded.
+REORDERED = (
+    *("-fassociative-math", "-freciprocal-math", "-fno-signed-zeros", "-fno-trapping-math", "-fno-math-errno"),
+    "-ffp-contract=fast",
+)
+
+
 def compile_fast_math(model: Model, folder: Path) -> EnsembleDriver | None:
     """The stepper, compiled so that arithmetic may be reordered, but NaN stays NaN; None without a compiler.
 
@@ -183,7 +222,7 @@ def compile_fast_math(model: Model, folder: Path) -> EnsembleDriver | None:
     compiler = find_compiler() if model.has_stepper else None
     if compiler is None:
         return None
-    flags = (*compiler.flags, "-ffast-math", "-fno-finite-math-only", "-ffp-contract=fast")
+    flags = (*compiler.flags, *REORDERED)
     return EnsembleDriver(
         compile_ensemble(folder.absolute(), model.manifest, replace(compiler, flags=flags)), model.manifest
     )
@@ -285,6 +324,7 @@ def measure_trade(
             *full_configurations(full),
             *(one for name in models if name != FULL for one in simple_configurations(name)),
             *(switched_configurations() if fast_math is not None else ()),
+            *located_configurations(full),
         )
     sets = perturbed(full, members, spread)
     reference = make_reference(full, sets, names, lambda f: say("making the reference", f))
@@ -342,6 +382,8 @@ def _integrate(
     ready: Prepared, observables: Sequence[Observable], one: Configuration, fast_math: EnsembleDriver | None
 ) -> tuple[np.ndarray | None, float]:
     driver = fast_math if one.switch == FAST_MATH else None
+    if one.switch == KINKS_LOCATED:
+        driver = ready.model.ensemble_driver.with_stepper(ready.model.locating_stepper)
     try:
         done = ready.run(observables, one.method, one.rtol, driver)
     except SimulationError:

@@ -5,17 +5,29 @@ In: a `Trade`.  Out: text, a table, plain data.
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from raceway.runtime.accuracy.quasi_static import NAME as QUASI_STATIC
-from raceway.runtime.accuracy.trade import FAST_MATH, FULL, PROMISED, TARGETS, Configuration, Measured, Trade
+from raceway.runtime.accuracy.trade import (
+    FAST_MATH,
+    FULL,
+    KINKS_LOCATED,
+    PROMISED,
+    TARGETS,
+    Configuration,
+    Measured,
+    Trade,
+)
 
 #: Layout of trade.json.
-SCHEMA = 1
+SCHEMA = 3
 
 
 def versions() -> dict[str, str]:
@@ -23,12 +35,21 @@ def versions() -> dict[str, str]:
     return {name: version(name) for name in ("raceway", "casadi")}
 
 
-def to_plain(trade: Trade, key: Mapping[str, Any]) -> dict[str, Any]:
-    """Plain data for JSON; `key` says what it was measured of.  What is infinite (nothing finished) becomes None."""
+def to_plain(trade: Trade, key: Mapping[str, Any], folder: Path | None = None) -> dict[str, Any]:
+    """Plain data for JSON; what is infinite (nothing finished) becomes None.
+
+    Parameters
+    ----------
+    key : says what it was measured of
+    folder : where it is stored; the models kept with it lie below
+    """
+    data = _without_infinities(asdict(replace(trade, folders={})))
+    data["folders"] = {} if folder is None else {n: p.relative_to(folder).as_posix() for n, p in trade.folders.items()}
     return {
         "schema": SCHEMA,
         "key": dict(key),
-        "trade": _without_infinities(asdict(trade)),
+        "digest": digest_of(key, data),
+        "trade": data,
         "front": {
             name: [_row(trade, one, quantity) for one in trade.front(quantity)] for name, quantity in _columns(trade)
         },
@@ -36,9 +57,17 @@ def to_plain(trade: Trade, key: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def from_plain(data: Mapping[str, Any]) -> Trade:
-    """The trade of plain data."""
+def digest_of(key: Mapping[str, Any], data: Mapping[str, Any]) -> str:
+    """What tells a measurement that was damaged or edited."""
+    text = json.dumps([SCHEMA, key, data], sort_keys=True, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def from_plain(data: Mapping[str, Any], folder: Path | None = None) -> Trade:
+    """The trade of plain data; without the models kept with it where the folder it was stored in is not known."""
     fields = dict(data["trade"])
+    kept = fields.pop("folders")
+    fields["folders"] = {} if folder is None else {name: folder / place for name, place in kept.items()}
     measured = []
     for entry in fields.pop("measured"):
         errors = {
@@ -72,6 +101,8 @@ def words(trade: Trade) -> list[str]:
                 )
                 continue
             said.append(f"{percent(target)} on {name}: {milliseconds(one.time)} a cycle ({one.configuration.words}).")
+    known = ", ".join(f"{name} {percent(trade.uncertainty[q])}" for name, q in _columns(trade) if q is not None)
+    said.append(f"The reference, two methods that agree, is known to: {known}. Nothing below is claimed.")
     return said + simplifications(trade)
 
 
@@ -96,7 +127,10 @@ def simplifications(trade: Trade) -> list[str]:
             continue
         finest = min(own, key=lambda m: m.configuration.rtol)
         errors = ", ".join(f"{percent(e)} on {q}" for q, e in finest.promised.items())
-        what = "Arithmetic that the compiler may reorder" if switch == FAST_MATH else f"The model with {model}"
+        what = {
+            FAST_MATH: "Arithmetic that the compiler may reorder",
+            KINKS_LOCATED: "Ending steps on the kinks of the laws",
+        }.get(switch, f"The model with {model}")
         ratio = sorted(ratios)[len(ratios) // 2]
         said.append(
             f"{what} takes {ratio:.2f} of the time of the full one at the same tolerance; at rtol "

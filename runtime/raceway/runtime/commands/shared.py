@@ -13,6 +13,7 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,6 +22,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+from raceway.runtime.entry import INTERRUPTED
 from raceway.runtime.errors import RacewayError, RequestError
 
 if TYPE_CHECKING:
@@ -28,19 +30,17 @@ if TYPE_CHECKING:
     from raceway.derive.errors import Fault
     from raceway.runtime.model import Model
 
-errors_console = Console(stderr=True)
+errors_console = Console(stderr=True, emoji=False)  # A:B:N is no picture
 
 SceneFile = Annotated[
     Path,
     typer.Argument(help="Scene file (TOML). The folder scenes/ has some to copy.", show_default=False),
 ]
 
-#: What an interrupted command says.
-INTERRUPTED = "interrupted. Whatever files are there are whole."
-
 #: Lines of a scene's run table that have an option of ``raceway run``.
 RUN_OPTIONS = {
     "run.cycles": "--cycles",
+    "run.duration": "--duration",
     "run.transient_cycles": "--transient",
     "run.rtol": "--rtol",
     "run.method": "--method",
@@ -82,19 +82,23 @@ def reported() -> Iterator[None]:
 
 
 def complain(message: str) -> None:
+    """Print an error on stderr."""
     errors_console.print(f"[bold red]error[/]: {escape(message)}", soft_wrap=True, highlight=False)
 
 
 def warn(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Print a warning on stderr; takes the place of `warnings.showwarning`."""
     errors_console.print(f"[bold yellow]warning[/]: {escape(str(message))}", soft_wrap=True, highlight=False)
 
 
 def note(message: str) -> None:
+    """Print a remark on stderr."""
     errors_console.print(f"[bold]note[/]: {escape(message)}", soft_wrap=True, highlight=False)
 
 
 @contextlib.contextmanager
 def warnings_shown() -> Iterator[None]:
+    """Print warnings within as a command prints them."""
     with warnings.catch_warnings():
         warnings.showwarning = warn
         yield
@@ -143,6 +147,7 @@ class Stages:
             )
 
     def fraction(self, done: float) -> None:
+        """Move the bar of the present stage to its finished fraction."""
         if self._moving:
             self._progress.update(self._task, total=1.0, completed=done)
 
@@ -160,19 +165,28 @@ def faults_of(source: Path | str) -> Iterator[None]:
         raise SceneError(error.faults, source=source) from None
 
 
-def read_with_settings(path: Path, settings: list[str]) -> tuple[Scene, Scene, dict[str, float]]:
-    """The scene as the file has it, the scene as asked for, and the overrides in SI; checked as if in the file."""
+def read_with_settings(
+    path: Path, settings: list[str], duration: float | None = None, transient: float | None = None
+) -> tuple[Scene, Scene, dict[str, float]]:
+    """The scene as the file has it, the scene as asked for, and the overrides in SI; checked as if in the file.
+
+    Parameters
+    ----------
+    duration : length of the run instead of the file's cycles or duration [s]
+    transient : turns at its start that do not count, beside a duration
+    """
     from raceway.derive import SceneError, read_scene
     from raceway.derive.linkage import check_assembly, derive_linkage
     from raceway.derive.read import parse_override, with_values
-    from raceway.derive.system import DRIVER_ANGLE
     from raceway.derive.terms import symbol_of
+    from raceway.derive.variables import DRIVER_ANGLE
 
     read = read_scene(path)
     faults: list[Fault] = []
     overrides: dict[str, float] = {}
+    texts: dict[str, str] = {}
     for text in settings:
-        misplaced = _run_setting(text)
+        misplaced = run_setting(text)
         if misplaced is not None:
             faults.append(misplaced)
             continue
@@ -180,14 +194,20 @@ def read_with_settings(path: Path, settings: list[str]) -> tuple[Scene, Scene, d
             name, value = parse_override(read, text)
         except SceneError as error:
             faults += error.faults
-        else:
-            overrides[name] = value
+            continue
+        if name in overrides:
+            faults.append(_given_twice(name, texts[name], text))
+        overrides[name], texts[name] = value, text
     if faults:
         raise SceneError(faults, source="--set")
+    asked = read
+    if duration is not None:
+        dropped = read.run.transient_cycles if transient is None else transient
+        asked = replace(read, run=replace(read.run, cycles=None, duration=duration, transient_cycles=dropped))
     if not overrides:
-        return read, read, {}
+        return read, asked, {}
     with faults_of("--set"):
-        asked = with_values(read, overrides)
+        asked = with_values(asked, overrides)
         if asked.mechanism is not None:
             # here, so that nothing is written for a linkage that locks
             linkage = derive_linkage(asked.mechanism, DRIVER_ANGLE, symbol_of(asked.mechanism.driver.speed))
@@ -195,7 +215,48 @@ def read_with_settings(path: Path, settings: list[str]) -> tuple[Scene, Scene, d
     return read, asked, overrides
 
 
-def _run_setting(text: str) -> Fault | None:
+def read_duration(text: str | None, cycles: float | None) -> float | None:
+    """The time of ``--duration "0.5 s"`` [s].
+
+    Raises
+    ------
+    RequestError
+        No time above 0, or turns were given as well.
+    """
+    if text is None:
+        return None
+    if cycles is not None:
+        raise RequestError(
+            f"--cycles {cycles:g} and --duration {text!r} were both given. Allowed: one of them. Leave one away."
+        )
+    from raceway.derive.units import QuantityError, parse_quantity
+
+    try:
+        seconds = parse_quantity(text, "s")
+    except QuantityError as error:
+        raise RequestError(f"--duration: {error}") from None
+    if not seconds > 0.0:
+        raise RequestError(
+            f'--duration: {text!r} cannot be simulated. Allowed: a time above 0, as in --duration "0.5 s".'
+        )
+    return seconds
+
+
+def _given_twice(path: str, first: str, second: str) -> Fault:
+    """A fault where ``--set`` names a number twice: nobody can tell which value is meant."""
+    from raceway.derive.errors import Fault
+
+    values = [text.partition("=")[2].strip() for text in (first, second)]
+    return Fault(
+        key=path,
+        problem="the number is set twice",
+        given=f"{values[0]} and {values[1]}",
+        allowed="one value for a number",
+        remedy="leave one --set away",
+    )
+
+
+def run_setting(text: str) -> Fault | None:
     """A fault where ``--set`` names a line of the run table, which holds no parameters of the model."""
     from raceway.derive.errors import Fault
 
@@ -233,8 +294,10 @@ def check_folder(folder: Path) -> None:
         )
 
 
-def load_model(scene: Scene, stages: Stages, method: str) -> Model:
+def load_model(scene: Scene, stages: Stages, method: str, kinks: str | None = None, rtol: float | None = None) -> Model:
+    """The scene's model, derived and compiled where it is stale; with the stepper that a run of these will take."""
     from raceway.derive import generate
+    from raceway.runtime.integrate.locating import choose_kinks, stepper_for
     from raceway.runtime.integrate.stepper import METHODS as STEPPERS
     from raceway.runtime.model import load
 
@@ -243,4 +306,8 @@ def load_model(scene: Scene, stages: Stages, method: str) -> Model:
     model = load(folder)
     if model.has_stepper and method in ("auto", *STEPPERS):
         _ = model.stepper  # compiled here, where it is announced
+        tolerance = model.manifest.run.rtol if rtol is None else rtol
+        _ = stepper_for(
+            model, choose_kinks(kinks, "stepper" if method == "auto" else method, model.manifest, tolerance)
+        )
     return model

@@ -9,6 +9,7 @@ import hashlib
 import json
 import math
 import os
+import platform
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,7 +20,16 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from raceway.runtime.commands.shared import SceneFile, Stages, check_folder, faults_of, reported, warnings_shown
+from raceway.runtime.commands.shared import (
+    SceneFile,
+    Stages,
+    check_folder,
+    faults_of,
+    read_with_settings,
+    reported,
+    warn,
+    warnings_shown,
+)
 from raceway.runtime.errors import RequestError
 
 if TYPE_CHECKING:
@@ -48,6 +58,10 @@ def trade(
             "repeated.",
         ),
     ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="PATH=VALUE", help="Another value for a number of the scene. May be repeated."),
+    ] = None,
     members: Annotated[
         int | None, typer.Option(metavar="N", help="Parameter sets around the scene's; 40 if not given.")
     ] = None,
@@ -62,16 +76,15 @@ def trade(
 
     A measurement is stored beside the results and used again until the scene, the versions or the request change.
     """
-    from raceway.derive import read_scene
     from raceway.runtime.accuracy.trade_report import to_plain, words
 
     with reported(), warnings_shown(), Stages() as stages, faults_of(scene):
         stages("read")
-        read = read_scene(scene)
+        _, read, _ = read_with_settings(scene, set_ or [])
         folder = out if out is not None else Path("results") / read.name
         check_folder(folder)
         measured, key, stored = _stored_or_measured(read, folder, of, members, stages, fresh=fresh)
-        plain = to_plain(measured, key)
+        plain = to_plain(measured, key, folder)
         if not stored:
             stages("write")
             folder.mkdir(parents=True, exist_ok=True)
@@ -92,7 +105,8 @@ def trade(
 
 
 def models_of(scene: Scene) -> dict[str, Scene]:
-    """The scene and simpler ones, by name; each with the outputs that errors are measured of, and no others.
+    """The scene and simpler ones, by name; each with the outputs of the scene that it has, and those that errors are
+    measured of.
 
     Raises
     ------
@@ -107,7 +121,7 @@ def models_of(scene: Scene) -> dict[str, Scene]:
             "This scene has no bearing: its outputs follow from time alone, without a tolerance. Add a [bearing]."
         )
     rings = ("inner.*", "outer.*") if scene.bearing.outer is not None else ("inner.*",)
-    full = replace(scene, outputs=(*rings, "ball.*"))
+    full = replace(scene, outputs=tuple(dict.fromkeys((*scene.outputs, *rings, "ball.*"))))
     found = {FULL: full}
     for feature in features(full):
         if feature.path == "bearing.outer_ring" and feature.without is not None:
@@ -120,15 +134,20 @@ def models_of(scene: Scene) -> dict[str, Scene]:
     return found
 
 
+def folders_of(scene: Scene, folder: Path) -> dict[str, Path]:
+    """Where the generated folders of the scene's models lie, by name."""
+    return {name: folder / MODELS / re.sub(r"[^a-z0-9]+", "_", name) for name in models_of(scene)}
+
+
 def load_models(scene: Scene, folder: Path, stages: Stages) -> dict[str, Model]:
     """The scene's models, derived into folders of their own and compiled."""
     from raceway.derive import generate
     from raceway.runtime.model import load
 
     found = {}
+    places = folders_of(scene, folder)
     for name, variant in models_of(scene).items():
-        place = folder / MODELS / re.sub(r"[^a-z0-9]+", "_", name)
-        generated = generate(variant, place, progress=lambda stage, name=name: stages(f"{stage}: {name}"))  # type: ignore[misc]
+        generated = generate(variant, places[name], progress=lambda stage, name=name: stages(f"{stage}: {name}"))  # type: ignore[misc]
         stages(f"compiling: {name}")
         found[name] = load(generated)
         _ = found[name].ensemble_driver
@@ -139,13 +158,17 @@ def key_of(scene: Scene, of: Sequence[str] | None, members: int) -> dict[str, An
     """What a measurement is valid for: structure, numbers, run, deriving sources, versions, request."""
     from raceway.derive.emit import signature
     from raceway.runtime.accuracy.trade_report import versions
+    from raceway.runtime.compiled.compile import find_compiler
 
+    compiler = find_compiler()
     numbers = repr([(q.path, q.value) for q in scene.quantities]) + repr(scene.run)
     return {
         "signature": signature(scene),
         "numbers": hashlib.sha256(numbers.encode()).hexdigest(),
         "driver": _driver_digest(),
         "versions": versions(),
+        "compiler": compiler.identity if compiler is not None else None,
+        "machine": f"{platform.machine()} {platform.processor()} {os.cpu_count()}",
         "of": list(of) if of is not None else None,
         "members": members,
     }
@@ -156,16 +179,28 @@ def stored_trade(folder: Path, key: dict[str, Any]) -> Trade | None:
     from raceway.runtime.accuracy.trade_report import SCHEMA, from_plain
 
     data = _read(folder)
-    return from_plain(data) if data.get("schema") == SCHEMA and data.get("key") == key else None
+    return from_plain(data, folder) if data.get("schema") == SCHEMA and data.get("key") == key else None
 
 
 def _read(folder: Path) -> dict[str, Any]:
-    """What the folder's measurement holds; nothing where there is none, or what is there is no measurement."""
+    """What the folder's measurement holds; nothing where there is none, or it is damaged, which is said."""
+    from raceway.runtime.accuracy.trade_report import SCHEMA, digest_of
+
+    path = folder / FILE_NAME
     try:
-        data = json.loads((folder / FILE_NAME).read_text(encoding="utf-8"))
-    except (FileNotFoundError, json.JSONDecodeError):
+        data = json.loads(path.read_bytes())
+    except FileNotFoundError:
         return {}
-    return data if isinstance(data, dict) else {}
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError):
+        data = None
+    if isinstance(data, dict) and isinstance(data.get("schema"), int) and data["schema"] != SCHEMA:
+        return {}  # of another version: whole, but of no use
+    key, measured = (data.get("key"), data.get("trade")) if isinstance(data, dict) else (None, None)
+    whole = isinstance(key, dict) and isinstance(measured, dict) and data.get("digest") == digest_of(key, measured)
+    if not whole:
+        warn(f"{path} is damaged or was edited by hand, and is not used. Measure again: raceway trade SCENE --fresh.")
+        return {}
+    return dict(data)
 
 
 def usable_trade(folder: Path, scene: Scene) -> Trade | None:
@@ -176,7 +211,8 @@ def usable_trade(folder: Path, scene: Scene) -> Trade | None:
     if scene.bearing is None or data.get("schema") != SCHEMA or not isinstance(data.get("key"), dict):
         return None
     given = data["key"]
-    return from_plain(data) if given == key_of(scene, given.get("of"), given.get("members", 0)) else None
+    same = given == key_of(scene, given.get("of"), given.get("members", 0))
+    return from_plain(data, folder) if same else None
 
 
 def read_error(text: str | None, of: list[str] | None, method: str | None, rtol: float | None) -> float | None:
@@ -228,11 +264,11 @@ def _stored_or_measured(
     measured = measure_trade(
         models, of, members=count, fast_math=compile_fast_math(models[FULL], folder / MODELS / FULL), progress=say
     )
-    return measured, key, False
+    return replace(measured, folders=folders_of(scene, folder)), key, False
 
 
 def _driver_digest() -> str:
-    from raceway.runtime.integrate.stepper import DRIVER
+    from raceway.runtime.compiled.driver_library import DRIVER
 
     digest = hashlib.sha256()
     for path in sorted(DRIVER.glob("*.[ch]")):
