@@ -4,6 +4,7 @@
 # make docs    builds the documentation into docs/_build/html
 # make generated   derives the committed artefact anew
 # make extremes   runs the tour of extremes and writes docs/extremes.md (ten minutes); QUICK=1: the test suite's part
+# make extremes-sanitized   the tour under the compiler's sanitizers alone (six minutes; part of make extremes)
 # make trade   measures accuracy against time on the shipped scenes and writes docs/trade.md (about ten minutes)
 # make bench   installs the peers into a venv of their own and measures (a quarter of an hour); QUICK=1: a minute, for show
 
@@ -12,7 +13,7 @@ VENV ?= .venv
 export PYTHON VENV
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint docs generated trade bench bench-test clean extremes
+.PHONY: demo test lint docs generated trade bench bench-test clean extremes extremes-sanitized compiler
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.ready
@@ -20,6 +21,9 @@ demo: $(VENV)/.ready
 
 test: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+# ziglang beside gcc: cases that compare two compilers run then
+compiler: $(VENV)/.ready-compiler
 
 lint: $(VENV)/.ready-dev
 	$(BIN)/ruff check .
@@ -43,8 +47,11 @@ BENCH_VENV := benchmarks/.venv
 bench: $(BENCH_VENV)/.ready
 	$(BENCH_VENV)/bin/python -m benchmarks $(if $(QUICK),--quick --out build/benchmarks/quick) $(if $(FRESH),--fresh)
 
-extremes: $(VENV)/.ready-dev
+extremes: $(VENV)/.ready-dev $(VENV)/.ready-compiler
 	$(BIN)/python -m extremes $(if $(QUICK),--quick)
+
+extremes-sanitized: $(VENV)/.ready-dev
+	$(BIN)/python -m extremes sanitizers
 
 bench-test: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest benchmarks
@@ -66,6 +73,11 @@ $(VENV)/.ready: pyproject.toml requirements.txt scripts/setup.sh
 $(VENV)/.ready-dev: pyproject.toml requirements.txt scripts/setup.sh
 	@scripts/setup.sh dev
 	@touch $@ $(VENV)/.ready
+
+# a second compiler, from PyPI: 100 MB of download, 400 MB on disk
+$(VENV)/.ready-compiler: pyproject.toml requirements.txt scripts/setup.sh
+	@scripts/setup.sh dev,compiler
+	@touch $@ $(VENV)/.ready $(VENV)/.ready-dev
 
 $(VENV)/.ready-docs: pyproject.toml requirements.txt scripts/setup.sh
 	@scripts/setup.sh dev,docs

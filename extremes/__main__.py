@@ -9,7 +9,7 @@ import argparse
 import sys
 import time
 
-from extremes import report
+from extremes import report, sanitized
 from extremes.case import Row, run_case, select
 from extremes.models import ROOT
 from extremes.tour import cases
@@ -24,9 +24,10 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     started = time.perf_counter()
     rows: list[Row] = []
-    for case in select(cases(), options.words):
-        if options.quick and not case.quick:
-            continue
+    chosen = [case for case in select(cases(), options.words) if case.quick or not options.quick]
+    if any(case.method == sanitized.METHOD and sanitized.BESIDE in case.name for case in chosen):
+        sanitized.started()
+    for case in chosen:
         row = run_case(case)
         rows.append(row)
         print(_line(row), file=sys.stdout if options.list_only else sys.stderr, flush=True)

@@ -47,6 +47,7 @@ class Case:
     against : the independent reference or invariant, and the measure of the error
     run : does it
     quick : part of the test suite
+    long : millions of steps: left out under sanitizers, where shorter ones take the same code
     """
 
     group: str
@@ -55,6 +56,7 @@ class Case:
     against: str
     run: Callable[[], Finding]
     quick: bool = False
+    long: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +85,10 @@ def run_case(case: Case) -> Row:
 
 
 def select(cases: Iterable[Case], words: Iterable[str]) -> list[Case]:
-    """Cases whose group or name holds one of the words; all without words."""
+    """Cases whose group, name or method holds one of the words; all without words."""
     wanted = [word.lower() for word in words]
-    return [case for case in cases if not wanted or any(word in f"{case.group} {case.name}".lower() for word in wanted)]
+    return [
+        case
+        for case in cases
+        if not wanted or any(word in f"{case.group} {case.name} {case.method}".lower() for word in wanted)
+    ]

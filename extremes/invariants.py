@@ -344,6 +344,14 @@ def cases() -> list[Case]:
         ),
     ]
     return [
-        Case(group=GROUP, name=name, method=method, against=against, run=run, quick=quick)
+        Case(
+            group=GROUP,
+            name=name,
+            method=method,
+            against=against,
+            run=run,
+            quick=quick,
+            long=name.startswith("energy over 100000"),
+        )
         for name, method, against, run, quick in table
     ]

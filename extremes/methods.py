@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
@@ -122,6 +124,45 @@ def _overflowing(method: str) -> object:
     return press().simulate(cycles=1, parameters=OVERFLOWS, method=method, transient=0)
 
 
+def growth(method: str) -> Finding:
+    """A rotor that damping of the wrong sign drives: refused with the samples kept, which grow as the closed form does.
+
+    No scene may have such damping: the bounds are taken off, to meet growth that nothing stops.
+    """
+    bounded = rotor()
+    model = copy.copy(bounded)
+    free = (replace(info, above=None, least=None, most=None, below=None) for info in bounded.manifest.parameters)
+    model.manifest = replace(bounded.manifest, parameters=tuple(free), relations=())
+    rate, mass, speed = 200.0, 1.0, 1.0
+    numbers = {
+        "shaft.speed": 0.0, "bearing.inner_ring.damping": -rate * mass, "bearing.inner_ring.mass": mass,
+        "bearing.clearance": 1e300, "load.force.x": 0.0, "load.force.y": 0.0, "bearing.initial.inner.x": 0.0,
+        "bearing.initial.inner.y": 0.0, "bearing.initial.inner_velocity.x": speed,
+    }  # fmt: skip
+    try:
+        model.simulate(duration=5.0, parameters=numbers, method=method, rtol=1e-8, samples_per_cycle=1000, transient=0)
+    except IntegrationError as fault:
+        kept, said = fault.partial, str(fault)
+        assert re.search(WHERE, said, re.DOTALL) or "samples kept in .partial" in said, said
+    else:
+        raise AssertionError("it was not refused")
+    assert len(kept.t) > 10, len(kept.t)
+    assert np.all(np.isfinite(kept.x))
+    t = kept.t[1:]
+    with np.errstate(over="ignore"):
+        expected = speed * np.expm1(rate * t) / rate
+    error = float(np.max(np.abs(kept["inner.x"][1:] / expected - 1.0)))
+    assert fault_is_told(said), said
+    return Finding(status="refused", error=error, bound=1e-4, note=f"{len(kept.t)} samples kept, to {t[-1]:.3g} s")
+
+
+def fault_is_told(said: str) -> bool:
+    """Whether a refusal names a cause and a remedy."""
+    return bool(re.search(r"(step size fell|stopped being finite|more steps than allowed|could not go on)", said)) and (
+        "check" in said
+    )
+
+
 def jumps(law: str, multiple: float, allowed: float) -> Finding:
     """Steps in a turn where the force jumps at contact."""
     model = press(law)
@@ -165,7 +206,8 @@ def cases() -> list[Case]:
     ]  # fmt: skip
     found += [
         Case(group=GROUP, name="100 times stiffer still", method=method, against="stepper-rodas4 at 1e-9, or a refusal",
-             run=partial(crawl, method), quick=method in ("stepper", "erk"))
+             run=partial(crawl, method), quick=method in ("stepper", "erk"),
+             long=method in ("stepper-dp54", "stepper-dop853"))
         for method in METHODS
     ]  # fmt: skip
     small = r"(step size fell to the resolution of time|stopped being finite).*check initial state"
@@ -203,6 +245,12 @@ def cases() -> list[Case]:
         for name, method, run, fast in plain
     ]
     found += [
+        Case(group=GROUP, name="growth without bound", method=method, against="closed form, of the samples kept",
+             run=partial(growth, method), quick=method in ("stepper", "erk"),
+             long=method in ("rosenbrock", "cvodes"))
+        for method in METHODS
+    ]  # fmt: skip
+    found += [
         Case(group=GROUP, name=f"law {law}, damping x {multiple:g}", method="stepper", against="steps a turn allowed",
              run=partial(jumps, law, multiple, 20_000.0), quick=law == "two-sided-gated")
         for law in ("one-sided-gated", "two-sided-gated")
@@ -210,7 +258,7 @@ def cases() -> list[Case]:
     ]  # fmt: skip
     found += [
         Case(group=GROUP, name=f"load of {f:g} Hz with nothing turning, 1 s", method="stepper", against="closed form",
-             run=partial(fast_load, f))
+             run=partial(fast_load, f), long=f > 1e3)
         for f in (1e3, 1e5)
     ]  # fmt: skip
     return found

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from extremes import figures
+from extremes import coverage, figures
 from extremes.case import Row
 
 #: The page's text before its tables.
@@ -30,6 +30,7 @@ def write(rows: Sequence[Row], page: Path, seconds: float) -> None:
     text = TEMPLATE.read_text(encoding="utf-8")
     for word, value in words.items():
         text = text.replace(f"@{word}@", value)
+    text = text.replace("@COVERAGE@", "\n".join(coverage.table(rows)))
     text = text.replace("@TABLES@", "\n".join(tables(rows)))
     temporary = page.with_suffix(".tmp")
     temporary.write_text(text, encoding="utf-8")

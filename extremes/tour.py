@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from extremes import conditions, generated_c, invariants, methods, physics
+from extremes import conditions, drivers, generated_c, invariants, late_times, methods, physics, sanitized
 from extremes.case import Case
 
 
 def cases() -> list[Case]:
     """Every case."""
-    sections = (physics, invariants, methods, conditions, generated_c)
+    sections = (physics, late_times, invariants, methods, drivers, conditions, generated_c, sanitized)
     return [case for section in sections for case in section.cases()]

@@ -61,6 +61,26 @@ def test_magnitudes_in_c_and_python_are_the_same_at_the_edges(
     np.testing.assert_allclose(by_c, by_python, rtol=1e-3)
 
 
+@pytest.mark.parametrize("start", [0.0, 1e-9])
+@pytest.mark.parametrize("force", [0.0, 1e-6])
+def test_a_rotor_thrown_through_its_clearance_flies_straight_for_many_turns(
+    make_model: ModelMaker, start: float, force: float
+) -> None:
+    # its magnitude was what the load moves in a turn, a tolerance below the digits of a position that velocity carries
+    model = needs_stepper(make_model("varying_compliance"))
+    numbers = {
+        "bearing.inner_ring.mass": 1.0, "bearing.inner_ring.damping": 0.0, "bearing.clearance": 1.0,
+        "load.force.x": force, "bearing.initial.inner.x": start, "bearing.initial.inner.y": 0.0,
+        "bearing.initial.inner_velocity.y": 1e-3,
+    }  # fmt: skip
+    solution = model.simulate(duration=10.0, parameters=numbers, transient=0, rtol=1e-9, samples_per_cycle=16)
+    np.testing.assert_allclose(solution["inner.x"][-1], start + 0.5 * force * 10.0**2, rtol=1e-6)
+    np.testing.assert_allclose(solution["inner.y"][-1], 1e-3 * 10.0, rtol=1e-9)
+    turn = clock.period(model.manifest, model.numbers(numbers).values)
+    by_python = model_scales(model, model.numbers(numbers), model.initial(numbers), 10.0, turn).magnitude
+    np.testing.assert_allclose(solution.statistics.magnitudes, by_python, rtol=1e-3)
+
+
 def test_a_load_that_overflows_ends_in_words_without_warnings_of_numpy(make_model: ModelMaker) -> None:
     model = make_model("punching_press")
     numbers = {"mechanism.forces.punch.force.y": 1e300}

@@ -20,8 +20,11 @@ from typer.testing import CliRunner
 from raceway.derive import generate
 from raceway.derive.read import scene_from_text
 from raceway.runtime import ArtefactError, Model, RequestError, load
+from raceway.runtime.bounds import allowed
 from raceway.runtime.cli import app
 from raceway.runtime.compiled.export import default_magnitudes, export_c
+from raceway.runtime.manifest import ParameterInfo
+from raceway.runtime.parameters import resolve_parameters
 
 SCENES = ("punching_press", "punching_press_tangent", "four_bar", "offset_slider", "varying_compliance")
 WARNINGS = "-Wall -Wextra -Wconversion -Wshadow -pedantic -Werror"
@@ -299,14 +302,15 @@ def test_wrong_requests_name_what_was_given_and_what_is_allowed(exported: Callab
         "bearing.clearance=nan": "SI units",
         "1e-5": "--list",
         "shaft.speed=0": "--duration",
-        "bearing.inner_ring.mass=0": "derived constant",
+        "bearing.inner_ring.mass=0": "a number above 0 [kg]",
+        "bearing.pitch_diameter=1e-3": "above 2.61312593 times bearing.ball_diameter",
     }
-    for argument, allowed in wrong.items():
+    for argument, words in wrong.items():
         done = program(argument)
         assert done.returncode == 2, argument
         assert done.stdout == "", argument
         assert done.stderr.startswith("error: "), argument
-        assert allowed in done.stderr, done.stderr
+        assert words in done.stderr, done.stderr
 
 
 def test_help_and_list_are_answers_and_not_errors(exported: Callable[..., Program]) -> None:
@@ -320,22 +324,72 @@ def test_help_and_list_are_answers_and_not_errors(exported: Callable[..., Progra
     assert float(lines["bearing.clearance"]) == 3e-6
 
 
+def just_outside(info: ParameterInfo) -> list[float]:
+    """The values nearest to what a parameter may have that it may not have."""
+    beyond = [info.above, info.below]
+    beyond += [None if info.least is None else np.nextafter(info.least, -np.inf)]
+    beyond += [None if info.most is None else np.nextafter(info.most, np.inf)]
+    return [float(value) for value in beyond if value is not None]
+
+
+def test_values_that_no_scene_file_may_have_are_refused_with_what_is_allowed(exported: Callable[..., Program]) -> None:
+    program = exported("punching_press")
+    manifest = program.model.manifest
+    looked_at = 0
+    for info in manifest.parameters:
+        for value in just_outside(info):
+            done = program(f"{info.name}={value!r}")
+            assert (done.returncode, done.stdout) == (2, ""), info.name
+            assert f"error: {info.name}: {value:.9g} was given. Allowed: a number {allowed(info)}" in done.stderr
+            looked_at += 1
+        for value in ("nan", "-inf", "1e999"):
+            done = program(f"{info.name}={value}")
+            assert (done.returncode, done.stdout) == (2, ""), info.name
+            assert done.stderr.startswith(f"error: {info.name}: {value} was given. Allowed: a number in SI units")
+    assert looked_at > 20
+    for name, factor, other in manifest.relations:
+        edge = factor * program.model.parameters[other]
+        done = program(f"{name}={edge - 1e-15 * abs(edge)!r}")
+        assert (done.returncode, done.stdout) == (2, "")
+        assert f"error: {name}: " in done.stderr
+        assert f"Allowed: a number above {factor:.9g} times {other}, which is" in done.stderr
+    # all faults at once, and numbers that are only listed are looked at as well
+    both = program("bearing.share=-1", "bearing.outer_ring.mass=0", "--list")
+    assert (both.returncode, both.stdout) == (2, "")
+    assert both.stderr.count("error: ") == 2
+
+
+def test_program_and_model_refuse_the_same_numbers(exported: Callable[..., Program]) -> None:
+    program = exported("punching_press")
+    model = program.model
+    random = np.random.default_rng(5)
+    names = list(model.parameters)
+    verdicts = []
+    for _ in range(60):
+        chosen = random.choice(names, size=3, replace=False)
+        factors = random.choice([1.0, 0.4, 3.0, -1.0, 0.0], size=3, p=[0.4, 0.2, 0.2, 0.1, 0.1])
+        numbers = {name: float(model.parameters[name] * k) for name, k in zip(chosen, factors, strict=True)}
+        try:
+            resolve_parameters(model.manifest, numbers)
+            expected = 0
+        except RequestError:
+            expected = 2
+        done = program("--list", *(f"{name}={value!r}" for name, value in numbers.items()))
+        assert done.returncode == expected, (numbers, done.stderr)
+        verdicts.append(expected)
+    assert {0, 2} == set(verdicts)
+
+
 def test_failed_run_prints_the_rows_it_reached(exported: Callable[..., Program]) -> None:
-    program = exported("varying_compliance")
-    # no contact, and damping that feeds the motion
-    done = program(
-        "bearing.contact.stiffness=0",
-        "bearing.inner_ring.damping=-1e6",
-        "--method=dp54",
-        "--duration=0.1",
-        "--samples=50000",
-    )
+    program = exported("punching_press")
+    done = program("mechanism.forces.punch.force.y=1e300", "--cycles=1", "--samples=3600")
     assert done.returncode == 1
     assert "written" in done.stderr
     assert "t = " in done.stderr
     rows = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1)
-    assert 1 < len(rows) < 50_001
     assert np.all(np.isfinite(rows))
+    # the punch begins at 237 degrees; ten samples to a degree
+    assert 2370 <= len(rows) < 2400
 
 
 def test_model_without_states_and_edited_folders_are_refused(tmp_path: Path, exported: Callable[..., Program]) -> None:
