@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 FORBIDDEN = ("sympy", "pint", "raceway.derive")
 #: What the deriving half may use of the runtime: the contract between them.
-SHARED = ("raceway.runtime", "raceway.runtime.manifest", "raceway.runtime.errors")
+SHARED = ("raceway.runtime", "raceway.runtime.manifest", "raceway.runtime.errors", "raceway.runtime.folders")
 
 
 def imports(path: Path) -> Iterator[tuple[int, str]]:

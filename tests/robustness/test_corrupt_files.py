@@ -45,14 +45,24 @@ def torn(content: bytes, random: random.Random) -> bytes:
 # ------------------------------------------------------------------------------------------------- the generated folder
 
 
+def means_the_same(content: bytes, whole: bytes) -> bool:
+    try:
+        return bool(json.loads(content) == json.loads(whole))
+    except (ValueError, RecursionError):
+        return False
+
+
 @pytest.mark.parametrize("name", ["model.c", "kernels.h", "model.casadi", "methods.h", "EQUATIONS.md", "manifest.json"])
 def test_an_edited_file_of_an_artefact_is_named_and_refused(rotor: Path, name: str) -> None:
-    whole, draw = (rotor / name).read_bytes(), random.Random(name)
+    whole, draw, original = (rotor / name).read_bytes(), random.Random(name), load(rotor).manifest
     for _ in range(200 if LONG else 12):
         content = torn(whole, draw)
         if content == whole:
             continue
         (rotor / name).write_bytes(content)
+        if name == "manifest.json" and means_the_same(content, whole):  # a space more: every number is as it was
+            assert load(rotor).manifest == original
+            continue
         with pytest.raises(ArtefactError) as caught:
             load(rotor)
         assert name in str(caught.value)
@@ -98,13 +108,13 @@ def test_a_manifest_of_something_else_is_refused_with_a_remedy(
     rotor: Path, key: str, value: object, words: str
 ) -> None:
     """The digest is right: whoever wrote it was another version, or wished the reader ill."""
-    from raceway.runtime.manifest import DIGEST, _text, _text_digest
+    from raceway.runtime.manifest import DIGEST, text_digest, text_of
 
     document = json.loads((rotor / "manifest.json").read_text(encoding="utf-8"))
     del document[DIGEST]
     document[key] = value
-    document[DIGEST] = _text_digest(document)
-    (rotor / "manifest.json").write_text(_text(document), encoding="utf-8")
+    document[DIGEST] = text_digest(document)
+    (rotor / "manifest.json").write_text(text_of(document), encoding="utf-8")
     with pytest.raises(ArtefactError, match=words) as caught:
         load(rotor)
     assert "raceway derive" in str(caught.value)

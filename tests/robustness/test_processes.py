@@ -6,6 +6,7 @@ What a process leaves is the old file or the new one, whenever it ends; what it 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import random
 import re
@@ -18,6 +19,7 @@ import textwrap
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +33,8 @@ from raceway.derive.replace_folder import replace_folder
 from raceway.runtime import CacheWarning, CompileError, RequestError, load, load_solution
 from raceway.runtime.compiled import compile as compiling
 from raceway.runtime.errors import ArtefactError
-from raceway.runtime.manifest import read_artefact
+from raceway.runtime.manifest import folder as folders_manifest
+from raceway.runtime.manifest import read_artefact, read_manifest
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 ROTOR = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
@@ -119,6 +122,86 @@ def test_a_killed_derivation_beside_files_of_others_is_refused_by_readers_and_me
                 read_artefact(target)
     generate(scene_from_text(ROTOR, "rotor"), target)
     assert kept(target) == {**whole[0], "notes.txt": b"mine"}
+
+
+def test_a_reader_between_whose_looks_the_folder_is_replaced_reads_the_new_one(
+    tmp_path: Path, both: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The manifest of the old folder and the files of the new one were taken for files edited by hand."""
+    target = tmp_path / "rotor"
+    shutil.copytree(both[0], target)
+    real, times = folders_manifest.read_manifest, []
+
+    def read(folder: Path, **options: Any) -> object:
+        found = real(folder, **options)
+        if len(times) < 3:
+            times.append(1)
+            replace_folder(target, "rotor", lambda made: copy_files(both[len(times) % 2], made))
+        return found
+
+    monkeypatch.setattr(folders_manifest, "read_manifest", read)
+    assert read_artefact(target) == read_manifest(both[1])
+    assert len(times) == 3
+
+
+def copy_files(source: Path, made: Path) -> None:
+    for path in sorted(source.iterdir()):
+        shutil.copy(path, made)
+
+
+def test_a_reader_beside_a_process_that_derives_reads_one_folder(tmp_path: Path, both: tuple[Path, Path]) -> None:
+    target = tmp_path / "rotor"
+    shutil.copytree(both[0], target)
+    allowed = [read_manifest(folder) for folder in both]
+    code = REPLACING.replace("for source in", "import time\n    for source in").replace(
+        "        replace_folder", "        time.sleep(0.02)\n        replace_folder"
+    )
+    with python(code, target, *both) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n", process.communicate()[1]
+        try:
+            for _ in range(3000 if LONG else 200):
+                assert read_artefact(target) in allowed
+        finally:
+            process.kill()
+
+
+def test_a_model_whose_folder_is_written_anew_compiles_nothing_of_the_new_one(
+    tmp_path: Path, both: tuple[Path, Path]
+) -> None:
+    """Drivers and derivatives are compiled when first asked for: of a new scene's C, and forces were 30 % wrong."""
+    target = tmp_path / "rotor"
+    shutil.copytree(both[0], target)
+    model = load(target)
+    replace_folder(target, "rotor", lambda made: copy_files(both[1], made))
+    calls: list[Callable[[], object]] = [
+        lambda: model.stepper,
+        lambda: model.reduce(cycles=0.1, transient=0),
+        lambda: model.jacobian("ball.force", wrt=["bearing.clearance"], t=0.0),
+        lambda: model.symbolic("rhs"),
+        lambda: model.simulate(cycles=0.1, transient=0),
+        lambda: model.simulate(cycles=0.1, transient=0, method="quasi-static"),
+    ]
+    for call in calls:
+        with pytest.raises(ArtefactError, match=r"written anew or edited since\. Load the folder again"):
+            call()
+    replace_folder(target, "rotor", lambda made: copy_files(both[0], made))
+    again = model.simulate(cycles=0.1, transient=0)
+    np.testing.assert_array_equal(again.x, load(both[0]).simulate(cycles=0.1, transient=0).x)
+
+
+def test_what_is_compiled_is_what_gave_the_key(cache: Path, source: Path, tmp_path: Path) -> None:
+    """A source that changed between key and compiler once left the new code in the cache under the key of the old."""
+    other = tmp_path / "other.c"
+    other.write_text(SOURCE.replace("2.0", "3.0"), encoding="utf-8")
+    compiler = compiling.find_compiler()
+    assert compiler is not None
+    racing = wrapper(tmp_path, f'cp {other} {source}\nexec {compiler.command[0]} "$@"')
+    racing = replace(racing, flags=compiler.flags)
+    library = ctypes.CDLL(str(compiling.compile_sources((source,), racing).path))
+    library.twice.restype = ctypes.c_double
+    library.twice.argtypes = [ctypes.c_double]
+    assert library.twice(4.0) == 8.0
 
 
 def test_what_killed_derivations_left_behind_is_deleted_after_a_day(tmp_path: Path) -> None:
@@ -259,6 +342,29 @@ def test_an_interrupt_after_the_work_is_done_takes_nothing_back() -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.parametrize("within", ["reported()", "contextlib.nullcontext()"])
+def test_an_interrupt_is_said_once_wherever_a_command_is(within: str) -> None:
+    """Before and behind what a command reports itself, typer ends with 130 and without a word."""
+    code = f"""
+        import contextlib, os, signal, sys
+        from raceway.runtime import cli
+        from raceway.runtime.commands.shared import reported
+
+        @cli.app.command()
+        def late():
+            with {within}:
+                os.kill(os.getpid(), signal.SIGINT)
+
+        sys.argv = ["raceway", "late"]
+        cli.main()
+    """
+    with python(code) as process:
+        out, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.strip() == "error: interrupted. Whatever files are there are whole."
+    assert out == ""
+
+
 def test_an_interrupt_that_an_import_turns_into_something_else_is_one_still() -> None:
     """Python 3.11 wraps what `__set_name__` raises in a RuntimeError: once a traceback and exit code 1."""
     code = """
@@ -304,9 +410,60 @@ def test_an_interrupt_while_compiling_ends_the_compiler_and_its_children(
     assert not (tmp_path / "results").exists()
 
 
+def test_an_interrupt_while_the_compiler_is_started_ends_it_as_well(tmp_path: Path) -> None:
+    """Between the start of a process and the moment its number is known nobody could end it: it ran on, its minutes.
+
+    Here an interrupt arrives at every line of Python between the two.
+    """
+    code = """
+        import os, signal, subprocess, sys
+        from raceway.runtime.compiled import compile as compiling
+
+        real, started = subprocess._fork_exec, []
+        def fork(*words):
+            number = real(*words)
+            started.append(number)
+            sys.settrace(trace)
+            frame = sys._getframe(1)
+            while frame is not None:  # those that run already are not traced by that
+                frame.f_trace = trace
+                frame = frame.f_back
+            return number
+        subprocess._fork_exec = fork
+
+        left = 0
+        def trace(frame, event, argument):
+            global left
+            left -= 1
+            if left == 0:
+                sys.settrace(None)
+                os.kill(os.getpid(), signal.SIGINT)
+            return trace
+
+        print("ready", flush=True)
+        for moment in range(1, 40):
+            left = moment
+            try:
+                compiling._finish(("sleep", "47"), None, 60.0)
+            except KeyboardInterrupt:
+                pass
+            sys.settrace(None)
+        print(*started)
+    """
+    with python(code) as process:
+        out, errors = process.communicate(timeout=100)
+    assert process.returncode == 0, errors
+    numbers = [int(word) for word in out.split()[1:]]
+    assert len(numbers) == 39
+    running = [number for number in numbers if not gone(number)]
+    for number in running:
+        os.kill(number, signal.SIGKILL)
+    assert not running
+
+
 def gone(process: int) -> bool:
-    """Whether a process that is no child of this one has ended, or ends within five seconds."""
-    for _ in range(500):
+    """Whether a process that is no child of this one has ended, or ends within a second."""
+    for _ in range(100):
         try:
             state = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
         except (FileNotFoundError, ProcessLookupError):

@@ -6,13 +6,10 @@ to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 t
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
-import os
 import signal
 import sys
-import tempfile
 from importlib.metadata import version
 from pathlib import Path
 from types import FrameType
@@ -25,7 +22,6 @@ from raceway.runtime.commands.explain import explain
 from raceway.runtime.commands.jacobian import jacobian, linearize
 from raceway.runtime.commands.sensitivity import sensitivity
 from raceway.runtime.commands.shared import (
-    INTERRUPTED,
     SceneFile,
     Stages,
     check_folder,
@@ -33,15 +29,19 @@ from raceway.runtime.commands.shared import (
     faults_of,
     load_model,
     note,
+    read_duration,
     read_with_settings,
     reported,
     warnings_shown,
 )
+from raceway.runtime.commands.sweep import sweep
 from raceway.runtime.commands.trade import read_error, trade, usable_trade
+from raceway.runtime.entry import INTERRUPTED, leave_at_once
 from raceway.runtime.errors import RequestError
 
 if TYPE_CHECKING:
     from raceway.derive import Scene
+    from raceway.runtime.integrate.locating import Kinks
     from raceway.runtime.model import Model
     from raceway.runtime.solution import Solution
 
@@ -78,6 +78,10 @@ def _common(
 def run(
     scene: SceneFile,
     cycles: Annotated[float | None, typer.Option(metavar="N", help="Turns of driver or shaft to simulate.")] = None,
+    duration: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help='Time to simulate instead of turns: --duration "0.5 s", also at speed 0.'),
+    ] = None,
     transient: Annotated[
         float | None, typer.Option(metavar="N", help="Turns at the start that summary and figures leave out.")
     ] = None,
@@ -98,6 +102,14 @@ def run(
             "cvodes; or quasi-static, the rings in equilibrium at each instant.",
         ),
     ] = None,
+    kinks: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOW",
+            help="What the stepper does where a law has a kink or jump: stepped-over, left to error control, or "
+            "located, so that its steps end there. Default: located at tight tolerances of auto and stepper.",
+        ),
+    ] = None,
     error: Annotated[
         str | None,
         typer.Option(
@@ -110,6 +122,9 @@ def run(
         list[str] | None,
         typer.Option("--of", metavar="Q", help="Quantity that --error is about: peak_ball_force. May be repeated."),
     ] = None,
+    full_model: Annotated[
+        bool, typer.Option("--full-model", help="With --error: take no simpler model, however accurate and fast.")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the results; results/<scene> if not given.")
     ] = None,
@@ -122,25 +137,34 @@ def run(
     """
     with reported(), warnings_shown(), Stages() as stages:
         stages("read")
-        read, asked, overrides = read_with_settings(scene, set_ or [])
+        seconds = read_duration(duration, cycles)
+        read, asked, overrides = read_with_settings(scene, set_ or [], seconds, transient)
         _check_request(asked, cycles, transient, rtol, method)
+        at_kinks = _checked_kinks(kinks, method or read.run.method, error)
         target = read_error(error, of, method, rtol)
         folder = out if out is not None else Path("results") / read.name
         check_folder(folder)
         with faults_of(scene):
-            model = load_model(read, stages, method or read.run.method)
+            model = load_model(read, stages, method or read.run.method, kinks, rtol)
+        measured = usable_trade(folder, read) if target is not None else None
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,
+            duration=seconds,
             transient=transient,
             parameters=overrides,
             method=method,
             rtol=rtol,
+            kinks=at_kinks,
             progress=stages.fraction,
             error=target,
             of=of,
-            trade=usable_trade(folder, read) if target is not None else None,
+            trade=measured,
+            models="full" if full_model else "any",
         )
+        if measured is not None and solution.accuracy is not None and solution.accuracy.model in measured.folders:
+            # the solution is of the model that was chosen, which may be a simpler one
+            model = measured.model(solution.accuracy.model)
         _note_size(solution)
         summary, files = _write_results(model, solution, folder, stages, figures=figures)
     from raceway.runtime.summary import render_summary
@@ -231,7 +255,16 @@ app.command()(explain)
 app.command()(jacobian)
 app.command()(linearize)
 app.command()(sensitivity)
+app.command()(sweep)
 app.command()(trade)
+
+
+def _checked_kinks(kinks: str | None, method: str, error: str | None) -> Kinks | None:
+    """What to do at kinks; what no run can do is refused before anything is derived or written."""
+    from raceway.runtime.integrate.locating import check_located, refuse_with_error
+
+    refuse_with_error(kinks, error)
+    return check_located(kinks, "stepper" if method == "auto" else method) if kinks is not None else None
 
 
 def _check_request(
@@ -263,8 +296,8 @@ def _check_request(
     speed = abs(shaft.value) if shaft is not None else 0.0
     if cycles is not None and speed == 0.0:
         raise RequestError(
-            f"--cycles: {cycles:g} turns were asked for, but nothing turns in this scene. Give it a speed, or write "
-            "duration in its [run] and leave --cycles away."
+            f"--cycles: {cycles:g} turns were asked for, but nothing turns in this scene. Give it a speed, or a "
+            'time instead of turns: --duration "0.5 s".'
         )
     turns = cycles if cycles is not None else scene.run.cycles
     if turns is None:
@@ -295,63 +328,43 @@ def _size(count: int) -> str:
 def _write_results(
     model: Model, solution: Solution, folder: Path, stages: Stages, *, figures: bool
 ) -> tuple[dict[str, Any], list[str]]:
-    """Write into a folder beside the target and move file by file: what is there is whole.
+    """Write solution, summary and figures in the place of those of an earlier run.
 
     Returns
     -------
     The summary, and the names of the files.
     """
+    from raceway.runtime.results import SOLUTION, write_results
     from raceway.runtime.summary import summarize
 
     stages("write")
     summary = summarize(model, solution)
     if solution.accuracy is not None:
         summary["accuracy"] = solution.accuracy.plain()
-    made = _make_folder(folder)
-    try:
-        with tempfile.TemporaryDirectory(prefix=".writing-", dir=folder) as name:
-            beside = Path(name)
-            solution.save(beside / "solution.nc")
-            if figures:
-                from raceway.runtime.figures import draw_all
 
-                stages("draw")
-                draw_all(model, solution, beside)
-            (beside / "summary.json").write_text(
-                json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8"
-            )
-            names = sorted(path.name for path in beside.iterdir())
-            _drop_figures(folder, names)
-            for file in names:
-                os.replace(beside / file, folder / file)
-    except BaseException:
-        for path in made:
-            with contextlib.suppress(OSError):  # not empty: files were moved already
-                path.rmdir()
-        raise
-    return summary, names
+    def write(made: Path) -> dict[str, Any]:
+        solution.save(made / SOLUTION)
+        if figures:
+            from raceway.runtime.figures import draw_all
+
+            stages("draw")
+            draw_all(model, solution, made)
+        return summary
+
+    return write_results(folder, write, figures=_figures(folder))
 
 
-def _make_folder(folder: Path) -> list[Path]:
-    """Make a folder and its parents; those that were not there, innermost first."""
-    missing = [path for path in (folder, *folder.parents) if not path.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
-    return missing
-
-
-def _drop_figures(folder: Path, kept: list[str]) -> None:
-    """Delete figures of an earlier run that this one does not replace: they would pass for its own."""
+def _figures(folder: Path) -> list[str]:
+    """Names of the figures that an earlier run may have left in a folder."""
     if not any(folder.glob("*.png")):
-        return
+        return []
     from raceway.runtime.figures import FIGURES
 
-    for kind in FIGURES:
-        if f"{kind.name}.png" not in kept:
-            (folder / f"{kind.name}.png").unlink(missing_ok=True)
+    return [f"{kind.name}.png" for kind in FIGURES]
 
 
 def main() -> None:
-    """Entry point of the ``raceway`` command.
+    """Run the command line; `raceway.runtime.entry` is where the command begins.
 
     An interrupt (Ctrl-C) ends it with exit code 130 wherever it arrives: within a command, between two, or while a
     module is imported, where Python may turn it into another exception.
@@ -362,7 +375,7 @@ def main() -> None:
         heard.append(number)
         signal.default_int_handler(number, frame)
 
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else somebody wants it ignored, as nohup does
+    if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, leave_at_once):  # else somebody wants it ignored
         signal.signal(signal.SIGINT, hear)
     try:
         app()
@@ -371,6 +384,11 @@ def main() -> None:
             raise
         complain(INTERRUPTED)
         sys.exit(130)
+    except SystemExit as ended:
+        # typer makes a silent end of an interrupt that arrives before or behind what a command reports itself
+        if heard and isinstance(getattr(ended.__context__, "__cause__", None), KeyboardInterrupt):
+            complain(INTERRUPTED)
+        raise
     finally:
         # what is done is done: while the interpreter shuts down it would end the process by the signal itself
         if signal.getsignal(signal.SIGINT) is hear:
