@@ -70,5 +70,5 @@ def test_bounds_are_those_of_the_file(scene_text: Callable[..., str]) -> None:
                 assert not accepted(path, limit)
     for path, factor, other in value_relations(scene):
         edge = factor * values[other]
-        assert accepted(path, math.nextafter(edge, math.inf) * (1.0 + 1e-12))
-        assert not accepted(path, edge * (1.0 - 1e-9))
+        assert accepted(path, math.nextafter(edge + 1e-12 * abs(edge), math.inf))
+        assert not accepted(path, edge - 1e-9 * abs(edge))

@@ -100,3 +100,19 @@ def test_hertz_is_not_called_smooth_where_people_read(tmp_path: Path, monkeypatc
     assert "shaft angle" in words
     assert "crank angle" not in words
     assert "_quantities" not in words
+
+
+def test_a_slow_turn_is_said_to_need_linearly_implicit_steps_and_takes_them(make_model: Callable[..., Model]) -> None:
+    """At one revolution a minute a quarter of a million oscillations fit into a turn; no explicit method steps over
+    them."""
+    model = make_model("punching_press")
+    slow = {"mechanism.driver.speed": 2.0 * math.pi / 60.0}
+    assert "explicit steps suit" in model.explain().reason
+    assert "linearly implicit" not in model.explain().reason
+    explanation = model.explain(slow)
+    assert "linearly implicit" in explanation.reason
+    oscillations = max(s.frequency for s in explanation.scales) * explanation.turn / (2.0 * math.pi)
+    run = model.simulate(1, parameters=slow, method="stepper", rtol=1e-4, samples_per_cycle=100)
+    assert run.statistics.steps is not None
+    assert run.statistics.steps < 0.1 * oscillations
+    assert "rodas" in run.statistics.reason

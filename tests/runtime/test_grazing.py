@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,10 @@ from scipy.optimize import brentq
 from raceway.runtime import Model
 from raceway.runtime.derivatives.grazing import Grazing, describe, find_grazing, merge_grazing
 from raceway.runtime.derivatives.sensitivity_report import SensitivityReport
+from raceway.runtime.figures.tornado import tornado
 
+#: Ball and time [s].
+PLACES = ((1, 0.1), (5, 0.1), (2, 0.2))
 TIMES = np.linspace(0.0, 1.0, 2001)
 ONE_PART = np.zeros(len(TIMES), dtype=int)
 
@@ -72,6 +76,18 @@ def test_balls_that_graze_at_one_moment_are_one_place() -> None:
     merged = merge_grazing(found)
     assert [[item.ball for item in items] for items in merged] == [[1, 5], [2], [1]]
     assert describe(merged[0]).startswith("balls 1 and 5 graze the kink")
+
+
+def test_the_chart_counts_the_places_that_the_table_lists(make_model: Callable[..., Model]) -> None:
+    """Two balls at one moment, and one at another: the report tells of three, in two places."""
+    model = make_model("varying_compliance")
+    report = model.sensitivity("static_deflection", ["load.force.x", "bearing.contact.stiffness"], check=False)
+    found = tuple(Grazing(ball=k, time=t, crank_angle=0.0, depth=1e-9, kink="contact") for k, t in PLACES)
+    for some, count in ((found, "2 places"), (found[:2], "1 place")):
+        grazing = replace(report, grazing=some)
+        words = " ".join(tornado(grazing, "static_deflection").get_supxlabel().split())
+        assert f"grazes a kink at {count}, where" in words
+        assert f"grazing at {count} ({len(some)} counting each ball)" in str(grazing)
 
 
 def test_kinks_are_sought_whether_or_not_the_outputs_name_the_deflection(make_model: Callable[..., Model]) -> None:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from typer.testing import CliRunner
-from virtual import virtual_model
 
 from raceway.runtime import Model
 from raceway.runtime.cli import app
@@ -44,20 +42,6 @@ def loaded_state(model: Model, t: float) -> np.ndarray:
     x[:half] *= 1.0 + 0.02 * rng.standard_normal(half)
     x[half:] = 2e-3 * rng.standard_normal(half)
     return x
-
-
-@pytest.fixture(scope="module")
-def make_virtual(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., str]) -> Callable[..., Model]:
-    @cache
-    def make(name: str, *changes: tuple[str, str]) -> Model:
-        return virtual_model(scene_text(name, *changes), tmp_path_factory.mktemp(name) / name)
-
-    return make
-
-
-@pytest.fixture(scope="module")
-def press(make_model: Callable[..., Model]) -> Model:
-    return make_model("punching_press_tangent")
 
 
 @pytest.mark.parametrize(

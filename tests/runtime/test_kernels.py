@@ -15,7 +15,7 @@ from raceway.derive.lower import Functions
 from raceway.derive.read import scene_from_text
 from raceway.derive.system import System
 from raceway.runtime.compiled.compile import compile_sources, find_compiler
-from raceway.runtime.integrate.stepper import DRIVER, FLAGS
+from raceway.runtime.compiled.driver_library import DRIVER, FLAGS
 
 #: The driver's own functions, one point a call: as a stage within a step sees it, and as the start of a step does.
 SHIM = """

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from raceway.runtime import Model, RequestError
-from raceway.runtime.quantities.quantities import KINDS, parse_quantity
+from raceway.runtime.quantities.kinds import KINDS
+from raceway.runtime.quantities.quantities import parse_quantity
 
 ENSEMBLE = [
     "peak_ball_force",
@@ -185,6 +186,9 @@ def test_a_sum_rule_of_amplitudes_holds(make_model: Callable[..., Model]) -> Non
         ("max:inner.y@2x", "nothing behind"),
         ("peak_time:ball.force", "no derivative"),
         ("drive_wrok", "drive_work"),
+        ("static_deflection@1000deg", "1000deg is more than two turns.* -720deg to 720deg"),
+        ("static_peak_ball_force@-17.5rad", "-17.5rad is more than two turns.* -4 pi to 4 pi rad"),
+        ("max:drive_angle", 'run.outputs: add "drive_angle" there'),
     ],
 )
 def test_wrong_names_are_refused_with_a_remedy(make_model: Callable[..., Model], text: str, words: str) -> None:

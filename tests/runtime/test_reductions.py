@@ -10,24 +10,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from press_laws import LAWS, press
 
 from raceway.runtime import Model, RequestError, SimulationError
 from raceway.runtime.integrate.reductions import Reduction
 
 ModelMaker = Callable[..., Model]
 BALLS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
-LAW = 'law = "one-sided"\nratio = "0.25e-5 s*mm^0.5"'
-LAWS = {
-    "one-sided": LAW,
-    "stiff": 'law = "one-sided"\ncoefficient = "2.16e4 N*s/m"',
-    "one-sided-gated": 'law = "one-sided-gated"\ncoefficient = "683 N*s/m"',
-    "two-sided-gated": 'law = "two-sided-gated"\ncoefficient = "683 N*s/m"',
-    "tangent": 'law = "tangent"\nratio = "0.25e-5 s"',
-}
-
-
-def press(make_model: ModelMaker, law: str) -> Model:
-    return make_model("punching_press", (LAW, LAWS[law]))
 
 
 @pytest.fixture

@@ -22,16 +22,6 @@ ModelMaker = Callable[..., Model]
 
 
 @pytest.fixture(scope="module")
-def press(make_model: ModelMaker) -> Model:
-    return make_model("punching_press_tangent")
-
-
-@pytest.fixture(scope="module")
-def rotor(make_model: ModelMaker) -> Model:
-    return make_model("varying_compliance")
-
-
-@pytest.fixture(scope="module")
 def oscillator(tmp_path_factory: pytest.TempPathFactory) -> Model:
     """Run by CasADi's virtual machine: this folder has no kernels, and no compiler is asked for."""
     folder = write_folder(tmp_path_factory.mktemp("sampling") / "oscillator")

@@ -11,7 +11,8 @@ from artefact import DEFAULTS, write_folder
 
 from raceway.runtime import IntegrationError, Model, RequestError, Status, load, load_solution
 from raceway.runtime.compiled import compile
-from raceway.runtime.integrate.integrators import Frozen, GeneratedIntegrator, Method
+from raceway.runtime.compiled.kernel import EvaluationError
+from raceway.runtime.integrate.integrators import CvodesIntegrator, Frozen, GeneratedIntegrator, Method
 
 METHODS = ("erk", "rosenbrock", "cvodes")
 TURN = 2.0 * math.pi
@@ -190,6 +191,41 @@ def test_integrator_that_returns_no_numbers_is_stopped_at_that_piece(
     assert caught.value.crank_angle == pytest.approx(TURN / 4)
     assert len(caught.value.partial) == 26
     assert np.isfinite(caught.value.partial["ball.force"]).all()
+
+
+@pytest.mark.parametrize("method", ["cvodes", "erk"])
+def test_a_call_that_fails_loses_no_sample_before_its_failure(
+    model: Model, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    # CVODES crosses a whole segment in one call, the generated integrators up to 64 samples; the failure lies amid both
+    duration, last = 0.09, 0.0271
+    family = {"cvodes": CvodesIntegrator, "erk": lambda m: GeneratedIntegrator(m, "erk")}[method]
+
+    class Failing:
+        def __init__(self, model: Model) -> None:
+            self._method = family(model)
+            self.pieces = self._method.pieces
+            self.steps = self.rejected = None
+
+        def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
+            if start + step > last:
+                raise EvaluationError("it could not go on")
+            return self._method.advance(state, start, step, intervals, frozen)
+
+    # no load switches meanwhile
+    request = {"duration": duration, "rtol": 1e-9, "samples_per_cycle": 800}
+    request["parameters"] = {"push.window.start": 1.0, "push.window.end": 1.0}
+    whole = model.simulate(method="rosenbrock", **request)
+    assert whole.statistics.segments == 1
+    for place in ("integrators", "simulate"):
+        broken = {"failing": Method(make=Failing, required=())}
+        monkeypatch.setattr(f"raceway.runtime.integrate.{place}.METHODS", broken)
+    with pytest.raises(IntegrationError, match="integrator could not go on") as caught:
+        model.simulate(method="failing", **request)
+    kept = caught.value.partial
+    assert kept.t[-1] <= last < whole.t[len(kept)]
+    assert caught.value.time == kept.t[-1]
+    np.testing.assert_allclose(kept.x, whole.x[: len(kept)], atol=1e-6 * np.max(np.abs(whole.x)))
 
 
 def test_model_without_states_only_evaluates_outputs(tmp_path: Path, cache: Path) -> None:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from functools import cache
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import minimize
-from virtual import virtual_model
 
 from raceway.runtime import Model
 from raceway.runtime.derivatives.differences import richardson
@@ -27,21 +25,13 @@ BETWEEN = math.pi / 8
 
 
 @pytest.fixture(scope="module")
-def make_virtual(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., str]) -> Callable[..., Model]:
-    @cache
-    def make(name: str, *changes: tuple[str, str]) -> Model:
-        return virtual_model(scene_text(name, *changes), tmp_path_factory.mktemp(name) / name)
-
-    return make
-
-
-@pytest.fixture(scope="module")
 def bearing_6204(make_virtual: Callable[..., Model]) -> Model:
     return make_virtual("varying_compliance", (GIVEN, HERTZ))
 
 
 @pytest.fixture(scope="module")
 def press(make_virtual: Callable[..., Model]) -> Model:
+    """In the virtual machine: nothing here is evaluated often."""
     return make_virtual("punching_press_tangent")
 
 

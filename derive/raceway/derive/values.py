@@ -400,7 +400,7 @@ def _check_clearance(checker: _Checker, bearing: Bearing) -> None:
         f"the {what} is as large as a ball",
         f"{checker.show(clearance)}, ball diameter {checker.show(ball)}",
         f"a diametral clearance between -{ball.value:.9g} m and {ball.value:.9g} m, the ball diameter",
-        "check its unit: clearances are some micrometres, \"10 um\"",
+        'check its unit: clearances are some micrometres, "10 um"',
     )
 
 

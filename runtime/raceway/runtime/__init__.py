@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from raceway.runtime.model import Model, load
     from raceway.runtime.parameters import Parameters
     from raceway.runtime.quantities.peaks import Peak
+    from raceway.runtime.results import Results, load_results
     from raceway.runtime.solution import Solution, Statistics, load_solution
     from raceway.runtime.status import IntegrationError, Status
 
@@ -49,6 +50,7 @@ __all__ = [
     "Reduction",
     "Reductions",
     "RequestError",
+    "Results",
     "Sensitivities",
     "SensitivityReport",
     "SimulationError",
@@ -57,6 +59,7 @@ __all__ = [
     "Statistics",
     "Status",
     "load",
+    "load_results",
     "load_solution",
     "read_manifest",
 ]
@@ -85,6 +88,8 @@ _HOME = {
     "Peak": "quantities.peaks",
     "Reduction": "integrate.reductions",
     "Reductions": "integrate.reductions",
+    "Results": "results",
+    "load_results": "results",
     "Sensitivities": "derivatives.sensitivity",
     "SensitivityReport": "derivatives.sensitivity_report",
     "Solution": "solution",

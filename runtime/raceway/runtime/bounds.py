@@ -20,7 +20,7 @@ def allowed(info: ParameterInfo) -> str:
 
 
 def outside(info: ParameterInfo, values: np.ndarray | float) -> np.ndarray:
-    """Whether each value violates the parameter's bounds."""
+    """Whether each value violates the parameter's bounds; of the shape of `values`."""
     given = np.asarray(values, dtype=float)
     bad = np.zeros(given.shape, dtype=bool)
     if info.above is not None:

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 #: Instants of a turn that are searched for the lightest and the heaviest load.
 INSTANTS = 360
 
+#: Fastest oscillations in a turn, above which vibrations die out within a small part of it, undamped ones apart.
+MANY_OSCILLATIONS = 5000.0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Breakpoint:
@@ -110,7 +113,7 @@ def explain(model: Model, parameters: Mapping[str, float] | None = None) -> Expl
     turn = clock.period(manifest, values)
     span = turn if math.isfinite(turn) else (manifest.run.duration or 1.0)
     scales, unsupported = _time_scales(model, parameters, span) if model.states else ((), ())
-    method, reason = _method(model, scales)
+    method, reason = _method(model, scales, turn)
     return Explanation(
         states=model.states,
         outputs=model.outputs,
@@ -204,8 +207,8 @@ def _is_constant(model: Model, numbers: Numbers, times: np.ndarray) -> bool:
     return bool(np.max(np.ptp(loads, axis=0)) <= 1e-12 * np.max(np.abs(loads)))
 
 
-def _method(model: Model, scales: tuple[TimeScale, ...]) -> tuple[str, str]:
-    """What ``auto`` takes for these rates, and why."""
+def _method(model: Model, scales: tuple[TimeScale, ...], turn: float) -> tuple[str, str]:
+    """What ``auto`` takes for these rates and turns of `turn` [s], and why."""
     if not model.states:
         return "none", "the model has no states: its outputs follow from time alone"
     decay = max((s.decay for s in scales), default=0.0)
@@ -219,7 +222,15 @@ def _method(model: Model, scales: tuple[TimeScale, ...]) -> tuple[str, str]:
                 "bounded by it: linearly implicit steps suit"
             )
         else:
-            reason += f"; decay is {ratio:.2g} times the fastest oscillation: explicit steps suit"
+            reason += (
+                f"; decay is {ratio:.2g} times the fastest oscillation: explicit steps suit while the ring vibrates"
+            )
+            oscillations = frequency * turn / (2.0 * math.pi)
+            if math.isfinite(turn) and oscillations > MANY_OSCILLATIONS:
+                reason += (
+                    f", but {oscillations:.2g} oscillations fit into a turn: where they have died out, the stepper's "
+                    "are linearly implicit and as long as the tolerance allows; the explicit methods cannot do so"
+                )
     jumping = [law for law, kind in model.manifest.smoothness if kind == "discontinuous"]
     if jumping:
         reason += f"; the {' and '.join(jumping)} law jumps, and steps across a jump are rejected and repeated"

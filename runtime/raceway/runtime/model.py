@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import casadi
 import numpy as np
 
-from raceway.runtime.accuracy.error_target import simulate_to_error
+from raceway.runtime.accuracy.named_error import Models, simulate_to_error
 from raceway.runtime.accuracy.quasi_static import NAME as QUASI_STATIC
 from raceway.runtime.accuracy.quasi_static import QuasiStatic
 from raceway.runtime.assembly import check_assembly
@@ -26,19 +26,21 @@ from raceway.runtime.derivatives.sensitivity import Sensitivities, sensitivities
 from raceway.runtime.ensembles.ensemble import EnsembleResult, simulate_many
 from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver
 from raceway.runtime.ensembles.members import Table
-from raceway.runtime.errors import RequestError
+from raceway.runtime.errors import ArtefactError, RequestError
 from raceway.runtime.explain import Explanation, explain
+from raceway.runtime.folders import LOOKS
 from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.evaluate import checked_time, evaluate_point
 from raceway.runtime.integrate.integrators import available_methods
+from raceway.runtime.integrate.locating import Kinks, refuse_with_error
 from raceway.runtime.integrate.reductions import Reductions, reduce_run
 from raceway.runtime.integrate.simulate import simulate
 from raceway.runtime.integrate.stepper import METHODS as STEPPERS
 from raceway.runtime.integrate.stepper import Stepper
 from raceway.runtime.manifest import Manifest, read_artefact
-from raceway.runtime.parameters import Numbers, Parameters, real, resolve_parameters, vector
+from raceway.runtime.parameters import Numbers, Parameters, numbers_of, resolve_parameters, vector
 from raceway.runtime.quantities.peaks import Peak, refine_peak
-from raceway.runtime.request import Request, run_length, start_state
+from raceway.runtime.request import Request
 
 if TYPE_CHECKING:
     from raceway.runtime.accuracy.trade import Trade
@@ -69,10 +71,18 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     CompileError
         The compiler failed.
     """
-    manifest = read_artefact(folder, verify=verify)
-    # absolute: the compiler runs in the cache folder, and functions may be read after the process has moved elsewhere
+    # absolute: functions may be read after the process has moved elsewhere
     place = Path(folder).absolute()
-    return Model(place, manifest, compile_model(place, manifest, compiler), compiler=compiler)
+    for look in range(LOOKS):
+        manifest = read_artefact(folder, verify=verify)
+        try:
+            library = compile_model(place, manifest, compiler)
+            break
+        except ArtefactError:
+            # another process has put a new folder in place since the manifest was read
+            if look == LOOKS - 1:
+                raise
+    return Model(place, manifest, library, compiler=compiler)
 
 
 class Model:
@@ -152,6 +162,11 @@ class Model:
         return self._drivers.differentiating_stepper
 
     @property
+    def locating_stepper(self) -> Stepper:
+        """The stepper whose steps end on kinks of the laws, compiled when first asked for; errors as for `stepper`."""
+        return self._drivers.locating_stepper
+
+    @property
     def ensemble_driver(self) -> EnsembleDriver:
         """The driver of ensembles and reductions, compiled when first asked for; errors as for `stepper`."""
         return self._drivers.ensemble
@@ -199,24 +214,7 @@ class Model:
 
     def numbers(self, parameters: Mapping[str, float] | None = None) -> Numbers:
         """Parameters with overrides, checked, and the derived constants that follow."""
-        resolved = resolve_parameters(self.manifest, parameters)
-        p = np.array(list(resolved.values()), dtype=float)
-        c = np.zeros(0)
-        if self.manifest.constants:
-            c = self.kernel("constants")({"p": p})
-            if not np.all(np.isfinite(c)):
-                bad = [
-                    info.name
-                    for info, value in zip(self.manifest.constants, c, strict=True)
-                    if not math.isfinite(value)
-                ]
-                raise RequestError(
-                    f"With these parameters the derived constants {', '.join(bad)} are not finite numbers. "
-                    "Check the values that were changed: geometry and elastic constants must be physical."
-                )
-        values = dict(resolved)
-        values.update((info.name, float(value)) for info, value in zip(self.manifest.constants, c, strict=True))
-        return Numbers(parameters=resolved, p=p, c=c, values=values)
+        return numbers_of(self.manifest, parameters, lambda p: self.kernel("constants")({"p": p}))
 
     def _runnable(self, parameters: Mapping[str, float] | None) -> Numbers:
         """Numbers of a run whose linkage can be assembled; what was looked at last is not looked at again."""
@@ -286,10 +284,12 @@ class Model:
         outputs: Sequence[str] | None = None,
         initial: Sequence[float] | np.ndarray | None = None,
         transient: float | None = None,
+        kinks: Kinks | None = None,
         progress: Callable[[float], None] | None = None,
         error: float | None = None,
         of: str | Sequence[str] | None = None,
         trade: Trade | None = None,
+        models: Models = "any",
     ) -> Solution:
         """Simulate from t = 0.  What is not given is taken from the scene's run settings.
 
@@ -308,12 +308,17 @@ class Model:
             the scene.  A new choice is compiled when first asked for, in a fraction of a second
         initial : state at the start, shape (states,)
         transient : turns at the start that `Solution.steady` leaves out
+        kinks : ``stepped-over`` leaves kinks of the laws to error control; with ``located`` steps of the project's own
+            stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 1e-7
+            (1e-6 where a law jumps), else stepped over
         progress : called with the finished fraction
         error : relative error wanted instead of `method` and `rtol`: the tool chooses them, estimates the error of
             this run and tightens until the estimate is within it; ``Solution.accuracy`` tells (see
             `raceway.runtime.accuracy.error_target`)
         of : quantities that `error` is about.  Default: peak ball force, rms and range of the inner ring's motion
         trade : a measurement of this scene (`raceway trade`), from which `error` begins its search
+        models : which models `error` may take: ``"any"``, simpler ones that were kept with the trade as well, or
+            ``"full"``
 
         Raises
         ------
@@ -335,11 +340,13 @@ class Model:
             outputs=outputs,
             initial=None if initial is None else vector(initial),
             transient_cycles=transient,
+            kinks=kinks,
             progress=progress,
         )
+        refuse_with_error(kinks, error)
         if error is None:
             return simulate(self, numbers, request)
-        return simulate_to_error(self, numbers, request, error, of, trade)
+        return simulate_to_error(self, numbers, request, error, of, trade, models)
 
     def sensitivities(
         self,
@@ -456,6 +463,7 @@ class Model:
         method: str | None = None,
         rtol: float | None = None,
         initial: Sequence[float] | np.ndarray | None = None,
+        kinks: Kinks | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Reductions:
         """Extremes with their times, mean and rms of a run behind its transient, without a stored trajectory.
@@ -469,19 +477,17 @@ class Model:
         SimulationError
             The computation failed.
         """
-        numbers = self._runnable(parameters)
-        run = self.manifest.run
-        request = Request(cycles=cycles, duration=duration, initial=None if initial is None else vector(initial))
-        return reduce_run(
-            self,
-            numbers,
-            initial=start_state(self, numbers, request.initial),
-            duration=run_length(self, request, clock.period(self.manifest, numbers.values)),
-            transient=run.transient_cycles if transient is None else real(transient),
-            method=method or run.method,
-            rtol=run.rtol if rtol is None else rtol,
+        request = Request(
+            cycles=cycles,
+            duration=duration,
+            method=method,
+            rtol=rtol,
+            initial=None if initial is None else vector(initial),
+            transient_cycles=transient,
+            kinks=kinks,
             progress=progress,
         )
+        return reduce_run(self, self._runnable(parameters), request)
 
     def simulate_many(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 
@@ -108,6 +108,41 @@ def resolve_parameters(manifest: Manifest, overrides: Mapping[str, float] | None
     return Parameters(manifest.parameters, values)
 
 
+def numbers_of(
+    manifest: Manifest, overrides: Mapping[str, float] | None, constants: Callable[[np.ndarray], np.ndarray]
+) -> Numbers:
+    """Parameters with overrides, checked, and the derived constants that follow.
+
+    Parameters
+    ----------
+    constants : derived constants, shape (constants,), of parameters, shape (parameters,); not called where there are
+        none
+
+    Raises
+    ------
+    RequestError
+        As `resolve_parameters`; or constants that are not finite.
+    """
+    numbers = unchecked_numbers(manifest, resolve_parameters(manifest, overrides), constants)
+    bad = [info.name for info in manifest.constants if not math.isfinite(numbers.values[info.name])]
+    if bad:
+        raise RequestError(
+            f"With these parameters the derived constants {', '.join(bad)} are not finite numbers. "
+            "Check the values that were changed: geometry and elastic constants must be physical."
+        )
+    return numbers
+
+
+def unchecked_numbers(
+    manifest: Manifest, parameters: Parameters, constants: Callable[[np.ndarray], np.ndarray]
+) -> Numbers:
+    """Numbers with the derived constants that follow, finite or not; see `numbers_of`."""
+    p = np.array(list(parameters.values()), dtype=float)
+    c = constants(p) if manifest.constants else np.zeros(0)
+    derived = {info.name: float(value) for info, value in zip(manifest.constants, c, strict=True)}
+    return Numbers(parameters=parameters, p=p, c=c, values={**parameters, **derived})
+
+
 def scalar(value: object) -> float | None:
     """`value` as float when it is one real number (NumPy's scalars and arrays of no dimension included), else None."""
     if getattr(value, "shape", None) == () and hasattr(value, "item"):
@@ -127,7 +162,7 @@ def real(value: object) -> float:
 
 
 def vector(value: object) -> np.ndarray:
-    """`value` as an array of numbers; one of NaN where it is none."""
+    """`value` as an array of numbers, of its own shape; where it is none, one NaN, shape (1,)."""
     try:
         return np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):

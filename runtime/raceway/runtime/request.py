@@ -17,7 +17,7 @@ from raceway.runtime.integrate import clock
 from raceway.runtime.parameters import Numbers, real, unknown_name, vector
 
 if TYPE_CHECKING:
-    from raceway.runtime.manifest import Manifest
+    from raceway.runtime.manifest import Manifest, RunInfo
     from raceway.runtime.model import Model
 
 #: Smallest and largest relative tolerance [1].
@@ -42,6 +42,7 @@ class Request:
     outputs : names of the outputs to evaluate; None: all of the scene
     initial : state at the start, shape (states,)
     transient_cycles : turns at the start that `Solution.steady` leaves out
+    kinks : "stepped-over" or "located"; None: as the tolerance is
     progress : called with the finished fraction of the run
     """
 
@@ -55,6 +56,7 @@ class Request:
     outputs: Sequence[str] | None = None
     initial: np.ndarray | None = None
     transient_cycles: float | None = None
+    kinks: str | None = None
     progress: Callable[[float], None] | None = None
 
 
@@ -206,10 +208,14 @@ def no_output(manifest: Manifest, name: object, known: Sequence[str], what: str 
     return f"{unknown_name(what, name, known)} The scene's run.outputs says which are computed."
 
 
-def run_length(model: Model, request: Request, turn: float) -> float:
-    """Length of the run that is asked for [s]."""
-    run = model.manifest.run
-    cycles, duration = request.cycles, request.duration
+def asked_length(run: RunInfo, cycles: float | None, duration: float | None) -> tuple[float | None, float | None]:
+    """Turns or time [s] to run, one of them None: as given, else as the scene's run settings say.
+
+    Raises
+    ------
+    RequestError
+        Both were given, or one that is no number above 0.
+    """
     if cycles is not None and duration is not None:
         raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
     if cycles is None and duration is None:
@@ -217,16 +223,25 @@ def run_length(model: Model, request: Request, turn: float) -> float:
     if cycles is not None:
         if not 0.0 < real(cycles) < math.inf:
             raise RequestError(f"cycles: a number above 0 is expected, not {cycles!r:.80}.")
-        if not math.isfinite(turn):
-            raise RequestError("cycles: nothing turns in this model (its speed is zero). Give duration in seconds.")
-        return float(cycles) * turn
+        return float(cycles), None
     if duration is None or not 0.0 < real(duration) < math.inf:
         raise RequestError(f"duration: a time above 0 s is expected, not {duration!r:.80}.")
-    return float(duration)
+    return None, float(duration)
+
+
+def run_length(model: Model, request: Request, turn: float) -> float:
+    """Length of the run that is asked for [s]; RequestError as for `asked_length`, or for turns of what never turns."""
+    cycles, duration = asked_length(model.manifest.run, request.cycles, request.duration)
+    if duration is not None:
+        return duration
+    assert cycles is not None
+    if not math.isfinite(turn):
+        raise RequestError("cycles: nothing turns in this model (its speed is zero). Give duration in seconds.")
+    return cycles * turn
 
 
 def start_state(model: Model, numbers: Numbers, given: np.ndarray | None) -> np.ndarray:
-    """State at the start: as given, else from the parameters."""
+    """State at the start, shape (states,): as given, else from the parameters; RequestError for another shape."""
     if given is None:
         return np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
     names = [state.name for state in model.manifest.states]
@@ -240,7 +255,7 @@ def start_state(model: Model, numbers: Numbers, given: np.ndarray | None) -> np.
 
 
 def tolerance(name: str, given: float) -> float:
-    """A relative tolerance that the methods can keep."""
+    """A relative tolerance that the methods can keep [1]; RequestError for one beyond `TOLERANCES`."""
     rtol = real(given)
     if not TOLERANCES[0] <= rtol <= TOLERANCES[1]:
         raise RequestError(

@@ -47,6 +47,8 @@ class Statistics:
     calls : calls of the integrator
     wall_time : time the simulation took [s]
     compiled : whether generated C ran, else CasADi's virtual machine
+    kinks : "stepped-over" or "located"; None for methods that do not know the kinks of the laws
+    located : kinks located, None where they are stepped over
     """
 
     method: str
@@ -59,6 +61,8 @@ class Statistics:
     calls: int
     wall_time: float
     compiled: bool
+    kinks: str | None = None
+    located: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -244,6 +248,11 @@ def load_solution(path: str | Path) -> Solution:
             f"{path}: cannot be read ({getattr(fault, 'strerror', None) or fault}). A file that `Solution.save` or "
             "`raceway run` wrote is expected."
         ) from None
+    return read_bytes(path, content)
+
+
+def read_bytes(path: str | Path, content: bytes) -> Solution:
+    """Solution from the bytes of a file; errors as for `load_solution`."""
     inner, seal = content[:-_SEAL_LENGTH], content[-_SEAL_LENGTH:]
     if seal != _SEAL + hashlib.sha256(inner).hexdigest().encode() + b"\n":
         ours = content.startswith(b"\x89HDF")

@@ -47,7 +47,8 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
 
     ``scene``, ``title``, ``status``, ``method``, ``compiled``, ``damping_law``, ``versions``
         words
-    ``steps``, ``wall_time``, ``rtol``, ``transient_cycles_dropped``, ``steady_cycles``, ``samples``, ``cycle_length``
+    ``steps``, ``located_kinks`` (where they were located), ``wall_time``, ``rtol``, ``transient_cycles_dropped``,
+    ``steady_cycles``, ``samples``, ``cycle_length``
         ``{"value": , "unit": }``
     ``reaction.<joint>.x`` and other reactions, ``drive_torque``, ``load.x``, ``load.y``
         ``{"min": , "max": , "unit": }``
@@ -85,6 +86,7 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
         "rtol": _value(statistic.rtol, "1", "rtol"),
         # null where the integrator does not tell: erk and rosenbrock in compiled code
         "steps": {"value": statistic.steps, "unit": "1"},
+        **({"located_kinks": {"value": statistic.located, "unit": "1"}} if statistic.located is not None else {}),
         "wall_time": _value(statistic.wall_time, "s", "wall_time"),
         "transient_cycles_dropped": _value(sol.transient_cycles, "1", "transient cycles"),
         "samples": {"value": len(steady.t), "unit": "1"},
@@ -224,12 +226,13 @@ def _finite(value: float | np.floating[Any], name: str) -> float:
 
 
 #: Unit of a number in the file -> factor and unit in the table, so that six digits of a displacement are six digits.
-_TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
+TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
 
 #: What the table's caption tells of the run, and with which words.
 _RUN = {
     "rtol": "rtol {}",
     "steps": "{} steps",
+    "located_kinks": "{} kinks located",
     "wall_time": "integrated in {} s",
     "cycle_length": "cycle {} s",
     "transient_cycles_dropped": "{} transient cycles dropped",
@@ -262,7 +265,7 @@ def render_summary(summary: Mapping[str, Any]) -> Table:
     for name, item in summary.items():
         if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
             continue
-        factor, unit = _TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
+        factor, unit = TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
         cells = [f"{factor * item[key]:.4g}" if key in item else "" for key in columns]
         if any(cells):
             table.add_row(name, *cells, unit)

@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal
 
 import casadi
@@ -130,10 +129,10 @@ class _Follower:
         manifest, values, chain = self._model.manifest, self._numbers.values, self._chain
         begin, end = times[:-1], times[1:]
         inputs = manifest.inputs
-        u = np.array([clock.inputs_at(inputs, values, a, 0.5 * (a + b)) for a, b in zip(begin, end, strict=True)])
+        u = clock.inputs_over(inputs, values, begin, 0.5 * (begin + end))
         rates = np.array([_input_rates(inputs, values, 0.5 * (a + b)) for a, b in zip(begin, end, strict=True)])
         count, directions = len(begin), len(chain.names)
-        u, rates = u.reshape(count, len(inputs)), rates.reshape(count, len(inputs))
+        rates = rates.reshape(count, len(inputs))
         by_names = np.array([chain.inputs(float(a)) for a in begin]).reshape(count, len(inputs), directions)
         moved = by_names + rates[:, :, None] * slopes[:-1, None, :]
         fixed = np.concatenate([self._numbers.p, self._numbers.c])
@@ -173,8 +172,8 @@ class _Follower:
     def _track(self, prepared: Prepared, x: Array, slope: Array, back: NDArray[np.int_]) -> Track:
         nodes, edges = prepared.nodes, prepared.edges
         inputs, values = self._model.manifest.inputs, self._numbers.values
-        u = np.array([clock.inputs_at(inputs, values, a, 0.5 * (a + b)) for a, b in pairwise(edges.times)])
-        u = u.reshape(len(edges.times) - 1, len(inputs))[nodes.segment]
+        u = clock.inputs_over(inputs, values, edges.times[:-1], 0.5 * (edges.times[:-1] + edges.times[1:]))
+        u = u[nodes.segment]
         moved = slope[back]
         still = np.zeros((len(nodes), x.shape[1]))
         local = nodes.t - edges.times[nodes.segment]

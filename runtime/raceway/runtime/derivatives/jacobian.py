@@ -69,7 +69,7 @@ class Directions:
     c: Array
 
     def of(self, argument: str) -> Array:
-        """The block of one argument: "t", "x", "u", "p" or "c"."""
+        """The block of one argument, "t", "x", "u", "p" or "c": shape (size of the argument, directions)."""
         return {"t": self.t, "x": self.x, "u": self.u, "p": self.p, "c": self.c}[argument]
 
 

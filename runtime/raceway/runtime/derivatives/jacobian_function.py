@@ -67,7 +67,7 @@ class JacobianFunction:
     def __init__(
         self, model: Model, numbers: Numbers, of: str | Sequence[str], wrt: str | Sequence[str], *, t: float
     ) -> None:
-        self._model, self._of, self._wrt = model, of, wrt
+        self._model, self._wrt = model, wrt
         chosen = rows_of(model, of)
         if len(chosen) != 1:
             groups = "; ".join(", ".join(part.labels) for part in chosen)

@@ -42,7 +42,15 @@ def hessian(
     t: float,
     x: Sequence[float] | np.ndarray | None,
 ) -> Array:
-    """Second derivatives at one time and state; see `raceway.runtime.Model.hessian`."""
+    """Second derivatives at one time and state, shape (rows,); see `raceway.runtime.Model.hessian`.
+
+    Raises
+    ------
+    RequestError
+        `wrt` is no pair, unknown names, or a law without a bounded second derivative.
+    SimulationError
+        The derivatives are not finite there.
+    """
     if isinstance(wrt, str) or len(wrt) != 2:
         raise RequestError(f"hessian: wrt must be a pair of names, as ('inner.x', 'bearing.clearance'), not {wrt!r}.")
     time = checked_time(t)
@@ -68,8 +76,8 @@ def hessian(
     local = symbols["moved"]
     if CRANK_ANGLE in wrt:
         turning_speed(model, numbers)
-        mechanism, bearing = model.manifest.mechanism, model.manifest.bearing
-        speed = mechanism.speed if mechanism is not None else bearing.shaft_speed if bearing is not None else ""
+        speed = clock.speed_name(model.manifest)
+        assert speed is not None  # something turns
         local = local + symbols["turned"] / known[speed]
     arguments = {"t": local, "x": symbols["x"], "u": ca.SX(u), "p": symbols["p"], "c": c}
     found = []

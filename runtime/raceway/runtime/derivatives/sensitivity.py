@@ -97,7 +97,7 @@ class Chain:
             self.initial[row] = self.p[rows[name]]
 
     def derivative(self, name: str) -> np.ndarray:
-        """Derivative of a parameter or derived constant along all directions."""
+        """Derivative of a parameter or derived constant, shape (directions,)."""
         matrix, row = (self.p, self._rows) if name in self._rows else (self.c, self._constants)
         return np.asarray(matrix[row[name]])
 

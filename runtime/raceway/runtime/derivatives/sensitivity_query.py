@@ -31,11 +31,12 @@ from raceway.runtime.integrate.simulate import STIFF_RATIO
 from raceway.runtime.integrate.stepper import METHODS, Family
 from raceway.runtime.manifest import Manifest
 from raceway.runtime.parameters import Numbers, real, unknown_name
+from raceway.runtime.quantities.kinks import DEFLECTION
 from raceway.runtime.quantities.nodes import Window
 from raceway.runtime.quantities.quantities import default_quantities, parse_quantity
-from raceway.runtime.quantities.study import DEFLECTION, Course, Span, Study
+from raceway.runtime.quantities.study import Course, Span, Study
 from raceway.runtime.quantities.track import Outlook, Stepping
-from raceway.runtime.request import TOLERANCES
+from raceway.runtime.request import TOLERANCES, asked_length
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -104,22 +105,11 @@ def make_span(manifest: Manifest, cycles: float | None, duration: float | None, 
     RequestError
         Both cycles and duration, or numbers that are none.
     """
-    run = manifest.run
-    if cycles is not None and duration is not None:
-        raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
-    if cycles is None and duration is None:
-        cycles, duration = run.cycles, run.duration
-    for name, number in (("cycles", cycles), ("duration", duration)):
-        if number is not None and not 0.0 < number < math.inf:
-            raise RequestError(f"{name}: a number above 0 is expected, not {number!r}.")
-    dropped = run.transient_cycles if transient is None else real(transient)
+    turns, time = asked_length(manifest.run, cycles, duration)
+    dropped = manifest.run.transient_cycles if transient is None else real(transient)
     if not 0.0 <= dropped < math.inf:
         raise RequestError(f"transient: a number of cycles from 0 on is expected, not {transient!r}.")
-    return Span(
-        cycles=None if cycles is None else float(cycles),
-        duration=None if duration is None else float(duration),
-        transient=dropped,
-    )
+    return Span(cycles=turns, duration=time, transient=dropped)
 
 
 def make_query(

@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: The output that shows where contacts begin and end.
+DEFLECTION = "ball.deflection"
+
 #: Kinks nearer to each other, or to an edge, than this share of the time that counts are one [1].
 APART = 1e-9
 

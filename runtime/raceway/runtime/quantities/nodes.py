@@ -167,12 +167,10 @@ def with_kinks(edges: Edges, times: Sequence[float]) -> Edges:
 
 
 def turn_slope(model: Model, numbers: Numbers, slopes: Slopes) -> Array:
-    """Derivative of the time of a turn along the directions [s/unit]; zero when nothing turns."""
+    """Derivative of the time of a turn, shape (directions,) [s/unit]; zero when nothing turns."""
     manifest = model.manifest
     speed = clock.shaft_speed(manifest, numbers.values)
-    name = manifest.mechanism.speed if manifest.mechanism is not None else None
-    if name is None and manifest.bearing is not None:
-        name = manifest.bearing.shaft_speed
+    name = clock.speed_name(manifest)
     if name is None or speed == 0.0:
         return np.zeros(0) if name is None else 0.0 * slopes(name)
     return np.asarray(-clock.period(manifest, numbers.values) / speed * slopes(name))

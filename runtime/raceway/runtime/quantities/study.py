@@ -17,12 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from raceway.runtime.derivatives.sensitivity import Chain
-from raceway.runtime.derivatives.statics import instant, static_equilibrium
 from raceway.runtime.errors import RequestError
 from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.reductions import check_span
 from raceway.runtime.parameters import Numbers
 from raceway.runtime.quantities.extremes import Extreme, find_extreme
-from raceway.runtime.quantities.kinks import Kink, find_kinks
+from raceway.runtime.quantities.kinds import KINDS
+from raceway.runtime.quantities.kinks import DEFLECTION, Kink, find_kinks
+from raceway.runtime.quantities.moving_kinks import released
 from raceway.runtime.quantities.nodes import (
     Edges,
     Nodes,
@@ -35,18 +37,10 @@ from raceway.runtime.quantities.nodes import (
     with_kinks,
     with_points,
 )
-from raceway.runtime.quantities.quantities import (
-    KINDS,
-    Estimate,
-    Mark,
-    Place,
-    Quantity,
-    View,
-    named_place,
-    place_of,
-    place_slope,
-)
+from raceway.runtime.quantities.places import Place, place_of, place_slope
+from raceway.runtime.quantities.static import at_rest
 from raceway.runtime.quantities.track import Outlook, Signal, Stepping, Track, follow
+from raceway.runtime.quantities.view import Estimate, Mark, Quantity, View
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -59,9 +53,8 @@ AT_EDGE = 1e-12
 #: Nodes whose weights in a quantity are found at once.
 TOGETHER = 512
 
-#: Outputs with kinks where contacts begin and end, and the one that shows where.
+#: Outputs with kinks where contacts begin and end.
 BROKEN = ("ball.", "ring_force.")
-DEFLECTION = "ball.deflection"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,12 +132,7 @@ class Study:
         if not np.isfinite(turn) and (span.cycles is not None or span.transient > 0.0):
             raise RequestError("Nothing turns in this model (its speed is zero): give duration, and transient = 0.")
         duration = float(span.cycles) * turn if span.cycles is not None else float(span.duration or 0.0)
-        start = span.transient * turn if span.transient > 0.0 else 0.0
-        if start >= duration * (1.0 - 1e-9):
-            raise RequestError(
-                f"The run of {duration / turn:g} cycles lies within its {span.transient:g} transient cycles: nothing "
-                "is left. Run more cycles, or set fewer transient ones."
-            )
+        start = check_span(duration, turn, span.transient)
         return Window(duration=duration, start=start, turn=turn, cycles=span.cycles, transient=span.transient)
 
     def measure(self, numbers: Numbers, stepping: Stepping) -> Course:
@@ -158,7 +146,7 @@ class Study:
             The computation failed.
         """
         if not self._moving:
-            return Course(track=None, estimates=tuple(self._at_rest(numbers, item, None) for item in self.quantities))
+            return self._all_at_rest(numbers, None)
         edges = make_edges(self.model, numbers, self.window(numbers))
         track, places = self._follow(numbers, edges, uniform_plan(edges, self.per_turn), stepping, None)
         regular = self._regular(track)
@@ -207,7 +195,7 @@ class Study:
         chain = Chain(self.model, numbers, names)
         prepared = self.prepare(numbers, chain, stepping)
         if prepared is None:
-            return Course(track=None, estimates=tuple(self._at_rest(numbers, item, chain) for item in self.quantities))
+            return self._all_at_rest(numbers, chain)
         track = prepared.track or follow(self.model, numbers, prepared.edges, prepared.nodes, stepping, chain)
         return self.finish(prepared, track)
 
@@ -240,7 +228,7 @@ class Study:
         track = None
         if kinks:
             track = follow(self.model, numbers, edges, nodes, stepping, chain)
-            track = self._released(numbers, track, full, kinks, chain)
+            track = released(self.model, numbers, track, self._regular(track), full, kinks, chain)
             nodes, edges = track.nodes, track.edges
         for key, item in extremes.items():
             here = np.flatnonzero((full.segment == item.segment) & (full.fraction == item.fraction))
@@ -316,33 +304,14 @@ class Study:
             weights[first : first + some] = kind.evaluate(view, replace(quantity, ball=None)).slope
         return np.asarray(weights[:, None] * by_states[rows, columns])
 
+    def _all_at_rest(self, numbers: Numbers, chain: Chain | None) -> Course:
+        """The quantities where all are static."""
+        estimates = tuple(at_rest(self.model, numbers, item, chain) for item in self.quantities)
+        return Course(track=None, estimates=estimates)
+
     def _estimate(self, view: View, quantity: Quantity, chain: Chain | None) -> Estimate:
         evaluate = KINDS[quantity.kind].evaluate
-        return self._at_rest(view.numbers, quantity, chain) if evaluate is None else evaluate(view, quantity)
-
-    def _at_rest(self, numbers: Numbers, quantity: Quantity, chain: Chain | None) -> Estimate:
-        """A static quantity; its derivative follows from the implicit function of the equilibrium."""
-        manifest = self.model.manifest
-        time, moved = 0.0, np.zeros(0 if chain is None else len(chain.names))
-        if quantity.place:
-            # an angle is that of the first turn, as in `Model.static_equilibrium`: the balls stand where they do there
-            kind = named_place(quantity)
-            by_angle = kind.kind == "angle"
-            time = instant(self.model, numbers, None if by_angle else kind.number, kind.number if by_angle else None)
-            if chain is not None:
-                moved = place_slope(manifest, numbers, kind, time, moved, chain.derivative)
-        rest = static_equilibrium(self.model, numbers, t=time)
-        names = [] if chain is None else [*chain.names, "time"]
-        if quantity.kind == "static_deflection":
-            place = np.array([rest["inner.x"], rest["inner.y"]])
-            value, ball = float(np.hypot(*place)), None
-            rows = rest.derivative("positions", names)[:2] if names else np.zeros((2, 1))
-            slope = place @ rows / value if value else np.zeros(rows.shape[1])
-        else:
-            best = int(np.argmax(rest.ball_force))
-            value, ball = float(rest.ball_force[best]), best + 1
-            slope = rest.derivative("ball.elastic_force", names)[best] if names else np.zeros(1)
-        return Estimate(value=value, slope=slope[:-1] + slope[-1] * moved, time=time, ball=ball)
+        return at_rest(self.model, view.numbers, quantity, chain) if evaluate is None else evaluate(view, quantity)
 
     def _nodes(
         self, numbers: Numbers, edges: Edges, plan: Plan, chain: Chain | None
@@ -401,42 +370,6 @@ class Study:
             edges=edges.times,
         )
 
-    def _released(self, numbers: Numbers, track: Track, plan: Plan, kinks: Sequence[Kink], chain: Chain) -> Track:
-        """The track along nodes that move with the kinks: a zero of s(t, p) moves by -s_p / s_t."""
-        edges, regular = track.edges, self._regular(track)
-        channels = [kink.channel for kink in kinks if kink.channel]
-        if any(kink.kind != "rank" for kink in kinks):
-            channels.append(DEFLECTION)
-        still = replace(regular.nodes, slope=np.zeros_like(regular.nodes.slope))
-        signals = Outlook(self.model, channels).look(regular.along(still, edges), numbers, chain)
-        slopes = edges.slopes.copy()
-        for place_, kink in zip(edges.kinks, kinks, strict=True):
-            first = int(np.searchsorted(regular.nodes.segment, place_, side="left"))
-            rows = np.arange(first, first + 4)
-            if kink.kind == "rank":
-                signal = signals[kink.channel]
-                values = signal.value[:, kink.ball] - signal.value[:, kink.other]
-                moved = signal.slope[first, kink.ball] - signal.slope[first, kink.other]
-                rate = _slope_at(regular.nodes.t[rows], values[rows])
-            else:
-                signal = signals[DEFLECTION]
-                values, moved = signal.value[:, kink.ball], signal.slope[first, kink.ball]
-                rate = _slope_at(regular.nodes.t[rows], values[rows])
-                if kink.kind == "rate":
-                    moved = _slope_at(regular.nodes.t[rows], signal.slope[rows, kink.ball])
-                    rate = _bend_at(regular.nodes.t[rows], values[rows])
-            if rate != 0.0:
-                slopes[place_] = -moved / rate
-        released = replace(edges, slopes=slopes)
-        nodes = place(plan, released)
-        count = len(nodes)
-        nodes = replace(
-            track.nodes,
-            slope=np.concatenate([nodes.slope, track.nodes.slope[count:]]),
-            weight_slope=np.concatenate([nodes.weight_slope, track.nodes.weight_slope[count:]]),
-        )
-        return track.along(nodes, released)
-
     def _extremes(self, numbers: Numbers, regular: Track, stepping: Stepping) -> dict[tuple[str, str], Extreme]:
         """Extremes of all quantities that need some."""
         wanted = [(item, kind) for item in self._moving for kind in KINDS[item.kind].extremes]
@@ -489,22 +422,3 @@ def _moved(extreme: Extreme, edges: Edges, broken: Edges) -> Extreme:
         return replace(extreme, segment=segment)
     segment, fraction = find(broken, extreme.time)
     return replace(extreme, segment=segment, fraction=fraction)
-
-
-def _slope_at(t: Array, values: Array) -> Array:
-    """Time derivative at the first of four times, of columns too; by the cubic through them."""
-    return np.asarray(_taylor(t, values)[1])
-
-
-def _bend_at(t: Array, values: Array) -> Array:
-    """Second time derivative likewise."""
-    return np.asarray(2.0 * _taylor(t, values)[2])
-
-
-def _taylor(t: Array, values: Array) -> Array:
-    """Coefficients of the cubic through four points in powers of the time since the first."""
-    span = float(t[-1] - t[0])
-    powers = np.vander((t - t[0]) / span, 4, increasing=True)
-    coefficients = np.linalg.solve(powers, values)
-    scale = span ** -np.arange(4.0)
-    return np.asarray(coefficients * (scale if values.ndim == 1 else scale[:, None]))

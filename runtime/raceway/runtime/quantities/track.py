@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import casadi
@@ -22,11 +21,12 @@ from raceway.runtime.compiled.kernel import Loop
 from raceway.runtime.derivatives.jacobian import rows_of
 from raceway.runtime.derivatives.sensitivity import Directions
 from raceway.runtime.errors import RequestError
-from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.reductions import RunFailed
-from raceway.runtime.integrate.stepper import End, Family, Segments
-from raceway.runtime.parameters import Numbers, unknown_name
+from raceway.runtime.integrate.segments import make_segments
+from raceway.runtime.integrate.stepper import End, Family
+from raceway.runtime.parameters import Numbers
 from raceway.runtime.quantities.nodes import Edges, Nodes
+from raceway.runtime.request import no_output
 
 if TYPE_CHECKING:
     from raceway.runtime.derivatives.sensitivity import Chain
@@ -133,8 +133,8 @@ def follow(
     """
     inputs, count = model.manifest.inputs, len(model.states)
     directions = 0 if chain is None else len(chain.names)
-    u = np.array([clock.inputs_at(inputs, numbers.values, a, 0.5 * (a + b)) for a, b in pairwise(edges.times)])
-    u = u.reshape(len(edges.times) - 1, len(inputs))
+    segments = make_segments(inputs, numbers, edges.times)
+    u = segments.inputs
     local, held = nodes.t - edges.times[nodes.segment], u[nodes.segment]
     if not count:
         empty = np.zeros((len(nodes), 0))
@@ -142,9 +142,6 @@ def follow(
         return Track(
             nodes=nodes, edges=edges, x=empty, slope=slope, fixed=slope, rate=empty, local=local, u=held, steps=0
         )
-    gates = [k for k, info in enumerate(inputs) if info.kind != "phase"]
-    restarts = np.concatenate([[True], np.any(np.diff(u[:, gates], axis=0) != 0.0, axis=1)])
-    segments = Segments(times=edges.times, inputs=np.ascontiguousarray(u), restarts=restarts)
     times, back = np.unique(nodes.t, return_inverse=True)
     states = np.empty((len(times), count))
     start = np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
@@ -207,8 +204,7 @@ class Outlook:
         known = list(dict.fromkeys((*model.states, *model.outputs, *(q.name for q in model.manifest.quantities))))
         for name in channels:
             if name not in known:
-                hint = unknown_name("output", name, known)
-                raise RequestError(f"{hint} The scene's run.outputs says which are computed.")
+                raise RequestError(no_output(model.manifest, name, known))
         self.channels = tuple(dict.fromkeys(channels))
         self._outputs = [info for info in model.manifest.outputs if info.name in self.channels]
         self._outputs = [info for info in self._outputs if info.name not in model.states]

@@ -1,0 +1,155 @@
+"""Claims about requests of the command line: a run of a given time, numbers given twice, what no bearing can be."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from raceway.derive import SceneError
+from raceway.derive.read import scene_from_text
+from raceway.runtime import Model, RequestError, load_solution
+from raceway.runtime.cli import app
+from raceway.runtime.errors import ArtefactError
+from raceway.runtime.manifest import Manifest
+from raceway.runtime.manifest.json_text import DIGEST, text_digest
+
+ROOT = Path(__file__).resolve().parent.parent
+SCENE = ROOT / "scenes" / "varying_compliance.toml"
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A working directory, where the scene is derived once."""
+    before = Path.cwd()
+    folder = tmp_path_factory.mktemp("requests")
+    os.chdir(folder)
+    yield folder
+    os.chdir(before)
+
+
+@pytest.fixture(scope="module")
+def raceway(site: Path) -> Callable[..., Result]:
+    def call(*words: str | Path) -> Result:
+        return CliRunner().invoke(app, [*map(str, words)])
+
+    return call
+
+
+def test_a_shaft_at_rest_runs_for_a_time_and_comes_to_rest_at_the_static_point(
+    site: Path, raceway: Callable[..., Result]
+) -> None:
+    """3.9937 um is the static deflection with a ball on the load line; transients fall like exp(-t/0.2 s)."""
+    words = ("--duration", "2500 ms", "--transient", "0", "--set", "shaft.speed=0 rpm", "--no-figures", "--out", "rest")
+    done = raceway("run", SCENE, *words)
+    assert done.exit_code == 0, done.output
+    solution = load_solution(site / "rest" / "solution.nc")
+    assert solution.t[-1] == 2.5
+    assert solution["inner.x"][-1] == pytest.approx(3.9937e-6, rel=2e-5)
+    assert solution["inner.vx"][-1] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--duration", "1 s", "--cycles", "2"), "both given"),
+        (("--duration", "1"), "unit is missing"),
+        (("--duration", "1 mm"), "dimension"),
+        (("--duration", "0 s"), "a time above 0"),
+        (("--duration", "0.1 s"), "nothing is left to report"),
+        (("--cycles", "2", "--set", "shaft.speed=0 rpm"), "--duration"),
+        (("--duration", "1 s", "--set", "shaft.speed=0 rpm"), "--transient 0"),
+        (("--set", "run.duration=2 s"), "--duration 2 s"),
+        (("--set", "load.force.x=1 N", "--set", "load.force.x=2 N"), "1 N and 2 N"),
+        (("--set", "load.force.x=1 N", "--set", "load.force.x = 1 N"), "set twice"),
+        (("--set", "bearing.clearance=8 mm"), "clearance is as large as a ball"),
+        (("--set", "bearing.clearance=-8 mm"), "preload (a negative clearance) is as large as a ball"),
+    ],
+)
+def test_contradictions_and_nonsense_end_with_exit_code_2_and_no_folder(
+    site: Path, raceway: Callable[..., Result], words: tuple[str, ...], told: str
+) -> None:
+    done = raceway("run", SCENE, *words, "--out", "never")
+    assert done.exit_code == 2, done.output
+    assert told in done.stderr
+    assert "error: error" not in done.stderr
+    assert not (site / "never").exists()
+
+
+@pytest.mark.parametrize("clearance", ["7.9375 mm", "-7.9375 mm", "1 m"])
+def test_a_clearance_of_a_balls_diameter_is_refused_in_a_file(scene_text: Callable[..., str], clearance: str) -> None:
+    """Two balls then fit one above the other, or none at all."""
+    with pytest.raises(SceneError, match="as large as a ball"):
+        scene_from_text(
+            scene_text("varying_compliance", ('clearance = "0 um" ', f'clearance = "{clearance}" ')), "wide"
+        )
+
+
+def test_a_clearance_of_a_balls_diameter_is_refused_in_python(make_model: Callable[..., Model]) -> None:
+    model = make_model("varying_compliance")
+    ball = model.parameters["bearing.ball_diameter"]
+    for clearance in (ball, -ball):
+        with pytest.raises(RequestError, match=r"bearing\.clearance"):
+            model.numbers({"bearing.clearance": clearance})
+        result = model.simulate_many({"bearing.clearance": [0.0, clearance]}, "peak_ball_force", cycles=1, transient=0)
+        assert [failure.member for failure in result.failures] == [1]
+    for clearance in (np.nextafter(ball, 0.0), -np.nextafter(ball, 0.0)):
+        assert model.numbers({"bearing.clearance": clearance}).values["bearing.clearance"] == clearance
+
+
+@pytest.mark.parametrize("error", [np.float32(0.01), np.float64(0.01), Fraction(1, 100)])
+def test_an_error_may_be_any_real_number(make_model: Callable[..., Model], error: float) -> None:
+    model = make_model("varying_compliance")
+    found = model.simulate(cycles=3, transient=1, samples_per_cycle=50, error=error, of="peak_ball_force").accuracy
+    assert found is not None
+    assert found.target == pytest.approx(0.01, rel=1e-6)
+    assert type(found.target) is float
+
+
+@pytest.mark.parametrize("error", [True, "0.01", [0.01], float("nan"), 0.0, 2.0])
+def test_an_error_that_is_none_is_refused_without_a_doubled_word(
+    make_model: Callable[..., Model], error: float
+) -> None:
+    model = make_model("varying_compliance")
+    with pytest.raises(RequestError, match="relative error from") as caught:
+        model.simulate(cycles=3, transient=1, error=error, of="peak_ball_force")
+    assert not str(caught.value).startswith("error")
+
+
+@pytest.mark.parametrize("digest", ["0" * 64, "", "12", None, 7])
+def test_a_wrong_digest_is_shown_between_whole_quotes(make_model: Callable[..., Model], digest: object) -> None:
+    manifest = make_model("varying_compliance").manifest
+    document = json.loads(manifest.to_json())
+    assert document[DIGEST] != text_digest({})
+    document[DIGEST] = digest
+    with pytest.raises(ArtefactError, match="digest in it") as caught:
+        Manifest.from_json(json.dumps(document))
+    shown = str(caught.value).split("digest in it, ")[1].split(", is not")[0]
+    assert shown.count("'") == (2 if isinstance(digest, str) else 0)
+
+
+def test_an_interrupt_within_cvodes_prints_nothing_of_its_own(
+    make_model: Callable[..., Model], capfd: pytest.CaptureFixture[str]
+) -> None:
+    """CasADi reports it as a right-hand side that failed; the run of some minutes ends within the first seconds."""
+    model = make_model("varying_compliance")
+    timers: list[threading.Timer] = []
+
+    def begin(_: float) -> None:
+        if not timers:
+            timers.append(threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)))
+            timers[0].start()
+
+    with pytest.raises(KeyboardInterrupt):
+        model.simulate(cycles=3000, transient=0, method="cvodes", samples_per_cycle=20, rtol=1e-11, progress=begin)
+    assert timers
+    told = capfd.readouterr()
+    assert told.out + told.err == ""

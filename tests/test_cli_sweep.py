@@ -1,0 +1,217 @@
+"""Claims about ``raceway sweep``: its grid is that of single runs, a failing member costs no other; its refusals."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from matplotlib.image import imread
+from typer.testing import CliRunner, Result
+
+from raceway.derive import read_scene
+from raceway.runtime import load
+from raceway.runtime.cli import app
+from raceway.runtime.commands.ranges import MOST, read_ranges
+from raceway.runtime.errors import RequestError
+from raceway.runtime.figures.canvas import GREY
+from raceway.runtime.figures.sweep import LUMINANCE, VariedAxis, draw_sweep
+
+ROOT = Path(__file__).resolve().parent.parent
+SCENE = ROOT / "scenes" / "varying_compliance.toml"
+SHORT = ("--cycles", "1.5", "--transient", "0.5", "--rtol", "1e-9")
+QUANTITIES = ("peak_ball_force", "rms:inner.y")
+CLEARANCE, LOAD = "bearing.clearance", "load.force.x"
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A working directory, where the scene is derived once."""
+    before = Path.cwd()
+    folder = tmp_path_factory.mktemp("sweep")
+    os.chdir(folder)
+    yield folder
+    os.chdir(before)
+
+
+@pytest.fixture(scope="module")
+def sweep(site: Path) -> Callable[..., Result]:
+    def call(*words: str | Path) -> Result:
+        return CliRunner().invoke(app, ["sweep", *map(str, words)])
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def grid(site: Path, sweep: Callable[..., Result]) -> Path:
+    """Results of a grid of clearance and load, with another damping than the scene's."""
+    of = [word for name in QUANTITIES for word in ("--of", name)]
+    ranges = ("--vary", f"{CLEARANCE}=-4 um:2 um:3", "--vary", f"{LOAD}=100 N:400 N:2:log")
+    done = sweep(SCENE, *ranges, *of, *SHORT, "--set", "bearing.inner_ring.damping=300 N*s/m", "--out", "grid")
+    assert done.exit_code == 0, done.output
+    return site / "grid"
+
+
+def rows(folder: Path) -> list[dict[str, str]]:
+    with (folder / "sweep.csv").open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_a_grid_holds_what_single_runs_reduce_to(grid: Path, site: Path) -> None:
+    """Each member beside the driver of single runs at a tighter tolerance; no ball rattles at these clearances."""
+    model = load(site / "generated" / "varying_compliance")
+    dataset = xarray.load_dataset(grid / "sweep.nc", engine="h5netcdf")
+    assert dataset["peak_ball_force"].dims == (CLEARANCE, LOAD)
+    for clearance, force in itertools.product((-4e-6, -1e-6, 2e-6), (100.0, 400.0)):
+        alone = model.reduce(
+            cycles=1.5,
+            transient=0.5,
+            rtol=1e-11,
+            parameters={CLEARANCE: clearance, LOAD: force, "bearing.inner_ring.damping": 300.0},
+        )
+        found = dataset.sel({CLEARANCE: clearance, LOAD: force}, method="nearest")
+        assert found["peak_ball_force"].item() == pytest.approx(alone["ball.force"].maximum, rel=1e-5)
+        assert found["rms:inner.y"].item() == pytest.approx(alone["inner.y"].rms, rel=1e-5)
+
+
+def test_table_grid_and_report_hold_the_same_numbers_with_units(grid: Path) -> None:
+    dataset = xarray.load_dataset(grid / "sweep.nc", engine="h5netcdf")
+    report = json.loads((grid / "sweep.json").read_text(encoding="utf-8"))
+    table = rows(grid)
+    assert len(table) == report["members"] == 6
+    for member, (i, j) in enumerate(np.ndindex(3, 2)):
+        row, point = table[member], dataset.isel({CLEARANCE: i, LOAD: j})
+        assert float(row[f"{CLEARANCE} [m]"]) == point[CLEARANCE].item()
+        assert float(row[f"{LOAD} [N]"]) == point[LOAD].item()
+        for name, unit in zip(QUANTITIES, ("N", "m"), strict=True):
+            assert point[name].attrs["units"] == unit == report["quantities"][name]["unit"]
+            value = float(row[f"{name} [{unit}]"])
+            assert value == point[name].item() == report["quantities"][name]["values"][member]
+        assert row["status"] == point["status"].item() == "DONE"
+    assert dataset[CLEARANCE].attrs["units"] == "m"
+    assert dataset[CLEARANCE].to_numpy() == pytest.approx([-4e-6, -1e-6, 2e-6], rel=1e-12)
+    assert dataset["bearing.inner_ring.damping"].item() == 300.0
+    assert report["set"] == {"bearing.inner_ring.damping": 300.0}
+    assert [one["spacing"] for one in report["varied"]] == ["linear", "logarithmic"]
+
+
+def test_a_map_of_two_parameters_and_a_line_of_one_are_drawn(
+    grid: Path, site: Path, sweep: Callable[..., Result]
+) -> None:
+    for name in ("sweep_peak_ball_force.png", "sweep_rms_inner_y.png"):
+        assert imread(grid / name).shape[1] == 1200
+    # a new sweep of other quantities leaves no figure that would pass for its own
+    done = sweep(SCENE, "--vary", f"{CLEARANCE}=1um:9um:2", "--of", "range:inner.x", *SHORT, "--out", grid)
+    assert done.exit_code == 0, done.output
+    assert [path.name for path in sorted(grid.glob("*.png"))] == ["sweep_range_inner_x.png"]
+
+
+def test_three_varied_parameters_have_no_figure_and_are_told_so(site: Path, sweep: Callable[..., Result]) -> None:
+    third = "bearing.inner_ring.damping=100 N*s/m:200 N*s/m:2"
+    ranges = ("--vary", f"{CLEARANCE}=1um:9um:2", "--vary", f"{LOAD}=90N:99N:2", "--vary", third)
+    done = sweep(SCENE, *ranges, *SHORT, "--out", "three", "--json")
+    assert done.exit_code == 0, done.output
+    assert "no figure" in done.stderr
+    report = json.loads(done.stdout)
+    assert report["members"] == 8
+    assert list(report["quantities"]) == [
+        "peak_ball_force", "rms_inner_x", "rms_inner_y", "range_inner_x", "range_inner_y"
+    ]  # fmt: skip
+    assert sorted(path.name for path in (site / "three").iterdir()) == ["sweep.csv", "sweep.json", "sweep.nc"]
+
+
+def test_a_member_that_fails_is_named_and_the_others_are_kept(site: Path, sweep: Callable[..., Result]) -> None:
+    """At speed zero there are no turns to run; the other two members have what they have without it."""
+    words = ("--of", "peak_ball_force", *SHORT)
+    done = sweep(SCENE, "--vary", "shaft.speed=-400rpm:400rpm:3", *words, "--out", "failing")
+    assert done.exit_code == 0, done.output
+    table = rows(site / "failing")
+    assert [row["status"] for row in table] == ["DONE", "REFUSED", "DONE"]
+    assert "nothing turns" in table[1]["message"]
+    assert table[1]["peak_ball_force [N]"] == ""
+    assert "shaft.speed = 0 rpm: REFUSED" in done.stderr
+    assert "3 members, 1 without results" in done.stdout
+    whole = sweep(SCENE, "--vary", "shaft.speed=-400rpm:400rpm:2", *words, "--out", "whole")
+    assert whole.exit_code == 0, whole.output
+    key = "peak_ball_force [N]"
+    assert [row[key] for row in rows(site / "whole")] == [table[0][key], table[2][key]]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ((), "no number to vary"),
+        (("--vary", "bearing.balls=6:9:4"), "decides which equations are derived"),
+        (("--vary", "bearing.damping.law=1:2:2"), "decides which equations are derived"),
+        (("--vary", "run.cycles=1:9:3"), "setting of the run"),
+        (("--vary", "bearing.clearence=0um:9um:4"), 'did you mean "bearing.clearance"'),
+        (("--vary", f"{CLEARANCE}=0:9um:4"), "unit is missing"),
+        (("--vary", f"{CLEARANCE}=0um:9N:4"), "wrong dimension for a length"),
+        (("--vary", f"{CLEARANCE}=0um:9um"), "PATH=A:B:N"),
+        (("--vary", f"{CLEARANCE}=0um:9um:4:lin"), "no range"),
+        (("--vary", f"{CLEARANCE}=0um:9um:1"), "from 2 on"),
+        (("--vary", f"{CLEARANCE}=0um:9um:2.5"), "from 2 on"),
+        (("--vary", f"{CLEARANCE}=0um:9um:4:log"), "no logarithm"),
+        (("--vary", f"{CLEARANCE}=9um:9um:4"), "both ends are the same"),
+        (("--vary", "bearing.ball_diameter=-1mm:8mm:4"), "above 0"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2", "--vary", f"{CLEARANCE}=1um:9um:3"), "given twice"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2", "--set", f"{CLEARANCE}=2um"), "given twice"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2", "--set", f"{LOAD}=2N", "--set", f"{LOAD}=3N"), "2N and 3N"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2000000"), f"at most {MOST}"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2000", "--vary", f"{LOAD}=2N:9N:2000"), f"at most {MOST}"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2", "--of", "peak_ball_farce"), "peak_ball_force"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2", "--threads", "0"), "from 1 on"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2", "--rtol", "3"), "1e-13 to 0.1"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2", "--cycles", "2", "--duration", "1s"), "both given"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2", "--method", "cvodes"), "project's own stepper"),
+        # more play than a ball fills: every member is refused
+        (("--vary", f"{CLEARANCE}=8mm:9mm:2"), "none of the 2 members"),
+    ],
+)
+def test_bad_requests_end_with_exit_code_2_and_no_folder(
+    site: Path, sweep: Callable[..., Result], words: tuple[str, ...], told: str
+) -> None:
+    done = sweep(SCENE, *words, "--out", "never")
+    assert done.exit_code == 2, done.output
+    assert done.stdout == ""
+    assert told in done.stderr
+    assert not (site / "never").exists()
+
+
+def test_ranges_have_both_ends_and_equal_steps_or_factors() -> None:
+    scene = read_scene(SCENE)
+    even, factors = read_ranges(scene, [f"{CLEARANCE}=-4um:0.011 mm:4", f"{LOAD}=1N:1kN:4:log"], {})
+    assert even.values == pytest.approx([-4e-6, 1e-6, 6e-6, 11e-6], rel=1e-12)
+    assert even.shown == pytest.approx([-4.0, 1.0, 6.0, 11.0])
+    assert (even.shown_unit, factors.shown_unit) == ("um", "N")
+    assert factors.values == pytest.approx([1.0, 10.0, 100.0, 1000.0], rel=1e-12)
+
+
+def test_colours_of_a_map_grow_in_luminance_by_equal_steps() -> None:
+    """Luminance (CIE L*) of sRGB from its definition: a greyscale print keeps the order of values."""
+    colours = LUMINANCE(np.linspace(0.0, 1.0, 41))[:, :3]
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    lightness = 116.0 * np.cbrt(linear @ [0.2126, 0.7152, 0.0722]) - 16.0
+    steps = np.diff(lightness)
+    assert steps.min() > 0.5 * steps.mean()
+
+
+def test_a_map_without_change_or_with_gaps_is_drawn_and_one_without_values_refused() -> None:
+    axes = [
+        VariedAxis(path="a", unit="um", values=np.array([1.0, 2.0, 4.0]), logarithmic=True),
+        VariedAxis(path="b", unit="N", values=np.array([5.0, 3.0]), logarithmic=False),
+    ]
+    values = np.arange(6.0).reshape(3, 2)
+    values[1, 1] = np.nan
+    figure = draw_sweep("t", axes, "q", "N", values, "")
+    crosses = [line for line in figure.axes[0].lines if line.get_color() == GREY]
+    assert [tuple(line.get_xydata()[0]) for line in crosses] == [(2.0, 3.0)]
+    draw_sweep("t", axes, "q", "N", np.ones((3, 2)), "").canvas.draw()
+    with pytest.raises(RequestError, match="nothing to draw"):
+        draw_sweep("t", axes, "q", "N", np.full((3, 2), np.nan), "")
