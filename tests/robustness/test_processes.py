@@ -444,7 +444,7 @@ def test_an_interrupt_while_the_compiler_is_started_ends_it_as_well(tmp_path: Pa
         for moment in range(1, 40):
             left = moment
             try:
-                compiling._finish(("sleep", "47"), None, 60.0)
+                compiling._finish(("sleep", "7"), None, 60.0)
             except KeyboardInterrupt:
                 pass
             sys.settrace(None)
