@@ -70,7 +70,6 @@ def test_a_shaft_at_rest_runs_for_a_time_and_comes_to_rest_at_the_static_point(
         (("--set", "run.duration=2 s"), "--duration 2 s"),
         (("--set", "load.force.x=1 N", "--set", "load.force.x=2 N"), "1 N and 2 N"),
         (("--set", "load.force.x=1 N", "--set", "load.force.x = 1 N"), "set twice"),
-        (("--set", "bearing.clearance=8 mm"), "clearance is as large as a ball"),
         (("--set", "bearing.clearance=-8 mm"), "preload (a negative clearance) is as large as a ball"),
     ],
 )
@@ -84,24 +83,23 @@ def test_contradictions_and_nonsense_end_with_exit_code_2_and_no_folder(
     assert not (site / "never").exists()
 
 
-@pytest.mark.parametrize("clearance", ["7.9375 mm", "-7.9375 mm", "1 m"])
-def test_a_clearance_of_a_balls_diameter_is_refused_in_a_file(scene_text: Callable[..., str], clearance: str) -> None:
-    """Two balls then fit one above the other, or none at all."""
+@pytest.mark.parametrize("clearance", ["-7.9375 mm", "-1 m"])
+def test_a_preload_of_a_balls_diameter_is_refused_in_a_file(scene_text: Callable[..., str], clearance: str) -> None:
+    """There is room for no ball then."""
     with pytest.raises(SceneError, match="as large as a ball"):
         scene_from_text(
             scene_text("varying_compliance", ('clearance = "0 um" ', f'clearance = "{clearance}" ')), "wide"
         )
 
 
-def test_a_clearance_of_a_balls_diameter_is_refused_in_python(make_model: Callable[..., Model]) -> None:
+def test_a_preload_of_a_balls_diameter_is_refused_in_python(make_model: Callable[..., Model]) -> None:
     model = make_model("varying_compliance")
     ball = model.parameters["bearing.ball_diameter"]
-    for clearance in (ball, -ball):
-        with pytest.raises(RequestError, match=r"bearing\.clearance"):
-            model.numbers({"bearing.clearance": clearance})
-        result = model.simulate_many({"bearing.clearance": [0.0, clearance]}, "peak_ball_force", cycles=1, transient=0)
-        assert [failure.member for failure in result.failures] == [1]
-    for clearance in (np.nextafter(ball, 0.0), -np.nextafter(ball, 0.0)):
+    with pytest.raises(RequestError, match=r"bearing\.clearance"):
+        model.numbers({"bearing.clearance": -ball})
+    result = model.simulate_many({"bearing.clearance": [0.0, -ball]}, "peak_ball_force", cycles=1, transient=0)
+    assert [failure.member for failure in result.failures] == [1]
+    for clearance in (-np.nextafter(ball, 0.0), 1.0):
         assert model.numbers({"bearing.clearance": clearance}).values["bearing.clearance"] == clearance
 
 

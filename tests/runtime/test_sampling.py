@@ -193,7 +193,7 @@ def test_a_run_in_several_calls_within_a_segment_is_the_same_motion(
     run = {"cycles": 1, "method": method, "rtol": 1e-9, "samples_per_cycle": 300}
     whole = rotor.simulate(**run)
     slope = rotor.sensitivities("bearing.clearance", **run).x
-    monkeypatch.setattr("raceway.runtime.integrate.stepping.STEPS_A_CALL", 500)
+    monkeypatch.setattr("raceway.runtime.integrate.stepping.STEPS_A_CALL", 100)
     fractions: list[float] = []
     found = rotor.simulate(**run, progress=fractions.append)
     assert found.statistics.segments == whole.statistics.segments == 1

@@ -101,8 +101,7 @@ def value_relations(scene: Scene) -> tuple[tuple[str, float, str], ...]:
     ball, pitch = bearing.ball_diameter.path, bearing.pitch_diameter.path
     # the balls fit side by side on the pitch circle, a hair's breadth apart
     relations = [(pitch, (1.0 - 1e-12) / math.sin(math.pi / bearing.balls) if bearing.balls > 1 else 1.0, ball)]
-    clearance = bearing.clearance.path
-    relations += [(ball, 1.0, clearance), (clearance, -1.0, ball)]  # see `_check_clearance`
+    relations.append((bearing.clearance.path, -1.0, ball))  # see `_check_preload`
     if isinstance(bearing.contact, HertzContact):
         grooves = (bearing.contact.inner_groove_radius, bearing.contact.outer_groove_radius)
         relations += [(radius.path, 0.5, ball) for radius in grooves]
@@ -337,7 +336,7 @@ def _check_bearing(checker: _Checker, bearing: Bearing) -> None:
     checker.positive(bearing.ball_diameter)
     checker.positive(bearing.pitch_diameter)
     _check_balls(checker, bearing)
-    _check_clearance(checker, bearing)
+    _check_preload(checker, bearing)
     if isinstance(bearing.contact, HertzContact):
         _check_hertz(checker, bearing.contact, bearing.ball_diameter)
     else:
@@ -385,21 +384,16 @@ def _check_balls(checker: _Checker, bearing: Bearing) -> None:
         )
 
 
-def _check_clearance(checker: _Checker, bearing: Bearing) -> None:
-    """Clearance and preload stay below a ball's diameter: far beyond any bearing, but beyond that there is none.
-
-    Rings pushed together by a clearance of a ball's diameter leave room for two balls, one above the other, on the far
-    side; a preload as large leaves no room for a ball anywhere.
-    """
+def _check_preload(checker: _Checker, bearing: Bearing) -> None:
+    """A preload as large as a ball leaves no room for one.  A clearance may have any width: what never touches flies."""
     ball, clearance = bearing.ball_diameter, bearing.clearance
-    if ball.value <= 0.0 or not abs(clearance.value) >= ball.value:
+    if ball.value <= 0.0 or -clearance.value < ball.value:
         return
-    what = "clearance" if clearance.value > 0.0 else "preload (a negative clearance)"
     checker.fault(
         clearance.path,
-        f"the {what} is as large as a ball",
+        "the preload (a negative clearance) is as large as a ball",
         f"{checker.show(clearance)}, ball diameter {checker.show(ball)}",
-        f"a diametral clearance between -{ball.value:.9g} m and {ball.value:.9g} m, the ball diameter",
+        f"a diametral clearance above -{ball.value:.9g} m, the ball diameter",
         'check its unit: clearances are some micrometres, "10 um"',
     )
 

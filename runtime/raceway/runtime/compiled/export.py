@@ -22,7 +22,7 @@ from raceway.runtime.compiled.compile import FLAGS as BASE_FLAGS
 from raceway.runtime.compiled.driver_library import DRIVER, FLAGS, SWITCHES
 from raceway.runtime.errors import ArtefactError, RequestError
 from raceway.runtime.integrate import clock
-from raceway.runtime.integrate.locating import has_kinks
+from raceway.runtime.integrate.locating import has_kinks, tight_below
 from raceway.runtime.integrate.magnitudes import default_magnitudes as run_magnitudes
 from raceway.runtime.integrate.stepper import METHODS as STEPPERS
 from raceway.runtime.manifest import InputInfo, Manifest, read_artefact
@@ -152,6 +152,9 @@ def _scene_header(manifest: Manifest) -> str:
 
 enum {{ {listed} }};
 {kinks}
+/* Tolerance at which kinks are located unless something else is asked for. */
+#define SCENE_TIGHT {tight_below(manifest)!r}
+
 /* A parameter in SI; a value must be above `above`, at least `least`, at most `most` and below `below`. */
 typedef struct {{
     const char *name, *unit, *description;

@@ -72,10 +72,14 @@ def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float
         Another word, or kinks are to be located by a method that cannot.
     """
     if asked is None:
-        jumps = any(word == "discontinuous" for _, word in manifest.smoothness)
-        tight = rtol <= (TIGHT_JUMPS if jumps else TIGHT)
+        tight = rtol <= tight_below(manifest)
         return LOCATED if method == "stepper" and tight and has_kinks(manifest) else STEPPED_OVER
     return check_located(asked, method)
+
+
+def tight_below(manifest: Manifest) -> float:
+    """Tolerance from which on `stepper` locates kinks by itself [1]."""
+    return TIGHT_JUMPS if any(word == "discontinuous" for _, word in manifest.smoothness) else TIGHT
 
 
 def check_located(asked: str, method: str) -> Kinks:

@@ -34,7 +34,7 @@ typedef struct {
     double rtol;
     long samples; /* in a turn; in the whole run where nothing turns */
     int method;
-    int located; /* whether steps end on the kinks of the laws */
+    int located; /* whether steps end on the kinks of the laws; -1: as the tolerance is */
 } request;
 
 static void help(const char *program)
@@ -45,7 +45,7 @@ static void help(const char *program)
     printf("  --rtol R         error allowed in a step, relative to the magnitudes of the states; default %g\n", scene_rtol);
     printf("  --samples N      samples in a turn (in the whole run where nothing turns); default %ld\n", scene_samples);
     printf("  --method M       auto, rodas4, rodas5p, dp54, dop853; default %s\n", scene_method);
-    printf("  --kinks HOW      stepped-over, or located: steps end where a law has a kink or jump; default stepped-over\n");
+    printf("  --kinks HOW      stepped-over, or located: steps end where a law has a kink or jump; default: located by method\n                   auto at an --rtol of %g and below, else stepped-over\n", SCENE_TIGHT);
     printf("  --list           print parameters with values, units and meaning, and stop\n\n");
     printf("Values of parameters are numbers in SI units.\n");
 }
@@ -276,7 +276,8 @@ static int simulate(const request *asked, const double *values)
     const raceway_options options = {
         .method = asked->method, .max_steps = steps < 2e9 ? (long)steps : 2000000000L, .largest_step = INFINITY, .tolerance = tolerance};
     const size_t inputs = SCENE_INPUTS > 0 ? SCENE_INPUTS : 1;
-    memory m = {NULL, NULL, NULL, NULL, NULL, NULL, asked->located};
+    const int tight = asked->method == RACEWAY_AUTO && asked->rtol <= SCENE_TIGHT;
+    memory m = {NULL, NULL, NULL, NULL, NULL, NULL, asked->located >= 0 ? asked->located : tight};
     m.times = malloc((size_t)(count + 1) * sizeof *m.times);
     m.inputs = malloc(SEGMENTS_A_CALL * inputs * sizeof *m.inputs);
     m.restarts = malloc(SEGMENTS_A_CALL);
@@ -327,7 +328,7 @@ static int simulate(const request *asked, const double *values)
 int main(int argc, char **argv)
 {
     static double values[SCENE_PARAMETERS + SCENE_CONSTANTS];
-    request asked = {scene_cycles, scene_duration, scene_rtol, scene_samples, 0, 0};
+    request asked = {scene_cycles, scene_duration, scene_rtol, scene_samples, 0, -1};
     int sizes[16] = {0};
     raceway_sizes(sizes);
     if (sizes[0] != SCENE_STATES || sizes[2] != SCENE_PARAMETERS || sizes[3] != SCENE_CONSTANTS) {
