@@ -309,7 +309,7 @@ class Model:
         initial : state at the start, shape (states,)
         transient : turns at the start that `Solution.steady` leaves out
         kinks : ``stepped-over`` leaves kinks of the laws to error control; with ``located`` steps of the project's own
-            stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 1e-7
+            stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 3e-8
             (1e-6 where a law jumps), else stepped over
         progress : called with the finished fraction
         error : relative error wanted instead of `method` and `rtol`: the tool chooses them, estimates the error of
