@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from profiles import LONG
 
-from raceway.runtime import RequestError, Solution, load, load_results
+from raceway.runtime import RequestError, Solution, load, load_results, results
 from raceway.runtime.results import FILES, SOLUTION, SUMMARY, write_results
 
 FIGURES = ("orbit.png", "forces.png")
@@ -247,6 +247,28 @@ def test_a_reader_beside_a_writer_gets_one_run(
                 np.testing.assert_array_equal(found.solution.x, solutions[found.summary["run"]].x)
         finally:
             process.kill()
+
+
+def test_a_reader_between_whose_looks_the_results_are_replaced_reads_the_new_ones(
+    tmp_path: Path, runs: tuple[Path, Path], solutions: list[Solution], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The summary is of one run, the solution beside it already of the next."""
+    target = tmp_path / "rotor"
+    put(target, runs[0], 0)
+    look, looks = results._summary_text, []
+
+    def and_then_replaced(home: Path) -> str:
+        text = look(home)
+        if not looks:
+            put(target, runs[1], 1)
+        looks.append(home)
+        return text
+
+    monkeypatch.setattr(results, "_summary_text", and_then_replaced)
+    found = load_results(target)
+    assert found.summary["run"] == 1
+    assert len(looks) == 2
+    np.testing.assert_array_equal(found.solution.x, solutions[1].x)
 
 
 def test_the_summary_names_every_file_of_the_run(tmp_path: Path, runs: tuple[Path, Path]) -> None:
