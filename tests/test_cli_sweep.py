@@ -170,8 +170,8 @@ def test_a_member_that_fails_is_named_and_the_others_are_kept(site: Path, sweep:
         (("--vary", f"{CLEARANCE}=1um:9um:2", "--rtol", "3"), "1e-13 to 0.1"),
         (("--vary", f"{CLEARANCE}=1um:9um:2", "--cycles", "2", "--duration", "1s"), "both given"),
         (("--vary", f"{CLEARANCE}=1um:9um:2", "--method", "cvodes"), "project's own stepper"),
-        # more play than a ball fills: every member is refused
-        (("--vary", f"{CLEARANCE}=8mm:9mm:2"), "none of the 2 members"),
+        # a preload that leaves no room for a ball: every member is refused
+        (("--vary", f"{CLEARANCE}=-9mm:-8mm:2"), "none of the 2 members"),
     ],
 )
 def test_bad_requests_end_with_exit_code_2_and_no_folder(

@@ -387,7 +387,7 @@ def _check_balls(checker: _Checker, bearing: Bearing) -> None:
 def _check_preload(checker: _Checker, bearing: Bearing) -> None:
     """A preload as large as a ball leaves no room for one.  A clearance may be of any width: it is a free ring then."""
     ball, clearance = bearing.ball_diameter, bearing.clearance
-    if ball.value <= 0.0 or -clearance.value < ball.value:
+    if ball.value <= 0.0 or not -clearance.value >= ball.value:
         return
     checker.fault(
         clearance.path,
