@@ -112,6 +112,26 @@ def test_a_map_of_two_parameters_and_a_line_of_one_are_drawn(
     assert [path.name for path in sorted(grid.glob("*.png"))] == ["sweep_range_inner_x.png"]
 
 
+def test_a_sweep_can_locate_kinks_and_says_so(site: Path, sweep: Callable[..., Result]) -> None:
+    """Each member is then the single run that locates them; no ball rattles at these clearances."""
+    words = ("--vary", f"{CLEARANCE}=2um:5um:2", "--of", "peak_ball_force", *SHORT, "--no-figures", "--json")
+    done = sweep(SCENE, *words, "--kinks", "located", "--out", "located")
+    assert done.exit_code == 0, done.output
+    report = json.loads(done.stdout)
+    assert (report["statistics"]["kinks"], report["statistics"]["lanes"]) == ("located", 1)
+    model = load(site / "generated" / "varying_compliance")
+    found = report["quantities"]["peak_ball_force"]["values"]
+    for clearance, peak in zip(report["varied"][0]["values"], found, strict=True):
+        numbers = {CLEARANCE: clearance}
+        alone = model.reduce(cycles=1.5, transient=0.5, rtol=1e-9, kinks="located", parameters=numbers)
+        assert peak == pytest.approx(alone["ball.force"].maximum, rel=1e-9)
+    over = sweep(SCENE, *words, "--out", "over")
+    lanes = json.loads(over.stdout)
+    assert lanes["statistics"]["kinks"] == "stepped-over"
+    # and they are other runs
+    assert lanes["quantities"]["peak_ball_force"]["values"][1] != pytest.approx(found[1], rel=1e-9)
+
+
 def test_three_varied_parameters_have_no_figure_and_are_told_so(site: Path, sweep: Callable[..., Result]) -> None:
     third = "bearing.inner_ring.damping=100 N*s/m:200 N*s/m:2"
     ranges = ("--vary", f"{CLEARANCE}=1um:9um:2", "--vary", f"{LOAD}=90N:99N:2", "--vary", third)
@@ -170,6 +190,8 @@ def test_a_member_that_fails_is_named_and_the_others_are_kept(site: Path, sweep:
         (("--vary", f"{CLEARANCE}=1um:9um:2", "--rtol", "3"), "1e-13 to 0.1"),
         (("--vary", f"{CLEARANCE}=1um:9um:2", "--cycles", "2", "--duration", "1s"), "both given"),
         (("--vary", f"{CLEARANCE}=1um:9um:2", "--method", "cvodes"), "project's own stepper"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2", "--kinks", "locate"), "Did you mean 'located'"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2", "--method", "erk", "--kinks", "located"), "cannot end its steps"),
         # a preload that leaves no room for a ball: every member is refused
         (("--vary", f"{CLEARANCE}=-9mm:-8mm:2"), "none of the 2 members"),
     ],

@@ -5,8 +5,12 @@
 
 enum { RW_NSWITCHES = 1 };
 
-/* Where the force cannot be continued beyond the kink, and where the kink is one of the rate. */
-static const double rw_branch_point[1] = {1.0};
+/* Whether rates of deflection are computed; a force that has no use for them has none. */
+enum { RW_RATES = 1 };
+
+/* Where the force above a kink, or below it, ends at a branch point; where a kink is one of the rate. */
+static const double rw_ends_above[1] = {1.0};
+static const double rw_ends_below[1] = {0.0};
 static const double rw_switch_of_rate[1] = {0.0};
 
 /* Switching functions of one ball [m, or m/s]. */
@@ -16,6 +20,58 @@ static inline void rw_ball_switches(double delta, double rate, const double *res
     (void)k;
     double w0 = delta;
     g[0] = w0;
+}
+
+/* Force of one ball with its sides held [N]. */
+static inline void rw_ball_held_force(double delta, double rate, const double *restrict k, const double *restrict b, double *restrict F)
+{
+    double w0 = 0.0;
+    double w1 = rate;
+    double w2 = (double)(w0 < w1);
+    double w3 = k[1];
+    w1 = w1 * w3;
+    w2 = (w2 != 0.0 ? w1 : 0.0);
+    w1 = delta;
+    w0 = (double)(w0 < w1);
+    w3 = b[0];
+    w3 = (double)(w3 < w1);
+    w0 = (double)(w0 != 0.0 && w3 != 0.0);
+    w3 = k[0];
+    double w4 = sqrt(w1);
+    w1 = w1 * w4;
+    w3 = w3 * w1;
+    w0 = (w0 != 0.0 ? w3 : 0.0);
+    w2 = w2 + w0;
+    F[0] = w2;
+}
+
+/* Force of one ball with its sides held [N] and its slopes. */
+static inline void rw_ball_held_slopes(double delta, double rate, const double *restrict k, const double *restrict b, double *restrict F, double *restrict Fd, double *restrict Fv)
+{
+    double w0 = 0.0;
+    double w1 = rate;
+    double w2 = (double)(w0 < w1);
+    double w3 = k[1];
+    w1 = w1 * w3;
+    w1 = (w2 != 0.0 ? w1 : 0.0);
+    double w4 = delta;
+    w0 = (double)(w0 < w4);
+    double w5 = b[0];
+    w5 = (double)(w5 < w4);
+    w0 = (double)(w0 != 0.0 && w5 != 0.0);
+    w5 = k[0];
+    double w6 = sqrt(w4);
+    w4 = w4 * w6;
+    w5 = w5 * w4;
+    w5 = (w0 != 0.0 ? w5 : 0.0);
+    w1 = w1 + w5;
+    F[0] = w1;
+    w1 = k[2];
+    w1 = w1 * w6;
+    w0 = (w0 != 0.0 ? w1 : 0.0);
+    Fd[0] = w0;
+    w2 = (w2 != 0.0 ? w3 : 0.0);
+    Fv[0] = w2;
 }
 
 #endif

@@ -36,7 +36,7 @@ def switching(law: str, *, contact: bool = False, rate: bool = False, pairs: boo
 @pytest.mark.parametrize(
     ("law", "expected"),
     [
-        # function, whether the law ends there, whether it jumps
+        # function, whether the law of contact ends there, whether it jumps
         ("none", [(DELTA, True, False)]),
         ("one-sided", [(DELTA, True, False), (RATE, False, False)]),
         ("one-sided-gated", [(DELTA, True, True), (RATE, False, False)]),
@@ -46,8 +46,8 @@ def switching(law: str, *, contact: bool = False, rate: bool = False, pairs: boo
 )
 def test_laws_switch_where_their_formulas_do(law: str, expected: list[tuple[sp.Symbol, bool, bool]]) -> None:
     found = switching(law)
-    assert [(s.function, s.branch_point, s.jumps) for s in found.switches] == expected
-    assert found.holds == (law in ("one-sided", "one-sided-gated", "two-sided-gated"))
+    assert [(s.function, s.ends_above, s.jumps) for s in found.switches] == expected
+    assert not any(s.ends_below for s in found.switches)
 
 
 @pytest.mark.parametrize("law", ["none", "one-sided", "one-sided-gated", "two-sided-gated", "tangent"])
@@ -76,10 +76,23 @@ def test_a_held_law_continues_its_side_and_is_the_law_where_let_go() -> None:
     assert there.subs({DELTA: -1, RATE: -5}) == -15
     assert there.subs({DELTA: sp.Rational(1, 4), RATE: 5}) == hertz + 15
     away = found.force.subs(numbers | {touch: sp.oo, approach: sp.oo})
-    assert away.subs({DELTA: sp.Rational(1, 4), RATE: 5}) == hertz
+    assert away.subs({DELTA: sp.Rational(1, 4), RATE: 5}) == 0
+    receding = found.force.subs(numbers | {touch: -sp.oo, approach: sp.oo})
+    assert receding.subs({DELTA: sp.Rational(1, 4), RATE: 5}) == hertz
     free = found.force.subs(numbers | {touch: 0, approach: 0})
     assert free.subs({DELTA: -1, RATE: 5}) == 0
     assert free.subs({DELTA: sp.Rational(1, 4), RATE: 5}) == hertz + 15
+
+
+def test_a_law_that_ends_from_above_is_held_there_alone() -> None:
+    mirrored = sp.Piecewise((0, DELTA > 0), (STIFFNESS * (-DELTA) ** sp.Rational(3, 2), True))
+    found = find_switching([mirrored], DELTA, RATE, pairs=False)
+    (switch,) = found.switches
+    assert (switch.ends_above, switch.ends_below) == (False, True)
+    values = {STIFFNESS: 2, DELTA: -sp.Rational(1, 4)}
+    assert found.force.subs({switch.border: -sp.oo}).subs(values) == 0
+    assert found.force.subs({switch.border: sp.oo}).subs(values) == sp.Rational(1, 4)
+    assert found.force.subs({switch.border: sp.oo}).subs({STIFFNESS: 2, DELTA: sp.Rational(1, 4)}) == 0
 
 
 def test_a_condition_of_something_else_is_refused() -> None:

@@ -254,8 +254,9 @@ def test_a_damaged_library_is_said_and_compiled_anew(
 ) -> None:
     """Mapping a library that was cut short ends the process: its bytes are compared with its name before."""
     first = compiled(tmp_path)
-    moved = cache.parent / "other"  # another place, for this process has the first one mapped
-    shutil.move(cache, moved)
+    moved = cache.parent / "other"  # another place and other files: this process has the first one mapped until its end
+    shutil.copytree(cache, moved)
+    shutil.rmtree(cache)
     monkeypatch.setenv(compiling.CACHE_VARIABLE, str(moved))
     path = moved / first.path.name
     DAMAGE[damage](path)

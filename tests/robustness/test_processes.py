@@ -32,6 +32,7 @@ from raceway.derive.read import scene_from_text
 from raceway.derive.replace_folder import replace_folder
 from raceway.runtime import CacheWarning, CompileError, RequestError, load, load_solution
 from raceway.runtime.compiled import compile as compiling
+from raceway.runtime.compiled import compilers
 from raceway.runtime.errors import ArtefactError
 from raceway.runtime.manifest import folder as folders_manifest
 from raceway.runtime.manifest import read_artefact, read_manifest
@@ -417,7 +418,7 @@ def test_an_interrupt_while_the_compiler_is_started_ends_it_as_well(tmp_path: Pa
     """
     code = """
         import os, signal, subprocess, sys
-        from raceway.runtime.compiled import compile as compiling
+        from raceway.runtime.compiled import compilers
 
         real, started = subprocess._fork_exec, []
         def fork(*words):
@@ -444,7 +445,7 @@ def test_an_interrupt_while_the_compiler_is_started_ends_it_as_well(tmp_path: Pa
         for moment in range(1, 40):
             left = moment
             try:
-                compiling._finish(("sleep", "7"), None, 60.0)
+                compilers._finish(("sleep", "7"), None, 60.0)
             except KeyboardInterrupt:
                 pass
             sys.settrace(None)
@@ -495,7 +496,7 @@ def test_a_compiler_whose_child_hangs_is_stopped_with_its_child(
     cache: Path, source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """gcc is a driver that starts the real one: ending gcc alone left that one, and waited for it without end."""
-    monkeypatch.setattr(compiling, "TIMEOUT", 0.3)
+    monkeypatch.setattr(compilers, "TIMEOUT", 0.3)
     note = tmp_path / "child"
     begun = time.perf_counter()
     with pytest.raises(CompileError, match=r"(?s)did not finish within 0\.3 s.*Nothing was written.*set CC") as caught:
@@ -509,10 +510,10 @@ def test_a_compiler_whose_child_hangs_is_stopped_with_its_child(
 def test_a_compiler_that_does_not_tell_its_version_is_refused_in_words(
     cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(compiling, "ANSWER_TIMEOUT", 0.3)
+    monkeypatch.setattr(compilers, "ANSWER_TIMEOUT", 0.3)
     command = wrapper(tmp_path, "sleep 60").command[0]
     with pytest.raises(CompileError, match=r"(?s)did not answer within 0\.3 s.*strange-cc --version.*set CC"):
-        compiling.find_compiler(command)
+        compilers.find_compiler(command)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from profiles import LONG
 
 from raceway.derive import generate
 from raceway.derive.read import scene_from_text
-from raceway.runtime import Model, load
+from raceway.runtime import ArtefactError, Model, load
 from raceway.runtime.accuracy import quasi_static
 from raceway.runtime.compiled.compile import compile_sources, find_compiler
 from raceway.runtime.compiled.driver_library import DRIVER
@@ -181,6 +181,28 @@ def test_records_of_the_driver_have_the_layout_that_python_gives_them(name: str,
     assert body is not None
     declared = re.findall(r"(\w+)\s*[;,]", body.group(1))
     assert declared == fields
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_a_driver_of_other_records_is_refused_before_it_is_called(
+    name: str, press: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A library of sources with one field more or less than the Python that calls it."""
+    model = load(press)
+    record = LAYOUTS[name]
+    longer = type(record.__name__, (ctypes.Structure,), {"_fields_": (*record._fields_, ("later", ctypes.c_double))})
+    driver, module = {
+        "raceway_ensemble_options": (model.ensemble_driver, ensemble_driver),
+        "raceway_equilibrium_options": (model.quasi_static, quasi_static),
+        "raceway_equilibrium_result": (model.quasi_static, quasi_static),
+    }.get(name, (model.stepper, stepper))
+    library = model.ensemble_driver.stepper.library if driver is model.ensemble_driver else driver.library
+    type(driver)(library, model.manifest)
+    monkeypatch.setattr(module, record.__name__, longer)
+    with pytest.raises(
+        ArtefactError, match=f"{ctypes.sizeof(record)}.* bytes there, and .*{ctypes.sizeof(longer)}.*again"
+    ):
+        type(driver)(library, model.manifest)
 
 
 def test_results_of_ensembles_have_the_layout_of_those_of_single_runs() -> None:

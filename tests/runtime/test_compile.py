@@ -18,7 +18,7 @@ import pytest
 from artefact import write_folder
 
 from raceway.runtime import CacheWarning, CompileError, NoCompilerWarning, RequestError, load
-from raceway.runtime.compiled import compile
+from raceway.runtime.compiled import compile, compilers
 
 SOURCE = "double twice(double x) { return 2.0 * x; }\n"
 
@@ -125,7 +125,7 @@ def test_hanging_compiler_is_stopped(
     script = tmp_path / "hanging-cc"
     script.write_text("#!/bin/sh\nexec sleep 60\n")
     script.chmod(0o755)
-    monkeypatch.setattr(compile, "TIMEOUT", 0.2)
+    monkeypatch.setattr(compilers, "TIMEOUT", 0.2)
     compiler = compile.Compiler(command=(str(script),), flags=(), identity="hanging")
     with pytest.raises(CompileError, match=r"did not finish within 0\.2 s"):
         compile.compile_sources((source,), compiler)

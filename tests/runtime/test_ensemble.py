@@ -84,6 +84,34 @@ def test_lanes_take_the_steps_of_single_runs(make_model: ModelMaker, law: str, r
     assert result.statistics.rejected == pytest.approx(sum(single.rejected for single in singles), rel=0.05)
 
 
+@pytest.mark.parametrize("method", ["auto", "stepper-dp54"])
+def test_members_that_locate_kinks_are_single_runs_that_do(make_model: ModelMaker, method: str) -> None:
+    """The same bits, one member at a time; lanes step over at tolerances where a single run would locate as well."""
+    model, columns = press(make_model, "one-sided-gated"), table(3)
+    given = {"cycles": 1, "transient": 0, "rtol": 1e-7, "method": method}
+    located, over, plain = (
+        model.simulate_many(columns, OBSERVABLES, kinks=kinks, **given)  # type: ignore[arg-type]
+        for kinks in ("located", "stepped-over", None)
+    )
+    assert (located.statistics.kinks, located.statistics.lanes) == ("located", 1)
+    assert (plain.statistics.kinks, plain.statistics.lanes) == ("stepped-over", model.ensemble_driver.lanes)
+    assert same(plain, over)
+    assert not same(plain, located)
+    for k in range(3):
+        single = model.reduce(**given, kinks="located", parameters=member(columns, k))  # type: ignore[arg-type]
+        assert located["max:ball.force"][k] == single["ball.force"].maximum
+        assert located["peak_time:ball.force"][k] == single["ball.force"].maximum_time
+        assert located["rms_inner_y"][k] == single["inner.y"].rms
+        assert located["end:inner.vx"][k] == single.end["inner.vx"]
+
+
+def test_members_of_smoothed_laws_have_no_kinks_to_locate(make_model: ModelMaker) -> None:
+    model = make_model("varying_compliance", ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n'))
+    columns = {"bearing.clearance": [5e-6, 1e-5]}
+    located = model.simulate_many(columns, ["rms:inner.y"], cycles=1, transient=0, kinks="located")
+    assert same(located, model.simulate_many(columns, ["rms:inner.y"], cycles=1, transient=0, lanes=False))
+
+
 @pytest.mark.parametrize("method", ["stepper-dp54", "stepper-rodas5p"])
 def test_lanes_serve_balls_without_an_opposite_one(make_model: ModelMaker, method: str) -> None:
     """An odd number of balls has no pairs that share a direction."""
@@ -245,6 +273,8 @@ def test_wrong_tables_are_refused_before_anything_runs(
         ({"duration": 1.0}, "give one"),
         ({"method": "cvodes"}, "stepper-dp54"),
         ({"rtol": 1.0}, "rtol"),
+        ({"kinks": "locate"}, "Did you mean 'located'"),
+        ({"kinks": "located", "method": "erk"}, "stepper-dp54"),
     ],
 )
 def test_wrong_requests_are_refused_with_a_remedy(

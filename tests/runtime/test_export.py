@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import io
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -23,6 +24,7 @@ from raceway.runtime import ArtefactError, Model, RequestError, load
 from raceway.runtime.bounds import allowed
 from raceway.runtime.cli import app
 from raceway.runtime.compiled.export import default_magnitudes, export_c
+from raceway.runtime.integrate.locating import tight_below
 from raceway.runtime.manifest import ParameterInfo
 from raceway.runtime.parameters import resolve_parameters
 
@@ -104,6 +106,59 @@ def test_program_prints_the_numbers_of_the_model_and_compiles_without_warnings(
     magnitude = np.array(solution.statistics.magnitudes)
     assert rows.shape == (len(solution), 1 + len(magnitude))
     assert np.max(np.abs(rows[:, 1:] - solution.x) / magnitude) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes", "rtol"),
+    [
+        ("punching_press", (), "1e-6"),
+        (
+            "varying_compliance",
+            (
+                ('law = "none"', 'law = "two-sided-gated"\ncoefficient = "4000 N*s/m"'),
+                ("cycles = 24 ", "cycles = 3 "),
+                ("transient_cycles = 20 ", "transient_cycles = 1 "),
+            ),
+            "1e-5",
+        ),
+        ("punching_press_tangent", (), "1e-8"),
+        ("four_bar", (), "1e-7"),
+        ("varying_compliance", (), "1e-9"),
+    ],
+)
+def test_program_locates_kinks_as_the_model_does(
+    exported: Callable[..., Program], scene: str, changes: tuple[tuple[str, str], ...], rtol: str
+) -> None:
+    """Laws with kinks of the rate, of contact, with jumps: every digit that is printed."""
+    program = exported(scene, *changes)
+    assert program.messages == ""
+    model = program.model
+    arguments = (f"--rtol={rtol}", "--samples=101")
+    over, located = (program.table(*arguments, f"--kinks={how}") for how in ("stepped-over", "located"))
+    solution = model.simulate(method="stepper", rtol=float(rtol), samples_per_cycle=101, kinks="located")
+    assert solution.statistics.located is not None
+    assert solution.statistics.located > 0
+    assert np.array_equal(located, np.column_stack([solution.t, solution.x]))
+    assert not np.array_equal(located, over)
+
+
+def test_program_locates_by_itself_where_the_model_does(exported: Callable[..., Program]) -> None:
+    program = exported("varying_compliance")
+    tight = tight_below(program.model.manifest)
+    for rtol, method, expected, other in (
+        (tight, "auto", "located", "stepped-over"),
+        (3.5 * tight, "auto", "stepped-over", "located"),
+        (tight, "dop853", "stepped-over", "located"),
+    ):
+        arguments = ("--cycles=0.5", f"--rtol={rtol!r}", f"--method={method}")
+        named = method.replace("auto", "stepper").replace("dop853", "stepper-dop853")
+        assert program.model.simulate(0.5, rtol=rtol, method=named).statistics.kinks == expected
+        words = ((), (f"--kinks={expected}",), (f"--kinks={other}",))
+        by_itself, told, otherwise = (program(*arguments, *more).stdout for more in words)
+        assert by_itself == told != otherwise
+    wrong = program("--kinks=locate")
+    assert (wrong.returncode, wrong.stdout) == (2, "")
+    assert "Allowed: stepped-over, located." in wrong.stderr
 
 
 def test_options_do_what_the_arguments_of_simulate_do(exported: Callable[..., Program]) -> None:
@@ -214,6 +269,7 @@ def test_program_runs_clean_under_the_sanitizers(exported: Callable[..., Program
         if method == "auto":
             scale = np.max(np.abs(expected[:, 1:]), axis=0)
             assert np.max(np.abs(found[:, 1:] - expected[:, 1:]) / scale) < 1e-9
+    program.table("--cycles=1", "--samples=101", "--kinks=located", binary=binary)
     # what fails must fail cleanly as well
     bad = program("--cycles=1", "bearing.initial.inner_velocity.x=1e300", binary=binary)
     assert bad.returncode == 1
@@ -313,12 +369,83 @@ def test_wrong_requests_name_what_was_given_and_what_is_allowed(exported: Callab
         assert words in done.stderr, done.stderr
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--cycles=2", "--duration=0.1"), "--cycles, --duration: each of them was given. Allowed: one of the two."),
+        (("--duration", "0.1", "--cycles", "2", "--list"), "--cycles, --duration: each of them was given."),
+        (("bearing.clearance=1e-5", "bearing.clearance=1e-5"), "bearing.clearance: more than one value was given."),
+        (
+            ("--samples=1000000000",),
+            "--samples: 24000000000 samples of 5 numbers were asked for. Allowed: 536870912 numbers.",
+        ),
+    ],
+)
+def test_requests_that_say_two_things_or_too_much_are_refused(
+    exported: Callable[..., Program], arguments: tuple[str, ...], words: str
+) -> None:
+    done = exported("varying_compliance")(*arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"error: {words}")
+
+
+CRANK, COUPLER, ROCKER = (
+    f"mechanism.bodies.{name}" for name in ("crank.points.B", "coupler.points.C", "rocker.points.C")
+)
+
+
+@pytest.mark.parametrize(
+    ("coupler", "start", "speed"), [(0.07, 0.0, 55.0), (0.07, 1.234, -55.0), (0.17, 0.0, 55.0), (0.17, 6.1, -55.0)]
+)
+def test_crank_of_a_four_bar_that_cannot_turn_is_refused(
+    exported: Callable[..., Program], coupler: float, start: float, speed: float
+) -> None:
+    """Crank 30 mm, rocker 80 mm, frame 120 mm: the rocker's joint meets from 90 to 150 mm across, a triangle each."""
+    program = exported("four_bar")
+    turned = (f"mechanism.driver.start_angle={start}", f"mechanism.driver.speed={speed}", "--duration=1e-5")
+    inward = 1e-7 if coupler < 0.1 else -1e-7
+    assert program(*turned, f"{COUPLER}={coupler + inward!r}").returncode == 0
+    locked = program(*turned, f"{COUPLER}={coupler - inward!r}")
+    assert (locked.returncode, locked.stdout) == (2, "")
+    worst = "180.00" if coupler < 0.1 else "0.00"
+    assert f"cannot be assembled at joint C, worst at crank angle {worst} deg" in locked.stderr.replace(
+        "360.00", "0.00"
+    )
+    assert "Allowed: lengths" in locked.stderr
+
+
+@pytest.mark.parametrize("scene", ["four_bar", "offset_slider"])
+def test_program_and_model_refuse_the_same_linkages(exported: Callable[..., Program], scene: str) -> None:
+    program = exported(scene)
+    model = program.model
+    random = np.random.default_rng(7)
+    names = [name for name in model.parameters if ".points." in name] + ["mechanism.driver.start_angle"]
+    told = re.compile(r"at joint '?(\w+)'?, worst at crank angle ([\d.]+) deg \((.*): margin (\S+)\)\.")
+    verdicts = []
+    for _ in range(30):
+        numbers = {name: float(model.parameters[name] * np.exp(random.normal(0.0, 0.6))) for name in names}
+        expected: list[tuple[str, ...]] = []
+        try:
+            model.check_assembly(numbers)
+        except RequestError as fault:
+            expected = told.findall(str(fault))
+            assert expected
+        done = program("--duration=1e-6", *(f"{name}={value!r}" for name, value in numbers.items()))
+        assert told.findall(done.stderr) == expected
+        assert done.returncode == (2 if expected else 0)
+        verdicts.append(bool(expected))
+    assert {True, False} == set(verdicts)
+
+
 def test_help_and_list_are_answers_and_not_errors(exported: Callable[..., Program]) -> None:
     program = exported("varying_compliance")
     helped, listed = program("--help"), program("--list", "bearing.clearance=3e-6")
     assert (helped.returncode, listed.returncode) == (0, 0)
-    for option in ("--cycles", "--duration", "--rtol", "--samples", "--method", "--list"):
-        assert option in helped.stdout
+    options = {"--cycles", "--duration", "--rtol", "--samples", "--method", "--kinks", "--list"}
+    assert set(re.findall(r"^  (--[a-z]+)", helped.stdout, flags=re.MULTILINE)) == options
+    page = Path(__file__).resolve().parents[2] / "docs" / "howto" / "export.md"
+    rows = set(re.findall(r"^\| `(--[a-z]+)", page.read_text(encoding="utf-8"), flags=re.MULTILINE))
+    assert rows == {*options, "--help"}
     lines = dict(line.split("  ", 1)[0].split("=") for line in listed.stdout.splitlines())
     assert list(lines) == list(program.model.parameters)
     assert float(lines["bearing.clearance"]) == 3e-6

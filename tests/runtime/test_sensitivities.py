@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -254,6 +255,20 @@ def test_wrong_requests_are_refused(make_model: Callable[..., Model]) -> None:
         model.sensitivities([], cycles=1)
     with pytest.raises(RequestError, match=r"sensitivity_rtol.*1e-13 to 0\.1"):
         model.sensitivities("bearing.clearance", cycles=1, sensitivity_rtol=0.0)
+
+
+def test_derivatives_are_those_of_steps_over_the_kinks_whoever_says_so(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press_tangent")
+    plain, named = (
+        model.sensitivities("bearing.clearance", cycles=0.1, rtol=1e-9, kinks=kinks) for kinks in (None, "stepped-over")
+    )
+    assert plain.solution.statistics.kinks == "stepped-over"
+    assert np.array_equal(plain.x, named.x)
+    for ask in (model.sensitivities, partial(model.sensitivity, "peak_ball_force")):
+        with pytest.raises(RequestError, match=r"Allowed: stepped-over\. Leave kinks out.*Model\.simulate_many"):
+            ask("bearing.clearance", cycles=1, kinks="located")  # type: ignore[operator]
+        with pytest.raises(RequestError, match="Did you mean 'located'"):
+            ask("bearing.clearance", cycles=1, kinks="locate")  # type: ignore[operator]
 
 
 def test_two_loads_that_switch_together_have_no_derivative(

@@ -49,6 +49,46 @@ def test_run_split_where_the_load_jumps_gives_the_same_bits(
     assert half.outcome.steps + rest.outcome.steps == at_once.outcome.steps
 
 
+def test_auto_chooses_anew_where_the_load_jumps(make_model: Make) -> None:
+    """A ring falls freely, touches a ball with heavy damping, and is pulled off again.
+
+    Flight is for an explicit method and such contact for a linearly implicit one.  Within a segment `auto` would need a
+    dozen steps to see that; where the load jumps it looks at once.  Without a restart it keeps what it has.
+    """
+    model = make_model(
+        "varying_compliance",
+        ('speed = "393.1540342298 rpm"', 'speed = "0 rpm"'),
+        ("cycles = 24 ", 'duration = "0.02 s" #'),
+        ("transient_cycles = 20", "transient_cycles = 0"),
+        ('law = "none"  ', 'law = "two-sided-gated"\ncoefficient = "4e5 N*s/m"  '),
+        ('damping = "200 N*s/m"  ', '#damping = "0 N*s/m"'),
+    )
+    numbers = model.numbers({"bearing.clearance": 40e-6})
+    flight, touched, brief = 1.5e-3, 2.1e-3, 1e-6
+    falling = np.array([0.0, flight, flight + brief, touched, touched + brief])
+    whole = segments_between(model, numbers, falling)
+
+    def family_behind(last: int, *, restarts: bool) -> Family:
+        some = Segments(
+            times=falling[: last + 2],
+            inputs=whole.inputs[: last + 1],
+            restarts=np.array([True] + [restarts] * last),
+        )
+        return run(model, numbers, some, family=Family.AUTO, tolerance=np.repeat([1e-9, 1e-6], 2)).outcome.family
+
+    explicit = (Family.DP54, Family.DOP853)
+    assert all(family_behind(k, restarts=True) in explicit for k in range(3))
+    assert family_behind(3, restarts=True) is Family.RODAS5P
+    assert family_behind(3, restarts=False) in explicit
+    # from the contact, pulled off: the other way round
+    start = np.array([20.8e-6, 0.0, -0.02, 0.0])
+    off = np.array([0.0, 2e-4, 2e-4 + brief])
+    for restarts, expected in ((True, Family.DP54), (False, Family.RODAS5P)):
+        some = Segments(times=off, inputs=whole.inputs[:2], restarts=np.array([True, restarts]))
+        found = run(model, numbers, some, family=Family.AUTO, tolerance=np.repeat([1e-9, 1e-6], 2), start=start)
+        assert found.outcome.family is expected
+
+
 @pytest.mark.parametrize("family", ORDERS)
 def test_further_edges_change_nothing_and_a_shifted_one_does(
     press: Model, magnitude: np.ndarray, family: Family
@@ -280,6 +320,13 @@ def test_faulty_calls_are_refused(rotor: Model) -> None:
         for family in (Family.AUTO, *ORDERS):
             found = run(rotor, numbers, good, family=family, tolerance=tolerance)
             assert found.outcome.end is End.BAD_ARGUMENT
+            assert np.array_equal(found.end, rotor.initial())
+    limits = [("largest_step", bad) for bad in (0.0, -1e-5, np.nan)]
+    limits += [(name, bad) for name in ("first_step", "smallest_step") for bad in (-1e-5, np.nan)]
+    for name, bad in limits:
+        for family in (Family.AUTO, *ORDERS):
+            found = run(rotor, numbers, good, family=family, tolerance=1e-9, **{name: bad})
+            assert found.outcome.end is End.BAD_ARGUMENT, (name, bad)
             assert np.array_equal(found.end, rotor.initial())
     with pytest.raises(RequestError, match="stepper-rodas4"):
         rotor.simulate(1, method="stepper-euler")

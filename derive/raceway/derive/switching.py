@@ -9,8 +9,8 @@ laws also distinguish cases, but their branches meet smoothly, and those are no 
 
 A branch that can be continued beyond its place (the damping force c_b times rate, both ways) is *held*: its condition
 z > z0 becomes z - z0 > b with a border b for each ball, minus infinity to hold it true, infinity to hold it false, 0 to
-leave it as it is.  Hertz's law cannot, for it has a branch point at zero: it keeps its condition, and only the step
-ends there.
+leave it as it is.  Hertz's law in contact cannot, for it has a branch point at zero: there b is 0 at least, and the law
+keeps its condition.  Out of contact it can, for it is zero.
 
 Balls of an even number stand in opposite pairs, with opposite rates and directions.  Where a force depends on the rate
 alone, the pair pushes with F(z) - F(-z), and what F(z) has in common with F(-z) drops out: the damping force
@@ -45,31 +45,33 @@ class Switch:
     ----------
     function : positive on one side, negative on the other: deflection or rate less a constant of the run
     of_rate : whether it is a rate [m/s]; else a deflection [m]
-    branch_point : whether some law ends there and cannot be continued
+    ends_above, ends_below : whether a law ends at a branch point there: the one that holds where the function is
+        positive, or the one where it is negative, cannot be continued
     jumps : whether a force jumps there
     border : symbol that the function is compared with in the held law
     """
 
     function: sp.Expr
     of_rate: bool
-    branch_point: bool
+    ends_above: bool
+    ends_below: bool
     jumps: bool
     border: sp.Symbol
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Switching:
-    """The switches of a ball's force, and the force with held sides; `holds` tells whether it differs from the law."""
+    """The switches of a ball's force, and the force with held sides."""
 
     switches: tuple[Switch, ...]
     force: sp.Expr
-    holds: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Place:
     kink: bool
-    branch_point: bool
+    ends_above: bool
+    ends_below: bool
     jumps: bool
 
 
@@ -86,9 +88,9 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
         A condition is not of the form deflection or rate against a constant of the run.
     """
     found: dict[tuple[bool, sp.Expr], list[_Place]] = {}
-    held: list[dict[sp.Basic, tuple[bool, sp.Expr]]] = []
+    held: list[dict[sp.Basic, tuple[tuple[bool, sp.Expr], _Place]]] = []
     for part in parts:
-        borders: dict[sp.Basic, tuple[bool, sp.Expr]] = {}
+        borders: dict[sp.Basic, tuple[tuple[bool, sp.Expr], _Place]] = {}
         for condition in sp.ordered(part.atoms(Relational)):
             of_rate, start = _border(condition, deflection, rate)
             decides, other = (rate, deflection) if of_rate else (deflection, rate)
@@ -97,8 +99,7 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
             if not place.kink:
                 continue
             found.setdefault((of_rate, start), []).append(place)
-            if not place.branch_point:
-                borders[condition] = (of_rate, start)
+            borders[condition] = (of_rate, start), place
         held.append(borders)
     order = sorted(found, key=lambda key: (key[0], sp.default_sort_key(key[1])))
     names = {key: sp.Symbol(f"ball.border_{k}", real=True) for k, key in enumerate(order)}
@@ -106,7 +107,8 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
         Switch(
             function=(rate if key[0] else deflection) - key[1],
             of_rate=key[0],
-            branch_point=any(place.branch_point for place in found[key]),
+            ends_above=any(place.ends_above for place in found[key]),
+            ends_below=any(place.ends_below for place in found[key]),
             jumps=any(place.jumps for place in found[key]),
             border=names[key],
         )
@@ -115,12 +117,22 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
     functions = dict(zip(order, (switch.function for switch in switches), strict=True))
     force = sum(
         (
-            part.xreplace({c: sp.StrictGreaterThan(functions[key], names[key]) for c, key in borders.items()})
+            part.xreplace({c: _held(functions[key], names[key], place) for c, (key, place) in borders.items()})
             for part, borders in zip(parts, held, strict=True)
         ),
         start=sp.S.Zero,
     )
-    return Switching(switches=switches, force=force, holds=any(held))
+    return Switching(switches=switches, force=force)
+
+
+def _held(function: sp.Expr, border: sp.Symbol, place: _Place) -> sp.logic.boolalg.Boolean:
+    """The condition with its sides held, as far as the laws on them can be continued."""
+    held, itself = sp.StrictGreaterThan(function, border), sp.StrictGreaterThan(function, 0)
+    if place.ends_above:
+        held = sp.And(held, itself)
+    if place.ends_below:
+        held = sp.Or(held, itself)
+    return held
 
 
 def _border(condition: Relational, deflection: sp.Symbol, rate: sp.Symbol) -> tuple[bool, sp.Expr]:
@@ -145,7 +157,7 @@ def _look(
     rest = sorted((part.free_symbols | start.free_symbols) - {decides, other}, key=sp.default_sort_key)
     numbers = {symbol: sp.Rational(sp.prime(k + 10), 37) for k, symbol in enumerate(rest)}
     meets = start.xreplace(numbers)
-    kink = branch = jumps = False
+    kink = jumps = above = below = False
     for elsewhere in _ELSEWHERE if other in part.free_symbols else _ELSEWHERE[:1]:
         branches = []
         for side in (sp.true, sp.false):
@@ -155,26 +167,37 @@ def _look(
         difference = sp.sympify(branches[0] - branches[1])
         if paired:
             difference += difference.xreplace({decides: -decides})
-        order, real = _order(difference, decides, meets)
+        order = _order(difference, decides, meets)
         kink = kink or order <= KINK_ORDER
         jumps = jumps or order == 0
-        branch = branch or not real
-    return _Place(kink=kink, branch_point=branch, jumps=jumps)
+        above = above or not _is_real(branches[0], decides, meets)
+        below = below or not _is_real(branches[1], decides, meets)
+    return _Place(kink=kink, ends_above=above, ends_below=below, jumps=jumps)
 
 
-def _order(difference: sp.Expr, decides: sp.Symbol, meets: sp.Expr) -> tuple[float, bool]:
-    """Power of the distance from the meeting place with which a difference grows, and whether it is real on both sides.
+def _beside(expression: sp.Expr, decides: sp.Symbol, meets: sp.Expr, side: int) -> list[mpmath.mpc]:
+    """Values at the two small distances from the meeting place, above it (1) or below (-1)."""
+    value = sp.lambdify(decides, expression, "mpmath")
+    place = mpmath.mpf(meets.p) / meets.q
+    return [mpmath.mpmathify(value(place + side * mpmath.mpf(distance))) for distance in _DISTANCES]
+
+
+def _is_real(branch: sp.Expr, decides: sp.Symbol, meets: sp.Expr) -> bool:
+    """Whether a branch has real values on both sides of the meeting place."""
+    with mpmath.workdps(_DIGITS):
+        return all(value.imag == 0 for side in (1, -1) for value in _beside(branch, decides, meets, side))
+
+
+def _order(difference: sp.Expr, decides: sp.Symbol, meets: sp.Expr) -> float:
+    """Power of the distance from the meeting place with which a difference grows.
 
     Values at two small distances tell, in so many digits that nothing is rounded away.
     """
-    value = sp.lambdify(decides, difference, "mpmath")
-    order, real = math.inf, True
+    order = math.inf
     with mpmath.workdps(_DIGITS):
-        place = mpmath.mpf(meets.p) / meets.q
         for side in (1, -1):
-            near, far = (mpmath.mpmathify(value(place + side * distance)) for distance in map(mpmath.mpf, _DISTANCES))
-            real = real and near.imag == 0 and far.imag == 0
+            near, far = _beside(difference, decides, meets, side)
             if abs(near) > _ZERO:
                 power = mpmath.log(abs(far) / abs(near)) / mpmath.log(10)
                 order = min(order, round(2.0 * float(power)) / 2.0)
-    return order, real
+    return order

@@ -20,13 +20,24 @@ from rich.console import Console
 
 from raceway.runtime.commands.explain import explain
 from raceway.runtime.commands.jacobian import jacobian, linearize
+from raceway.runtime.commands.options import (
+    Cycles,
+    Duration,
+    Figures,
+    Json,
+    ResultsFolder,
+    SceneFile,
+    Settings,
+    Tolerance,
+)
 from raceway.runtime.commands.sensitivity import sensitivity
 from raceway.runtime.commands.shared import (
-    SceneFile,
     Stages,
     check_folder,
+    checked_kinks,
     complain,
     faults_of,
+    faults_of_turns,
     load_model,
     note,
     read_duration,
@@ -41,7 +52,6 @@ from raceway.runtime.errors import RequestError
 
 if TYPE_CHECKING:
     from raceway.derive import Scene
-    from raceway.runtime.integrate.locating import Kinks
     from raceway.runtime.model import Model
     from raceway.runtime.solution import Solution
 
@@ -77,23 +87,13 @@ def _common(
 @app.command()
 def run(
     scene: SceneFile,
-    cycles: Annotated[float | None, typer.Option(metavar="N", help="Turns of driver or shaft to simulate.")] = None,
-    duration: Annotated[
-        str | None,
-        typer.Option(metavar="TIME", help='Time to simulate instead of turns: --duration "0.5 s", also at speed 0.'),
-    ] = None,
+    cycles: Cycles = None,
+    duration: Duration = None,
     transient: Annotated[
         float | None, typer.Option(metavar="N", help="Turns at the start that summary and figures leave out.")
     ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="PATH=VALUE",
-            help='Another value for a number of the scene: --set bearing.clearance="20 um". May be repeated.',
-        ),
-    ] = None,
-    rtol: Annotated[float | None, typer.Option(metavar="R", help="Relative tolerance of the integrator.")] = None,
+    set_: Settings = None,
+    rtol: Tolerance = None,
     method: Annotated[
         str | None,
         typer.Option(
@@ -125,11 +125,9 @@ def run(
     full_model: Annotated[
         bool, typer.Option("--full-model", help="With --error: take no simpler model, however accurate and fast.")
     ] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the results; results/<scene> if not given.")
-    ] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print the summary as JSON on stdout, nothing else.")] = False,
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+    out: ResultsFolder = None,
+    json_: Json = False,
+    figures: Figures = True,
 ) -> None:
     """Simulate a scene; write solution, summary and figures.
 
@@ -140,7 +138,7 @@ def run(
         seconds = read_duration(duration, cycles)
         read, asked, overrides = read_with_settings(scene, set_ or [], seconds, transient)
         _check_request(asked, cycles, transient, rtol, method)
-        at_kinks = _checked_kinks(kinks, method or read.run.method, error)
+        at_kinks = checked_kinks(kinks, method or read.run.method, error)
         target = read_error(error, of, method, rtol)
         folder = out if out is not None else Path("results") / read.name
         check_folder(folder)
@@ -259,14 +257,6 @@ app.command()(sweep)
 app.command()(trade)
 
 
-def _checked_kinks(kinks: str | None, method: str, error: str | None) -> Kinks | None:
-    """What to do at kinks; what no run can do is refused before anything is derived or written."""
-    from raceway.runtime.integrate.locating import check_located, refuse_with_error
-
-    refuse_with_error(kinks, error)
-    return check_located(kinks, "stepper" if method == "auto" else method) if kinks is not None else None
-
-
 def _check_request(
     scene: Scene, cycles: float | None, transient: float | None, rtol: float | None, method: str | None
 ) -> None:
@@ -286,10 +276,7 @@ def _check_request(
             f"--rtol: {rtol:g} lies outside its bounds. Allowed: {TOLERANCES[0]:g} to {TOLERANCES[1]:g}. "
             "Take 1e-6 where nothing speaks for another value."
         )
-    if cycles is not None and not 0.0 < cycles < math.inf:
-        faults.append(f"--cycles: {cycles:g} turns cannot be simulated. Allowed: a number above 0, as in --cycles 4.")
-    if transient is not None and not 0.0 <= transient < math.inf:
-        faults.append(f"--transient: {transient:g} turns cannot be left out. Allowed: a number from 0 on.")
+    faults += faults_of_turns(cycles, transient)
     if faults:
         raise RequestError("\n".join(faults))
     shaft = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None

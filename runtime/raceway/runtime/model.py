@@ -22,7 +22,7 @@ from raceway.runtime.compiled.loops import PointLoop
 from raceway.runtime.derivatives.jacobian import jacobian
 from raceway.runtime.derivatives.jacobian_function import JacobianFunction
 from raceway.runtime.derivatives.second_derivatives import hessian
-from raceway.runtime.derivatives.sensitivity import Sensitivities, sensitivities
+from raceway.runtime.derivatives.sensitivity import Sensitivities, refuse_located, sensitivities
 from raceway.runtime.ensembles.ensemble import EnsembleResult, simulate_many
 from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver
 from raceway.runtime.ensembles.members import Table
@@ -309,7 +309,7 @@ class Model:
         initial : state at the start, shape (states,)
         transient : turns at the start that `Solution.steady` leaves out
         kinks : ``stepped-over`` leaves kinks of the laws to error control; with ``located`` steps of the project's own
-            stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 3e-8
+            stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 3e-7
             (1e-6 where a law jumps), else stepped over
         progress : called with the finished fraction
         error : relative error wanted instead of `method` and `rtol`: the tool chooses them, estimates the error of
@@ -359,6 +359,7 @@ class Model:
         rtol: float | None = None,
         sensitivity_rtol: float | None = None,
         samples_per_cycle: int | None = None,
+        kinks: Literal["stepped-over"] | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Sensitivities:
         """Simulate from t = 0 with the derivatives of the states by parameters, exact for the discrete solution.
@@ -369,6 +370,7 @@ class Model:
         sensitivity_rtol : error allowed per step in the derivatives, which then take part in the choice of step sizes,
             relative to the states' magnitudes over the parameters' scales (`derivatives/direction_scales.py`) or to
             the derivative itself where it is larger; None: the states alone choose the steps
+        kinks : ``stepped-over`` at any tolerance: what is differentiated are steps that go over the kinks of the laws
         others : as for `simulate`
 
         Raises
@@ -386,6 +388,7 @@ class Model:
             rtol=rtol,
             sensitivity_rtol=sensitivity_rtol,
             samples_per_cycle=samples_per_cycle,
+            kinks=kinks,
             progress=progress,
         )
         return sensitivities(self, numbers, request, [wrt] if isinstance(wrt, str) else list(wrt))
@@ -405,6 +408,7 @@ class Model:
         rtol: float | None = None,
         sensitivity_rtol: float | None = None,
         samples_per_cycle: int | None = None,
+        kinks: Literal["stepped-over"] | None = None,
         agreement: float | None = None,
         progress: Callable[[str, float], None] | None = None,
     ) -> SensitivityReport:
@@ -420,6 +424,7 @@ class Model:
         check : the second route: True (differences), "erk", "adjoint", or False for none
         rtol, sensitivity_rtol : tolerances of states and derivatives; tight ones by default
         samples_per_cycle : nodes of quadratures in a turn
+        kinks : ``stepped-over`` at any tolerance, as for `sensitivities`
         agreement : relative disagreement of both routes that is allowed
         progress : called with words and a finished fraction
 
@@ -435,6 +440,7 @@ class Model:
             make_query,
         )
 
+        refuse_located(kinks)
         query = make_query(
             self.manifest,
             of=of,
@@ -499,6 +505,7 @@ class Model:
         transient: float | None = None,
         rtol: float | None = None,
         method: str | None = None,
+        kinks: Kinks | None = None,
         threads: int | None = None,
         lanes: bool = True,
         progress: Callable[[float], None] | None = None,
@@ -520,6 +527,8 @@ class Model:
         transient : turns at the start that do not count
         rtol : error allowed per step, relative to each member's own magnitudes
         method : ``auto``, or one of the project's own stepper
+        kinks : ``stepped-over``, the default at any tolerance, for lanes have no other way; with ``located`` members
+            run one at a time and their steps end on the kinks of the laws, as in `simulate`
         threads : default: as many as processors
         lanes : False advances one member at a time
         progress : called with the finished fraction
@@ -538,6 +547,7 @@ class Model:
             transient=transient,
             rtol=rtol,
             method=method,
+            kinks=kinks,
             threads=threads,
             lanes=lanes,
             progress=progress,

@@ -16,14 +16,15 @@ from pathlib import Path
 
 import numpy as np
 
-from raceway.runtime.compiled.compile import CompiledLibrary, Compiler
+from raceway.runtime.compiled.compile import CompiledLibrary
+from raceway.runtime.compiled.compilers import Compiler
 from raceway.runtime.compiled.driver_library import (
     ENSEMBLE_HEADERS,
     address,
     check_headers,
-    check_sizes,
     compile_driver,
     input_columns,
+    open_driver,
     padded,
 )
 from raceway.runtime.integrate.stepper import Segments
@@ -120,17 +121,14 @@ class QuasiStatic:
     Raises
     ------
     ArtefactError
-        The library's sizes are not those of the manifest.
+        The library's sizes are not those of the manifest, or its records not those of this module.
     """
 
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
         self.library = library
-        code = ctypes.CDLL(str(library.path))
-        sizes = (ctypes.c_int * 5)()
-        code.raceway_equilibrium_sizes(sizes)
-        check_sizes(library, list(sizes)[:4], manifest)
+        records = (_Options, _Result)
+        code, (self.row,) = open_driver(library, manifest, "raceway_equilibrium_sizes", records, others=1)
         self._inputs = input_columns(manifest)
-        self.row = int(sizes[4])
         self._run = code.raceway_equilibria
         self._run.restype = ctypes.c_int
         pointer, long = ctypes.c_void_p, ctypes.c_long

@@ -22,7 +22,7 @@ import numpy as np
 from raceway.runtime.accuracy.prepared import Observable, Prepared, check_observables, default_observables, prepare
 from raceway.runtime.accuracy.quasi_static import NAME as QUASI_STATIC
 from raceway.runtime.bounds import outside, violations
-from raceway.runtime.compiled.compile import find_compiler
+from raceway.runtime.compiled.compilers import find_compiler
 from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver, compile_ensemble
 from raceway.runtime.errors import RequestError, SimulationError
 from raceway.runtime.integrate.locating import has_kinks

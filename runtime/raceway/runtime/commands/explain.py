@@ -7,7 +7,7 @@ import math
 import re
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.console import Console, Group
@@ -15,7 +15,8 @@ from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
 
-from raceway.runtime.commands.shared import SceneFile, Stages, faults_of, load_model, read_with_settings, reported
+from raceway.runtime.commands.options import Json, SceneFile, Settings
+from raceway.runtime.commands.shared import Stages, faults_of, load_model, read_with_settings, reported
 from raceway.runtime.smoothness import WORDS
 
 if TYPE_CHECKING:
@@ -39,11 +40,8 @@ _NEVER = (
 
 def explain(
     scene: SceneFile,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="PATH=VALUE", help="Another value for a number of the scene. May be repeated."),
-    ] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print it as JSON on stdout, nothing else.")] = False,
+    set_: Settings = None,
+    json_: Json = False,
 ) -> None:
     """Say what a scene models and which of its lines asked for it, what it does not, the cost of each part, and the
     time scales that decide about the method. Simulates nothing."""

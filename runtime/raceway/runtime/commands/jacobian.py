@@ -11,8 +11,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from raceway.runtime.commands.options import Json, SceneFile, Settings
 from raceway.runtime.commands.shared import (
-    SceneFile,
     Stages,
     complain,
     faults_of,
@@ -27,10 +27,6 @@ if TYPE_CHECKING:
     from raceway.runtime.derivatives.jacobian_check import CheckedJacobian
     from raceway.runtime.model import Model
 
-_SET = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="PATH=VALUE", help="Another value for a number of the scene. May be repeated."),
-]
 _ANGLE = Annotated[
     str | None,
     typer.Option(
@@ -38,7 +34,6 @@ _ANGLE = Annotated[
     ),
 ]
 _TIME = Annotated[str | None, typer.Option("--time", metavar="TIME", help='The instant as a time, as "0.08 s".')]
-_JSON = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout, nothing else.")]
 
 
 def jacobian(
@@ -56,11 +51,11 @@ def jacobian(
     state: Annotated[
         str, typer.Option(help="Where the rings are: equilibrium (static, under the load of that instant) or initial.")
     ] = "equilibrium",
-    set_: _SET = None,
+    set_: Settings = None,
     check: Annotated[
         bool, typer.Option("--check/--no-check", help="Compare each derivative with extrapolated differences.")
     ] = True,
-    json_: _JSON = False,
+    json_: Json = False,
 ) -> None:
     """Derivatives of quantities at one instant, from generated code, each with a second opinion.
 
@@ -90,8 +85,8 @@ def linearize(
     scene: SceneFile,
     at_angle: _ANGLE = None,
     time: _TIME = None,
-    set_: _SET = None,
-    json_: _JSON = False,
+    set_: Settings = None,
+    json_: Json = False,
 ) -> None:
     """Matrices, natural frequencies and modes of small vibrations about the static equilibrium of an instant."""
     with reported(), warnings_shown(), Stages() as stages:

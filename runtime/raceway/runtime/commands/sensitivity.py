@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from raceway.runtime.commands.options import Cycles, Json, SceneFile, Settings, Transient
 from raceway.runtime.commands.shared import (
-    SceneFile,
     Stages,
     check_folder,
     complain,
@@ -44,12 +44,9 @@ def sensitivity(
             "given.",
         ),
     ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="PATH=VALUE", help="Another value for a number of the scene. May be repeated."),
-    ] = None,
-    cycles: Annotated[float | None, typer.Option(metavar="N", help="Turns of driver or shaft to simulate.")] = None,
-    transient: Annotated[float | None, typer.Option(metavar="N", help="Turns at the start that do not count.")] = None,
+    set_: Settings = None,
+    cycles: Cycles = None,
+    transient: Transient = None,
     rtol: Annotated[
         float | None, typer.Option(metavar="R", help="Tolerance of the states; tight if not given.")
     ] = None,
@@ -67,7 +64,7 @@ def sensitivity(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for report and charts; none are written if not given.")
     ] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print the report as JSON on stdout, nothing else.")] = False,
+    json_: Json = False,
 ) -> None:
     """Differentiate quantities of interest by parameters, and check every derivative by a second route.
 

@@ -8,6 +8,7 @@ interrupted.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import sys
 import time
@@ -15,7 +16,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.console import Console
@@ -28,14 +29,10 @@ from raceway.runtime.errors import RacewayError, RequestError
 if TYPE_CHECKING:
     from raceway.derive import Scene
     from raceway.derive.errors import Fault
+    from raceway.runtime.integrate.locating import Kinks
     from raceway.runtime.model import Model
 
 errors_console = Console(stderr=True, emoji=False)  # A:B:N is no picture
-
-SceneFile = Annotated[
-    Path,
-    typer.Argument(help="Scene file (TOML). The folder scenes/ has some to copy.", show_default=False),
-]
 
 #: Lines of a scene's run table that have an option of ``raceway run``.
 RUN_OPTIONS = {
@@ -242,6 +239,16 @@ def read_duration(text: str | None, cycles: float | None) -> float | None:
     return seconds
 
 
+def faults_of_turns(cycles: float | None, transient: float | None) -> list[str]:
+    """What is wrong with ``--cycles`` and ``--transient``."""
+    faults = []
+    if cycles is not None and not 0.0 < cycles < math.inf:
+        faults.append(f"--cycles: {cycles:g} turns cannot be simulated. Allowed: a number above 0, as in --cycles 4.")
+    if transient is not None and not 0.0 <= transient < math.inf:
+        faults.append(f"--transient: {transient:g} turns cannot be left out. Allowed: a number from 0 on.")
+    return faults
+
+
 def _given_twice(path: str, first: str, second: str) -> Fault:
     """A fault where ``--set`` names a number twice: nobody can tell which value is meant."""
     from raceway.derive.errors import Fault
@@ -292,6 +299,14 @@ def check_folder(folder: Path) -> None:
             f"The folder of the results, {folder}, cannot be written: {why}. Allowed: a folder that you may write, or "
             "one that can be made. Give another: --out DIR."
         )
+
+
+def checked_kinks(kinks: str | None, method: str, error: str | None = None) -> Kinks | None:
+    """What to do at kinks; what no run can do is refused before anything is derived or written."""
+    from raceway.runtime.integrate.locating import check_located, refuse_with_error
+
+    refuse_with_error(kinks, error)
+    return check_located(kinks, "stepper" if method == "auto" else method) if kinks is not None else None
 
 
 def load_model(scene: Scene, stages: Stages, method: str, kinks: str | None = None, rtol: float | None = None) -> Model:

@@ -25,13 +25,25 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from raceway.runtime.commands.options import (
+    Cycles,
+    Duration,
+    Figures,
+    Json,
+    ResultsFolder,
+    SceneFile,
+    Settings,
+    Tolerance,
+    Transient,
+)
 from raceway.runtime.commands.ranges import Range, grid, read_ranges
 from raceway.runtime.commands.shared import (
-    SceneFile,
     Stages,
     check_folder,
+    checked_kinks,
     complain,
     faults_of,
+    faults_of_turns,
     load_model,
     note,
     read_duration,
@@ -66,7 +78,7 @@ def sweep(
         typer.Option(
             metavar="PATH=A:B:N",
             help='N values of a number of the scene from A to B: --vary bearing.clearance="5 um:40 um:8". '
-            "A:B:N:log spaces them by a factor. May be repeated: all combinations run.",
+            "With :log behind N they are spaced by a factor. May be repeated: all combinations run.",
         ),
     ] = None,
     of: Annotated[
@@ -77,32 +89,36 @@ def sweep(
             "be repeated. Peak ball force and motion of the inner ring if none is given.",
         ),
     ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="PATH=VALUE", help="Another value for a number of the scene. May be repeated."),
-    ] = None,
-    cycles: Annotated[float | None, typer.Option(metavar="N", help="Turns of driver or shaft to simulate.")] = None,
-    duration: Annotated[
-        str | None, typer.Option(metavar="TIME", help='Time to simulate instead of turns: "0.5 s".')
-    ] = None,
-    transient: Annotated[float | None, typer.Option(metavar="N", help="Turns at the start that do not count.")] = None,
-    rtol: Annotated[float | None, typer.Option(metavar="R", help="Relative tolerance of the integrator.")] = None,
+    set_: Settings = None,
+    cycles: Cycles = None,
+    duration: Duration = None,
+    transient: Transient = None,
+    rtol: Tolerance = None,
     method: Annotated[
         str | None, typer.Option(metavar="NAME", help="auto, or a stepper's name as in raceway run.")
+    ] = None,
+    kinks: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOW",
+            help="What steps do where a law has a kink or jump: stepped-over, in lanes, or located, one member at a "
+            "time. Stepped over if not given.",
+        ),
     ] = None,
     threads: Annotated[
         int | None, typer.Option(metavar="N", help="Threads; as many as processors if not given.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the results; results/<scene> if not given.")
-    ] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print the report as JSON on stdout, nothing else.")] = False,
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+    out: ResultsFolder = None,
+    json_: Json = False,
+    figures: Figures = True,
 ) -> None:
     """Run a scene for all values of one or more of its numbers; write table, grid and figures.
 
     A member that fails is named and has no number in its place; the others are kept. Exit code 1 where all fail.
     """
+    from raceway.runtime.accuracy.prepared import default_observables
+    from raceway.runtime.integrate.locating import STEPPED_OVER
+
     with reported(), warnings_shown(), Stages() as stages:
         stages("read")
         seconds = read_duration(duration, cycles)
@@ -110,12 +126,12 @@ def sweep(
         read, asked, overrides = read_with_settings(scene, set_ or [], seconds, transient)
         ranges = read_ranges(asked, vary or [], overrides)
         _check_scene(asked)
+        at_kinks = checked_kinks(kinks, method or read.run.method)
         folder = out if out is not None else Path("results") / read.name
         check_folder(folder)
         with faults_of(scene):
-            model = load_model(read, stages, method or read.run.method)
+            model = load_model(read, stages, method or read.run.method, at_kinks or STEPPED_OVER)
             _ = model.ensemble_driver  # compiled here, where it is announced
-        from raceway.runtime.accuracy.prepared import default_observables
 
         varied = grid(ranges)
         count = math.prod(len(one.values) for one in ranges)
@@ -129,6 +145,7 @@ def sweep(
             transient=transient,
             rtol=rtol,
             method=method,
+            kinks=at_kinks,
             threads=threads,
             progress=stages.fraction,
         )
@@ -193,11 +210,7 @@ def _check_request(cycles: float | None, transient: float | None, rtol: float | 
     """Refuse what no ensemble can follow, before anything is derived or written."""
     from raceway.runtime.request import tolerance
 
-    faults = []
-    if cycles is not None and not 0.0 < cycles < math.inf:
-        faults.append(f"--cycles: {cycles:g} turns cannot be simulated. Allowed: a number above 0, as in --cycles 4.")
-    if transient is not None and not 0.0 <= transient < math.inf:
-        faults.append(f"--transient: {transient:g} turns cannot be left out. Allowed: a number from 0 on.")
+    faults = faults_of_turns(cycles, transient)
     if threads is not None and threads < 1:
         faults.append(f"--threads: {threads} threads cannot work. Allowed: a whole number from 1 on, or leave it away.")
     if faults:

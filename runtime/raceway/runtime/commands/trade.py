@@ -20,8 +20,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from raceway.runtime.commands.options import Figures, Json, ResultsFolder, SceneFile, Settings
 from raceway.runtime.commands.shared import (
-    SceneFile,
     Stages,
     check_folder,
     faults_of,
@@ -58,19 +58,14 @@ def trade(
             "repeated.",
         ),
     ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="PATH=VALUE", help="Another value for a number of the scene. May be repeated."),
-    ] = None,
+    set_: Settings = None,
     members: Annotated[
         int | None, typer.Option(metavar="N", help="Parameter sets around the scene's; 40 if not given.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of the results; results/<scene> if not given.")
-    ] = None,
+    out: ResultsFolder = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Measure again, also where a measurement is there.")] = False,
-    json_: Annotated[bool, typer.Option("--json", help="Print the measurement as JSON on stdout.")] = False,
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+    json_: Json = False,
+    figures: Figures = True,
 ) -> None:
     """Measure error against time for methods, tolerances and simpler models of a scene.
 
@@ -158,7 +153,7 @@ def key_of(scene: Scene, of: Sequence[str] | None, members: int) -> dict[str, An
     """What a measurement is valid for: structure, numbers, run, deriving sources, versions, request."""
     from raceway.derive.emit import signature
     from raceway.runtime.accuracy.trade_report import versions
-    from raceway.runtime.compiled.compile import find_compiler
+    from raceway.runtime.compiled.compilers import find_compiler
 
     compiler = find_compiler()
     numbers = repr([(q.path, q.value) for q in scene.quantities]) + repr(scene.run)

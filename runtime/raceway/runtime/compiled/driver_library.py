@@ -5,12 +5,14 @@ In: a generated folder and the C of a driver.  Out: a library, checked against t
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from raceway.runtime.compiled.compile import CompiledLibrary, Compiler, compile_sources, digests_of
+from raceway.runtime.compiled.compile import CompiledLibrary, compile_sources, digests_of
+from raceway.runtime.compiled.compilers import Compiler
 from raceway.runtime.errors import ArtefactError
 from raceway.runtime.manifest import Manifest
 
@@ -22,6 +24,9 @@ ENSEMBLE_HEADERS = (*HEADERS, "ensemble_kernels.h")
 #: Where the laws have kinks, for the driver whose steps end there; laws without kinks have no such file.
 SWITCHES = "switches.h"
 LOCATING_HEADERS = (*ENSEMBLE_HEADERS, SWITCHES)
+
+#: Numbers that fit where a library tells its sizes, more than any does.
+MOST_SIZES = 16
 
 #: IEEE arithmetic throughout, without fused multiply-add: contact amplifies the last bit, and another compiler should
 #: give the same motion.  What is given up is errno and traps, and what is gained are vectors of square roots.
@@ -82,6 +87,57 @@ def input_columns(manifest: Manifest) -> int:
 def padded(inputs: np.ndarray, columns: int) -> np.ndarray:
     """Inputs, shape (segments, inputs); zeros of shape (segments, columns) where a model has none."""
     return inputs if inputs.shape[1] else np.zeros((len(inputs), columns))
+
+
+def open_driver(
+    library: CompiledLibrary,
+    manifest: Manifest,
+    sizes: str,
+    records: Sequence[type[ctypes.Structure]],
+    *,
+    others: int,
+) -> tuple[ctypes.CDLL, list[int]]:
+    """Code of a library, checked to be of this model and to take the records that it will be called with.
+
+    Parameters
+    ----------
+    sizes : name of the C function that tells the library's sizes: states, inputs, parameters, constants, others, and
+        bytes of the records
+    records : as declared here
+    others : how many there are
+
+    Returns
+    -------
+    The code, and the other sizes.
+
+    Raises
+    ------
+    ArtefactError
+        The library is of another model, or its records are others.
+    """
+    code = ctypes.CDLL(str(library.path))
+    found = sizes_of(code, sizes)
+    check_sizes(library, found[:4], manifest)
+    check_records(library, found[4 + others :], records)
+    return code, found[4 : 4 + others]
+
+
+def sizes_of(code: ctypes.CDLL, name: str) -> list[int]:
+    """What a library's function of sizes tells; zeros follow."""
+    sizes = (ctypes.c_int * MOST_SIZES)()
+    getattr(code, name)(sizes)
+    return list(sizes)
+
+
+def check_records(library: CompiledLibrary, found: Sequence[int], records: Sequence[type[ctypes.Structure]]) -> None:
+    """Raise `ArtefactError` where records have other sizes in C: it would write beyond them, or read chance numbers."""
+    expected = [ctypes.sizeof(record) for record in records]
+    told = list(found)[: len(expected)]
+    if told != expected:
+        raise ArtefactError(
+            f"{library.path}: the records of the driver's calls have {told} bytes there, and {expected} where they are "
+            "called. The driver's C and the Python that calls it are of two versions: install raceway again."
+        )
 
 
 def check_sizes(library: CompiledLibrary, found: Sequence[int], manifest: Manifest) -> None:

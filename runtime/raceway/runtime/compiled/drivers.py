@@ -9,7 +9,7 @@ import threading
 from pathlib import Path
 
 from raceway.runtime.accuracy.quasi_static import QuasiStatic, compile_quasi_static
-from raceway.runtime.compiled.compile import Compiler, find_compiler
+from raceway.runtime.compiled.compilers import Compiler, find_compiler
 from raceway.runtime.compiled.driver_library import HEADERS, SWITCHES
 from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver, compile_ensemble
 from raceway.runtime.errors import ArtefactError, RequestError

@@ -15,7 +15,8 @@ from typing import Any
 
 import casadi
 
-from raceway.runtime.compiled.compile import CompiledLibrary, Compiler, compile_sources, digests_of, find_compiler
+from raceway.runtime.compiled.compile import CompiledLibrary, compile_sources, digests_of
+from raceway.runtime.compiled.compilers import Compiler, find_compiler
 from raceway.runtime.compiled.kernel import Array, Kernel, Loop
 from raceway.runtime.compiled.loops import CompiledLoop, LoopDriver, PointLoop
 from raceway.runtime.errors import ArtefactError, CompileError, RequestError

@@ -14,7 +14,8 @@ from typing import Any, Protocol
 import casadi
 import numpy as np
 
-from raceway.runtime.compiled.compile import Compiler, compile_sources
+from raceway.runtime.compiled.compile import compile_sources
+from raceway.runtime.compiled.compilers import Compiler
 from raceway.runtime.compiled.driver_library import DRIVER
 from raceway.runtime.compiled.kernel import Array, EvaluationError
 

@@ -19,6 +19,7 @@ import numpy as np
 from raceway.runtime.derivatives.direction_scales import direction_scales
 from raceway.runtime.errors import RequestError
 from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.locating import LOCATED, STEPPED_OVER, check_kinks
 from raceway.runtime.integrate.stepper import METHODS, Segments, Tangents
 from raceway.runtime.parameters import unknown_name
 
@@ -195,18 +196,29 @@ class Directions:
         return np.ascontiguousarray(blocks.reshape(finished, blocks.shape[1], -1)[:, :, : self._count])
 
 
+def refuse_located(kinks: str | None) -> None:
+    """Raise `RequestError` where derivatives are asked for of steps that end on the kinks of the laws."""
+    if kinks is not None and check_kinks(kinks) == LOCATED:
+        raise RequestError(
+            f"kinks = {kinks!r}: derivatives are those of steps that go over the kinks of the laws; the place of a "
+            f"located one is not differentiated. Allowed: {STEPPED_OVER}. Leave kinks out, or take differences of "
+            f"runs: `Model.simulate` and `Model.simulate_many` have kinks = {LOCATED!r}."
+        )
+
+
 def sensitivities(model: Model, numbers: Numbers, request: Request, names: Sequence[str]) -> Sensitivities:
     """Run a model with its derivatives along parameters.
 
     Raises
     ------
     RequestError
-        An unknown parameter, a method that is not the stepper's, a law whose force jumps.
+        An unknown parameter, a method that is not the stepper's, kinks to be located, a law whose force jumps.
     IntegrationError
         The computation failed.
     """
     from raceway.runtime.integrate.simulate import simulate
 
+    refuse_located(request.kinks)
     jumping = [law for law, smoothness in model.manifest.smoothness if smoothness == "discontinuous"]
     if jumping:
         raise RequestError(

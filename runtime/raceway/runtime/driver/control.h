@@ -24,6 +24,9 @@ static const double RW_HIGH_ORDER = 0.35, RW_LOW_ORDER = 1.2, RW_FREE = 1e-3;
 /* Logarithm of 1e-4: smaller errors of the step before do not tell the controller more. */
 static const double RW_LOG_SMALL_ERROR = -9.210340371976182;
 
+/* Whether limits of the step size [s] are numbers that can be kept to. */
+static inline int rw_are_limits(double first, double smallest, double largest) { return first >= 0.0 && smallest >= 0.0 && largest > 0.0; }
+
 /* Initial step (Hairer, Norsett & Wanner I, section II.4): from the size of the first and a guess of the second derivative.  Takes two
    evaluations of the right-hand side. */
 static inline double rw_first_step(const rw_numbers *n, double t, const double *restrict x, double longest, const double *restrict weight,

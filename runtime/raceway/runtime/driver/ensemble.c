@@ -637,4 +637,5 @@ void raceway_ensemble_sizes(int *sizes)
     sizes[0] = RW_REDUCTION;
     sizes[1] = RW_CHANNELS;
     sizes[2] = RW_L;
+    sizes[3] = (int)sizeof(raceway_ensemble_options);
 }

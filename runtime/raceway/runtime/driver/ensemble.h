@@ -44,7 +44,7 @@ RACEWAY_EXPORT void raceway_ensemble_magnitudes(long members, const double *p, c
 
 RACEWAY_EXPORT long raceway_ensemble_work(long members);
 
-/* Numbers in a reduction, its channels, and the lanes of this library. */
+/* Numbers in a reduction, its channels, the lanes of this library; bytes of the options. */
 RACEWAY_EXPORT void raceway_ensemble_sizes(int *sizes);
 
 #endif

@@ -231,4 +231,6 @@ void raceway_equilibrium_sizes(int *sizes)
     sizes[2] = RW_NP;
     sizes[3] = RW_NC;
     sizes[4] = RW_REDUCTION;
+    sizes[5] = (int)sizeof(raceway_equilibrium_options);
+    sizes[6] = (int)sizeof(raceway_equilibrium_result);
 }

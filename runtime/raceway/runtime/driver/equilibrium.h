@@ -41,7 +41,7 @@ RACEWAY_EXPORT int raceway_equilibria(const raceway_equilibrium_options *options
                                       const double *times, const double *inputs, long outputs, const double *output_times,
                                       double *output_states, raceway_equilibrium_result *result);
 
-/* Sizes the library was compiled for: states, inputs, parameters, constants, numbers in a reduction. */
+/* Sizes the library was compiled for: states, inputs, parameters, constants, numbers in a reduction; bytes of options and result. */
 RACEWAY_EXPORT void raceway_equilibrium_sizes(int *sizes);
 
 #endif

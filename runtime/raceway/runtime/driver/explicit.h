@@ -4,6 +4,7 @@
 
 #include "methods.h"
 #include "model.h"
+#include "pace.h"
 
 typedef struct {
     double k[RW_METHOD_STAGES][RW_NX]; /* slopes; the first is known when a step starts */
@@ -29,15 +30,21 @@ static inline __attribute__((always_inline)) void rw_combine(const double *restr
     *(rw_state *)y = RW_STATE(x) + h * sum;
 }
 
-/* One step of size h from (t, x) to `next`, the end slope included; returns the scaled error. */
+/* One step of size h from (t, x) to `next`, the end slope included; returns the scaled error.  Where `lead` is given the step has an
+   uneven pace (pace.h), and all its slopes are by theta h, the first as well. */
 static inline __attribute__((always_inline)) double rw_explicit_step(const rw_explicit_method *restrict method, const int stages,
                                                                       rw_explicit *restrict work, const rw_numbers *n, double t,
-                                                                      const double *restrict x, double h,
+                                                                      const double *restrict x, double h, const double *restrict lead,
                                                                       const double *restrict weight, double *restrict next)
 {
     /* all times of the step at once; the last stage and the end slope are both at its end */
-    double w[RW_METHOD_STAGES][RW_NW];
-    rw_stages(n, t, h, method->nodes + 1, stages - 1, w);
+    double w[RW_METHOD_STAGES][RW_NW], passed[RW_METHOD_STAGES];
+    const double *nodes = method->nodes;
+    if (lead) {
+        for (int i = 1; i < stages; i++) passed[i] = rw_passed(*lead, method->nodes[i]);
+        nodes = passed;
+    }
+    rw_stages(n, t, h, nodes + 1, stages - 1, w);
     /* the latest slope stays in registers and is added last: all else is ready before it is */
     double last[RW_NX], y[RW_NX];
     for (int k = 0; k < RW_NX; k++) last[k] = work->k[0][k];
@@ -49,6 +56,10 @@ static inline __attribute__((always_inline)) double rw_explicit_step(const rw_ex
 #pragma GCC unroll 16
         for (int k = 0; k < RW_NX; k++) y[k] = base[k] + latest * last[k];
         rw_rate(n, w[i < stages ? i - 1 : stages - 2], y, last);
+        if (lead) {
+            const double pace = rw_pace(*lead, i < stages ? method->nodes[i] : 1.0);
+            for (int k = 0; k < RW_NX; k++) last[k] *= pace;
+        }
 #pragma GCC unroll 16
         for (int k = 0; k < RW_NX; k++) work->k[i][k] = last[k];
         if (i == stages - 1)
@@ -85,19 +96,29 @@ static inline double rw_explicit_stiffness(const rw_explicit *restrict work, int
     return below > 0.0 ? h * rw_norm(slopes, weight) / below : 0.0;
 }
 
-/* Terms F1, F2, ... of the dense output of an accepted step; may take further slopes. */
+/* Terms F1, F2, ... of the dense output of an accepted step; may take further slopes.  `lead` is the step's. */
 static inline __attribute__((always_inline)) void rw_explicit_dense(const rw_explicit_method *restrict method, rw_explicit *restrict work,
                                                                      const rw_numbers *n, double t, const double *restrict x, double h,
-                                                                     const double *restrict next, double dense[RW_DENSE_ROWS][RW_NX])
+                                                                     const double *restrict lead, const double *restrict next,
+                                                                     double dense[RW_DENSE_ROWS][RW_NX])
 {
     const int end = method->stages;
     if (method->dense_stages > 0) {
-        double w[RW_METHOD_STAGES][RW_NW];
-        rw_stages(n, t, h, method->dense_nodes, method->dense_stages, w);
+        double w[RW_METHOD_STAGES][RW_NW], passed[RW_METHOD_STAGES];
+        const double *nodes = method->dense_nodes;
+        if (lead) {
+            for (int r = 0; r < method->dense_stages; r++) passed[r] = rw_passed(*lead, method->dense_nodes[r]);
+            nodes = passed;
+        }
+        rw_stages(n, t, h, nodes, method->dense_stages, w);
         for (int r = 0; r < method->dense_stages; r++) {
             double y[RW_NX];
             rw_combine(method->dense_a[r], end + 1 + r, (const double(*)[RW_NX])work->k, h, x, y);
             rw_rate(n, w[r], y, work->k[end + 1 + r]);
+            if (lead) {
+                const double pace = rw_pace(*lead, method->dense_nodes[r]);
+                for (int k = 0; k < RW_NX; k++) work->k[end + 1 + r][k] *= pace;
+            }
         }
     }
     const rw_state delta = RW_STATE(next) - RW_STATE(x), first = h * RW_STATE(work->k[0]);

@@ -21,12 +21,23 @@
 
 enum { RW_LOOKS = 4, RW_REPEATS = 4, RW_TURNS = 2, RW_CHATTER = 4, RW_REST = 64, RW_ROOT_ITERATIONS = 60 };
 
+/* A root on the dense output is as good as a kink within this part of the band. */
+static const double RW_CLOSE = 0.1;
+
 static const double RW_BAND = 0.01, RW_BRIEF = 1.5;
+
+/* Steps take the root of the time from a branch point behind them as their clock (pace.h) where they are longer than this part of it.  Its
+   pace at the end is not taken out of the end's slope where it is less than the second.  The end of a contact is foreseen no nearer than
+   this part of the step that error control proposes, and looked for up to so many times as far as it was foreseen; a step has arrived
+   there that leaves less than the last part of its way. */
+static const double RW_FAR = 2.0, RW_LEAST_PACE = 0.25, RW_NEAREST = 0.1, RW_ASTRAY = 1.5, RW_ARRIVED = 1e-6;
 
 typedef struct {
     double border[RW_NB][RW_NSWITCHES]; /* in place of the zero of g in the held law: -infinity, infinity, or 0 for a ball let go */
     double side[RW_NSWITCHES][RW_NB];   /* 1 where g > 0, else -1; 0 for a ball let go */
     double seen[RW_LOOKS + 1][RW_NSWITCHES][RW_NB]; /* g at the start of the step and at its looks */
+    double place[RW_LOOKS + 1];         /* where these are, as parts of the step's time */
+    double slope[2][RW_NB];             /* rate of deflection at the start of the step and at its end */
     double last[RW_NSWITCHES][RW_NB];   /* time of the last crossing [s] */
     double band[RW_NSWITCHES];
     unsigned char turn[RW_NSWITCHES][RW_NB]; /* sides to turn behind the step */
@@ -35,8 +46,9 @@ typedef struct {
     int resting; /* balls let go */
 } rw_sides;
 
-/* Switching functions of all balls at a state and time.  One ball a lane. */
-static inline void rw_switch_values(const rw_numbers *n, double t, const double *restrict x, double g[RW_NSWITCHES][RW_NB])
+/* Switching functions of all balls at a state and time, and their rates of deflection.  One ball a lane. */
+static inline void rw_switch_values(const rw_numbers *n, double t, const double *restrict x, double g[RW_NSWITCHES][RW_NB],
+                                    double slope[RW_NB])
 {
     double w[RW_NW], r[5], k[RW_NK];
     rw_cage(t, n->u, n->p, n->c, w);
@@ -48,7 +60,8 @@ static inline void rw_switch_values(const rw_numbers *n, double t, const double 
         const double co = rw_cos[j] * cage_cos - rw_sin[j] * cage_sin;
         const double si = rw_sin[j] * cage_cos + rw_cos[j] * cage_sin;
         double at[RW_NSWITCHES];
-        rw_ball_switches(r[0] + r[1] * co + r[2] * si, r[3] * co + r[4] * si, k, at);
+        slope[j] = r[3] * co + r[4] * si;
+        rw_ball_switches(r[0] + r[1] * co + r[2] * si, slope[j], k, at);
         for (int i = 0; i < RW_NSWITCHES; i++) g[i][j] = at[i];
     }
 }
@@ -71,12 +84,86 @@ static inline void rw_sides_start(rw_sides *restrict s, const rw_numbers *n, dou
         }
         s->band[i] = RW_BAND / least;
     }
-    rw_switch_values(n, t, x, s->seen[0]);
+    rw_switch_values(n, t, x, s->seen[0], s->slope[0]);
     for (int i = 0; i < RW_NSWITCHES; i++)
         for (int j = 0; j < RW_NB; j++) {
             rw_set_side(s, i, j, s->seen[0][i][j] > 0.0 ? 1.0 : -1.0);
             s->last[i][j] = -INFINITY;
         }
+}
+
+/* Whether the law on a side of a switch ends there at a branch point. */
+static inline int rw_ends(int i, double side) { return (side > 0.0 && rw_ends_above[i] > 0.0) || (side < 0.0 && rw_ends_below[i] > 0.0); }
+
+/* Whether slopes of a switching function come with its values: of a deflection, where rates are computed. */
+static inline int rw_has_slope(int i) { return RW_RATES && !(rw_switch_of_rate[i] > 0.0); }
+
+static inline int rw_has_slopes(void)
+{
+    int all = 1;
+    for (int i = 0; i < RW_NSWITCHES; i++) all &= rw_has_slope(i);
+    return all;
+}
+
+/* Whether a ball has been on its other side between three looks in a row, on its own at all of them, as far as the parabola through them
+   tells. */
+static inline int rw_is_dip(double before, double here, double behind, double band)
+{
+    const double bend = before - 2.0 * here + behind, difference = behind - before;
+    return (bend > 0.0) & (fabs(difference) <= 2.0 * bend) & (8.0 * (here - band) * bend < difference * difference);
+}
+
+/* Whether a step has to be looked at in earnest: the cubics through the values of the switching functions at its ends and their slopes
+   tell, at these theta of its looks.  `pace`: paces at the ends, times the step's size. */
+static inline int rw_glance(const rw_sides *restrict s, const double theta[RW_LOOKS + 1], const double pace[2])
+{
+    int found = 0;
+    for (int i = 0; i < RW_NSWITCHES; i++) {
+        const double band = -s->band[i];
+        int any = 0;
+#pragma omp simd reduction(| : any)
+        for (int j = 0; j < RW_NB; j++) {
+            const double side = s->side[i][j], from = side * s->seen[0][i][j], to = side * s->seen[RW_LOOKS][i][j], change = to - from;
+            const double first = side * pace[0] * s->slope[0][j], last = side * pace[1] * s->slope[1][j];
+            const double level = first - change, tilt = 2.0 * change - (first + last);
+            double at[RW_LOOKS + 1];
+            at[0] = from;
+            at[RW_LOOKS] = to;
+#pragma GCC unroll 8
+            for (int k = 1; k < RW_LOOKS; k++) at[k] = from + theta[k] * (change + (1.0 - theta[k]) * (level + theta[k] * tilt));
+            any |= to < band;
+#pragma GCC unroll 8
+            for (int k = 1; k < RW_LOOKS; k++) any |= (at[k] < band) | rw_is_dip(at[k - 1], at[k], at[k + 1], band);
+        }
+        found |= any;
+    }
+    return found;
+}
+
+/* Time of the last onset that has a branch point, of the balls that have not left it since. */
+static inline double rw_onset(const rw_sides *restrict s)
+{
+    double onset = -INFINITY;
+    for (int i = 0; i < RW_NSWITCHES; i++)
+        for (int j = 0; j < RW_NB; j++)
+            if (rw_ends(i, s->side[i][j]) && s->last[i][j] > onset) onset = s->last[i][j];
+    return onset;
+}
+
+/* Where a ball that all looks find on its side has been on the other between them: the place of the vertex, to be looked at, and the look
+   that it replaces; 0 where there is none. */
+static inline int rw_dip(const rw_sides *restrict s, double *place)
+{
+    for (int k = 1; k < RW_LOOKS; k++)
+        for (int i = 0; i < RW_NSWITCHES; i++)
+            for (int j = 0; j < RW_NB; j++) {
+                const double side = s->side[i][j], here = side * s->seen[k][i][j];
+                const double before = side * s->seen[k - 1][i][j], behind = side * s->seen[k + 1][i][j];
+                if (!rw_is_dip(before, here, behind, -s->band[i])) continue;
+                *place = (k - 0.5 * (behind - before) / (behind - 2.0 * here + before)) / RW_LOOKS;
+                return k;
+            }
+    return 0;
 }
 
 /* Whether any ball is on its other side at a look. */
@@ -122,6 +209,7 @@ static inline void rw_turn_sides(rw_sides *s, double time, double step)
 static inline void rw_sides_move_on(rw_sides *s)
 {
     memcpy(s->seen[0], s->seen[RW_LOOKS], sizeof s->seen[0]);
+    memcpy(s->slope[0], s->slope[1], sizeof s->slope[0]);
     if (!s->resting) return;
     for (int i = 0; i < RW_NSWITCHES; i++)
         for (int j = 0; j < RW_NB; j++) {

@@ -30,7 +30,7 @@ typedef struct {
 } rw_numbers;
 
 /* The law of a ball, and with its slopes; where kinks are located its sides are held. */
-#if defined(RACEWAY_LOCATED) && defined(RW_HELD)
+#ifdef RACEWAY_LOCATED
 #define RW_BALL_FORCE(n, j, delta, rate, k, force) rw_ball_held_force(delta, rate, k, (n)->border[j], force)
 #define RW_BALL_SLOPES(n, j, delta, rate, k, force, by_delta, by_rate) \
     rw_ball_held_slopes(delta, rate, k, (n)->border[j], force, by_delta, by_rate)

@@ -28,7 +28,8 @@ enum raceway_status {
     RACEWAY_TOO_MANY_STEPS = 1, /* max_steps reached */
     RACEWAY_STEP_TOO_SMALL = 2, /* the error test fails at the smallest step */
     RACEWAY_NOT_FINITE = 3,     /* the state or its rate is not a number even for the smallest step */
-    RACEWAY_BAD_ARGUMENT = 4    /* method unknown, times out of order, a tolerance that is not positive */
+    RACEWAY_BAD_ARGUMENT = 4    /* method unknown, times out of order, a tolerance or a largest step that is not positive, another step
+                                   that is negative; a number that is none */
 };
 
 typedef struct {
@@ -108,7 +109,7 @@ RACEWAY_EXPORT void raceway_magnitudes(const double *p, const double *c, const d
                                        double horizon, double *magnitude);
 #endif
 
-/* Sizes the library was compiled for: states, inputs, parameters, constants, balls, lanes. */
+/* Sizes the library was compiled for: states, inputs, parameters, constants, balls, lanes; bytes of options, result and tangents. */
 RACEWAY_EXPORT void raceway_sizes(int *sizes);
 
 #endif

@@ -25,6 +25,7 @@ from raceway.runtime.ensembles.member_segments import member_arrays
 from raceway.runtime.ensembles.members import Members, Span, Table, make_members, read_table
 from raceway.runtime.errors import RequestError
 from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.locating import LOCATED, STEPPED_OVER, Kinks, check_kinks, has_kinks
 from raceway.runtime.integrate.reductions import (
     RunFailed,
     channel_names,
@@ -87,6 +88,7 @@ class EnsembleStatistics:
     pivoted : systems of the linearly implicit method solved with pivoting
     chunk : members of a chunk
     lanes : members that advance together in a thread
+    kinks : what steps did at the kinks of the laws, ``stepped-over`` or ``located``
     threads : at work
     rtol : relative tolerance [1]
     wall_time : [s]
@@ -99,6 +101,7 @@ class EnsembleStatistics:
     pivoted: int
     chunk: int
     lanes: int
+    kinks: Kinks
     threads: int
     rtol: float
     wall_time: float
@@ -196,6 +199,7 @@ def simulate_many(
     transient: float | None,
     rtol: float | None,
     method: str | None,
+    kinks: str | None,
     threads: int | None,
     lanes: bool,
     progress: Callable[[float], None] | None,
@@ -207,14 +211,17 @@ def simulate_many(
     chosen = _observables(observables, aliases)
     family = choose_family(method or manifest.run.method)
     tolerance = check_rtol(manifest.run.rtol if rtol is None else rtol)
+    at_kinks = STEPPED_OVER if kinks is None else check_kinks(kinks)
     workers = _threads(threads)
     # the table first: a wrong one is told before the driver is compiled
     columns = read_table(manifest, table)
     driver = model.ensemble_driver
+    if at_kinks == LOCATED and has_kinks(manifest):
+        driver = driver.with_stepper(model.locating_stepper)
     members = make_members(model, columns)
     skipped = manifest.run.transient_cycles if transient is None else real(transient)
     span = _span(model, members, cycles, duration, skipped)
-    in_lanes = lanes and family in LANE_FAMILIES
+    in_lanes = lanes and at_kinks != LOCATED and family in LANE_FAMILIES
     reduced = {channel for kind, channel in chosen.values() if kind != "end"}
     work = _Work(
         model=model,
@@ -253,6 +260,7 @@ def simulate_many(
             **work.counts,
             chunk=size,
             lanes=driver.lanes if in_lanes else 1,
+            kinks=at_kinks,
             threads=workers,
             rtol=tolerance,
             wall_time=clocks.perf_counter() - started,

@@ -14,13 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
-from raceway.runtime.compiled.compile import CompiledLibrary, Compiler
+from raceway.runtime.compiled.compile import CompiledLibrary
+from raceway.runtime.compiled.compilers import Compiler
 from raceway.runtime.compiled.driver_library import (
     ENSEMBLE_HEADERS,
     check_headers,
+    check_records,
     compile_driver,
     input_columns,
     padded,
+    sizes_of,
 )
 from raceway.runtime.errors import ArtefactError
 from raceway.runtime.integrate.stepper import MAX_STEPS, Family, Stepper
@@ -115,9 +118,8 @@ class EnsembleDriver:
         self.stepper = Stepper(library, manifest)
         self.channels = (*(state.name for state in manifest.states), *BALL_CHANNELS)
         code = ctypes.CDLL(str(library.path))
-        sizes = (ctypes.c_int * 3)()
-        code.raceway_ensemble_sizes(sizes)
-        self.row, channels, self.lanes = list(sizes)
+        self.row, channels, self.lanes, *records = sizes_of(code, "raceway_ensemble_sizes")
+        check_records(library, records, (_Options,))
         expected = len(HEAD) + len(ROWS) * len(self.channels)
         if (self.row, channels) != (expected, len(self.channels)):
             raise ArtefactError(

@@ -25,7 +25,7 @@ CHOICES: tuple[Kinks, ...] = (STEPPED_OVER, LOCATED)
 
 #: Tolerances from which on the stepper locates kinks by itself: there it takes less time to an equal error.  First
 #: where the motion has kinks, then where a law jumps [1].
-TIGHT, TIGHT_JUMPS = 3e-8, 1e-6
+TIGHT, TIGHT_JUMPS = 3e-7, 1e-6
 
 
 def check_kinks(asked: str) -> Kinks:

@@ -15,14 +15,15 @@ from pathlib import Path
 
 import numpy as np
 
-from raceway.runtime.compiled.compile import CompiledLibrary, Compiler
+from raceway.runtime.compiled.compile import CompiledLibrary
+from raceway.runtime.compiled.compilers import Compiler
 from raceway.runtime.compiled.driver_library import (
     HEADERS,
     LOCATING_HEADERS,
     address,
-    check_sizes,
     compile_driver,
     input_columns,
+    open_driver,
     padded,
 )
 from raceway.runtime.manifest import Manifest
@@ -205,21 +206,22 @@ def compile_locating_stepper(folder: Path, manifest: Manifest, compiler: Compile
 class Stepper:
     """The compiled driver of one model.
 
+    Attributes
+    ----------
+    library : what was compiled
+    lanes : directions that the driver differentiates along at once
+
     Raises
     ------
     ArtefactError
-        The library's sizes are not those of the manifest.
+        The library's sizes are not those of the manifest, or its records not those of this module.
     """
 
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
         self.library = library
-        code = ctypes.CDLL(str(library.path))
-        sizes = (ctypes.c_int * 6)()
-        code.raceway_sizes(sizes)
-        check_sizes(library, list(sizes)[:4], manifest)
+        records = (_Options, _Result, _Tangents)
+        code, (_, self.lanes) = open_driver(library, manifest, "raceway_sizes", records, others=2)
         self._inputs = input_columns(manifest)
-        #: directions that the driver differentiates along at once
-        self.lanes = int(sizes[5])
         self._code = code
         self._run = code.raceway_run
         self._run.restype = ctypes.c_int

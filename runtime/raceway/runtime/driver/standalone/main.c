@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "assembly.h"
 #include "located.h"
 #include "scene.h"
 #include "stepper.h"
@@ -14,6 +15,9 @@ enum { EXIT_FAILED = 1, EXIT_REQUEST = 2 };
 
 /* Segments of one call: so much memory does a run need at a time. */
 enum { SEGMENTS_A_CALL = 600 };
+
+/* That the samples of a run may hold: 4 GiB. */
+static const double MOST_NUMBERS = 536870912.0;
 
 static const double SMALLEST_RTOL = 1e-13, LARGEST_RTOL = 1e-1;
 static const double TURN = 6.283185307179586476925286766559;
@@ -31,6 +35,7 @@ static const char *const STATUS[] = {
 
 typedef struct {
     double cycles, duration; /* one of them above zero */
+    int turns_given, time_given;
     double rtol;
     long samples; /* in a turn; in the whole run where nothing turns */
     int method;
@@ -118,9 +123,11 @@ static int set_option(request *asked, const char *name, const char *text)
     if (!strcmp(name, "--cycles")) {
         asked->cycles = value;
         asked->duration = 0.0;
+        asked->turns_given = 1;
     } else if (!strcmp(name, "--duration")) {
         asked->duration = value;
         asked->cycles = 0.0;
+        asked->time_given = 1;
     } else if (!strcmp(name, "--rtol")) {
         if (value < SMALLEST_RTOL || value > LARGEST_RTOL) return refuse(name, text, "a number from 1e-13 to 0.1.");
         asked->rtol = value;
@@ -131,13 +138,15 @@ static int set_option(request *asked, const char *name, const char *text)
     return 0;
 }
 
-static int set_parameter(double *values, const char *text)
+static int set_parameter(double *values, unsigned char *given, const char *text)
 {
     const char *sign = strchr(text, '=');
     const size_t length = sign ? (size_t)(sign - text) : strlen(text);
     for (int i = 0; i < SCENE_PARAMETERS; i++) {
         if (strlen(scene_parameters[i].name) != length || strncmp(scene_parameters[i].name, text, length) != 0) continue;
         if (!sign || !number(sign + 1, &values[i])) return refuse(scene_parameters[i].name, sign ? sign + 1 : "nothing", "a number in SI units, as in name=1e-5.");
+        if (given[i]) return refuse(scene_parameters[i].name, "more than one value", "one value for a number. Leave the others away.");
+        given[i] = 1;
         return 0;
     }
     return refuse("parameter", text, "PARAMETER=VALUE with a parameter that --list names, and the options that --help names.");
@@ -154,6 +163,7 @@ static int known_option(const char *name)
 /* The request from the command line; 0, or an exit code, or -1 where everything is said already. */
 static int read_request(int count, char **arguments, request *asked, double *values)
 {
+    unsigned char given[SCENE_PARAMETERS] = {0}; /* parameters that have a value from there */
     int listed = 0;
     for (int i = 1; i < count; i++) {
         char *text = arguments[i];
@@ -174,10 +184,11 @@ static int read_request(int count, char **arguments, request *asked, double *val
             if (!value) return refuse(text, "nothing", "a value behind it.");
             fault = set_option(asked, text, value);
         } else {
-            fault = set_parameter(values, text);
+            fault = set_parameter(values, given, text);
         }
         if (fault) return fault;
     }
+    if (asked->turns_given && asked->time_given) return refuse("--cycles, --duration", "each of them", "one of the two. Leave the other away.");
     if (listed) {
         if (refuse_outside(values)) return EXIT_REQUEST;
         list(values);
@@ -258,14 +269,25 @@ static int run_part(memory *m, long first, long count, int whole, long from, lon
     return raceway_run(options, values, values + SCENE_PARAMETERS, x, count, edges, m->inputs, m->restarts, samples, wanted, states, result);
 }
 
+/* Time of a turn of driver or shaft [s]; infinite where nothing turns. */
+static double time_of_turn(const double *values)
+{
+    const double speed = scene_speed >= 0 ? values[scene_speed] : 0.0;
+    return speed != 0.0 ? TURN / fabs(speed) : INFINITY;
+}
+
 static int simulate(const request *asked, const double *values)
 {
     double tolerance[SCENE_STATES], x[SCENE_STATES], before[SCENE_INPUTS > 0 ? SCENE_INPUTS : 1] = {0.0};
-    const double speed = scene_speed >= 0 ? values[scene_speed] : 0.0, turn = speed != 0.0 ? TURN / fabs(speed) : INFINITY;
+    const double turn = time_of_turn(values);
     if (asked->cycles > 0.0 && !isfinite(turn)) return refuse("--cycles", "a number", "--duration T, for nothing turns in this model (its speed is zero).");
     const double duration = asked->cycles > 0.0 ? asked->cycles * turn : asked->duration;
     const double wished = isfinite(turn) ? rint((double)asked->samples * duration / turn) : (double)asked->samples;
-    if (wished > 1e12) return refuse("--samples", "a number", "fewer samples: they would fill the memory.");
+    if ((wished + 1.0) * (SCENE_STATES + 1.0) > MOST_NUMBERS) {
+        fprintf(stderr, "error: --samples: %.0f samples of %d numbers were asked for. Allowed: %.0f numbers. Take fewer samples, or a shorter run.\n",
+                wished, SCENE_STATES + 1, MOST_NUMBERS);
+        return EXIT_REQUEST;
+    }
     const long count = wished > 1.0 ? (long)wished : 1;
     for (int i = 0; i < SCENE_STATES; i++) {
         tolerance[i] = asked->rtol * scene_magnitudes[i];
@@ -328,7 +350,7 @@ static int simulate(const request *asked, const double *values)
 int main(int argc, char **argv)
 {
     static double values[SCENE_PARAMETERS + SCENE_CONSTANTS];
-    request asked = {scene_cycles, scene_duration, scene_rtol, scene_samples, 0, -1};
+    request asked = {scene_cycles, scene_duration, 0, 0, scene_rtol, scene_samples, 0, -1};
     int sizes[16] = {0};
     raceway_sizes(sizes);
     if (sizes[0] != SCENE_STATES || sizes[2] != SCENE_PARAMETERS || sizes[3] != SCENE_CONSTANTS) {
@@ -348,5 +370,8 @@ int main(int argc, char **argv)
         if (!isfinite(c[k])) return refuse("derived constant", scene_constant_names[k], "geometry and elastic constants that make it a finite number.");
     const int table = schedule_fault(scene_inputs, SCENE_INPUTS, values);
     if (table >= 0) return refuse("table", "a time that is not after the one before", "times that increase.");
+#ifdef SCENE_LINKAGE
+    if (refuse_unassembled(values, time_of_turn(values))) return EXIT_REQUEST;
+#endif
     return simulate(&asked, values);
 }

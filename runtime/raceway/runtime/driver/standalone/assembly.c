@@ -1,0 +1,61 @@
+/* See assembly.h: the margins of the dyads over a turn, refined around their smallest sample. */
+#include "assembly.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "scene.h"
+#include "schedule.h"
+
+static const double TURN = 6.283185307179586476925286766559;
+
+/* Angles looked at in a turn; then sweeps around the smallest, each so many times finer than the one before. */
+enum { ANGLES = 720, SWEEPS = 3, FINE = 128 };
+
+/* A margin at a time, from the inputs at t = 0; no number is no assembly. */
+static double margin_at(const double *values, const double *inputs, int row, double time)
+{
+    double margins[SCENE_MARGINS];
+    scene_margins(time, inputs, values, values + SCENE_PARAMETERS, margins);
+    return isnan(margins[row]) ? -INFINITY : margins[row];
+}
+
+/* Keeps the smaller of two margins, the earlier of equal ones, with its time. */
+static void keep_smaller(double margin, double time, double *worst, double *when)
+{
+    if (margin >= *worst) return;
+    *worst = margin;
+    *when = time;
+}
+
+int refuse_unassembled(const double *values, double turn)
+{
+    double inputs[SCENE_INPUTS > 0 ? SCENE_INPUTS : 1] = {0.0};
+    const int turns = isfinite(turn);
+    int faults = 0;
+    schedule_inputs(scene_inputs, SCENE_INPUTS, values, 0.0, 0.0, inputs);
+    for (int row = 0; row < SCENE_MARGINS; row++) {
+        double worst = margin_at(values, inputs, row, 0.0), when = 0.0, reach = turn / ANGLES;
+        for (int k = 1; turns && k < ANGLES; k++) {
+            const double time = turn * k / ANGLES;
+            keep_smaller(margin_at(values, inputs, row, time), time, &worst, &when);
+        }
+        for (int sweep = 0; turns && worst > 0.0 && sweep < SWEEPS; sweep++) {
+            const double middle = when;
+            for (int k = -FINE; k <= FINE; k++) {
+                const double time = middle + reach * k / FINE;
+                keep_smaller(margin_at(values, inputs, row, time), time, &worst, &when);
+            }
+            reach /= FINE;
+        }
+        if (worst > 0.0) continue;
+        double angle = fmod(values[scene_start_angle] + values[scene_speed] * when, TURN);
+        if (angle < 0.0) angle += TURN;
+        fprintf(stderr,
+                "error: the linkage cannot be assembled at joint %s, worst at crank angle %.2f deg (%s: margin %.4g). Allowed: lengths that "
+                "keep the margin above 0 in the whole turn. Change those of the bodies that meet at the joint.\n",
+                scene_margin_infos[row].joint, 360.0 / TURN * angle, scene_margin_infos[row].description, worst);
+        faults++;
+    }
+    return faults;
+}
