@@ -11,10 +11,13 @@ from press_laws import press
 
 from raceway.runtime import Model, RequestError, SimulationError
 from raceway.runtime.ensembles.ensemble import EnsembleResult
-from raceway.runtime.ensembles.member_segments import inputs_of, member_arrays
+from raceway.runtime.ensembles.ensemble_driver import MemberNumbers
+from raceway.runtime.ensembles.member_segments import inputs_of, moments, stretches
 from raceway.runtime.ensembles.members import Members, Span, edge_windows, make_members
 from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.magnitudes import MOMENTS, model_scales
+from raceway.runtime.integrate.reductions import SCALED_TURNS
+from raceway.runtime.integrate.segments import segment_edges
 
 ModelMaker = Callable[..., Model]
 OBSERVABLES = (
@@ -303,8 +306,8 @@ def test_magnitudes_in_c_are_those_of_single_runs(make_model: ModelMaker) -> Non
         numbers = [members.numbers(model, k) for k in range(count)]
         turns = np.array([clock.period(model.manifest, n.values) for n in numbers])
         span = Span(durations=2 * turns, turns=turns, starts=np.zeros(count))
-        arrays, (first, inputs, horizons) = member_arrays(model, members, span, np.arange(count))
-        found = model.ensemble_driver.magnitudes(arrays, members.initial, first, inputs, horizons)
+        looked_at = moments(model, members, span, np.arange(count))
+        found = model.ensemble_driver.magnitudes(MemberNumbers(p=members.p, c=members.c), members.initial, *looked_at)
         expected = [
             model_scales(model, n, start, 2 * turn, turn).magnitude
             for n, start, turn in zip(numbers, members.initial, turns, strict=True)
@@ -363,22 +366,30 @@ def test_inputs_made_for_many_are_those_made_for_one(make_model: ModelMaker) -> 
 
 
 def assert_segments_of_one(model: Model, members: Members, span: Span) -> None:
-    """Segments made for many members at once are the bits of those made for each by itself."""
+    """Segments and moments made for many members at once are the bits of those made for each by itself."""
     count, inputs = len(members), model.manifest.inputs
-    arrays, (first, moments, horizons) = member_arrays(model, members, span, np.arange(count))
+    parts = list(stretches(model, members, span, np.arange(count)))
+    first, looked_at, horizons = moments(model, members, span, np.arange(count))
     for k in range(count):
         numbers = members.numbers(model, k)
         duration, turn, start = (float(values[k]) for values in (span.durations, span.turns, span.starts))
         windows = list(edge_windows(model, numbers, duration, turn, start))
         edges = np.concatenate([windows[0], *(window[1:] for window in windows[1:])])
-        a, b = arrays.first[k], arrays.first[k + 1]
-        assert np.array_equal(arrays.times[a + k : b + k + 1], edges), k
+        own = [(part, int(part.first[k]), int(part.first[k + 1])) for part in parts]
+        times = [part.times[a + k : b + k + 1] for part, a, b in own]
+        assert np.array_equal(np.concatenate([times[0], *(some[1:] for some in times[1:])]), edges), k
         middles = 0.5 * (edges[:-1] + edges[1:])
-        assert np.array_equal(arrays.inputs[a:b], clock.inputs_over(inputs, numbers.values, edges[:-1], middles)), k
+        expected = clock.inputs_over(inputs, numbers.values, edges[:-1], middles)
+        assert np.array_equal(np.concatenate([part.inputs[a:b] for part, a, b in own]), expected), k
+        gates = [place for place, info in enumerate(inputs) if info.kind != "phase"]
+        jumps = [True, *np.any(np.diff(expected[:, gates], axis=0) != 0.0, axis=1)]
+        assert np.array_equal(np.concatenate([part.restarts[a:b] for part, a, b in own]), jumps), k
+        edges = segment_edges(model, numbers, 0.0, min(duration, SCALED_TURNS * turn), turn)
+        middles = 0.5 * (edges[:-1] + edges[1:])
         looked = np.unique(np.linspace(0, len(middles) - 1, MOMENTS).astype(int))
-        times = np.concatenate([middles[looked], min(duration, turn) * (np.arange(MOMENTS) + 0.5) / MOMENTS])
-        expected = clock.inputs_over(inputs, numbers.values, times, times)
-        assert np.array_equal(moments[first[k] : first[k + 1]], expected), k
+        at = np.concatenate([middles[looked], min(duration, turn) * (np.arange(MOMENTS) + 0.5) / MOMENTS])
+        expected = clock.inputs_over(inputs, numbers.values, at, at)
+        assert np.array_equal(looked_at[first[k] : first[k + 1]], expected), k
         assert horizons[k] == min(duration, turn)
 
 
@@ -419,7 +430,8 @@ def test_segments_of_fast_loads_on_slow_shafts_are_those_made_for_one(make_model
     turns = np.array([clock.period(model.manifest, members.numbers(model, k).values) for k in range(3)])
     span = Span(durations=2.0 * turns, turns=turns, starts=turns)
     assert_segments_of_one(model, members, span)
-    assert len(np.unique(np.diff(member_arrays(model, members, span, np.arange(3))[0].first))) == 3
+    (whole,) = stretches(model, members, span, np.arange(3))
+    assert len(np.unique(np.diff(whole.first))) == 3
 
 
 def test_one_observable_is_named_like_several(make_model: ModelMaker) -> None:

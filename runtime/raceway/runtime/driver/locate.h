@@ -277,7 +277,7 @@ static int aim(rw_run *run, double t, double left, double resolution, double *h)
     return 1;
 }
 #else
-#define locate(run, start, t, h, error, resolution, aimed, longest) ((void)(aimed), NO_KINK)
+#define locate(run, start, t, h, error, resolution, aimed, longest) ((void)(aimed), (void)(longest), NO_KINK)
 #define turn_sides(run, time, step) ((void)(time), (void)(step))
 #define sides_start(run, t) ((void)0)
 #define sides_move_on(run) ((void)0)

@@ -1,0 +1,238 @@
+"""Claims about long ensembles: a run cut into stretches is the run, whatever it costs in memory and patience."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import math
+import subprocess
+import sys
+import textwrap
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from press_laws import press
+
+from raceway.runtime import Model
+from raceway.runtime.ensembles import chunks, member_segments
+from raceway.runtime.ensembles.chunks import PATIENCE
+from raceway.runtime.ensembles.ensemble_driver import RESULT, MemberArrays
+from raceway.runtime.ensembles.member_segments import moments, stretches
+from raceway.runtime.ensembles.members import Span, make_members
+from raceway.runtime.integrate.reductions import choose_family
+
+ModelMaker = Callable[..., Model]
+OBSERVABLES = ("max:ball.force", "peak_time:ball.force", "min:inner.y", "rms_inner_y", "end:inner.vx")
+SPEED = "mechanism.driver.speed"
+
+
+def cut(whole: MemberArrays, cuts: list[list[int]]) -> list[MemberArrays]:
+    """Segments cut for each member where its list says, in as many parts as the longest list has entries but one."""
+    found = []
+    for part in range(len(cuts[0]) - 1):
+        spans = [(int(whole.first[m]), places[part], places[part + 1]) for m, places in enumerate(cuts)]
+        times = [whole.times[begin + m + a : begin + m + b + 1] for m, (begin, a, b) in enumerate(spans)]
+        found.append(
+            MemberArrays(
+                p=whole.p,
+                c=whole.c,
+                first=np.concatenate([[0], np.cumsum([b - a for _, a, b in spans])]).astype(np.int_),
+                times=np.concatenate(times),
+                inputs=np.concatenate([whole.inputs[begin + a : begin + b] for begin, a, b in spans]),
+                restarts=np.concatenate([whole.restarts[begin + a : begin + b] for begin, a, b in spans]),
+            )
+        )
+    return found
+
+
+@pytest.mark.parametrize("law", ["one-sided", "stiff", "tangent"])
+@pytest.mark.parametrize("method", ["auto", "stepper-dp54", "stepper-rodas5p"])
+def test_a_run_cut_at_its_segments_is_the_run_in_one_call(make_model: ModelMaker, law: str, method: str) -> None:
+    """States, reductions, counts, methods and step sizes are the same bits; members are cut each at its own places."""
+    model, count = press(make_model, law), 11
+    random = np.random.default_rng(5)
+    clearance = random.uniform(5e-6, 2e-5, count)
+    speed = 52.36 * random.uniform(0.8, 1.2, count)
+    members = make_members(model, {"bearing.clearance": clearance, SPEED: speed})
+    turns = 2.0 * math.pi / speed
+    span = Span(durations=2.0 * turns, turns=turns, starts=0.3 * turns)
+    (whole,) = stretches(model, members, span, np.arange(count))
+    driver = model.ensemble_driver
+    tolerance = 1e-6 * driver.magnitudes(whole, members.initial, *moments(model, members, span, np.arange(count)))
+    segments = np.diff(whole.first)
+    cuts = [[0, *np.sort(random.integers(0, n + 1, 3)).tolist(), int(n)] for n in segments]
+    # one that begins late, one that is done early
+    cuts[0][1:3], cuts[1][1:4] = [0, 0], [int(segments[1])] * 3
+    runs = []
+    for parts in ([whole], cut(whole, cuts)):
+        x = members.initial.copy()
+        rows = driver.reductions(count, span.starts, ("inner.y", "ball.force"))
+        carried = driver.carry(count)
+        reached = np.zeros(count)
+        for part in parts:
+            results = driver.run(
+                *(choose_family(method), part, x, tolerance, rows, ctypes.c_int(0)),
+                carried=carried,
+                reached=reached,
+            )
+        assert np.array_equal(reached, span.durations)
+        runs.append((x, rows, results))
+    (x, rows, results), (cut_x, cut_rows, cut_results) = runs
+    assert np.array_equal(x, cut_x)
+    assert np.array_equal(rows, cut_rows)
+    assert results["steps"].min() > 100
+    for name in RESULT.names or ():
+        if name != "segment":
+            assert np.array_equal(results[name], cut_results[name]), name
+
+
+@pytest.mark.parametrize("law", ["one-sided", "stiff"])
+def test_results_are_the_same_bits_for_stretches_of_any_length(
+    make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch, law: str
+) -> None:
+    """Runs of 200 turns in four stretches and in one; a member that turns slowly is done in the first."""
+    model = press(make_model, law)
+    columns = {"bearing.clearance": [8e-6, 1e-5, 1.2e-5], SPEED: [52.36, 48.0, 3.0]}
+    assert 24.0 * 52.36 / (2.0 * math.pi) > 3 * 64
+    found = []
+    for windows in (1, 1000):
+        monkeypatch.setattr(member_segments, "MEMBER_WINDOWS", windows)
+        found.append(model.simulate_many(columns, OBSERVABLES, duration=24.0, transient=1.5))
+    short, long = found
+    assert short.failures == long.failures == ()
+    for name in OBSERVABLES:
+        assert np.array_equal(short[name], long[name]), name
+    assert short.statistics.steps == long.statistics.steps
+    assert short.statistics.evaluations == long.statistics.evaluations
+
+
+@pytest.mark.parametrize(
+    ("scene", "cycles", "transient"), [("varying_compliance", 5.5, 0.3), ("varying_compliance", 20.0, 2.0)]
+)
+def test_members_one_by_one_are_reduced_runs_to_the_last_bit(
+    make_model: ModelMaker, scene: str, cycles: float, transient: float
+) -> None:
+    """Rattling balls carry a last digit of the tolerance to the first of the motion: both must find the same one."""
+    model = make_model(scene)
+    clearance = [5e-6, 2e-5, 4e-5, 8e-5]
+    found = model.simulate_many(
+        {"bearing.clearance": clearance}, OBSERVABLES, cycles=cycles, transient=transient, rtol=1e-9, lanes=False
+    )
+    for k, value in enumerate(clearance):
+        single = model.reduce(
+            cycles=cycles,
+            transient=transient,
+            rtol=1e-9,
+            kinks="stepped-over",
+            parameters={"bearing.clearance": value},
+        )
+        assert found["max:ball.force"][k] == single["ball.force"].maximum
+        assert found["peak_time:ball.force"][k] == single["ball.force"].maximum_time
+        assert found["rms_inner_y"][k] == single["inner.y"].rms
+        assert found["end:inner.vx"][k] == single.end["inner.vx"]
+
+
+@pytest.mark.parametrize("lanes", [True, False])
+def test_a_member_has_its_own_limit_of_steps(
+    make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch, lanes: bool
+) -> None:
+    """One that meets its limit alone meets it beside a member that turns ten times as often, and may take more."""
+    model = press(make_model)
+    for module in ("ensembles.chunks", "integrate.reductions"):
+        monkeypatch.setattr(
+            f"raceway.runtime.{module}.step_limit", lambda duration, turn: 400 * math.ceil(duration / turn - 1e-9)
+        )
+    fates = []
+    for speeds in ([10.0], [10.0, 100.0]):
+        columns = {SPEED: speeds}
+        found = model.simulate_many(
+            columns, ["end:inner.y"], duration=0.2 * math.pi, transient=0, rtol=1e-3, lanes=lanes
+        )
+        fates.append(found.failures)
+    assert [(failure.member, failure.status) for failure in fates[0]] == [(0, "TOO_MANY_STEPS")]
+    assert fates[0] == fates[1]
+
+
+@pytest.mark.parametrize("lanes", [True, False])
+@pytest.mark.parametrize(("members", "cycles"), [(8, 200), (200, 8)], ids=["few long", "many short"])
+def test_progress_is_told_within_chunks(
+    make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch, lanes: bool, members: int, cycles: int
+) -> None:
+    """As often as patience asks, though nothing has come to its end."""
+    model = press(make_model)
+    monkeypatch.setattr(chunks, "PATIENCE", 0.01)
+    monkeypatch.setattr(chunks, "CHUNKS", 1)
+    monkeypatch.setattr(chunks, "CHUNK", 1000)
+    told: list[float] = []
+    columns = {"bearing.clearance": np.linspace(5e-6, 2e-5, members)}
+    model.simulate_many(
+        columns, ["end:inner.y"], cycles=cycles, transient=0, rtol=1e-4, lanes=lanes, progress=told.append
+    )
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    assert len({fraction for fraction in told if 0.0 < fraction < 1.0}) >= 4
+    # twice a second and more, as it is
+    assert PATIENCE <= 0.5
+
+
+@pytest.mark.parametrize("lanes", [True, False])
+def test_members_interrupted_between_stretches_have_no_results(make_model: ModelMaker, lanes: bool) -> None:
+    model = press(make_model)
+
+    def interrupt(fraction: float) -> None:
+        if fraction > 0.0:
+            raise KeyboardInterrupt
+
+    columns = {"bearing.clearance": np.linspace(5e-6, 2e-5, 8)}
+    found = model.simulate_many(
+        columns, OBSERVABLES, cycles=1e7, transient=0, threads=1, lanes=lanes, progress=interrupt
+    )
+    assert found.interrupted
+    assert [failure.member for failure in found.failures] == list(range(8))
+    assert {failure.status for failure in found.failures} == {"INTERRUPTED"}
+    reached = np.array([failure.time for failure in found.failures])
+    assert np.all(reached < 1e7 * model.period())
+    assert np.all(reached > 0.0) if lanes else reached[0] > 0.0
+    assert np.all(np.isnan(found["max:ball.force"]))
+
+
+def test_runs_of_ten_million_turns_need_little_memory_and_hear_an_interrupt(make_model: ModelMaker) -> None:
+    """A process of its own: its largest memory, and how soon Ctrl-C ends it."""
+    pytest.importorskip("resource")
+    folder = press(make_model)._drivers._folder
+    code = """
+        import json, os, resource, signal, sys, threading, time
+        from raceway.runtime import load
+
+        model = load(sys.argv[1])
+        asked = {"bearing.clearance": [k * 1e-6 for k in range(4, 12)]}, ["max:ball.force"]
+        model.simulate_many(*asked, cycles=3, transient=0)
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        sent = []
+
+        def interrupt():
+            sent.append(time.perf_counter())
+            os.kill(os.getpid(), signal.SIGINT)
+
+        threading.Timer(1.0, interrupt).start()
+        found = model.simulate_many(*asked, cycles=1e7, transient=0)
+        heard = time.perf_counter() - sent[0]
+        grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+        print(json.dumps([found.interrupted, [failure.time for failure in found.failures], heard, grown]))
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code), str(folder)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    interrupted, times, heard, grown = json.loads(done.stdout)
+    assert interrupted
+    assert len(times) == 8
+    assert min(times) > 0.0
+    assert heard < 1.0
+    # in kilobytes; in one go it were gigabytes
+    assert grown < 40_000
