@@ -6,7 +6,8 @@
 # make extremes   runs the tour of extremes and writes docs/extremes.md (ten minutes); QUICK=1: the test suite's part
 # make extremes-sanitized   the tour under the compiler's sanitizers alone (six minutes; part of make extremes)
 # make trade   measures accuracy against time on the shipped scenes and writes docs/trade.md (about ten minutes)
-# make bench   installs the peers into a venv of their own and measures (a quarter of an hour); QUICK=1: a minute, for show
+# make bench   installs the peers into a venv of their own and measures (25 minutes); QUICK=1: two minutes, for show
+# make bench-test   tests the benchmarks, and that page and results belong together (a minute)
 
 PYTHON ?= python3
 VENV ?= .venv

@@ -2,7 +2,8 @@
 
 Results go to benchmarks/results/*.json, one file a part, as soon as it is done.  A part whose file was measured on
 the same code and machine is kept: an interrupted run goes on where it stopped.  ``--fresh`` measures again.  A name
-stands for all parts that begin with it: ``work_precision``, ``sensitivity``.
+stands for all parts that begin with it: ``work_precision``, ``sensitivity``.  Every file says which state of the code
+it was measured at, and the page says so where they differ.
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import os
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +24,7 @@ from benchmarks import (
     costs,
     ensemble,
     jacobians,
+    provenance,
     regeneration,
     report,
     sensitivity_cost,
@@ -28,7 +32,7 @@ from benchmarks import (
     work_precision,
 )
 from benchmarks.machine import load, machine
-from benchmarks.problem import ROOT
+from benchmarks.problem import CASES, ROOT, Case, models
 
 RESULTS = ROOT / "benchmarks" / "results"
 
@@ -38,31 +42,9 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parse(arguments)
     folder = options.out / "results" if options.out else RESULTS
     folder.mkdir(parents=True, exist_ok=True)
-    key = _key(options.quick)
-    effort = work_precision.QUICK if options.quick else work_precision.Effort()
-    rounds = 2 if options.quick else 15
-
-    parts: dict[str, Callable[[], dict[str, Any]]] = {}
-    cases = work_precision.cases()
-    for case, model in cases[1:2] if options.quick else cases:
-        parts[f"work_precision_{case.key}"] = lambda c=case, m=model: work_precision.measure(c, m, effort, _say)
-    light, model_of_light = cases[-1]
-    parts["one_step"] = lambda: costs.one_step(light, model_of_light, rounds)
-    parts["balls"] = lambda: costs.balls(rounds, costs.BALLS[:2] if options.quick else costs.BALLS)
-    parts["sensitivity_cost"] = lambda: (
-        sensitivity_cost.sensitivity_cost(2, (1, 5), (1,))
-        if options.quick
-        else sensitivity_cost.sensitivity_cost(rounds)
-    )
-    parts["sensitivity_error"] = lambda: (
-        sensitivity_error.sensitivity_error(2, _say, (1e-4, 1e-6))
-        if options.quick
-        else sensitivity_error.sensitivity_error(24, _say)
-    )
-    parts["ensemble"] = lambda: ensemble.throughput(*((32, 2) if options.quick else (10_000, 3)))
-    parts["jacobians"] = lambda: jacobians.measure(rounds)
-    parts["arithmetic"] = lambda: arithmetic.arithmetic(2 if options.quick else 32, rounds)
-    parts["regeneration"] = lambda: regeneration.regeneration(1 if options.quick else 5)
+    state = provenance.present()
+    key = _key(options.quick, state)
+    parts = parts_of(options.quick)
     unknown = [wanted for wanted in options.parts if not any(name.startswith(wanted) for name in parts)]
     if unknown:
         _say(f"no part begins with {', '.join(unknown)}; there are {', '.join(parts)}")
@@ -76,8 +58,13 @@ def main(arguments: list[str] | None = None) -> int:
             _say(f"{name}: measured before on this code and machine, kept")
             continue
         begun = time.perf_counter()
-        result = {"key": key, "quick": options.quick, "machine": machine(), **part()}
+        before = provenance.present()
+        result = {"key": key, "state": before.record(), "quick": options.quick, "machine": machine(), **part()}
         result["machine"]["load_after"] = load()
+        after = provenance.digest()
+        if not state.digest == before.digest == after:
+            _say(f"{name}: the code changed meanwhile; its results say so, and it is measured again next time")
+            result |= {"key": "", "state": {**before.record(), "digest": f"{state.digest} to {after}"}}
         result["seconds"] = round(time.perf_counter() - begun, 1)
         temporary = path.with_suffix(".tmp")
         temporary.write_text(_compact(result), encoding="utf-8")
@@ -92,11 +79,41 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
+def parts_of(quick: bool) -> dict[str, Callable[[], dict[str, Any]]]:
+    """What measures each part, by the name of its file of results."""
+    effort = work_precision.QUICK if quick else work_precision.Effort()
+    rounds = 2 if quick else 15
+    light = CASES[-1]
+    precision = {
+        f"work_precision_{case.key}": partial(_work_precision, case, effort)
+        for case in (CASES[1:2] if quick else CASES)
+    }
+    return {
+        **precision,
+        "one_step": lambda: costs.one_step(light, models()[light.scene], rounds),
+        "balls": lambda: costs.balls(rounds, costs.BALLS[:2] if quick else costs.BALLS),
+        "sensitivity_cost": lambda: (
+            sensitivity_cost.sensitivity_cost(2, (1, 5), (1,)) if quick else sensitivity_cost.sensitivity_cost(rounds)
+        ),
+        "sensitivity_error": lambda: (
+            sensitivity_error.sensitivity_error(2, _say, (1e-4, 1e-6))
+            if quick
+            else sensitivity_error.sensitivity_error(24, _say)
+        ),
+        "ensemble": lambda: ensemble.throughput(*((32, 2) if quick else (10_000, 7))),
+        "jacobians": lambda: jacobians.measure(rounds),
+        "arithmetic": lambda: arithmetic.arithmetic(2 if quick else 32, rounds),
+        "regeneration": lambda: regeneration.regeneration(1 if quick else 5),
+    }
+
+
+def _work_precision(case: Case, effort: work_precision.Effort) -> dict[str, Any]:
+    return work_precision.measure(case, models()[case.scene], effort, _say)
+
+
 def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument(
-        "--quick", action="store_true", help="a minute instead of a quarter of an hour; numbers mean little"
-    )
+    parser.add_argument("--quick", action="store_true", help="two minutes instead of 25; numbers mean little")
     parser.add_argument("--fresh", action="store_true", help="measure again what is there")
     parser.add_argument("parts", nargs="*", metavar="PART", help="only the parts whose names begin so")
     parser.add_argument("--out", type=Path, help="folder for results and page, instead of benchmarks/results and docs")
@@ -108,11 +125,12 @@ def _say(line: str) -> None:
 
 
 def _compact(result: dict[str, Any]) -> str:
-    """JSON with one line for each innermost record."""
+    """JSON with one line for each innermost record or list."""
 
     def text(value: Any, depth: int) -> str:
         flat = json.dumps(value, ensure_ascii=False)
-        if len(flat) <= 300 or not isinstance(value, dict | list) or not value:
+        inside = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+        if len(flat) <= 300 or not any(isinstance(item, dict | list) for item in inside):
             return flat
         inner = " " * (depth + 1)
         if isinstance(value, list):
@@ -131,18 +149,21 @@ def _kept(path: Path, key: str) -> bool:
         return False
 
 
-def _key(quick: bool) -> str:
+def _key(quick: bool, state: provenance.State) -> str:
     """Digest of the code that is measured and that measures, and of the machine without its load."""
-    digest = hashlib.sha256()
     facts = {name: value for name, value in machine().items() if name != "load"}
-    digest.update(json.dumps([quick, facts]).encode())
-    for pattern in ("derive/**/*.py", "runtime/**/*.py", "runtime/**/*.[ch]", "benchmarks/*.py", "benchmarks/*.c"):
-        for path in sorted(ROOT.glob(pattern)):
-            if path.parent.name == "benchmarks" and path.stem in ("report", "figures"):
-                continue
-            digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:16]
+    return hashlib.sha256(json.dumps([quick, facts, state.digest]).encode()).hexdigest()[:16]
+
+
+def _apart() -> None:
+    """Give Python a standard output of its own: numbalsoda's DOP853 prints past it, in Fortran, what seems stiff."""
+    sys.stdout.flush()
+    sys.stdout = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.close(nowhere)
 
 
 if __name__ == "__main__":
+    _apart()
     sys.exit(main())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import math
 import re
 import time
 from collections.abc import Callable
@@ -88,7 +87,7 @@ def one_step(case: Case, model: Model, rounds: int) -> dict[str, Any]:
             kind="step",
             evaluations=counts.evaluations,
         )
-    interleave([entry for entry, _ in entries], rounds=rounds, budget=math.inf)
+    interleave([entry for entry, _ in entries], rounds=rounds)
     for entry, row in entries:
         row["seconds_each"] = spread([t / row["count"] for t in entry.times])
         if row["kind"] == "step":
@@ -142,7 +141,7 @@ def balls(rounds: int, counts: tuple[int, ...] = BALLS) -> dict[str, Any]:
                     row,
                 )
             )
-    interleave([entry for entry, _ in entries], rounds=rounds, budget=math.inf)
+    interleave([entry for entry, _ in entries], rounds=rounds)
     for entry, row in entries:
         row["seconds"] = spread(entry.times)
         row["seconds_an_evaluation"] = spread([t / row["evaluations"] for t in entry.times])

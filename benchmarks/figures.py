@@ -59,8 +59,16 @@ _LIBRARIES: dict[str, tuple[str, tuple[str, ...], Look]] = {
         ("erk", "rosenbrock", "cvodes-compiled"),
         Look(color="#c0392b", marker="^", line="-"),
     ),
-    "sundials": ("SUNDIALS CVODE, C", ("cvode-c",), Look(color="#38761d", marker="D", line="--")),
-    "numbalsoda": ("numbalsoda LSODA", ("numbalsoda",), Look(color="#0b5394", marker="s", line=":")),
+    "sundials": (
+        "SUNDIALS CVODE, C:\nBDF, Adams",
+        ("cvode-bdf", "cvode-adams", "cvode-adams-newton"),
+        Look(color="#38761d", marker="D", line="--"),
+    ),
+    "numbalsoda": (
+        "numbalsoda:\nLSODA, DOP853",
+        ("numbalsoda-lsoda", "numbalsoda-dop853"),
+        Look(color="#0b5394", marker="s", line=":"),
+    ),
 }
 
 #: raceway's own, and the limit.
@@ -235,7 +243,7 @@ def ensembles(path: Path, result: dict[str, Any]) -> None:
         axes.bar_label(drawn, [f"{rate:.1f}" for rate in rates], **inside)
     reach = 1.5 * width
     for n, case in enumerate(cases):
-        limit = 1e-3 * case["possible"] * case["rows"]["end, 1"]["per_second"]
+        limit = 1e-3 * case["ratios"]["possible"]["median"] * case["rows"]["end, 1"]["per_second"]
         label = "what two threads that only\nhash would gain" if n == 0 else "_nolegend_"
         axes.plot((n + reach - width, n + reach), (limit, limit), color="#c0392b", linestyle="--", label=label)
     axes.set_xticks(range(len(cases)), ["damping\n" + case["words"].replace(", ", ",\n") for case in cases])

@@ -12,7 +12,6 @@ dense `Model.jacobian`, which looks up names and numbers anew, is there for scal
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -66,7 +65,7 @@ def measure(rounds: int) -> dict[str, Any]:
             f"{k}, dense": Entry(call=_times(partial(model.jacobian, of, wrt, t=INSTANT, x=x), CALLS // 50)),
             f"{k}, differences": Entry(call=_raw(model, rows.function, x, 2 * prepared.sparsity.shape[1])),
         }
-    interleave(list(entries.values()), rounds=rounds, budget=math.inf)
+    interleave(list(entries.values()), rounds=rounds)
     reference = np.array(base.times) / CALLS
     out = []
     for k, fact in enumerate(facts):
@@ -74,7 +73,11 @@ def measure(rounds: int) -> dict[str, Any]:
         for way in ("code", "prepared", "dense", "differences"):
             calls = CALLS // 50 if way == "dense" else CALLS
             times = np.array(entries[f"{k}, {way}"].times) / calls
-            row[way] = {"time": digits(float(np.median(times))), "ratio": spread(times / reference)}
+            row[way] = {
+                "time": digits(float(np.median(times))),
+                "seconds": spread(times),
+                "ratio": spread(times / reference),
+            }
         out.append(row)
     return {"scene": SCENE, "rhs": digits(float(np.median(reference))), "rows": out}
 

@@ -20,7 +20,8 @@ import casadi
 import numpy as np
 
 from benchmarks.problem import BUILD, POINTS, ROOT, Member
-from raceway.runtime.compiled.compile import compile_sources, find_compiler
+from raceway.runtime.compiled.compile import compile_sources
+from raceway.runtime.compiled.compilers import find_compiler
 from raceway.runtime.compiled.kernel import Kernel
 from raceway.runtime.integrate.locating import choose_kinks, stepper_for
 from raceway.runtime.integrate.stepper import METHODS, End, Family, Stepper
@@ -42,7 +43,6 @@ class Contender:
     key, label, group : names for files, for people, and of the group it belongs to
     solve : member and tolerance to states at the output points, shape (POINTS, 8)
     tolerances : that are swept
-    errors_like : key of a contender that takes the same steps and is faster: its errors stand for this one's
     ready : raises `Unavailable` where it cannot run
     """
 
@@ -51,7 +51,6 @@ class Contender:
     group: str
     solve: Callable[[Member, float], np.ndarray]
     tolerances: tuple[float, ...] = DECADES
-    errors_like: str = ""
     ready: Callable[[], None] = lambda: None
     counts: Callable[[Member, float], dict[str, int]] | None = None
 
@@ -323,7 +322,6 @@ def own_contenders() -> list[Contender]:
             group="raceway",
             solve=_simulate,
             tolerances=HALVES,
-            errors_like="stepper",
         ),
         *(_by_hand(method) for method in HAND_METHODS),
         _casadi("erk", "CasADi erk, C", "erk", "C"),

@@ -22,7 +22,8 @@ from scipy.integrate import solve_ivp
 from benchmarks.own import HALVES, HAND_FLAGS, Contender, Kept, Unavailable, c_numbers
 from benchmarks.press import Press, make_load, make_loop_rate, make_vector_rate
 from benchmarks.problem import ROOT, Member
-from raceway.runtime.compiled.compile import compile_sources, find_compiler
+from raceway.runtime.compiled.compile import compile_sources
+from raceway.runtime.compiled.compilers import find_compiler
 
 
 def imported(name: str) -> Any:
@@ -120,7 +121,6 @@ def _scipy(method: str, how: str) -> Contender:
         label=f"SciPy {method}, {words}",
         group=f"SciPy, {words}",
         solve=solve,
-        errors_like="" if how == "numba" else f"scipy-{method.lower()}-numba",
         ready=_needs("numba") if how == "numba" else lambda: None,
     )
 
@@ -129,7 +129,8 @@ def _scipy(method: str, how: str) -> Contender:
 
 
 @cache
-def _lsoda_cycle() -> Any:
+def _numbalsoda_rate() -> Any:
+    """dz/dt of the scaled states as a C function; what has to live as long as its address."""
     numba, numbalsoda, rate = imported("numba"), imported("numbalsoda"), numba_rate()
     count = len(Press._fields)
 
@@ -149,8 +150,15 @@ def _lsoda_cycle() -> Any:
         for k in range(8):
             outside[k] /= scale[k]
 
-    address = scaled.address
-    lsoda = numbalsoda.lsoda
+    return scaled
+
+
+@cache
+def _numbalsoda_cycle(method: str) -> Any:
+    numba = imported("numba")
+    count = len(Press._fields)
+    address = _numbalsoda_rate().address
+    solve = getattr(imported("numbalsoda"), method)
 
     @numba.njit
     def cycle(data, start, edges, gates, counts, times, tolerance):  # type: ignore[no-untyped-def]
@@ -166,7 +174,7 @@ def _lsoda_cycle() -> Any:
             wanted[-1] = edges[i + 1]
             if wanted[-2] >= wanted[-1]:
                 wanted = wanted[:-1]
-            found, success = lsoda(address, z, wanted, data, tolerance, tolerance, 10_000_000)
+            found, success = solve(address, z, wanted, data, tolerance, tolerance, 10_000_000)
             if not success:
                 states[:] = np.nan
                 return states
@@ -175,10 +183,10 @@ def _lsoda_cycle() -> Any:
             row += counts[i]
         return states
 
-    return cycle, scaled
+    return cycle
 
 
-_lsoda_data = Kept(
+_numbalsoda_data = Kept(
     lambda member: (
         np.concatenate([np.array(member.press), [0.0], member.magnitude]),
         np.array(member.gates),
@@ -187,10 +195,20 @@ _lsoda_data = Kept(
 )
 
 
-def _numbalsoda(member: Member, tolerance: float) -> np.ndarray:
-    data, gates, counts = _lsoda_data(member)
-    cycle, _ = _lsoda_cycle()
-    return np.asarray(cycle(data, member.start, member.edges, gates, counts, member.times, tolerance))
+def _numbalsoda(method: str) -> Contender:
+    def solve(member: Member, tolerance: float) -> np.ndarray:
+        data, gates, counts = _numbalsoda_data(member)
+        cycle = _numbalsoda_cycle(method)
+        return np.asarray(cycle(data, member.start, member.edges, gates, counts, member.times, tolerance))
+
+    return Contender(
+        key=f"numbalsoda-{method}",
+        label=f"numbalsoda {method.upper()}",
+        group="numbalsoda",
+        solve=solve,
+        tolerances=HALVES,
+        ready=_needs("numba", "numbalsoda"),
+    )
 
 
 # ----------------------------------------------------------------------------------------------------------- SUNDIALS
@@ -247,25 +265,46 @@ _cvode_data = Kept(
 )
 
 
-def _cvode(member: Member, tolerance: float) -> np.ndarray:
-    numbers, gates, counts = _cvode_data(member)
-    states = np.empty((len(member.times), 8))
-    code = _cvode_library()
-    pointer = ctypes.c_void_p
-    status = code.cvode_cycle(
-        ctypes.c_double(tolerance),
-        ctypes.byref(numbers),
-        pointer(member.start.ctypes.data),
-        len(gates),
-        pointer(member.edges.ctypes.data),
-        pointer(gates.ctypes.data),
-        pointer(counts.ctypes.data),
-        pointer(member.times.ctypes.data),
-        pointer(states.ctypes.data),
+#: Methods of cvode.c by the end of their keys: words, CVODE's number, and whether iteration is fixed-point.
+_CVODE_METHODS = {
+    "bdf": ("BDF, C", 2, 0),
+    "adams": ("Adams, fixed point, C", 1, 1),
+    "adams-newton": ("Adams, Newton, C", 1, 0),
+}
+
+
+def _cvode(key: str) -> Contender:
+    words, method, fixed_point = _CVODE_METHODS[key]
+
+    def solve(member: Member, tolerance: float) -> np.ndarray:
+        numbers, gates, counts = _cvode_data(member)
+        states = np.empty((len(member.times), 8))
+        pointer = ctypes.c_void_p
+        status = _cvode_library().cvode_cycle(
+            method,
+            fixed_point,
+            ctypes.c_double(tolerance),
+            ctypes.byref(numbers),
+            pointer(member.start.ctypes.data),
+            len(gates),
+            pointer(member.edges.ctypes.data),
+            pointer(gates.ctypes.data),
+            pointer(counts.ctypes.data),
+            pointer(member.times.ctypes.data),
+            pointer(states.ctypes.data),
+        )
+        if status:
+            states[:] = np.nan
+        return states
+
+    return Contender(
+        key=f"cvode-{key}",
+        label=f"SUNDIALS CVODE {words}",
+        group="SUNDIALS in C",
+        solve=solve,
+        tolerances=HALVES,
+        ready=_cvode_ready,
     )
-    if status:
-        states[:] = np.nan
-    return states
 
 
 def _cvode_ready() -> None:
@@ -357,26 +396,12 @@ def _diffrax(solver: str) -> Contender:
 def peers() -> list[Contender]:
     """All of them, in the order of tables."""
     return [
-        Contender(
-            key="numbalsoda",
-            label="numbalsoda LSODA",
-            group="numbalsoda",
-            solve=_numbalsoda,
-            tolerances=HALVES,
-            ready=_needs("numba", "numbalsoda"),
-        ),
-        Contender(
-            key="cvode-c",
-            label="SUNDIALS CVODE, C",
-            group="SUNDIALS",
-            solve=_cvode,
-            tolerances=HALVES,
-            ready=_cvode_ready,
-        ),
+        *(_numbalsoda(method) for method in ("lsoda", "dop853")),
+        *(_cvode(key) for key in _CVODE_METHODS),
         Contender(
             key="sundae",
             label="scikit-sundae CVODE, numba",
-            group="SUNDIALS",
+            group="scikit-sundae",
             solve=_sundae,
             ready=_needs("numba", "sksundae"),
         ),

@@ -11,7 +11,6 @@ checked against the stepper's derivatives before it is timed.
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -25,7 +24,8 @@ from benchmarks.own import Unavailable, integrator
 from benchmarks.problem import BUILD, CASES, Case, Member, models, parameter_sets
 from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave, spread
-from raceway.runtime.compiled.compile import compile_sources, find_compiler
+from raceway.runtime.compiled.compile import compile_sources
+from raceway.runtime.compiled.compilers import find_compiler
 from raceway.runtime.compiled.kernel import Kernel
 from raceway.runtime.derivatives.sensitivity import Chain, Directions
 from raceway.runtime.integrate.stepper import End, Family
@@ -80,7 +80,7 @@ class _Timed:
 def _paired(timed: Sequence[_Timed], rounds: int) -> list[dict[str, Any]]:
     """Times, and ratios to the plain run of the same way in the same round."""
     entries = [Entry(call=_numbered(one.call)) for one in timed]
-    interleave(entries, rounds=rounds, budget=math.inf)
+    interleave(entries, rounds=rounds)
     plain = {(one.way, one.case.key): entry for one, entry in zip(timed, entries, strict=True) if one.count == 0}
     rows = []
     for one, entry in zip(timed, entries, strict=True):

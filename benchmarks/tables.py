@@ -14,3 +14,13 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 def milliseconds(seconds: float | None) -> str:
     """Three digits, or a dash."""
     return "–" if seconds is None else f"{1e3 * seconds:.3g}"
+
+
+def with_spread(value: float, low: float, high: float) -> str:
+    """Three digits of each."""
+    return f"{value:.3g} ({low:.3g} … {high:.3g})"
+
+
+def spread_of(value: dict[str, float], factor: float) -> str:
+    """Median with 10th and 90th percentile, in a unit that is `factor` of them."""
+    return with_spread(*(factor * value[what] for what in ("median", "p10", "p90")))
