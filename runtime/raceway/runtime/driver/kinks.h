@@ -4,8 +4,8 @@
    the kinks, and the law with its sides held.  A step is tried with the sides that its start has; where the law can be continued, it is
    smooth within the step whatever the step does.  The step is looked at in RW_LOOKS places: a side changes where g is beyond zero by more
    than a band, which is a part RW_BAND of the error allowed in a step.  Below that a kink does not matter, and a ring that rests on one
-   does not count as crossing it by rounding.  The step is then repeated so that it ends where g is zero on its dense output, and the
-   sides are turned there.  What visits the other side between two looks is stepped over.
+   does not count as crossing it by rounding; between looks the parabola through three of them tells who has been on the other side.  The
+   step is then repeated so that it ends where g is zero on its dense output, and the sides are turned there.
 
    Work is bounded.  A step is repeated RW_REPEATS times at most for one kink.  A ball may turn its side back at the very place where it
    turned; the RW_TURNS-th time it is let go.  A crossing that follows the last one of the same ball by less than RW_BRIEF times the step
@@ -21,15 +21,13 @@
 
 enum { RW_LOOKS = 4, RW_REPEATS = 4, RW_TURNS = 2, RW_CHATTER = 4, RW_REST = 64, RW_ROOT_ITERATIONS = 60 };
 
-/* A root on the dense output is as good as a kink within this part of the band. */
-static const double RW_CLOSE = 0.1;
+/* A root on the dense output is good enough where g is within the part RW_CLOSE of the band. */
+static const double RW_BAND = 0.01, RW_BRIEF = 1.5, RW_CLOSE = 0.1;
 
-static const double RW_BAND = 0.01, RW_BRIEF = 1.5;
-
-/* Steps take the root of the time from a branch point behind them as their clock (pace.h) where they are longer than this part of it.  Its
-   pace at the end is not taken out of the end's slope where it is less than the second.  The end of a contact is foreseen no nearer than
-   this part of the step that error control proposes, and looked for up to so many times as far as it was foreseen; a step has arrived
-   there that leaves less than the last part of its way. */
+/* Steps have the clock of pace.h where they are longer than RW_FAR times the time since an onset.  A slope at a step's end is divided by
+   the pace there unless it is below RW_LEAST_PACE.  The end of a contact is foreseen no nearer than RW_NEAREST times the step that error
+   control proposes, and looked for up to RW_ASTRAY times as far as it was foreseen; a step that leaves less than the part RW_ARRIVED of
+   the way there has arrived. */
 static const double RW_FAR = 2.0, RW_LEAST_PACE = 0.25, RW_NEAREST = 0.1, RW_ASTRAY = 1.5, RW_ARRIVED = 1e-6;
 
 typedef struct {
