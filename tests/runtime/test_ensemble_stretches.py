@@ -9,6 +9,7 @@ import subprocess
 import sys
 import textwrap
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from press_laws import press
 from raceway.runtime import Model
 from raceway.runtime.ensembles import chunks, member_segments
 from raceway.runtime.ensembles.chunks import PATIENCE
-from raceway.runtime.ensembles.ensemble_driver import RESULT, MemberArrays
+from raceway.runtime.ensembles.ensemble_driver import RESULT, EnsembleDriver, MemberArrays
 from raceway.runtime.ensembles.member_segments import moments, stretches
 from raceway.runtime.ensembles.members import Span, make_members
 from raceway.runtime.integrate.reductions import choose_family
@@ -87,24 +88,62 @@ def test_a_run_cut_at_its_segments_is_the_run_in_one_call(make_model: ModelMaker
             assert np.array_equal(results[name], cut_results[name]), name
 
 
-@pytest.mark.parametrize("law", ["one-sided", "stiff"])
+@pytest.mark.parametrize(("law", "rtol"), [("one-sided", 1e-6), ("stiff", 1e-6), ("tangent", 1e-2)])
 def test_results_are_the_same_bits_for_stretches_of_any_length(
-    make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch, law: str
+    make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch, law: str, rtol: float
 ) -> None:
-    """Runs of 200 turns in four stretches and in one; a member that turns slowly is done in the first."""
+    """Runs of 200 turns, some turns or some segments at a time; a member that turns slowly is done in the first.
+
+    At a loose tolerance, light damping lets the rates seen in the whole run decide about the families.
+    """
     model = press(make_model, law)
     columns = {"bearing.clearance": [8e-6, 1e-5, 1.2e-5], SPEED: [52.36, 48.0, 3.0]}
     assert 24.0 * 52.36 / (2.0 * math.pi) > 3 * 64
-    found = []
-    for windows in (1, 1000):
+    calls: list[int] = []
+    run = EnsembleDriver.run
+
+    def counted(*given: Any, **more: Any) -> np.ndarray:
+        calls.append(len(given[2].inputs))
+        return run(*given, **more)
+
+    monkeypatch.setattr(EnsembleDriver, "run", counted)
+    found, stretched = [], []
+    for windows, segments in ((1000, 1_000_000), (1, 1_000_000), (1000, 30)):
         monkeypatch.setattr(member_segments, "MEMBER_WINDOWS", windows)
-        found.append(model.simulate_many(columns, OBSERVABLES, duration=24.0, transient=1.5))
-    short, long = found
-    assert short.failures == long.failures == ()
+        monkeypatch.setattr(member_segments, "SEGMENTS", segments)
+        calls.clear()
+        found.append(model.simulate_many(columns, OBSERVABLES, duration=24.0, transient=1.5, rtol=rtol))
+        stretched.append(len(calls))
+        assert max(calls) <= segments
+    assert stretched[:2] == [1, 4]
+    assert stretched[2] > 50
+    whole, *others = found
+    assert whole.failures == ()
+    for other in others:
+        assert other.failures == ()
+        for name in OBSERVABLES:
+            assert np.array_equal(whole[name], other[name]), name
+        assert whole.statistics.steps == other.statistics.steps
+        assert whole.statistics.evaluations == other.statistics.evaluations
+
+
+def test_a_member_that_fails_in_one_stretch_does_not_go_on_in_the_next(
+    make_model: ModelMaker, boundless: Callable[[Model], Model], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = boundless(press(make_model))
+    columns = {"bearing.outer_ring.stiffness": [5e7, -1e10, 5e7]}
+    found = []
+    for segments in (1_000_000, 3):
+        monkeypatch.setattr(member_segments, "SEGMENTS", segments)
+        found.append(model.simulate_many(columns, OBSERVABLES, cycles=3, transient=0))
+    whole, cut_up = found
+    assert whole.failures == cut_up.failures
+    (failure,) = whole.failures
+    assert failure.member == 1
+    assert 0.0 < failure.time < 3.0 * model.period()
     for name in OBSERVABLES:
-        assert np.array_equal(short[name], long[name]), name
-    assert short.statistics.steps == long.statistics.steps
-    assert short.statistics.evaluations == long.statistics.evaluations
+        assert np.array_equal(whole[name], cut_up[name], equal_nan=True), name
+    assert whole.statistics.steps == cut_up.statistics.steps
 
 
 @pytest.mark.parametrize(
@@ -195,6 +234,27 @@ def test_members_interrupted_between_stretches_have_no_results(make_model: Model
     assert np.all(reached < 1e7 * model.period())
     assert np.all(reached > 0.0) if lanes else reached[0] > 0.0
     assert np.all(np.isnan(found["max:ball.force"]))
+
+
+def test_the_end_of_a_stretch_is_not_that_of_the_run(make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Asked to stop when all have come to the end of their first stretch: only who needs no other one has results."""
+    model = press(make_model)
+    run = EnsembleDriver.run
+
+    def stopping(*given: Any, **more: Any) -> np.ndarray:
+        found = run(*given, **more)
+        given[6].value = 1
+        return found
+
+    monkeypatch.setattr(EnsembleDriver, "run", stopping)
+    monkeypatch.setattr(member_segments, "MEMBER_WINDOWS", 1)
+    columns = {SPEED: [52.36, 5.236, 48.0]}
+    found = model.simulate_many(columns, OBSERVABLES, duration=10.0, transient=0)
+    assert [(failure.member, failure.status) for failure in found.failures] == [(0, "INTERRUPTED"), (2, "INTERRUPTED")]
+    assert [failure.time for failure in found.failures] == pytest.approx(
+        [128.0 * math.pi / 52.36, 128.0 * math.pi / 48.0]
+    )
+    assert np.flatnonzero(np.isfinite(found["rms_inner_y"])).tolist() == [1]
 
 
 def test_runs_of_ten_million_turns_need_little_memory_and_hear_an_interrupt(make_model: ModelMaker) -> None:

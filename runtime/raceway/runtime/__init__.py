@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from raceway.runtime.derivatives.sensitivity import Sensitivities
     from raceway.runtime.derivatives.sensitivity_report import SensitivityReport
     from raceway.runtime.derivatives.statics import FreeRingWarning, StaticEquilibrium
-    from raceway.runtime.ensembles.ensemble import EnsembleResult, EnsembleStatistics, MemberFailure
+    from raceway.runtime.ensembles.chunks import MemberFailure
+    from raceway.runtime.ensembles.ensemble import EnsembleResult, EnsembleStatistics
     from raceway.runtime.errors import ArtefactError, CompileError, RacewayError, RequestError, SimulationError
     from raceway.runtime.explain import Explanation
     from raceway.runtime.integrate.reductions import Reduction, Reductions
@@ -69,7 +70,7 @@ _HOME = {
     "NoCompilerWarning": "compiled.compile",
     "EnsembleResult": "ensembles.ensemble",
     "EnsembleStatistics": "ensembles.ensemble",
-    "MemberFailure": "ensembles.ensemble",
+    "MemberFailure": "ensembles.chunks",
     "ArtefactError": "errors",
     "CompileError": "errors",
     "RacewayError": "errors",

@@ -12,7 +12,7 @@
 #include "scales.h"
 
 enum { RW_WAITING = 0, RW_FINISHED = 1 };
-enum { RW_STOP_INTERVAL = 64 }; /* rounds between looks at the caller's wish to stop */
+enum { RW_TELL_INTERVAL = 64 }; /* rounds between looks at the caller's wish to stop, and words on how far members are */
 
 /* A member outside the lanes. */
 typedef struct {
@@ -173,7 +173,7 @@ static void enter_lane(const rw_job *job, rw_lane_block *b, int lane, long m)
     b->who[lane] = m;
     b->active[lane] = 1.0;
     b->steps[lane] = b->rejected[lane] = b->pivoted[lane] = 0.0;
-    b->allowed[lane] = (double)(job->options->max_steps - job->results[m].steps - job->results[m].rejected);
+    b->allowed[lane] = (double)(job->options->max_steps[m] - job->results[m].steps - job->results[m].rejected);
     put(b->p, lane, job->p + m * RW_NP, RW_NP);
     put(b->c, lane, job->c + m * RW_NC, RW_NC);
     put(b->x, lane, job->x + m * RW_NX, RW_NX);
@@ -506,6 +506,7 @@ static int settle(const rw_job *job, rw_lane_block *b, int lane)
         at->phase = RW_FINISHED;
         leave_lane(job, b, lane, RACEWAY_DONE);
         result->time = reached;
+        if (job->options->reached != NULL) job->options->reached[m] = reached;
         return 1;
     }
     if (b->small[lane] != 0.0) {
@@ -528,6 +529,14 @@ static long next_member(const rw_job *job, int linearly, long from)
     for (long m = from; m < job->members; m++)
         if (job->member[m].phase == RW_WAITING && (job->member[m].method == RACEWAY_RODAS5P) == linearly) return m;
     return -1;
+}
+
+/* Tell the caller how far the members in the lanes have come. */
+static void tell_reached(const rw_job *job, const rw_lane_block *b)
+{
+    if (job->options->reached == NULL) return;
+    for (int lane = 0; lane < RW_L; lane++)
+        if (b->active[lane] != 0.0) job->options->reached[b->who[lane]] = b->start[lane] + b->t[lane];
 }
 
 /* Advance all members that wait for a family until they are done or leave it; returns 0 when asked to stop. */
@@ -577,7 +586,9 @@ static int pass(const rw_job *job, rw_lane_block *b, int linearly)
                 filled--;
             }
         }
-        stopped = job->options->stop != NULL && round % RW_STOP_INTERVAL == 0 && *job->options->stop;
+        if (round % RW_TELL_INTERVAL != 0) continue;
+        tell_reached(job, b);
+        stopped = job->options->stop != NULL && *job->options->stop;
     }
     for (int lane = 0; lane < RW_L; lane++)
         if (b->active[lane] != 0.0) leave_lane(job, b, lane, RACEWAY_STOPPED);
@@ -596,13 +607,18 @@ int raceway_ensemble(const raceway_ensemble_options *options, long members, cons
         rw_member *at = job.member + m;
         const long segments = first[m + 1] - first[m];
         const double *own = times + first[m] + m;
-        memset(result, 0, sizeof *result);
-        memset(at, 0, sizeof *at);
-        at->seen.slowest = INFINITY;
-        result->state = -1;
-        result->time = own[0];
-        result->status = RACEWAY_DONE;
+        if (!options->resume) {
+            memset(result, 0, sizeof *result);
+            memset(at, 0, sizeof *at);
+            at->seen.slowest = INFINITY;
+            result->state = -1;
+            result->status = RACEWAY_DONE;
+        }
         at->phase = RW_FINISHED;
+        /* what an earlier call could not bring to its end does not go on */
+        if (result->status != RACEWAY_DONE) continue;
+        result->segment = 0;
+        result->time = own[0];
         for (long i = 0; i < segments; i++)
             if (!(own[i + 1] >= own[i])) result->status = RACEWAY_BAD_ARGUMENT;
         for (int k = 0; k < RW_NX; k++)

@@ -3,6 +3,9 @@
    Every member has its own parameters, segments, step sizes and method; a lane whose member is done takes the next one.  A member's numbers
    do not depend on its neighbours, so results are the same bits however members are spread over calls and threads.
 
+   A run may be cut at the ends of its segments: a call can go on where another has ended, with what members carry over in their results and
+   in the work space.  Steps and bits are those of a run in one call, so a run of any length needs memory for a stretch of it only.
+
    No static state, no allocation: callable from many threads at once. */
 #ifndef RACEWAY_ENSEMBLE_H
 #define RACEWAY_ENSEMBLE_H
@@ -12,9 +15,11 @@
 enum { RACEWAY_STOPPED = 5 }; /* status of members that were under way when the caller asked to stop */
 
 typedef struct {
-    int method;              /* RACEWAY_AUTO, RACEWAY_DP54 or RACEWAY_RODAS5P */
-    long max_steps;          /* of a member, accepted and rejected */
+    int method;               /* RACEWAY_AUTO, RACEWAY_DP54 or RACEWAY_RODAS5P */
+    int resume;               /* nonzero: go on behind an earlier call with the same x, reductions, work and results */
+    const long *max_steps;    /* of each member, accepted and rejected, in all its calls */
     const volatile int *stop; /* the call ends soon after this becomes nonzero; or NULL */
+    volatile double *reached; /* how far each member has come, told now and then while the call is under way [s]; or NULL */
 } raceway_ensemble_options;
 
 /* Integrate members from x to the ends of their last segments.
@@ -26,10 +31,12 @@ typedef struct {
    first        first segment of each member, [members + 1]
    times        ends of the segments, [segments + 1] values a member: those of member m start at first[m] + m [s]
    inputs       u of each segment
-   restarts     1 where the load jumps at the segment's start
+   restarts     1 where the load jumps at the segment's start; of a member's first segment in a call that goes on, against the last one of
+                the call before
    reductions   rows of raceway_reduction_size() numbers, head filled in (see reductions.h), or NULL
    work         raceway_ensemble_work(members) bytes, aligned for double
-   results      one for each member; `written` is not used */
+   results      one for each member; `written` is not used.  In a call that goes on, counts are added to, and members that ended otherwise
+                than done stay as they are, and so do those without segments in this call */
 RACEWAY_EXPORT int raceway_ensemble(const raceway_ensemble_options *options, long members, const double *p, const double *c,
                                     const double *tolerance, double *x, const long *first, const double *times, const double *inputs,
                                     const unsigned char *restarts, double *reductions, void *work, raceway_result *results);

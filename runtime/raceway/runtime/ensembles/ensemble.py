@@ -14,31 +14,25 @@ import math
 import os
 import time as clocks
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from raceway.runtime.ensembles.ensemble_driver import LANE_FAMILIES, STOPPED, EnsembleDriver
-from raceway.runtime.ensembles.member_segments import member_arrays
+from raceway.runtime.ensembles.chunks import COUNTS, MemberFailure, Work, chunk_size, run_chunks
+from raceway.runtime.ensembles.ensemble_driver import LANE_FAMILIES
 from raceway.runtime.ensembles.members import Members, Span, Table, make_members, read_table
 from raceway.runtime.errors import RequestError
 from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.locating import LOCATED, STEPPED_OVER, Kinks, check_kinks, has_kinks
 from raceway.runtime.integrate.reductions import (
-    RunFailed,
     channel_names,
     check_rtol,
     check_span,
     choose_family,
-    integrate_reduced,
     observable_aliases,
     observe,
-    step_limit,
 )
-from raceway.runtime.integrate.stepper import End, Family
-from raceway.runtime.integrate.stepping import STATUS_OF_END
 from raceway.runtime.manifest import Manifest
 from raceway.runtime.parameters import real, unknown_name
 from raceway.runtime.printed import printed
@@ -47,34 +41,6 @@ if TYPE_CHECKING:
     import xarray
 
     from raceway.runtime.model import Model
-
-#: Most members of a chunk: enough that lanes which run out of members at its end do not count.
-CHUNK = 128
-
-#: Chunks that an ensemble is cut into at least, as far as its members fill lanes: what threads share.
-CHUNKS = 16
-
-#: Longest that an interrupt waits to be heard [s].
-PATIENCE = 0.2
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MemberFailure:
-    """A member without results.
-
-    Attributes
-    ----------
-    member : its place in the table
-    status : a name of `raceway.runtime.status.Status`, ``REFUSED`` where its numbers cannot be simulated, or
-        ``INTERRUPTED``
-    time : how far it came [s]
-    message : cause and remedy
-    """
-
-    member: int
-    status: str
-    time: float
-    message: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,25 +136,6 @@ class EnsembleResult(Mapping[str, np.ndarray]):
         return xarray.Dataset(variables, coords=coordinates, attrs={"title": self.manifest.title})
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Work:
-    """One ensemble under way: what chunks read, and the rows they fill."""
-
-    model: Model
-    driver: EnsembleDriver
-    members: Members
-    span: Span
-    family: Family
-    rtol: float
-    lanes: bool
-    reducing: bool
-    end: np.ndarray
-    rows: np.ndarray
-    results: dict[int, MemberFailure]
-    counts: dict[str, int]
-    stop: ctypes.c_int
-
-
 def simulate_many(
     model: Model,
     table: Table,
@@ -223,7 +170,7 @@ def simulate_many(
     span = _span(model, members, cycles, duration, skipped)
     in_lanes = lanes and at_kinks != LOCATED and family in LANE_FAMILIES
     reduced = {channel for kind, channel in chosen.values() if kind != "end"}
-    work = _Work(
+    work = Work(
         model=model,
         driver=driver,
         members=members,
@@ -238,12 +185,12 @@ def simulate_many(
             member: MemberFailure(member=member, status="REFUSED", time=0.0, message=message)
             for member, message in members.refused.items()
         },
-        counts=dict.fromkeys(("steps", "rejected", "evaluations", "switches", "pivoted"), 0),
+        counts=dict.fromkeys(COUNTS, 0),
         stop=ctypes.c_int(0),
     )
     able = np.array([m for m in range(len(members)) if m not in members.refused], dtype=np.int_)
-    size = _chunk_size(len(able), driver.lanes)
-    interrupted = _run(work, [able[k : k + size] for k in range(0, len(able), size)], workers, progress)
+    size = chunk_size(len(able), driver.lanes)
+    interrupted = run_chunks(work, able, size, workers, progress)
 
     failed = sorted(work.results)
     found = {}
@@ -269,102 +216,6 @@ def simulate_many(
     )
 
 
-def _run(work: _Work, chunks: list[np.ndarray], threads: int, progress: Callable[[float], None] | None) -> bool:
-    """Let threads work through the chunks; returns whether the user interrupted."""
-    total = sum(len(chunk) for chunk in chunks)
-    done = 0
-    interrupted = False
-    with ThreadPoolExecutor(max_workers=threads, thread_name_prefix="raceway") as pool:
-        pending: dict[Future[dict[str, int]], np.ndarray] = {
-            pool.submit(_chunk_in_lanes if work.lanes else _chunk_one_by_one, work, chunk): chunk for chunk in chunks
-        }
-        try:
-            while pending:
-                # with a limit: waiting without one, the main thread would not hear an interrupt on every system
-                finished, _ = wait(pending, timeout=PATIENCE, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    _add(work.counts, future.result())
-                    done += len(pending.pop(future))
-                if finished and progress is not None:
-                    progress(done / total)
-        except BaseException as fault:
-            work.stop.value = 1
-            for future, chunk in pending.items():
-                if future.cancel():
-                    _note(work, chunk, "INTERRUPTED", "Interrupted before it began.")
-            if not isinstance(fault, KeyboardInterrupt):
-                raise
-            interrupted = True
-            for future in pending:
-                if not future.cancelled():
-                    _add(work.counts, future.result())
-    return interrupted
-
-
-def _add(counts: dict[str, int], more: Mapping[str, int]) -> None:
-    for name, count in more.items():
-        counts[name] += count
-
-
-def _note(work: _Work, members: np.ndarray, status: str, message: str) -> None:
-    for member in members.tolist():
-        work.results[member] = MemberFailure(member=member, status=status, time=0.0, message=message)
-
-
-def _chunk_in_lanes(work: _Work, chunk: np.ndarray) -> dict[str, int]:
-    """Integrate a chunk's members, several together."""
-    arrays, (first, inputs, horizons) = member_arrays(work.model, work.members, work.span, chunk)
-    x = work.members.initial[chunk]
-    tolerance = work.rtol * work.driver.magnitudes(arrays, x, first, inputs, horizons)
-    rows = work.rows[chunk] if work.reducing else None
-    limit = max(map(step_limit, work.span.durations.tolist(), work.span.turns.tolist()))
-    results = work.driver.run(work.family, arrays, x, tolerance, rows, work.stop, max_steps=limit)
-    work.end[chunk] = x
-    if rows is not None:
-        work.rows[chunk] = rows
-    for place in np.flatnonzero(results["status"] != End.DONE):
-        member, told = int(chunk[place]), results[place]
-        if told["status"] == STOPPED:
-            status, message = "INTERRUPTED", "Interrupted on its way."
-        else:
-            ending = STATUS_OF_END[End(int(told["status"]))]
-            state = f", worst state {work.model.states[told['state']]}" if told["state"] >= 0 else ""
-            status, message = ending.name, f"{ending.value} Step size {told['step']:.3g} s{state}."
-        work.results[member] = MemberFailure(member=member, status=status, time=float(told["time"]), message=message)
-    return {name: int(results[name].sum()) for name in work.counts}
-
-
-def _chunk_one_by_one(work: _Work, chunk: np.ndarray) -> dict[str, int]:
-    """Integrate a chunk's members by the driver of single runs."""
-    arrays, (first, inputs, horizons) = member_arrays(work.model, work.members, work.span, chunk)
-    magnitudes = work.driver.magnitudes(arrays, work.members.initial[chunk], first, inputs, horizons)
-    counts = dict.fromkeys(work.counts, 0)
-    for place, member in enumerate(chunk.tolist()):
-        if work.stop.value:
-            _note(work, chunk[place:], "INTERRUPTED", "Interrupted before it ended.")
-            break
-        lengths = (work.span.durations[member], work.span.turns[member], work.span.starts[member])
-        try:
-            steps, rejected = integrate_reduced(
-                work.model,
-                work.driver,
-                work.members.numbers(work.model, member),
-                work.family,
-                work.rtol * magnitudes[place],
-                work.end[member],
-                work.rows[member],
-                (float(lengths[0]), float(lengths[1]), float(lengths[2])),
-            )
-        except RunFailed as fault:
-            work.results[member] = MemberFailure(
-                member=member, status=fault.status.name, time=fault.time, message=str(fault)
-            )
-            continue
-        counts["steps"] += steps
-        counts["rejected"] += rejected
-    return counts
-
-
 def _observables(names: str | Sequence[str], aliases: Mapping[str, tuple[str, str]]) -> dict[str, tuple[str, str]]:
     names = [names] if isinstance(names, str) else list(names)
     if not names:
@@ -384,12 +235,6 @@ def _threads(given: int | None) -> int:
     if not (1.0 <= real(given) < math.inf and int(given) == given):
         raise RequestError(f"threads: a whole number from 1 on is expected, not {given!r}.")
     return int(given)
-
-
-def _chunk_size(members: int, lanes: int) -> int:
-    """Members of a chunk: a multiple of the lanes, from the number of members alone."""
-    wanted = -(-members // CHUNKS)
-    return min(CHUNK, max(1, -(-wanted // lanes)) * lanes)
 
 
 def _span(model: Model, members: Members, cycles: float | None, duration: float | None, transient: float) -> Span:

@@ -1,6 +1,7 @@
 """The driver of ensembles: C of `driver/ensemble.c` compiled with a model's kernels and called through ctypes.
 
-In: numbers and segments of many members.  Out: their states at the end, on-line reductions, and how each ended.
+In: numbers and segments of many members.  Out: their states at the end, on-line reductions, and how each ended.  A long
+run is cut into several calls: `Carried` is what members carry from one to the next, and the bits are those of one call.
 The library also holds the driver of single runs, there with reductions; plain runs pay for neither.
 """
 
@@ -58,30 +59,53 @@ RESULT = np.dtype(
 class _Options(ctypes.Structure):
     _fields_ = (
         ("method", ctypes.c_int),
-        ("max_steps", ctypes.c_long),
+        ("resume", ctypes.c_int),
+        ("max_steps", ctypes.c_void_p),
         ("stop", ctypes.POINTER(ctypes.c_int)),
+        ("reached", ctypes.c_void_p),
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MemberArrays:
-    """Numbers of the members of one call, row after row.
+class MemberNumbers:
+    """Parameters and constants of the members of one call, shape (members, .)."""
+
+    p: np.ndarray
+    c: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MemberArrays(MemberNumbers):
+    """The same with their segments, row after row.
 
     Attributes
     ----------
-    p, c : parameters and constants, shape (members, .)
     first : first segment of each member, shape (members + 1,)
     times : ends of the segments, one more than segments for each member, shape (segments + members,) [s]
     inputs : of each segment at its start, shape (segments, inputs)
     restarts : where the load jumps at a segment's start, shape (segments,)
     """
 
-    p: np.ndarray
-    c: np.ndarray
     first: np.ndarray
     times: np.ndarray
     inputs: np.ndarray
     restarts: np.ndarray
+
+
+@dataclass(slots=True, kw_only=True)
+class Carried:
+    """What members carry from one call to the next: step sizes, error of the last step, methods, rates seen, counts.
+
+    Attributes
+    ----------
+    results : how each ended so far, shape (members,) of `RESULT`; counts are those of all calls
+    work : records of the driver, which read as C wrote them
+    begun : whether there was a call
+    """
+
+    results: np.ndarray
+    work: np.ndarray
+    begun: bool = False
 
 
 def compile_ensemble(folder: Path, manifest: Manifest, compiler: Compiler) -> CompiledLibrary:
@@ -144,6 +168,11 @@ class EnsembleDriver:
         rows[:, 1] = sum(2**k for k, name in enumerate(self.channels) if name in channels)
         return rows
 
+    def carry(self, members: int) -> Carried:
+        """What so many members carry, before their first call."""
+        size = self._code.raceway_ensemble_work(ctypes.c_long(members))
+        return Carried(results=np.zeros(members, dtype=RESULT), work=np.empty(size // 8 + 1))
+
     def run(
         self,
         family: Family,
@@ -153,7 +182,9 @@ class EnsembleDriver:
         reductions: np.ndarray | None,
         stop: ctypes.c_int,
         *,
-        max_steps: int = MAX_STEPS,
+        max_steps: np.ndarray | int = MAX_STEPS,
+        carried: Carried | None = None,
+        reached: np.ndarray | None = None,
     ) -> np.ndarray:
         """Advance members in lanes.
 
@@ -164,6 +195,9 @@ class EnsembleDriver:
         tolerance : error allowed in a step, shape (members, states)
         reductions : rows to add to, or None
         stop : the call ends soon after this becomes nonzero
+        max_steps : allowed to all members, or to each, shape (members,); accepted and rejected, in all calls
+        carried : from `carry`; a second call with it goes on where the first ended, with the same `x` and `reductions`
+        reached : how far each member has come, written while the call is under way, shape (members,) [s]
 
         Returns
         -------
@@ -172,9 +206,16 @@ class EnsembleDriver:
         if family not in LANE_FAMILIES:
             raise ValueError(f"{family!r} does not advance in lanes: {', '.join(f.name for f in LANE_FAMILIES)} do.")
         count = len(x)
-        results = np.zeros(count, dtype=RESULT)
-        work = np.empty(self._code.raceway_ensemble_work(ctypes.c_long(count)) // 8 + 1)
-        options = _Options(int(family), max_steps, ctypes.pointer(stop))
+        carried = self.carry(count) if carried is None else carried
+        limits = np.full(count, max_steps, dtype=ctypes.c_long)
+        options = _Options(
+            method=int(family),
+            resume=int(carried.begun),
+            max_steps=_pointer(limits),
+            stop=ctypes.pointer(stop),
+            reached=None if reached is None else _pointer(reached),
+        )
+        carried.begun = True
         inputs = padded(members.inputs, self._inputs)
         arrays = (members.p, members.c, tolerance, x, members.first, members.times, inputs)
         self._code.raceway_ensemble(
@@ -183,14 +224,14 @@ class EnsembleDriver:
             *(_pointer(array) for array in arrays),
             _pointer(members.restarts),
             None if reductions is None else _pointer(reductions),
-            _pointer(work),
-            _pointer(results),
+            _pointer(carried.work),
+            _pointer(carried.results),
         )
-        return results
+        return carried.results
 
     def magnitudes(
         self,
-        members: MemberArrays,
+        members: MemberNumbers,
         initial: np.ndarray,
         first: np.ndarray,
         inputs: np.ndarray,

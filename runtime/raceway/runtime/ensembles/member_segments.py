@@ -1,6 +1,7 @@
 """Segments and inputs of many members at once.
 
-In: members and their spans.  Out: `MemberArrays` for the driver, with the moments that magnitudes are taken from.
+In: members and their spans.  Out: `MemberArrays` for the driver, a stretch of the runs after the other, and the moments
+that magnitudes are taken from.
 
 Edges are those of single runs to the last bit: the same formulas, for all members in one array.  Where edges come so
 close that rules about equal times decide, or a run is long, `edge_windows` finds them for one member after another.
@@ -8,8 +9,9 @@ close that rules about equal times decide, or a run is long, `edge_windows` find
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +20,8 @@ from raceway.runtime.ensembles.ensemble_driver import MemberArrays
 from raceway.runtime.ensembles.members import TURNS_A_SEARCH, Members, Span, edge_windows, groups
 from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.magnitudes import MOMENTS
-from raceway.runtime.integrate.segments import LARGEST_PHASE
+from raceway.runtime.integrate.reductions import SCALED_TURNS
+from raceway.runtime.integrate.segments import LARGEST_PHASE, segment_edges
 from raceway.runtime.manifest import InputInfo
 
 if TYPE_CHECKING:
@@ -26,6 +29,14 @@ if TYPE_CHECKING:
 
 #: Edges closer than this fraction of run or turn are left to `edge_windows`; far above its own resolutions [1].
 CLOSE = 1e-8
+
+#: Windows of `TURNS_A_SEARCH` turns that edges are sought in at a time, over all members of a chunk: about a second's
+#: work.
+MEMBER_WINDOWS = 128
+
+#: Most segments of a stretch, over all its members: some ten megabytes with their inputs.  A window has more where a
+#: load is fast and the shaft slow.
+SEGMENTS = 65_536
 
 #: Most passages of a gate's edge that are sought at once.
 PASSAGES = 4 * TURNS_A_SEARCH
@@ -49,43 +60,49 @@ class _Part:
     starts: np.ndarray
 
 
-def member_arrays(
-    model: Model, members: Members, span: Span, which: np.ndarray
-) -> tuple[MemberArrays, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Segments of some members, and the moments of theirs: (first moment of each, inputs there, horizons)."""
+def stretches(model: Model, members: Members, span: Span, which: np.ndarray) -> Iterator[MemberArrays]:
+    """Segments of some members, a stretch of their runs after the other; memory does not grow with the runs.
+
+    A member whose run is over has no segments in later stretches.
+    """
     inputs = model.manifest.inputs
-    part = _Part(
-        which=which,
-        columns={name: members.columns[name][which] for name in _named(inputs)},
-        durations=span.durations[which],
-        turns=span.turns[which],
-        starts=span.starts[which],
+    part = _part(model, members, span, which)
+    numbers = {"p": np.ascontiguousarray(members.p[which]), "c": np.ascontiguousarray(members.c[which])}
+    gates = np.array([k for k, info in enumerate(inputs) if info.kind != "phase"], dtype=np.int_)
+    before: np.ndarray | None = None
+    for edges in _cut(_edges(model, members, part, windows=max(1, MEMBER_WINDOWS // len(which)))):
+        counts = np.sum(np.isfinite(edges), axis=1) - 1
+        within = np.arange(edges.shape[1] - 1) < counts[:, None]
+        left, right = edges[:, :-1][within], edges[:, 1:][within]
+        u = inputs_of(inputs, part.columns, np.repeat(np.arange(len(which)), counts), left, 0.5 * (left + right))
+        first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int_)
+        restarts = np.ones(len(left), dtype=np.uint8)
+        restarts[1:] = np.any(np.diff(u[:, gates], axis=0) != 0.0, axis=1)
+        going = np.flatnonzero(counts)
+        if before is None:
+            before = np.zeros((len(which), len(gates)))
+            restarts[first[going]] = 1
+        else:
+            restarts[first[going]] = np.any(u[np.ix_(first[going], gates)] != before[going], axis=1)
+        before[going] = u[np.ix_(first[going + 1] - 1, gates)]
+        yield MemberArrays(**numbers, first=first, times=edges[np.isfinite(edges)], inputs=u, restarts=restarts)
+
+
+def moments(model: Model, members: Members, span: Span, which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The moments that `raceway.runtime.integrate.magnitudes` looks at, as for a single run with reductions.
+
+    Returns
+    -------
+    first moment of each member, shape (members + 1,); inputs at the moments, shape (moments, inputs); a turn, or the
+    run, of each member, shape (members,) [s]
+    """
+    inputs = model.manifest.inputs
+    whole = _part(model, members, span, which)
+    part = replace(
+        whole, durations=np.minimum(whole.durations, SCALED_TURNS * whole.turns), starts=np.zeros(len(which))
     )
-    edges = _edges(model, members, part)
+    (edges,) = _edges(model, members, part, windows=None)
     counts = np.sum(np.isfinite(edges), axis=1) - 1
-    within = np.arange(edges.shape[1] - 1) < counts[:, None]
-    left, right = edges[:, :-1][within], edges[:, 1:][within]
-    u = inputs_of(inputs, part.columns, np.repeat(np.arange(len(which)), counts), left, 0.5 * (left + right))
-    first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int_)
-    gates = [k for k, info in enumerate(inputs) if info.kind != "phase"]
-    restarts = np.ones(len(left), dtype=np.uint8)
-    restarts[1:] = np.any(np.diff(u[:, gates], axis=0) != 0.0, axis=1)
-    restarts[first[:-1]] = 1
-    arrays = MemberArrays(
-        p=np.ascontiguousarray(members.p[which]),
-        c=np.ascontiguousarray(members.c[which]),
-        first=first,
-        times=edges[np.isfinite(edges)],
-        inputs=u,
-        restarts=restarts,
-    )
-    return arrays, _moments(inputs, part, edges, counts)
-
-
-def _moments(
-    inputs: Sequence[InputInfo], part: _Part, edges: np.ndarray, counts: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The moments that `raceway.runtime.integrate.magnitudes` looks at, for each member."""
     horizons = np.minimum(part.durations, part.turns)
     middles = 0.5 * (edges[:, :-1] + edges[:, 1:])
     times = np.full((len(edges), 2 * MOMENTS), np.inf)
@@ -96,38 +113,76 @@ def _moments(
         times[alike, : len(picked)] = middles[np.ix_(alike, picked)]
     used = np.isfinite(times)
     number = np.sum(used, axis=1)
-    moments = times[used]
-    u = inputs_of(inputs, part.columns, np.repeat(np.arange(len(edges)), number), moments, moments)
+    found = times[used]
+    u = inputs_of(inputs, part.columns, np.repeat(np.arange(len(edges)), number), found, found)
     return np.concatenate([[0], np.cumsum(number)]).astype(np.int_), u, horizons
 
 
-def _edges(model: Model, members: Members, part: _Part) -> np.ndarray:
-    """Begin, breakpoints, whole turns, where reductions start, and end of each member's run.
+def _part(model: Model, members: Members, span: Span, which: np.ndarray) -> _Part:
+    return _Part(
+        which=which,
+        columns={name: members.columns[name][which] for name in _named(model.manifest.inputs)},
+        durations=span.durations[which],
+        turns=span.turns[which],
+        starts=span.starts[which],
+    )
 
-    Returns
-    -------
-    array, shape (members, edges), increasing along a row and filled up with infinity [s]
+
+def _edges(model: Model, members: Members, part: _Part, windows: int | None) -> Iterator[np.ndarray]:
+    """Begin, breakpoints, whole turns, where reductions start, and end of each member's run, a stretch after the other.
+
+    Parameters
+    ----------
+    windows : of `edge_windows` in a stretch; None: a run, which then is short, is all one
+
+    Yields
+    ------
+    array, shape (members, edges), increasing along a row and filled up with infinity; of a run that is over, its end
+    alone [s]
     """
     found, clear = _clear_edges(model.manifest.inputs, part)
     others = np.flatnonzero(~clear)
-    if not len(others):
-        return found
     names = _timing(model.manifest.inputs)
     timing = [*(part.columns[name] for name in names), part.durations, part.turns, part.starts]
-    apart: list[tuple[np.ndarray, np.ndarray]] = []
-    for group in groups(np.column_stack([column[others] for column in timing])):
-        places = others[group]
-        one = places[0]
+    apart: list[tuple[np.ndarray, Iterator[np.ndarray]]] = []
+    for group in groups(np.column_stack([column[others] for column in timing])) if len(others) else []:
+        one = int(others[group[0]])
         numbers = members.timing(model, names, int(part.which[one]))
-        lengths = (float(part.durations[one]), float(part.turns[one]), float(part.starts[one]))
-        windows = list(edge_windows(model, numbers, *lengths))
-        apart.append((places, np.concatenate([windows[0], *(window[1:] for window in windows[1:])])))
-    width = max(found.shape[1], *(len(edges) for _, edges in apart))
-    found = np.pad(found, ((0, 0), (0, width - found.shape[1])), constant_values=np.inf)
-    for places, edges in apart:
-        found[places] = np.inf
-        found[places, : len(edges)] = edges
-    return found
+        duration, turn, start = float(part.durations[one]), float(part.turns[one]), float(part.starts[one])
+        if windows is None:
+            run = iter([segment_edges(model, numbers, 0.0, duration, turn)])
+        else:
+            run = edge_windows(model, numbers, duration, turn, start)
+        apart.append((others[group], run))
+    ends = np.where(np.arange(found.shape[1]) == 0, part.durations[:, None], np.inf)
+    found = np.where(clear[:, None], found, ends)
+    while True:
+        next_ones = [(places, list(islice(run, windows or 1))) for places, run in apart]
+        rows = [(places, _joined(parts)) for places, parts in next_ones if parts]
+        if not rows and not np.any(np.isfinite(found[:, 1:])):
+            return
+        width = max(found.shape[1], *(len(edges) for _, edges in rows), 2)
+        found = np.pad(found, ((0, 0), (0, width - found.shape[1])), constant_values=np.inf)
+        for places, edges in rows:
+            found[places, : len(edges)] = edges
+        yield found
+        found = ends
+
+
+def _cut(stretched: Iterable[np.ndarray]) -> Iterator[np.ndarray]:
+    """Edges as from `_edges`, in stretches of `SEGMENTS` at most."""
+    for edges in stretched:
+        columns = max(1, SEGMENTS // len(edges))
+        ends = np.max(edges, axis=1, where=np.isfinite(edges), initial=0.0)
+        for begin in range(0, edges.shape[1] - 1, columns):
+            piece = edges[:, begin : begin + columns + 1].copy()
+            piece[:, 0] = np.minimum(piece[:, 0], ends)
+            yield piece
+
+
+def _joined(windows: Sequence[np.ndarray]) -> np.ndarray:
+    """Windows that begin where the ones before end, as one."""
+    return np.concatenate([windows[0], *(window[1:] for window in windows[1:])])
 
 
 def _clear_edges(inputs: Sequence[InputInfo], part: _Part) -> tuple[np.ndarray, np.ndarray]:

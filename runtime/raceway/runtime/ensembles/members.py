@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -244,8 +244,8 @@ def edge_windows(model: Model, numbers: Numbers, duration: float, turn: float, s
     """
     near = 1e-9 * min(turn, duration)
     wholes = range(TURNS_A_SEARCH, math.ceil(duration / turn), TURNS_A_SEARCH) if math.isfinite(turn) else ()
-    stops = (0.0, *(k * turn for k in wholes if k * turn < duration - near), duration)
-    for left, right in pairwise(stops):
+    stops = (k * turn for k in wholes if k * turn < duration - near)
+    for left, right in pairwise(chain((0.0,), stops, (duration,))):
         if left + near < start < right - near:
             # not a window of its own: a window's first step size is estimated anew
             before, behind = (segment_edges(model, numbers, a, b, turn) for a, b in ((left, start), (start, right)))
