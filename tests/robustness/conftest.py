@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -15,17 +14,6 @@ from raceway.runtime.compiled import compile as compiling
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = ROOT / "scenes"
-
-
-@pytest.fixture(scope="session", autouse=True)
-def interrupts_heard() -> Iterator[None]:
-    """Processes started by these tests hear interrupts, also where the tests run in a shell's background, which ignores
-    them and has its children ignore them."""
-    before = signal.getsignal(signal.SIGINT)
-    if before is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="session", autouse=True)
