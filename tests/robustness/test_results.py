@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from profiles import LONG
 
-from raceway.runtime import RequestError, Solution, load, load_results, results
+from raceway.runtime import RequestError, Solution, folders, load, load_results, results
 from raceway.runtime.results import FILES, SOLUTION, SUMMARY, write_results
 
 FIGURES = ("orbit.png", "forces.png")
@@ -269,6 +269,72 @@ def test_a_reader_between_whose_looks_the_results_are_replaced_reads_the_new_one
     assert found.summary["run"] == 1
     assert len(looks) == 2
     np.testing.assert_array_equal(found.solution.x, solutions[1].x)
+
+
+def test_a_figure_that_a_new_run_takes_away_between_two_looks_is_no_fault(
+    tmp_path: Path, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second run has no forces.png: the reader met a file that was gone when it opened it."""
+    target = tmp_path / "rotor"
+    put(target, runs[0], 0)
+    real, opened = Path.open, []
+
+    def and_then_replaced(path: Path, *words: Any, **options: Any) -> Any:
+        if path.parent == target and path.suffix == ".png" and not opened:
+            opened.append(path)
+            with monkeypatch.context() as patch:
+                patch.setattr(Path, "open", real)
+                put(target, runs[1], 1)
+        return real(path, *words, **options)
+
+    monkeypatch.setattr(Path, "open", and_then_replaced)
+    found = load_results(target)
+    assert opened == [target / "forces.png"]
+    assert found.summary["run"] == 1
+
+
+def test_a_figure_that_cannot_be_read_is_named(tmp_path: Path, runs: tuple[Path, Path]) -> None:
+    target = tmp_path / "rotor"
+    put(target, runs[0], 0)
+    (target / "orbit.png").unlink()
+    (target / "orbit.png").mkdir()
+    with pytest.raises(RequestError, match=r"orbit\.png: cannot be read \(Is a directory\)"):
+        load_results(target)
+
+
+def test_a_clock_that_stands_between_two_replacements_misleads_no_reader(
+    tmp_path: Path, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file system's clock ticks every few milliseconds: the folder may be another one with the times of the first."""
+    target = tmp_path / "rotor"
+    put(target, runs[0], 0)
+    (target / SOLUTION).write_bytes((runs[1] / SOLUTION).read_bytes())  # half of the second run
+    times = target.stat().st_mtime_ns
+
+    def tick(seconds: float) -> None:
+        assert seconds > 0.0
+        put(target, runs[1], 1)
+
+    monkeypatch.setattr(folders, "state", lambda _: (1, times, times))
+    monkeypatch.setattr(folders.time, "sleep", tick)
+    monkeypatch.setattr(folders.time, "time", lambda: times * 1e-9 + 0.001)
+    assert load_results(target).summary["run"] == 1
+    (target / SOLUTION).write_bytes(b"")
+    monkeypatch.setattr(folders.time, "time", lambda: times * 1e-9 + 10.0)
+    with pytest.raises(RequestError, match=r"not of the run"):
+        load_results(target)
+
+
+def test_a_reader_that_is_never_left_alone_says_so(
+    tmp_path: Path, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "rotor"
+    put(target, runs[0], 0)
+    (target / SOLUTION).write_bytes(b"")
+    numbers = iter(range(1000))
+    monkeypatch.setattr(folders, "state", lambda _: (next(numbers), 0, 0))
+    with pytest.raises(RequestError, match="written anew all the time"):
+        load_results(target)
 
 
 def test_the_summary_names_every_file_of_the_run(tmp_path: Path, runs: tuple[Path, Path]) -> None:

@@ -13,7 +13,9 @@ import os
 import shutil
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 #: Folders of this age, made to be moved, were left by a process that was killed [s].
 LEFT_BEHIND = 86_400.0
@@ -21,8 +23,13 @@ LEFT_BEHIND = 86_400.0
 #: How often a folder is looked at again that another process replaces meanwhile.
 LOOKS = 20
 
+#: A file system's clock may stand for as long [s]: two changes within it leave the same times.
+_TICK = 0.1
+
 _AT_CWD, _RENAME_EXCHANGE = -100, 2  # fcntl.h, stdio.h of Linux
 _RENAME_SWAP = 2  # stdio.h of macOS
+
+_Content = TypeVar("_Content")
 
 
 def state(folder: Path) -> tuple[int, int, int] | None:
@@ -32,6 +39,32 @@ def state(folder: Path) -> tuple[int, int, int] | None:
     except (OSError, ValueError):
         return None
     return found.st_ino, found.st_mtime_ns, found.st_ctime_ns
+
+
+def read_settled(folder: Path, read: Callable[[], _Content], fault: type[Exception]) -> _Content:
+    """What `read` gives of a folder; read again where another process replaced files between its looks.
+
+    Parameters
+    ----------
+    fault : what `read` raises where files do not belong together
+
+    Raises
+    ------
+    fault
+        Nobody writes there, and they do not belong together; or the folder is written anew all the time.
+    """
+    for _ in range(LOOKS):
+        before = state(folder)
+        try:
+            return read()
+        except fault:
+            if state(folder) == before:
+                if before is None or time.time() - before[1] * 1e-9 > _TICK:
+                    raise
+                time.sleep(2 * _TICK)  # it may have changed twice within a tick; nobody can once the tick is over
+                if state(folder) == before:
+                    return read()
+    raise fault(f"{folder}: is written anew all the time. Read it when no process writes there.")
 
 
 def swap(first: Path, second: Path) -> bool:

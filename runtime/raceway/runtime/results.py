@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from raceway.runtime.errors import RequestError
-from raceway.runtime.folders import LOOKS, clear, permit, state, swap
+from raceway.runtime.folders import clear, permit, read_settled, swap
 from raceway.runtime.interrupts import held
 from raceway.runtime.solution import Solution, read_bytes
 
@@ -104,17 +104,16 @@ def load_results(folder: str | Path) -> Results:
         There are no results, or files of different runs.
     """
     place = Path(folder)
-    for _ in range(LOOKS):
-        before = state(place)
-        # the newest that was whole before a process was ended while it put its files in place
-        hidden = sorted(place.glob(f"{_COMPLETE}-*.new"), key=lambda path: (path.stat().st_mtime, path.name))
-        home = hidden[-1] if hidden else place
-        try:
-            return _load(home)
-        except RequestError:
-            if state(place) == before:  # no process has replaced the files meanwhile
-                raise
-    raise RequestError(f"{place}: is written anew all the time. Read it when no process writes there.")
+    return read_settled(place, lambda: _load(_newest(place)), RequestError)
+
+
+def _newest(place: Path) -> Path:
+    """The folder itself, or the newest in it that was whole before a process was ended while it put files in place."""
+    hidden = []
+    for path in place.glob(f"{_COMPLETE}-*.new"):
+        with contextlib.suppress(FileNotFoundError):  # its files are in place now
+            hidden.append((path.stat().st_mtime_ns, path.name))
+    return place / max(hidden)[1] if hidden else place
 
 
 def _summary_text(home: Path) -> str:
@@ -137,11 +136,7 @@ def _load(home: Path) -> Results:
             f"{home / SUMMARY}: it does not tell the digests of the run's files: not written by `raceway run` of this "
             "version, or edited. Run the scene again."
         ) from None
-    strange = [
-        name
-        for name, digest in digests.items()
-        if Path(name).name == name and (home / name).is_file() and _digest(home / name) != digest
-    ]
+    strange = [name for name, digest in digests.items() if Path(name).name == name and _differs(home / name, digest)]
     if strange:
         raise RequestError(
             f"{home}: {', '.join(strange)}: not of the run that {SUMMARY} tells of: edited, or of another run. Run the "
@@ -226,6 +221,16 @@ def _move(made: Path, place: Path, owned: Collection[str]) -> Path:
 
 def _names(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
+
+
+def _differs(path: Path, digest: str) -> bool:
+    """Whether a file is there and is another one; the user may have deleted it, or a new run that has no such file."""
+    try:
+        return _digest(path) != digest
+    except FileNotFoundError:
+        return False
+    except OSError as fault:
+        raise RequestError(f"{path}: cannot be read ({fault.strerror}). Run the scene again.") from None
 
 
 def _digest(path: Path) -> str:

@@ -209,6 +209,8 @@ def _find(folder: Path, name: str) -> Path | None:
                 _opened[path] = ctypes.CDLL(str(path))
                 return path
             why = "it is not the file that was written"
+        except FileNotFoundError:  # another process has deleted it meanwhile
+            continue
         except OSError as fault:
             why = str(fault)
         warnings.warn(

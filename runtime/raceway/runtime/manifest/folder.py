@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.metadata
 import os
 import tempfile
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from raceway.runtime.errors import ArtefactError
-from raceway.runtime.folders import LOOKS, state
+from raceway.runtime.folders import read_settled
 from raceway.runtime.manifest.records import FILE_NAME, Manifest
 
 
@@ -29,22 +31,23 @@ def read_artefact(folder: str | Path, *, verify: bool = True) -> Manifest:
     place = Path(folder)
     if not verify:
         manifest = read_manifest(folder, verify=False)
-        present = (name for name, _ in manifest.files if (place / name).is_file())
-        return replace(manifest, files=tuple((name, file_digest(place / name)) for name in present))
-    for _ in range(LOOKS):
-        before = state(place)
+        return replace(manifest, files=tuple(_present(place, [name for name, _ in manifest.files])))
+
+    def consistent() -> Manifest:
         manifest = read_manifest(folder)
-        try:
-            check_files(folder, manifest)
-            break
-        except ArtefactError:
-            # another process may have put a new folder in place between the two looks
-            if state(place) == before:
-                raise
-    else:
-        raise ArtefactError(f"{folder}: is written anew all the time. Load it when no process writes there.")
+        check_files(folder, manifest)
+        return manifest
+
+    manifest = read_settled(place, consistent, ArtefactError)
     _check_version(folder, manifest)
     return manifest
+
+
+def _present(place: Path, names: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Names and digests of the files that are there."""
+    for name in names:
+        with contextlib.suppress(FileNotFoundError):
+            yield name, file_digest(place / name)
 
 
 def _check_version(folder: str | Path, manifest: Manifest) -> None:
