@@ -16,6 +16,7 @@ import subprocess
 import sys
 import sysconfig
 import textwrap
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -165,6 +166,31 @@ def test_a_reader_beside_a_process_that_derives_reads_one_folder(tmp_path: Path,
                 assert read_artefact(target) in allowed
         finally:
             process.kill()
+
+
+def test_two_that_derive_into_one_folder_take_turns(
+    tmp_path: Path,
+    both: tuple[Path, Path],
+    kept: Callable[[Path], dict[str, bytes]],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Beside files of others, files are moved one by one: two derivations at once left files of both."""
+    target = tmp_path / "rotor"
+    shutil.copytree(both[0], target)
+    (target / "notes.txt").write_text("mine", encoding="utf-8")
+    second = threading.Thread(target=replace_folder, args=(target, "rotor", lambda made: copy_files(both[1], made)))
+    real = os.replace
+
+    def moving(source: Path, place: Path) -> None:
+        if second.ident is None and Path(place).parent == target and Path(place).name == "kernels.h":
+            second.start()
+            second.join(0.3)
+        real(source, place)
+
+    monkeypatch.setattr(os, "replace", moving)
+    replace_folder(target, "rotor", lambda made: copy_files(both[0], made))
+    second.join()
+    assert kept(target) == {**kept(both[1]), "notes.txt": b"mine"}
 
 
 def test_a_model_whose_folder_is_written_anew_compiles_nothing_of_the_new_one(

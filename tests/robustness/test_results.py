@@ -29,10 +29,11 @@ WRITING = """
     import itertools, sys
     from pathlib import Path
     from raceway.runtime.results import SOLUTION, write_results
-    target, *sources = map(Path, sys.argv[1:])
+    target, *sources = map(Path, sys.argv[2:])
     runs = [{path.name: path.read_bytes() for path in sorted(source.iterdir())} for source in sources]
     print("ready", flush=True)
-    for number in itertools.cycle(range(len(runs))):
+    times = itertools.count() if "always" in sys.argv else range(50)
+    for number in (time % len(runs) for time in times):
         def write(made):
             for name, content in runs[number].items():
                 (made / name).write_bytes(content)
@@ -71,7 +72,7 @@ def put(target: Path, source: Path, number: int) -> None:
 
 def killed_while_writing(target: Path, runs: tuple[Path, Path], *, kills: int, within: float) -> Iterator[None]:
     draw = random.Random(kills)
-    command = [sys.executable, "-c", textwrap.dedent(WRITING), str(target), *map(str, runs)]
+    command = [sys.executable, "-c", textwrap.dedent(WRITING), "always", str(target), *map(str, runs)]
     for _ in range(200 if LONG else kills):
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             assert process.stdout is not None
@@ -237,7 +238,7 @@ def test_a_reader_beside_a_writer_gets_one_run(
     code = WRITING.replace(
         "        def write(made):", "        import time; time.sleep(0.02)\n        def write(made):"
     )
-    command = [sys.executable, "-c", textwrap.dedent(code), str(target), *map(str, runs)]
+    command = [sys.executable, "-c", textwrap.dedent(code), "always", str(target), *map(str, runs)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
@@ -269,6 +270,41 @@ def test_a_reader_between_whose_looks_the_results_are_replaced_reads_the_new_one
     assert found.summary["run"] == 1
     assert len(looks) == 2
     np.testing.assert_array_equal(found.solution.x, solutions[1].x)
+
+
+@pytest.mark.parametrize("others", [False, True], ids=["exchanged", "moved one by one"])
+def test_two_processes_that_write_one_folder_take_turns(tmp_path: Path, runs: tuple[Path, Path], others: bool) -> None:
+    """Each took files of the other for those of a killed process, and one ended in FileNotFoundError."""
+    target = tmp_path / "rotor"
+    put(target, runs[0], 0)
+    if others:
+        (target / "mine").mkdir()
+    command = [sys.executable, "-c", textwrap.dedent(WRITING), "some", str(target), *map(str, runs)]
+    both = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    errors = [process.communicate(timeout=60)[1] for process in both]
+    assert [process.returncode for process in both] == [0, 0], errors
+    assert load_results(target).summary["run"] == 1
+    assert own(target) == own(runs[1])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["rotor"]
+
+
+@pytest.mark.skipif(folders.fcntl is None, reason="no locks here")
+def test_a_lock_that_another_program_keeps_delays_and_no_more(
+    tmp_path: Path, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`flock FOLDER raceway run ...` holds one for as long as the run lasts."""
+    waited: list[float] = []
+    monkeypatch.setattr(folders.time, "sleep", waited.append)
+    now = iter(np.arange(0.0, 1000.0, 0.5))
+    monkeypatch.setattr(folders.time, "monotonic", lambda: float(next(now)))
+    descriptor = os.open(tmp_path, os.O_RDONLY)
+    try:
+        folders.fcntl.flock(descriptor, folders.fcntl.LOCK_EX)
+        put(tmp_path / "rotor", runs[0], 0)
+    finally:
+        os.close(descriptor)
+    assert len(waited) > 20
+    assert load_results(tmp_path / "rotor").summary["run"] == 0
 
 
 def test_a_figure_that_a_new_run_takes_away_between_two_looks_is_no_fault(

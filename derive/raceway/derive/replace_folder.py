@@ -19,7 +19,7 @@ from pathlib import Path
 
 from raceway.runtime import manifest as mf
 from raceway.runtime.errors import ArtefactError, RequestError
-from raceway.runtime.folders import clear, permit, swap
+from raceway.runtime.folders import clear, permit, swap, turn
 
 #: Every file that a derivation writes.
 GENERATED = (
@@ -78,8 +78,9 @@ def replace_folder(folder: Path, label: str, write: Callable[[Path], None]) -> N
     made = Path(tempfile.mkdtemp(prefix=f".{label}-", suffix=".new", dir=place.parent))
     try:
         write(made)
-        permit(made, place)
-        _put(made, place)
+        with turn(place.parent):
+            permit(made, place)
+            _put(made, place)
     finally:
         # what was made and could not be put there, or what was there before
         shutil.rmtree(made, ignore_errors=True)

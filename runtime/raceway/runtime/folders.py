@@ -1,7 +1,7 @@
 """Put a folder in the place of another: the old files or the new ones, whenever the process is stopped.
 
 What both halves need for it: an exchange of two folders in one step where the system can (Linux, macOS), permissions,
-and the removal of what killed processes left.
+turns of processes that write the same folder, readers beside them, and the removal of what killed processes left.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TypeVar
 
@@ -26,8 +26,17 @@ LOOKS = 20
 #: A file system's clock may stand for as long [s]: two changes within it leave the same times.
 _TICK = 0.1
 
+#: How long a process waits for its turn [s].  Files are put in place within milliseconds: who holds a lock for longer
+#: is another program, perhaps the one that started this process (``flock results raceway run ...``).
+_PATIENCE = 10.0
+
 _AT_CWD, _RENAME_EXCHANGE = -100, 2  # fcntl.h, stdio.h of Linux
 _RENAME_SWAP = 2  # stdio.h of macOS
+
+try:
+    import fcntl
+except ModuleNotFoundError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 _Content = TypeVar("_Content")
 
@@ -65,6 +74,36 @@ def read_settled(folder: Path, read: Callable[[], _Content], fault: type[Excepti
                 if state(folder) == before:
                     return read()
     raise fault(f"{folder}: is written anew all the time. Read it when no process writes there.")
+
+
+@contextlib.contextmanager
+def turn(parent: Path) -> Iterator[None]:
+    """Let one process or thread at a time put files in place below a folder.
+
+    Where the system or its file system has no locks, and where somebody holds one for long, nothing is waited for: the
+    files are then whole as well, but the slower of two processes may find its own gone.
+    """
+    if fcntl is None:
+        yield
+        return
+    try:
+        descriptor = os.open(parent, os.O_RDONLY)
+    except OSError:  # may be written, not read
+        yield
+        return
+    try:
+        end = time.monotonic() + _PATIENCE
+        while time.monotonic() < end:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                time.sleep(0.01)
+            except OSError:  # no locks on this file system
+                break
+        yield
+    finally:
+        os.close(descriptor)  # and the lock with it, also where the process is killed
 
 
 def swap(first: Path, second: Path) -> bool:

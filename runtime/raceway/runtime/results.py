@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from raceway.runtime.errors import RequestError
-from raceway.runtime.folders import clear, permit, read_settled, swap
+from raceway.runtime.folders import clear, permit, read_settled, swap, turn
 from raceway.runtime.interrupts import held
 from raceway.runtime.solution import Solution, read_bytes
 
@@ -67,7 +67,8 @@ def write_results(
     place = Path(os.path.realpath(folder))  # of a link, what it points to: the link itself stays
     missing = [path for path in (place.parent, *place.parent.parents) if not path.exists()]
     place.parent.mkdir(parents=True, exist_ok=True)
-    beside = _may_be_exchanged(place)
+    with turn(place.parent):
+        beside = _may_be_exchanged(place)
     home = place.parent if beside else place
     if not beside and not place.exists():
         missing.insert(0, place)
@@ -81,7 +82,7 @@ def write_results(
         names = sorted(path.name for path in made.iterdir())
         summary[FILES] = {name: _digest(made / name) for name in names}
         (made / SUMMARY).write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        with held():
+        with turn(place.parent), held():
             if not (beside and _exchange(made, place, owned)):
                 made = _move(made, place, owned)
     except BaseException:
