@@ -300,6 +300,15 @@ def test_another_compiler_gives_the_same_numbers(exported: Callable[..., Program
         assert np.max(np.abs(found[:, 1:] - expected[:, 1:]) / scale) < 1e-12, name
 
 
+def test_an_exported_folder_has_the_headers_that_its_program_needs_and_no_other(
+    exported: Callable[..., Program],
+) -> None:
+    folder = exported("four_bar").folder
+    sources = sorted(folder.glob("*.c"))
+    rules = subprocess.run(["cc", "-MM", *map(str, sources)], capture_output=True, text=True, check=True).stdout
+    assert set(re.findall(r"[^\s/]+\.h\b", rules)) == {path.name for path in folder.glob("*.h")}
+
+
 def test_exported_folder_knows_no_machine_and_repeats_byte_for_byte(
     exported: Callable[..., Program], tmp_path: Path
 ) -> None:

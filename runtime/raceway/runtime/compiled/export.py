@@ -1,7 +1,8 @@
 """From a generated folder to a folder of plain C that runs without Python.
 
 In: a generated folder.  Out: the model's kernels, the driver with its methods, the scene's numbers, a main that prints
-a CSV, a Makefile and a README.  `make` needs a C99 compiler and nothing else.
+a CSV, a Makefile and a README.  `make` needs gcc, clang or another compiler of C99
+that knows their vector types, and nothing else.
 
 The program finds the segments of a run in C (``schedule.c``, the counterpart of `integrate/clock.py`) and evaluates
 the derived constants there, so that parameters can be changed on its command line.
@@ -40,6 +41,9 @@ STANDALONE = DRIVER / "standalone"
 _LIBRARY_ONLY = ("-O2", "-fPIC", "-shared")
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
+
+#: Includes for what a program that only simulates does not do.
+_LEFT_OUT = re.compile(r'^#ifdef RACEWAY_(?:SENSITIVITIES|REDUCTIONS)\n(?:#include "[^"]+"\n)+#endif\n', re.MULTILINE)
 
 
 def export_c(folder: str | Path, out: str | Path) -> Path:
@@ -118,7 +122,7 @@ def default_magnitudes(model: Model) -> np.ndarray:
 def _with_includes(source: Path, places: Sequence[Path], known: Iterable[str]) -> dict[str, str]:
     """Text of a source and of all that it includes from `places`; what is in `known` is there already."""
     texts = {source.name: source.read_text(encoding="utf-8")}
-    for name in _INCLUDE.findall(texts[source.name]):
+    for name in _INCLUDE.findall(_LEFT_OUT.sub("", texts[source.name])):
         if name in known or name in texts or (name == SWITCHES and not (places[-1] / SWITCHES).is_file()):
             continue  # a scene without kinks has no file of them, and compiles nothing that includes it
         found = next((place / name for place in places if (place / name).is_file()), None)
@@ -168,7 +172,8 @@ def _readme(manifest: Manifest) -> str:
     example, program = manifest.parameters[0], _program(manifest)
     return f"""# {manifest.title}
 
-A simulation in C99, written by `raceway export`. It needs a C compiler and nothing else.
+A simulation in C99 with the vector types of GCC and Clang, written by `raceway export`. It needs one of these compilers
+(or another that knows their `vector_size`) and nothing else.
 
 ```console
 $ make
