@@ -12,9 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from raceway.derive import read_scene
-from raceway.runtime import RequestError
+from raceway.runtime import RequestError, load, load_trade
+from raceway.runtime.accuracy.stored_trade import FILE_NAME
 from raceway.runtime.cli import app
-from raceway.runtime.commands.trade import FILE_NAME, key_of, models_of, read_error, stored_trade
+from raceway.runtime.commands.trade import key_of, models_of, read_error, stored_trade
 
 ROOT = Path(__file__).resolve().parent.parent
 NAME = "varying_compliance"
@@ -192,3 +193,31 @@ def test_a_damaged_measurement_is_said_and_not_used(place: Path, damage: bytes) 
     assert "is damaged or was edited by hand, and is not used" in " ".join(done.stderr.split())
     assert "no trade of this scene was measured" in json.loads(done.stdout)["accuracy"]["reason"]
     assert (folder / FILE_NAME).read_bytes() == spoilt
+    with pytest.raises(RequestError, match="is damaged or was edited by hand, and is not used"):
+        load_trade("damaged")
+
+
+def test_a_stored_measurement_serves_python_as_it_serves_the_command(place: Path) -> None:
+    trade = load_trade(place / "results" / NAME)
+    arguments = ["run", f"{NAME}.toml", "--error", "1%", "--of", "peak_ball_force", "--no-figures", "--json"]
+    done = CliRunner().invoke(app, [*arguments, "--full-model"])
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)["accuracy"]
+    solution = load("generated/varying_compliance").simulate(
+        error=0.01, of="peak_ball_force", trade=trade, models="full"
+    )
+    assert solution.accuracy is not None
+    assert (solution.accuracy.method, solution.accuracy.rtol) == (told["method"], told["rtol"])
+    assert "trade" in solution.accuracy.reason
+    assert solution.accuracy.reason == told["reason"]
+
+
+def test_a_folder_without_a_measurement_of_this_version_says_what_to_do(place: Path, tmp_path: Path) -> None:
+    with pytest.raises(
+        RequestError, match=r"trade\.json: cannot be read \(No such file or directory\)\. .*raceway trade"
+    ):
+        load_trade(tmp_path)
+    data = json.loads((place / "results" / NAME / FILE_NAME).read_text(encoding="utf-8"))
+    (tmp_path / FILE_NAME).write_text(json.dumps({**data, "schema": 1}), encoding="utf-8")
+    with pytest.raises(RequestError, match=r"another version.*--fresh"):
+        load_trade(tmp_path)

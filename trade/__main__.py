@@ -21,6 +21,7 @@ from raceway.runtime.accuracy.calibration import Calibration, calibrate
 from raceway.runtime.accuracy.candidates import prefer, rungs
 from raceway.runtime.accuracy.ladder import TABLE, table_of
 from raceway.runtime.accuracy.prepared import check_observables
+from raceway.runtime.accuracy.stored_trade import to_plain
 from raceway.runtime.accuracy.trade import (
     FULL,
     TARGETS,
@@ -30,7 +31,7 @@ from raceway.runtime.accuracy.trade import (
     compile_fast_math,
     measure_trade,
 )
-from raceway.runtime.accuracy.trade_report import milliseconds, percent, simplifications, table, to_plain
+from raceway.runtime.accuracy.trade_report import milliseconds, percent, simplifications, table
 from raceway.runtime.commands.shared import Stages, check_folder
 from raceway.runtime.commands.trade import FILE_NAME, MODELS, folders_of, key_of, load_models
 from raceway.runtime.figures.canvas import save

@@ -13,8 +13,8 @@ from raceway.derive.read import scene_from_text
 from raceway.runtime import Model, RequestError, load
 from raceway.runtime.accuracy.error_target import Search, meet_target
 from raceway.runtime.accuracy.prepared import prepare
+from raceway.runtime.accuracy.stored_trade import from_plain, to_plain
 from raceway.runtime.accuracy.trade import FULL, Configuration, Trade, measure_trade
-from raceway.runtime.accuracy.trade_report import from_plain, to_plain
 from raceway.runtime.commands.trade import models_of
 
 FIXED = "the outer ring fixed"

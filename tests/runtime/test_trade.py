@@ -13,6 +13,7 @@ import pytest
 from raceway.runtime import Model, RequestError
 from raceway.runtime.accuracy.error_target import meet_target
 from raceway.runtime.accuracy.prepared import prepare
+from raceway.runtime.accuracy.stored_trade import from_plain, to_plain
 from raceway.runtime.accuracy.trade import (
     FULL,
     Configuration,
@@ -22,7 +23,7 @@ from raceway.runtime.accuracy.trade import (
     measure_trade,
     perturbed,
 )
-from raceway.runtime.accuracy.trade_report import from_plain, percent, to_plain, words
+from raceway.runtime.accuracy.trade_report import percent, words
 from raceway.runtime.figures.canvas import save
 from raceway.runtime.figures.trade import draw_trade
 

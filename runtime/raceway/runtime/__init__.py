@@ -9,6 +9,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from raceway.runtime.accuracy.stored_trade import load_trade
+    from raceway.runtime.accuracy.trade import Trade
     from raceway.runtime.compiled.compile import CacheWarning, NoCompilerWarning
     from raceway.runtime.derivatives.jacobian_function import JacobianFunction
     from raceway.runtime.derivatives.linearize import KinkWarning, Linearization, Mode
@@ -59,13 +61,17 @@ __all__ = [
     "StaticEquilibrium",
     "Statistics",
     "Status",
+    "Trade",
     "load",
     "load_results",
     "load_solution",
+    "load_trade",
     "read_manifest",
 ]
 
 _HOME = {
+    "load_trade": "accuracy.stored_trade",
+    "Trade": "accuracy.trade",
     "CacheWarning": "compiled.compile",
     "NoCompilerWarning": "compiled.compile",
     "EnsembleResult": "ensembles.ensemble",

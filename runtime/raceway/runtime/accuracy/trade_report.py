@@ -5,13 +5,8 @@ In: a `Trade`.  Out: text, a table, plain data.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, replace
-from importlib.metadata import version
-from pathlib import Path
+from dataclasses import asdict
 from typing import Any
 
 from raceway.runtime.accuracy.quasi_static import NAME as QUASI_STATIC
@@ -26,71 +21,11 @@ from raceway.runtime.accuracy.trade import (
     Trade,
 )
 
-#: Layout of trade.json.
-SCHEMA = 3
-
-
-def versions() -> dict[str, str]:
-    """What a measurement depends on besides the scene."""
-    return {name: version(name) for name in ("raceway", "casadi")}
-
-
-def to_plain(trade: Trade, key: Mapping[str, Any], folder: Path | None = None) -> dict[str, Any]:
-    """Plain data for JSON; what is infinite (nothing finished) becomes None.
-
-    Parameters
-    ----------
-    key : says what it was measured of
-    folder : where it is stored; the models kept with it lie below
-    """
-    data = _without_infinities(asdict(replace(trade, folders={})))
-    data["folders"] = {} if folder is None else {n: p.relative_to(folder).as_posix() for n, p in trade.folders.items()}
-    return {
-        "schema": SCHEMA,
-        "key": dict(key),
-        "digest": digest_of(key, data),
-        "trade": data,
-        "front": {
-            name: [_row(trade, one, quantity) for one in trade.front(quantity)] for name, quantity in _columns(trade)
-        },
-        "words": words(trade),
-    }
-
-
-def digest_of(key: Mapping[str, Any], data: Mapping[str, Any]) -> str:
-    """What tells a measurement that was damaged or edited."""
-    text = json.dumps([SCHEMA, key, data], sort_keys=True, allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def from_plain(data: Mapping[str, Any], folder: Path | None = None) -> Trade:
-    """The trade of plain data; without the models kept with it where the folder it was stored in is not known."""
-    fields = dict(data["trade"])
-    kept = fields.pop("folders")
-    fields["folders"] = {} if folder is None else {name: folder / place for name, place in kept.items()}
-    measured = []
-    for entry in fields.pop("measured"):
-        errors = {
-            name: {q: math.inf if e is None else float(e) for q, e in entry[name].items()}
-            for name in ("median", "promised")
-        }
-        measured.append(
-            Measured(
-                configuration=Configuration(**entry["configuration"]),
-                time=math.inf if entry["time"] is None else float(entry["time"]),
-                median=errors["median"],
-                promised=errors["promised"],
-                failures=int(entry["failures"]),
-            )
-        )
-    fields["quantities"] = tuple(fields["quantities"])
-    return Trade(measured=tuple(measured), **fields)
-
 
 def words(trade: Trade) -> list[str]:
     """The front in words: what each target costs for each quantity, and what simplifications cost and save."""
     said = []
-    for name, quantity in _columns(trade):
+    for name, quantity in columns(trade):
         for target in TARGETS:
             one = trade.cheapest(target, quantity)
             if one is None:
@@ -101,7 +36,7 @@ def words(trade: Trade) -> list[str]:
                 )
                 continue
             said.append(f"{percent(target)} on {name}: {milliseconds(one.time)} a cycle ({one.configuration.words}).")
-    known = ", ".join(f"{name} {percent(trade.uncertainty[q])}" for name, q in _columns(trade) if q is not None)
+    known = ", ".join(f"{name} {percent(trade.uncertainty[q])}" for name, q in columns(trade) if q is not None)
     said.append(f"The reference, two methods that agree, is known to: {known}. Nothing below is claimed.")
     return said + simplifications(trade)
 
@@ -181,20 +116,10 @@ def milliseconds(seconds: float) -> str:
     return f"{1e3 * seconds:.2g} ms" if seconds < 0.1 else f"{1e3 * seconds:.0f} ms"
 
 
-def _columns(trade: Trade) -> list[tuple[str, str | None]]:
+def columns(trade: Trade) -> list[tuple[str, str | None]]:
     both: list[tuple[str, str | None]] = [(name, name) for name in trade.quantities]
     return [*both, ("all of them", None)] if len(both) > 1 else both
 
 
-def _row(trade: Trade, one: Measured, quantity: str | None) -> dict[str, Any]:
+def row(trade: Trade, one: Measured, quantity: str | None) -> dict[str, Any]:
     return {"error": trade.error(one, quantity), "time": one.time, **asdict(one.configuration)}
-
-
-def _without_infinities(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {k: _without_infinities(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_infinities(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

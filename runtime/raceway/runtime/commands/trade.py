@@ -11,7 +11,7 @@ import math
 import os
 import platform
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -39,9 +39,6 @@ if TYPE_CHECKING:
 
 #: Harmonics of the load that simpler models keep.
 HARMONICS = (4, 16)
-
-#: Name of the file with the measurement, in the folder of the results.
-FILE_NAME = "trade.json"
 
 #: Name of the folder with the models, beside it.
 MODELS = "models"
@@ -71,7 +68,8 @@ def trade(
 
     A measurement is stored beside the results and used again until the scene, the versions or the request change.
     """
-    from raceway.runtime.accuracy.trade_report import to_plain, words
+    from raceway.runtime.accuracy.stored_trade import FILE_NAME, to_plain
+    from raceway.runtime.accuracy.trade_report import words
 
     with reported(), warnings_shown(), Stages() as stages, faults_of(scene):
         stages("read")
@@ -152,7 +150,7 @@ def load_models(scene: Scene, folder: Path, stages: Stages) -> dict[str, Model]:
 def key_of(scene: Scene, of: Sequence[str] | None, members: int) -> dict[str, Any]:
     """What a measurement is valid for: structure, numbers, run, deriving sources, versions, request."""
     from raceway.derive.emit import signature
-    from raceway.runtime.accuracy.trade_report import versions
+    from raceway.runtime.accuracy.stored_trade import versions
     from raceway.runtime.compiled.compilers import find_compiler
 
     compiler = find_compiler()
@@ -171,39 +169,31 @@ def key_of(scene: Scene, of: Sequence[str] | None, members: int) -> dict[str, An
 
 def stored_trade(folder: Path, key: dict[str, Any]) -> Trade | None:
     """A measurement that is still valid, or None."""
-    from raceway.runtime.accuracy.trade_report import SCHEMA, from_plain
+    from raceway.runtime.accuracy.stored_trade import from_plain
 
     data = _read(folder)
-    return from_plain(data, folder) if data.get("schema") == SCHEMA and data.get("key") == key else None
+    return from_plain(data, folder) if data is not None and data["key"] == key else None
 
 
-def _read(folder: Path) -> dict[str, Any]:
-    """What the folder's measurement holds; nothing where there is none, or it is damaged, which is said."""
-    from raceway.runtime.accuracy.trade_report import SCHEMA, digest_of
+def _read(folder: Path) -> Mapping[str, Any] | None:
+    """What the folder's measurement holds; None where this version wrote none, or it is damaged, which is said."""
+    from raceway.runtime.accuracy.stored_trade import FILE_NAME, read_stored
 
-    path = folder / FILE_NAME
     try:
-        data = json.loads(path.read_bytes())
+        return read_stored(folder / FILE_NAME)
     except FileNotFoundError:
-        return {}
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError):
-        data = None
-    if isinstance(data, dict) and isinstance(data.get("schema"), int) and data["schema"] != SCHEMA:
-        return {}  # of another version: whole, but of no use
-    key, measured = (data.get("key"), data.get("trade")) if isinstance(data, dict) else (None, None)
-    whole = isinstance(key, dict) and isinstance(measured, dict) and data.get("digest") == digest_of(key, measured)
-    if not whole:
-        warn(f"{path} is damaged or was edited by hand, and is not used. Measure again: raceway trade SCENE --fresh.")
-        return {}
-    return dict(data)
+        return None
+    except RequestError as fault:
+        warn(str(fault))
+        return None
 
 
 def usable_trade(folder: Path, scene: Scene) -> Trade | None:
     """A measurement in the folder whose ranking still holds for the scene, of whatever quantities; or None."""
-    from raceway.runtime.accuracy.trade_report import SCHEMA, from_plain
+    from raceway.runtime.accuracy.stored_trade import from_plain
 
     data = _read(folder)
-    if scene.bearing is None or data.get("schema") != SCHEMA or not isinstance(data.get("key"), dict):
+    if scene.bearing is None or data is None:
         return None
     given = data["key"]
     same = given == key_of(scene, given.get("of"), given.get("members", 0))
