@@ -74,7 +74,7 @@ def one_step(case: Case, model: Model, rounds: int) -> dict[str, Any]:
         add(
             name,
             outcome.steps + outcome.rejected,
-            lambda _, family=family: stepper_run(member, TOLERANCE, family, outputs=False),
+            _by_stepper(member, family),
             kind="step",
             evaluations=outcome.evaluations,
         )
@@ -83,7 +83,7 @@ def one_step(case: Case, model: Model, rounds: int) -> dict[str, Any]:
         add(
             f"by hand in C, {method}",
             counts.steps + counts.rejected,
-            lambda _, method=method: hand_run(member, TOLERANCE, method, outputs=False),
+            _by_hand(member, method),
             kind="step",
             evaluations=counts.evaluations,
         )
@@ -93,6 +93,14 @@ def one_step(case: Case, model: Model, rounds: int) -> dict[str, Any]:
         if row["kind"] == "step":
             row["seconds_an_evaluation"] = spread([t / row["evaluations"] for t in entry.times])
     return {"case": case.key, "tolerance": TOLERANCE, "rows": rows}
+
+
+def _by_stepper(member: Member, family: Family) -> Callable[[int], object]:
+    return lambda _: stepper_run(member, TOLERANCE, family, outputs=False)
+
+
+def _by_hand(member: Member, method: str) -> Callable[[int], object]:
+    return lambda _: hand_run(member, TOLERANCE, method, outputs=False)
 
 
 def _numba_sweep() -> Callable[..., float]:
@@ -107,7 +115,8 @@ def _numba_sweep() -> Callable[..., float]:
             total += dx[4]
         return total
 
-    return sweep
+    found: Callable[..., float] = sweep
+    return found
 
 
 def balls(rounds: int, counts: tuple[int, ...] = BALLS) -> dict[str, Any]:
@@ -135,9 +144,7 @@ def balls(rounds: int, counts: tuple[int, ...] = BALLS) -> dict[str, Any]:
             rows.append(row)
             entries.append(
                 (
-                    Entry(
-                        call=lambda _, m=member, f=family: stepper_run(m, TOLERANCE, f, outputs=False),
-                    ),
+                    Entry(call=_by_stepper(member, family)),
                     row,
                 )
             )

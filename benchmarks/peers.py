@@ -95,12 +95,14 @@ def _scipy(method: str, how: str) -> Contender:
             scaled = numba_scaled_rate()
 
             def right_side(t: float, z: np.ndarray, gate: float) -> np.ndarray:
-                return scaled(t, z, n, gate, scale)
+                rates: np.ndarray = scaled(t, z, n, gate, scale)
+                return rates
         else:
             rate = _numpy_rates[n.tangent == 1.0]
 
             def right_side(t: float, z: np.ndarray, gate: float) -> np.ndarray:
-                return rate(n, gate, t, z * scale) / scale
+                rates: np.ndarray = rate(n, gate, t, z * scale) / scale
+                return rates
 
         state = member.start / scale
         rows = []
@@ -113,7 +115,7 @@ def _scipy(method: str, how: str) -> Contender:
                 return np.full((len(member.times), 8), np.nan)
             rows.append(done.y.T[: len(inside)])
             state = done.y[:, -1]
-        return np.concatenate(rows) * scale
+        return np.asarray(np.concatenate(rows) * scale)
 
     words = "numba" if how == "numba" else "NumPy"
     return Contender(
@@ -231,7 +233,7 @@ def _sundae(member: Member, tolerance: float) -> np.ndarray:
             return np.full((len(member.times), 8), np.nan)
         rows.append(found.y[1 : len(inside) + 1])
         state = np.array(found.y[-1])
-    return np.concatenate(rows) * scale
+    return np.asarray(np.concatenate(rows) * scale)
 
 
 @cache

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -183,11 +184,15 @@ def test_parts_of_different_states_are_told() -> None:
         assert next(line for line in mixed.splitlines() if f"`{part}`" in line).split(" | ")[3] == differs
 
 
+def _visit(visits: list[str], name: str, _: int) -> None:
+    visits.append(name)
+
+
 def test_what_others_are_divided_by_is_visited_more_often_and_evenly() -> None:
     visits: list[str] = []
     names = [f"peer {k}" for k in range(9)]
     entries = [Entry(call=lambda _: visits.append("stepper"), turns=3)]
-    entries += [Entry(call=lambda _, name=name: visits.append(name)) for name in names]
+    entries += [Entry(call=partial(_visit, visits, name)) for name in names]
     interleave(entries, rounds=2)
     calls = [name for name, before in zip(visits, ["", *visits], strict=False) if name != before]
     assert sorted(calls) == sorted(2 * [*3 * ["stepper"], *names])

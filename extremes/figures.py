@@ -120,7 +120,7 @@ def energy() -> Figure:
             "shaft.speed": 0.0, "bearing.inner_ring.damping": 0.0, "bearing.inner_ring.mass": mass,
             "bearing.clearance": clearance,
         }  # fmt: skip
-        run = {"parameters": numbers, "initial": np.array([20e-6, 6e-6, 0.0, 0.0]), "transient": 0}
+        run: dict[str, Any] = {"parameters": numbers, "initial": np.array([20e-6, 6e-6, 0.0, 0.0]), "transient": 0}
         solution = model.simulate(duration=2.0, rtol=rtol, method=method, samples_per_cycle=400, **run)
         x = solution.x
         pressed = np.maximum(

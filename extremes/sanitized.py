@@ -23,7 +23,7 @@ from collections import Counter
 from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from extremes.case import Case, Finding, run_case, select
@@ -238,13 +238,13 @@ def cases() -> list[Case]:
     """The tour under sanitizers, and what shows that they see."""
     found = [
         Case(group=GROUP, name=f"planted fault in {plant[0]}", method=METHOD, against="a report that names it",
-             run=lambda plant=plant: planted(*plant))
+             run=partial(planted, *plant))
         for plant in PLANTS
     ]  # fmt: skip
     sections = ("Physics", "Invariants", "Methods", "Other drivers", "Conditioning")
     found += [
         Case(group=GROUP, name=f"section {group} {BESIDE}", method=METHOD, against="no report",
-             run=lambda group=group: section(group))
+             run=partial(section, group))
         for group in sections
     ]  # fmt: skip
     return found

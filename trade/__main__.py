@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from raceway.runtime.accuracy.calibration import Calibration, calibrate
 from raceway.runtime.accuracy.candidates import prefer, rungs
 from raceway.runtime.accuracy.ladder import TABLE, table_of
 from raceway.runtime.accuracy.prepared import check_observables
-from raceway.runtime.accuracy.stored_trade import to_plain
+from raceway.runtime.accuracy.stored_trade import FILE_NAME, to_plain
 from raceway.runtime.accuracy.trade import (
     FULL,
     TARGETS,
@@ -33,7 +34,7 @@ from raceway.runtime.accuracy.trade import (
 )
 from raceway.runtime.accuracy.trade_report import milliseconds, percent, simplifications, table
 from raceway.runtime.commands.shared import Stages, check_folder
-from raceway.runtime.commands.trade import FILE_NAME, MODELS, folders_of, key_of, load_models
+from raceway.runtime.commands.trade import MODELS, folders_of, key_of, load_models
 from raceway.runtime.figures.canvas import save
 from raceway.runtime.figures.trade import draw_trade
 
@@ -200,7 +201,7 @@ def _counted(results: list[Result], *, measured: bool) -> str:
     return _markdown(head, rows)
 
 
-def _markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+def _markdown(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
 
