@@ -73,6 +73,11 @@ def test_a_trade_of_other_numbers_is_kept_for_these_numbers_alone(place: Path) -
     run = CliRunner().invoke(app, [*arguments, "--out", "lighter"])
     assert run.exit_code == 0, run.output
     assert "no trade of this scene was measured" in json.loads(run.stdout)["accuracy"]["reason"]
+    run = CliRunner().invoke(app, [*arguments, "--out", "lighter", *setting])
+    assert run.exit_code == 0, run.output
+    reason = json.loads(run.stdout)["accuracy"]["reason"]
+    assert "the scene's trade allows" in reason
+    assert "other numbers" not in reason
 
 
 def test_a_measurement_is_used_again_until_the_scene_changes(place: Path) -> None:

@@ -64,7 +64,7 @@ def test_with_a_trade_the_estimate_costs_half_of_the_run_and_is_as_near(make_mod
 def test_errors_measured_with_other_numbers_are_not_taken_for_this_run(make_model: Callable[..., Model]) -> None:
     model = make_model("four_bar")
     run = prepare(model)
-    trade = replace(a_trade(), cycles=run.cycles, spread=0.005)
+    trade = replace(a_trade(), cycles=run.cycles, spread=0.005, numbers=dict(model.parameters))
     assert like_those_measured(run, trade)
     assert like_those_measured(
         prepare(model, {"bearing.clearance": 1.004 * model.parameters["bearing.clearance"]}), trade
@@ -221,6 +221,7 @@ def a_trade(*ways: Measured) -> Trade:
         members=2,
         spread=0.0,
         cycles=4.0,
+        numbers={},
         measured=ways,
     )
 

@@ -11,7 +11,7 @@ import pytest
 from raceway.derive import generate
 from raceway.derive.read import scene_from_text
 from raceway.runtime import Model, RequestError, load
-from raceway.runtime.accuracy.error_target import Search, meet_target
+from raceway.runtime.accuracy.error_target import Search, like_those_measured, meet_target
 from raceway.runtime.accuracy.prepared import prepare
 from raceway.runtime.accuracy.stored_trade import from_plain, to_plain
 from raceway.runtime.accuracy.trade import FULL, Configuration, Trade, measure_trade
@@ -114,10 +114,22 @@ def test_the_full_model_is_taken_where_it_is_asked_for_or_alone_has_an_output(st
 def test_a_simpler_model_that_is_wrong_for_this_very_run_is_found_out(stiff: Variants, soft: Variants) -> None:
     """The ranking of a stiff housing misleads in a soft one; a part of the full model, run beside, tells."""
     search = Search(run=prepare(soft.models[FULL]), simpler={FIXED: prepare(soft.models[FIXED])}.__getitem__)
-    found = meet_target(search.run, 0.01, [PEAK], stiff.trade, models=(FULL, FIXED), search=search)
+    misleading = replace(stiff.trade, numbers=dict(soft.models[FULL].parameters))
+    found = meet_target(search.run, 0.01, [PEAK], misleading, models=(FULL, FIXED), search=search)
     assert found.model == FULL
     assert [model for model, _, _, estimate in found.tried if estimate > 0.02] == [FIXED]
     assert found.companion_time > found.time  # what was tried in vain is counted
+
+
+def test_it_is_the_numbers_of_the_measurement_that_count_not_those_of_the_scene(
+    stiff: Variants, soft: Variants
+) -> None:
+    """Numbers given with --set are no defaults of the model; and a scene may have changed since it was measured."""
+    run = prepare(soft.models[FULL])
+    assert not like_those_measured(run, stiff.trade)
+    asked = prepare(soft.models[FULL], dict(stiff.models[FULL].parameters))
+    assert like_those_measured(asked, stiff.trade)
+    assert not like_those_measured(asked, replace(stiff.trade, numbers={}))  # of a scene without these parameters
 
 
 def test_a_simpler_model_is_taken_for_runs_like_those_measured_and_for_no_others(stiff: Variants) -> None:

@@ -144,7 +144,7 @@ def run(
         check_folder(folder)
         with faults_of(scene):
             model = load_model(read, stages, method or read.run.method, kinks, rtol)
-        measured = usable_trade(folder, read) if target is not None else None
+        measured = usable_trade(folder, asked, read) if target is not None else None
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,

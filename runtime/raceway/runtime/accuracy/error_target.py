@@ -248,12 +248,13 @@ def meet_target(
 
 
 def like_those_measured(run: Prepared, trade: Trade) -> bool:
-    """Whether a run is one of those that a trade was measured on: numbers near the scene's, its start and length."""
+    """Whether a run is one of those that a trade was measured on: numbers near the trade's, the start and length."""
     model = run.model
     asked = model.manifest.run.transient_cycles * run.turn if math.isfinite(run.turn) else 0.0
     return (
-        all(
-            abs(value - model.parameters[name]) <= 2.0 * trade.spread * abs(model.parameters[name])
+        run.numbers.parameters.keys() == trade.numbers.keys()
+        and all(
+            abs(value - trade.numbers[name]) <= 2.0 * trade.spread * abs(trade.numbers[name])
             for name, value in run.numbers.parameters.items()
         )
         and math.isclose(run.cycles, trade.cycles, rel_tol=2.0 * trade.spread)

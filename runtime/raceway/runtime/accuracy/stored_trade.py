@@ -22,7 +22,7 @@ from raceway.runtime.errors import RequestError
 FILE_NAME = "trade.json"
 
 #: Layout of trade.json.
-SCHEMA = 3
+SCHEMA = 4
 
 
 def versions() -> dict[str, str]:

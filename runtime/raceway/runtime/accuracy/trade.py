@@ -106,6 +106,7 @@ class Trade:
     members : parameter sets
     spread : half the width of the interval they are drawn from [1]
     cycles : turns of a run
+    numbers : parameters that the members lie around, in SI
     measured : all configurations
     folders : generated folders of the models it was measured with, by name, where they were kept
     """
@@ -118,6 +119,7 @@ class Trade:
     members: int
     spread: float
     cycles: float
+    numbers: Mapping[str, float]
     measured: tuple[Measured, ...]
     folders: Mapping[str, Path] = field(default_factory=dict, compare=False)
 
@@ -365,6 +367,7 @@ def measure_trade(
         members=members,
         spread=spread,
         cycles=turns,
+        numbers=dict(full.parameters),
         measured=measured,
     )
 

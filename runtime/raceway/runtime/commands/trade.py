@@ -188,16 +188,16 @@ def _read(folder: Path) -> Mapping[str, Any] | None:
         return None
 
 
-def usable_trade(folder: Path, scene: Scene) -> Trade | None:
-    """A measurement in the folder whose ranking still holds for the scene, of whatever quantities; or None."""
+def usable_trade(folder: Path, *scenes: Scene) -> Trade | None:
+    """A measurement in the folder that was made of one of these scenes, of whatever quantities; or None."""
     from raceway.runtime.accuracy.stored_trade import from_plain
 
     data = _read(folder)
-    if scene.bearing is None or data is None:
+    if data is None:
         return None
     given = data["key"]
-    same = given == key_of(scene, given.get("of"), given.get("members", 0))
-    return from_plain(data, folder) if same else None
+    known = (key_of(scene, given.get("of"), given.get("members", 0)) for scene in scenes if scene.bearing is not None)
+    return from_plain(data, folder) if given in known else None
 
 
 def read_error(text: str | None, of: list[str] | None, method: str | None, rtol: float | None) -> float | None:
