@@ -7,9 +7,11 @@ import signal
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from raceway.derive import generate
 from raceway.derive.read import scene_from_text
@@ -17,9 +19,30 @@ from raceway.runtime import Model, load
 
 ROOT = Path(__file__).resolve().parent.parent
 
+# The same examples on every run and on every machine, however slow it is; RACEWAY_LONG=1 draws others each time.
+settings.register_profile(
+    "repeatable",
+    derandomize=not os.environ.get("RACEWAY_LONG"),
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("repeatable")
+
+#: What `make` tells the makes it starts: of its own threads, which exported programs then warn about.
+MAKE = ("MAKEFLAGS", "MFLAGS", "GNUMAKEFLAGS", "MAKELEVEL", "MAKEOVERRIDES")
+
 
 @pytest.fixture(scope="session", autouse=True)
-def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+def _no_make_above() -> Iterator[None]:
+    """Programs are built here as a user builds them, also where ``make -j2 test`` runs the tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in MAKE:
+            patch.delenv(name, raising=False)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Compiled models of the suite stay out of the user's cache folder; the processes of one run share theirs."""
     place = tmp_path_factory.getbasetemp()
     cache = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "compiled"
@@ -27,6 +50,12 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RACEWAY_CACHE_DIR", str(cache))
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _fonts_known() -> None:
+    """matplotlib looks for fonts once in an account, and says so on stderr where that takes long: not within a test."""
+    import_module("matplotlib.font_manager")
 
 
 @pytest.fixture(scope="session", autouse=True)

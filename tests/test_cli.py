@@ -85,7 +85,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         def start(name: str) -> subprocess.CompletedProcess[str]:
             figures = "--figures" if name == "punching_press" else "--no-figures"
             words = command("run", SCENES / f"{name}.toml", "--json", figures)
-            return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+            return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
 
         with ThreadPoolExecutor(2) as pool:
             runs = dict(zip(NAMES, pool.map(start, NAMES), strict=True))
@@ -288,7 +288,7 @@ def test_empty_and_missing_files_are_refused_by_the_process(site: Site, tmp_path
     empty.touch()
     for path, words in ((empty, "the file is empty"), (tmp_path / "missing.toml", "No such file")):
         run = subprocess.run(
-            command("run", path, "--json"), cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+            command("run", path, "--json"), cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
         )
         assert run.returncode == 2
         assert run.stdout == ""
@@ -435,9 +435,9 @@ def test_interrupted_run_leaves_no_results_and_says_so(
     words = ("--method", method, "--cycles", length[0], "--rtol", length[1])
     with started(site, tmp_path / "results", *words) as process:
         with pytest.raises(subprocess.TimeoutExpired):
-            process.wait(0.5)  # it is on the way
+            process.wait(0.3)  # it is on the way
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)  # the stepper hears it between its calls
+        out, err = process.communicate(timeout=300)  # the stepper hears it between its calls
     assert process.returncode == 130
     assert "interrupted" in err
     assert "Traceback" not in err

@@ -16,18 +16,26 @@ ROOT = Path(__file__).resolve().parents[2]
 SCENES = ROOT / "scenes"
 
 
-@pytest.fixture(scope="session", autouse=True)
-def quick_compiler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A compiler that does not optimize: what is tested here is not speed."""
+@pytest.fixture(scope="session")
+def _quick_script(tmp_path_factory: pytest.TempPathFactory) -> Path:
     real = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     if real is None:
         pytest.skip("needs a C compiler: the tests are about what happens to it and to what it writes")
     script = tmp_path_factory.mktemp("compiler") / "cc"
     script.write_text(f'#!/bin/sh\nexec {real} "$@" -O0\n', encoding="utf-8")
     script.chmod(0o755)
+    return script
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick_compiler(_quick_script: Path) -> Iterator[Path]:
+    """A compiler that does not optimize: what is tested here is not speed.
+
+    Of these files alone: what the same process tests behind them is compiled as users compile it.
+    """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("CC", str(script))
-        yield script
+        patch.setenv("CC", str(_quick_script))
+        yield _quick_script
 
 
 @pytest.fixture(scope="session")

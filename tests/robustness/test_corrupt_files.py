@@ -160,7 +160,7 @@ def test_functions_cut_short_are_an_error_and_no_crash(rotor: Path) -> None:
         "except ArtefactError as fault: print(fault); sys.exit(2)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, str(rotor)], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", code, str(rotor)], capture_output=True, text=True, timeout=300, check=False
     )
     assert done.returncode == 2, done.stderr
     assert "model.casadi: no functions can be read from it. Write the folder again" in done.stdout
@@ -289,7 +289,7 @@ def test_a_damaged_library_never_ends_a_process(cache: Path, rotor: Path, tmp_pa
         "print(load(sys.argv[1]).simulate(cycles=0.2).x[-1].tobytes().hex())"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, str(rotor)], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", code, str(rotor)], capture_output=True, text=True, timeout=300, check=False
     )
     assert done.returncode == 0, done.stderr
     assert "is damaged" in done.stderr
@@ -305,7 +305,7 @@ def test_a_cache_emptied_while_it_is_used_is_no_trouble(cache: Path, rotor: Path
         "load(sys.argv[1]).simulate(cycles=0.2)"
     )
     command = [sys.executable, "-W", "error", "-c", code, str(rotor), str(cache)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     assert bytes.fromhex(done.stdout.strip()) == expected.tobytes()
 

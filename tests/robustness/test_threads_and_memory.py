@@ -137,7 +137,7 @@ def test_a_process_with_models_at_work_in_threads_ends_well(press: Path) -> None
     """
     for _ in range(20 if LONG else 3):
         command = [sys.executable, "-X", "faulthandler", "-c", textwrap.dedent(code), str(press)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
         assert done.returncode == 0, done.stderr
         assert done.stdout == "done\n"
         assert "Segmentation" not in done.stderr

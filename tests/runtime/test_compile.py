@@ -212,7 +212,7 @@ def test_two_processes_loading_at_once_both_get_a_whole_library(cache: Path, tmp
         subprocess.Popen([sys.executable, "-W", "error", "-c", code, str(folder)], stdout=subprocess.PIPE, text=True)
         for _ in range(2)
     ]
-    answers = [process.communicate(timeout=60)[0] for process in running]
+    answers = [process.communicate(timeout=300)[0] for process in running]
     assert [process.returncode for process in running] == [0, 0]
     assert answers[0] == answers[1] != ""
     names = [path.name for path in cache.iterdir()]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from time import monotonic, sleep
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from press_laws import press
 
 from raceway.runtime import Model, RequestError, SimulationError
 from raceway.runtime.ensembles.ensemble import EnsembleResult
-from raceway.runtime.ensembles.ensemble_driver import MemberNumbers
+from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver, MemberNumbers
 from raceway.runtime.ensembles.member_segments import inputs_of, moments, stretches
 from raceway.runtime.ensembles.members import Members, Span, edge_windows, make_members
 from raceway.runtime.integrate import clock
@@ -196,14 +198,26 @@ def test_an_absurd_member_ends_soon_and_as_a_single_run_does(
     assert np.isfinite(result["end:inner.y"][[0, 2]]).all()
 
 
-def test_an_interrupt_keeps_the_members_finished_by_then(make_model: ModelMaker) -> None:
+def test_an_interrupt_keeps_the_members_finished_by_then(
+    make_model: ModelMaker, monkeypatch: pytest.MonkeyPatch
+) -> None:
     model, columns = press(make_model), table(400)
     whole = model.simulate_many(columns, ["max:ball.force"], cycles=1, transient=0)
+    calls, run = [], EnsembleDriver.run
+
+    def waiting(*given: Any, **more: Any) -> np.ndarray:
+        """The third chunk waits to be stopped, so that two are finished by then on any machine."""
+        calls.append(1)
+        patience = monotonic() + 120.0
+        while len(calls) == 3 and not given[6].value and monotonic() < patience:
+            sleep(0.001)
+        return run(*given, **more)
 
     def interrupt(fraction: float) -> None:
         if fraction > 0.1:
             raise KeyboardInterrupt
 
+    monkeypatch.setattr(EnsembleDriver, "run", waiting)
     part = model.simulate_many(columns, ["max:ball.force"], cycles=1, transient=0, threads=1, progress=interrupt)
     assert part.interrupted
     lost = [failure.member for failure in part.failures]

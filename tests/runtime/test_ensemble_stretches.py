@@ -203,14 +203,18 @@ def test_progress_is_told_within_chunks(
     monkeypatch.setattr(chunks, "PATIENCE", 0.01)
     monkeypatch.setattr(chunks, "CHUNKS", 1)
     monkeypatch.setattr(chunks, "CHUNK", 1000)
-    told: list[float] = []
     columns = {"bearing.clearance": np.linspace(5e-6, 2e-5, members)}
-    model.simulate_many(
-        columns, ["end:inner.y"], cycles=cycles, transient=0, rtol=1e-4, lanes=lanes, progress=told.append
-    )
-    assert told == sorted(told)
-    assert told[-1] == 1.0
-    assert len({fraction for fraction in told if 0.0 < fraction < 1.0}) >= 4
+    for longer in (1, 4, 16, 64):  # runs that last, on a fast machine and on one that does something else as well
+        told: list[float] = []
+        model.simulate_many(
+            columns, ["end:inner.y"], cycles=longer * cycles, transient=0, rtol=1e-4, lanes=lanes, progress=told.append
+        )
+        assert told == sorted(told)
+        assert told[-1] == 1.0
+        if len({fraction for fraction in told if 0.0 < fraction < 1.0}) >= 4:
+            break
+    else:
+        pytest.fail(f"progress was told {len(told)} times in a run of {64 * cycles} turns")
     # twice a second and more, as it is
     assert PATIENCE <= 0.5
 
@@ -220,7 +224,7 @@ def test_members_interrupted_between_stretches_have_no_results(make_model: Model
     model = press(make_model)
 
     def interrupt(fraction: float) -> None:
-        if fraction > 0.0:
+        if fraction > 1e-6:  # ten turns each in lanes, where all go on together
             raise KeyboardInterrupt
 
     columns = {"bearing.clearance": np.linspace(5e-6, 2e-5, 8)}
@@ -269,15 +273,19 @@ def test_runs_of_ten_million_turns_need_little_memory_and_hear_an_interrupt(make
         asked = {"bearing.clearance": [k * 1e-6 for k in range(4, 12)]}, ["max:ball.force"]
         model.simulate_many(*asked, cycles=3, transient=0)
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        sent = []
+        sent, timers = [], []
 
         def interrupt():
-            sent.append(time.perf_counter())
+            sent.append(time.process_time())  # of this process: others may keep it from its processor
             os.kill(os.getpid(), signal.SIGINT)
 
-        threading.Timer(1.0, interrupt).start()
-        found = model.simulate_many(*asked, cycles=1e7, transient=0)
-        heard = time.perf_counter() - sent[0]
+        def begun(fraction):
+            if fraction > 1e-6 and not timers:
+                timers.append(threading.Timer(0.3, interrupt))
+                timers[0].start()
+
+        found = model.simulate_many(*asked, cycles=1e7, transient=0, progress=begun)
+        heard = time.process_time() - sent[0]
         grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
         print(json.dumps([found.interrupted, [failure.time for failure in found.failures], heard, grown]))
     """
@@ -285,7 +293,7 @@ def test_runs_of_ten_million_turns_need_little_memory_and_hear_an_interrupt(make
         [sys.executable, "-c", textwrap.dedent(code), str(folder)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -33,6 +33,7 @@ PEAK = "peak_ball_force"
 PEAK_ALONE = [("max", "ball.force")]
 
 
+@pytest.mark.usefixtures("counted_work")
 @pytest.mark.parametrize("scene", ["punching_press", "four_bar"])
 def test_true_errors_are_within_the_target_and_near_an_estimate_that_is_cheap(
     make_model: Callable[..., Model], scene: str
@@ -49,6 +50,7 @@ def test_true_errors_are_within_the_target_and_near_an_estimate_that_is_cheap(
     assert np.median([row.share for row in rows]) < 1.0
 
 
+@pytest.mark.usefixtures("counted_work")
 def test_with_a_trade_the_estimate_costs_half_of_the_run_and_is_as_near(make_model: Callable[..., Model]) -> None:
     model = make_model("four_bar")
     ways = [way for way in full_configurations(model) if way.method.startswith("stepper") and way.rtol > 1e-7]

@@ -47,7 +47,7 @@ class Program:
 
     def __call__(self, *arguments: str, binary: Path | None = None) -> subprocess.CompletedProcess[str]:
         command = [str(binary or self.folder / self.name), *arguments]
-        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+        return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
 
     def table(self, *arguments: str, binary: Path | None = None) -> np.ndarray:
         done = self(*arguments, binary=binary)

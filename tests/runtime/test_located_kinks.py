@@ -174,6 +174,16 @@ def test_a_step_behind_an_onset_has_its_order_in_the_root_of_time(
     assert last[0] < 1e-3 * last[1]
 
 
+def test_a_step_that_looks_for_the_end_of_a_contact_stays_within_its_run(hertz: Model) -> None:
+    """The run ends half a nanosecond before its ball leaves, and its last step aims a little short of that."""
+    start, overrides = np.array([0.5 * CLEARANCE + 22.73e-6, 0.0, -0.0697, 0.0]), {"bearing.clearance": CLEARANCE}
+    release = time_of_kink(hertz, start, 0.01, Family.DP54, overrides)
+    for before in np.geomspace(2.5e-6, 3.3e-6, 50):
+        end = release * (1.0 - before)
+        outcome, _ = call(hertz, hertz.locating_stepper, start, end, tolerance=1e-4, overrides=overrides)
+        assert (outcome.time, outcome.kinks) == (end, 0)
+
+
 @pytest.mark.parametrize("law", ["hertz", "tangent"])
 def test_contacts_cost_a_few_steps_and_not_a_cascade(request: pytest.FixtureRequest, law: str) -> None:
     """A ring bounces on turning balls.  At a tight tolerance steps of its own clock enter and leave each contact.

@@ -263,8 +263,8 @@ static void remember_touch(rw_run *run, double h, double factor)
 /* The coming times are those of another segment. */
 static void forget_release(rw_run *run) { run->release = (rw_release){NAN, 0, 0}; }
 
-/* Whether a step is to end where a contact is foreseen to; `h` is the way there then. */
-static int aim(rw_run *run, double t, double left, double resolution, double *h)
+/* Whether a step is to end where a contact is foreseen to, no farther than `longest`; `h` is the way there then. */
+static int aim(rw_run *run, double t, double longest, double resolution, double *h)
 {
     const double ahead = run->release.time - t;
     if (!(ahead > 0.0)) return 0;
@@ -272,18 +272,18 @@ static int aim(rw_run *run, double t, double left, double resolution, double *h)
         run->release.time = NAN;
         return 0;
     }
-    if (!(ahead <= *h * 1.0001 && ahead <= left)) return 0;
+    if (!(ahead <= *h * 1.0001 && ahead <= longest)) return 0;
     *h = ahead;
     return 1;
 }
 #else
-#define locate(run, start, t, h, error, resolution, aimed, longest) ((void)(aimed), (void)(longest), NO_KINK)
+#define locate(run, start, t, h, error, resolution, aimed, longest) ((void)(aimed), NO_KINK)
 #define turn_sides(run, time, step) ((void)(time), (void)(step))
 #define sides_start(run, t) ((void)0)
 #define sides_move_on(run) ((void)0)
 #define remember_touch(run, h, factor) ((void)0)
 #define forget_release(run) ((void)0)
-#define aim(run, t, left, resolution, h) 0
+#define aim(run, t, longest, resolution, h) ((void)(longest), 0)
 #define set_pace(run, start, t, h) ((void)0)
 #define stretched(run, start, t, h, factor, next) ((h) * (factor))
 #define foresee(run, t, h, next) ((void)0)

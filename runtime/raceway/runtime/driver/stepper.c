@@ -78,7 +78,8 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
         } else if (2.0 * h > left) {
             h = 0.5 * left; /* two even steps rather than a full and a tiny one */
         }
-        const int aimed = aim(run, t, left, resolution, &h);
+        const double longest = left < options->largest_step ? left : options->largest_step;
+        const int aimed = aim(run, t, longest, resolution, &h);
         if (aimed) last = 0;
         if (result->steps + result->rejected >= options->max_steps) {
             result->step = h;
@@ -95,7 +96,6 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
         const double q = error_exponent(run->method);
         if (error >= 0.0 && error <= 1.0 && within_reach(run)) error = tangent_step(run, t, h, error);
         const double tried = h;
-        const double longest = left < options->largest_step ? left : options->largest_step;
         const int met = error >= 0.0 && error <= 1.0 && within_reach(run)
                             ? locate(run, start, t, &h, &error, resolution, aimed, longest)
                             : NO_KINK;
