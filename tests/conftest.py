@@ -28,17 +28,13 @@ settings.register_profile(
 )
 settings.load_profile("repeatable")
 
-#: What `make` tells the makes it starts: of its own threads, which exported programs then warn about.
-MAKE = ("MAKEFLAGS", "MFLAGS", "GNUMAKEFLAGS", "MAKELEVEL", "MAKEOVERRIDES")
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _no_make_above() -> Iterator[None]:
-    """Programs are built here as a user builds them, also where ``make -j2 test`` runs the tests."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name in MAKE:
-            patch.delenv(name, raising=False)
-        yield
+# What `make -j2 test` tells the makes below it, which they warn about, and what makes programs colour or wrap what they
+# print to a file: the tests see what a user's shell shows.  Here, for typer looks when it is imported.
+for _name in (
+    *("MAKEFLAGS", "MFLAGS", "GNUMAKEFLAGS", "MAKELEVEL", "MAKEOVERRIDES"),
+    *("COLUMNS", "LINES", "TERMINAL_WIDTH", "FORCE_COLOR", "CLICOLOR_FORCE", "PY_COLORS", "GITHUB_ACTIONS"),
+):
+    os.environ.pop(_name, None)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -443,6 +443,28 @@ def test_an_interrupt_that_an_import_turns_into_something_else_is_one_still() ->
     assert out == ""
 
 
+def test_an_interrupt_where_python_ignores_exceptions_is_heard_all_the_same() -> None:
+    """In a callback of a weak reference it was printed with a traceback, and the run went on to its end."""
+    code = """
+        import os, signal, time, weakref
+        from raceway.runtime import cli
+        def collecting():
+            class Thing:
+                pass
+            thing = Thing()
+            reference = weakref.ref(thing, lambda _: os.kill(os.getpid(), signal.SIGINT))
+            del thing
+            time.sleep(10)
+        cli.app = collecting
+        cli.main()
+    """
+    with python(code) as process:
+        out, errors = process.communicate(timeout=300)
+    assert process.returncode == 130
+    assert errors.strip() == "error: interrupted. Whatever files are there are whole."
+    assert out == ""
+
+
 def test_an_interrupt_while_compiling_ends_the_compiler_and_its_children(
     cache: Path, scene: Path, tmp_path: Path
 ) -> None:

@@ -243,10 +243,10 @@ def test_applied_force_is_drawn_where_it_acts_and_while_it_acts(press: Run) -> N
     ],
 )
 def test_applied_force_has_the_components_of_the_scene(
-    make_model: Callable[..., Model], change: str, expected: tuple[float, float]
+    make_virtual: Callable[..., Model], change: str, expected: tuple[float, float]
 ) -> None:
     always = ('window = { start = "237 deg", end = "267 deg" }', "")
-    model = make_model("punching_press", ('force = ["0 N", "8964.8 N"]', change), always)
+    model = make_virtual("punching_press", ('force = ["0 N", "8964.8 N"]', change), always)
     ((name, place, force),) = gather(model, model.simulate(cycles=0.01, transient=0)).applied_forces(1e-4)
     assert (name, place) == ("punch", ("slider", "C"))
     assert force == pytest.approx(expected)

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import signal
 import sys
+import threading
 from importlib.metadata import version
 from pathlib import Path
 from types import FrameType
@@ -362,8 +364,19 @@ def main() -> None:
         heard.append(number)
         signal.default_int_handler(number, frame)
 
+    def swallowed(told: sys.UnraisableHookArgs) -> None:
+        """An interrupt that arrived where Python ignores exceptions, as in a callback of a weak reference: again."""
+        if not (heard and issubclass(told.exc_type, KeyboardInterrupt)):
+            sys.__unraisablehook__(told)
+            return
+        again = threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT))  # sent here it would be swallowed as well
+        again.daemon = True
+        again.start()
+
+    before = sys.unraisablehook
     if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, leave_at_once):  # else somebody wants it ignored
         signal.signal(signal.SIGINT, hear)
+        sys.unraisablehook = swallowed
     try:
         app()
     except (Exception, KeyboardInterrupt):  # whatever an interrupt became; all else shows itself
@@ -380,3 +393,4 @@ def main() -> None:
         # what is done is done: while the interpreter shuts down it would end the process by the signal itself
         if signal.getsignal(signal.SIGINT) is hear:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
+        sys.unraisablehook = before
