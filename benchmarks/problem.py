@@ -105,7 +105,8 @@ class Member:
         self.numbers: Numbers = model.numbers(self.parameters)
         self.press: Press = press_numbers(model, self.parameters)
         self.period = model.period(self.parameters)
-        self.times = self.period * np.arange(1, POINTS + 1) / POINTS
+        # the quotient may lie a last digit behind the end
+        self.times = np.minimum(self.period * np.arange(1, POINTS + 1) / POINTS, self.period)
         self.edges = segment_edges(model, self.numbers, 0.0, self.period, self.period)
         self.gates = tuple(
             float(self.press.window_start <= self.press.speed * 0.5 * (a + b) < self.press.window_end)

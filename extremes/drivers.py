@@ -84,7 +84,7 @@ def lanes(law: str, method: str, members: tuple[int, ...], bound: float) -> Find
         for name in dict.fromkeys(name for row in rows for name in row)
     }
     asked = [*(f"end:{name}" for name in POSITIONS), "max:ball.elastic_force", "mean:inner.y"]
-    found = model.simulate_many(table, asked, cycles=PART, transient=0, rtol=1e-8, method=method)
+    found = model.simulate_many(table, asked, cycles=PART, transient=0, rtol=1e-8, method=method, kinks="stepped-over")
     assert not found.failures, found.failures
     assert found.statistics.lanes > 1, found.statistics
     worst = 0.0
@@ -230,7 +230,8 @@ def free_lanes() -> Finding:
         "bearing.initial.inner.x": [0.0] * len(masses), "bearing.initial.inner.y": [0.0] * len(masses),
         "bearing.initial.inner_velocity.y": [1e-3] * len(masses),
     }  # fmt: skip
-    found = model.simulate_many(table, ["end:inner.x", "end:inner.y"], duration=10.0, transient=0, rtol=1e-9)
+    asked = ["end:inner.x", "end:inner.y"]
+    found = model.simulate_many(table, asked, duration=10.0, transient=0, rtol=1e-9, kinks="stepped-over")
     assert not found.failures, found.failures
     worst = max(
         float(np.max(np.abs(found["end:inner.x"] / (0.5 * 1e-6 * 100.0) - 1.0))),

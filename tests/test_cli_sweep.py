@@ -112,10 +112,10 @@ def test_a_map_of_two_parameters_and_a_line_of_one_are_drawn(
     assert [path.name for path in sorted(grid.glob("*.png"))] == ["sweep_range_inner_x.png"]
 
 
-def test_a_sweep_can_locate_kinks_and_says_so(site: Path, sweep: Callable[..., Result]) -> None:
+def test_a_sweep_locates_kinks_where_single_runs_do_and_says_so(site: Path, sweep: Callable[..., Result]) -> None:
     """Each member is then the single run that locates them; no ball rattles at these clearances."""
     words = ("--vary", f"{CLEARANCE}=2um:5um:2", "--of", "peak_ball_force", *SHORT, "--no-figures", "--json")
-    done = sweep(SCENE, *words, "--kinks", "located", "--out", "located")
+    done = sweep(SCENE, *words, "--out", "located")
     assert done.exit_code == 0, done.output
     report = json.loads(done.stdout)
     assert (report["statistics"]["kinks"], report["statistics"]["lanes"]) == ("located", 1)
@@ -123,9 +123,9 @@ def test_a_sweep_can_locate_kinks_and_says_so(site: Path, sweep: Callable[..., R
     found = report["quantities"]["peak_ball_force"]["values"]
     for clearance, peak in zip(report["varied"][0]["values"], found, strict=True):
         numbers = {CLEARANCE: clearance}
-        alone = model.reduce(cycles=1.5, transient=0.5, rtol=1e-9, kinks="located", parameters=numbers)
+        alone = model.reduce(cycles=1.5, transient=0.5, rtol=1e-9, parameters=numbers)
         assert peak == pytest.approx(alone["ball.force"].maximum, rel=1e-9)
-    over = sweep(SCENE, *words, "--out", "over")
+    over = sweep(SCENE, *words, "--kinks", "stepped-over", "--out", "over")
     lanes = json.loads(over.stdout)
     assert lanes["statistics"]["kinks"] == "stepped-over"
     # and they are other runs

@@ -13,9 +13,8 @@ from raceway.runtime import IntegrationError, Model
 from raceway.runtime.conditioning import ConditioningWarning
 from raceway.runtime.errors import RequestError, SimulationError
 from raceway.runtime.integrate import clock
-from raceway.runtime.integrate.limits import step_limit
+from raceway.runtime.integrate.limits import brief_limit, step_limit
 from raceway.runtime.integrate.magnitudes import model_scales
-from raceway.runtime.integrate.reductions import step_limit as reduced_step_limit
 from raceway.runtime.integrate.segments import LARGEST_PHASE, segment_edges
 from raceway.runtime.integrate.whereabouts import whereabouts
 from raceway.runtime.status import Status
@@ -116,7 +115,7 @@ def test_erk_on_an_overdamped_model_is_refused_before_it_starts(make_model: Mode
 
 def test_slow_machines_may_take_as_many_steps_a_second_as_fast_ones() -> None:
     # a turn at 1 rpm without damping takes ten million steps at tight tolerances, and was refused
-    for limit in (step_limit, reduced_step_limit):
+    for limit in (step_limit, brief_limit):
         assert limit(60.0, 60.0) > 30_000_000
         assert limit(60.0, math.inf) > 30_000_000
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from time import monotonic, sleep
 from typing import Any
 
@@ -13,13 +15,14 @@ from press_laws import press
 
 from raceway.runtime import Model, RequestError, SimulationError
 from raceway.runtime.ensembles.ensemble import EnsembleResult
-from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver, MemberNumbers
+from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver, MemberArrays, MemberNumbers
 from raceway.runtime.ensembles.member_segments import inputs_of, moments, stretches
 from raceway.runtime.ensembles.members import Members, Span, edge_windows, make_members
 from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.magnitudes import MOMENTS, model_scales
-from raceway.runtime.integrate.reductions import SCALED_TURNS
+from raceway.runtime.integrate.reductions import SCALED_TURNS, choose_family
 from raceway.runtime.integrate.segments import segment_edges
+from raceway.runtime.integrate.stepper import End
 
 ModelMaker = Callable[..., Model]
 OBSERVABLES = (
@@ -52,10 +55,14 @@ def same(a: EnsembleResult, b: EnsembleResult, rows: np.ndarray | slice = slice(
 @pytest.mark.parametrize("law", ["one-sided", "stiff", "one-sided-gated", "tangent"])
 @pytest.mark.parametrize("method", ["auto", "stepper-dp54", "stepper-rodas5p", "stepper-rodas4"])
 def test_members_equal_single_runs_within_the_tolerance(make_model: ModelMaker, law: str, method: str) -> None:
+    """Stepped over, as lanes do; single runs of ``auto`` locate kinks at these tolerances."""
     model, columns = press(make_model, law), table(11)
     rtol = 1e-10 if law == "tangent" else 1e-8
-    result = model.simulate_many(columns, OBSERVABLES, cycles=1.5, transient=0.75, rtol=rtol, method=method)
+    result = model.simulate_many(
+        columns, OBSERVABLES, cycles=1.5, transient=0.75, rtol=rtol, method=method, kinks="stepped-over"
+    )
     assert result.failures == ()
+    assert result.statistics.lanes == (1 if method == "stepper-rodas4" else model.ensemble_driver.lanes)
     for k in range(11):
         single = model.reduce(1.5, transient=0.75, rtol=rtol, method=method, parameters=member(columns, k))
         force, y = single["ball.force"], single["inner.y"]
@@ -91,7 +98,7 @@ def test_lanes_take_the_steps_of_single_runs(make_model: ModelMaker, law: str, r
 
 @pytest.mark.parametrize("method", ["auto", "stepper-dp54"])
 def test_members_that_locate_kinks_are_single_runs_that_do(make_model: ModelMaker, method: str) -> None:
-    """The same bits, one member at a time; lanes step over at tolerances where a single run would locate as well."""
+    """The same bits, one member at a time; without being told, members locate kinks where single runs do."""
     model, columns = press(make_model, "one-sided-gated"), table(3)
     given = {"cycles": 1, "transient": 0, "rtol": 1e-7, "method": method}
     located, over, plain = (
@@ -99,15 +106,43 @@ def test_members_that_locate_kinks_are_single_runs_that_do(make_model: ModelMake
         for kinks in ("located", "stepped-over", None)
     )
     assert (located.statistics.kinks, located.statistics.lanes) == ("located", 1)
-    assert (plain.statistics.kinks, plain.statistics.lanes) == ("stepped-over", model.ensemble_driver.lanes)
-    assert same(plain, over)
-    assert not same(plain, located)
+    assert (over.statistics.kinks, over.statistics.lanes) == ("stepped-over", model.ensemble_driver.lanes)
+    assert not same(over, located)
+    # a method named by hand steps over, as in a single run
+    chosen = located if method == "auto" else over
+    assert (plain.statistics.kinks, plain.statistics.lanes) == (chosen.statistics.kinks, chosen.statistics.lanes)
+    assert same(plain, chosen)
     for k in range(3):
         single = model.reduce(**given, kinks="located", parameters=member(columns, k))  # type: ignore[arg-type]
         assert located["max:ball.force"][k] == single["ball.force"].maximum
         assert located["peak_time:ball.force"][k] == single["ball.force"].maximum_time
         assert located["rms_inner_y"][k] == single["inner.y"].rms
         assert located["end:inner.vx"][k] == single.end["inner.vx"]
+
+
+@pytest.mark.parametrize("rtol", [1e-8, 1e-10])
+def test_members_at_tight_tolerances_are_single_runs(make_model: ModelMaker, rtol: float) -> None:
+    """Tangent damping is steep where contact begins: lanes lose hundreds of tolerances there."""
+    model, columns = press(make_model, "tangent"), table(3)
+    names = ("rms:inner.x", "rms:inner.y", "max:ball.force", "end:inner.vx")
+    given = {"cycles": 2, "transient": 1, "rtol": rtol}
+    found = model.simulate_many(columns, names, **given)  # type: ignore[arg-type]
+    lanes = model.simulate_many(columns, names, kinks="stepped-over", **given)  # type: ignore[arg-type]
+    assert found.statistics.kinks == "located"
+    astray = []
+    for k in range(3):
+        single = model.reduce(**given, parameters=member(columns, k))  # type: ignore[arg-type]
+        expected = (single["inner.x"].rms, single["inner.y"].rms, single["ball.force"].maximum, single.end["inner.vx"])
+        assert [found[name][k] for name in names] == list(expected)
+        astray.append(abs(lanes["rms:inner.x"][k] / expected[0] - 1.0))
+    assert max(astray) > 100.0 * rtol
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6])
+def test_members_at_loose_tolerances_advance_in_lanes(make_model: ModelMaker, rtol: float) -> None:
+    model = press(make_model, "tangent")
+    found = model.simulate_many(table(3), ["rms:inner.x"], cycles=1, transient=0, rtol=rtol)
+    assert (found.statistics.kinks, found.statistics.lanes) == ("stepped-over", model.ensemble_driver.lanes)
 
 
 def test_members_of_smoothed_laws_have_no_kinks_to_locate(make_model: ModelMaker) -> None:
@@ -468,3 +503,43 @@ def test_a_wrong_table_is_told_before_anything_is_compiled(
     monkeypatch.setattr(Model, "ensemble_driver", property(compiled))
     with pytest.raises(RequestError, match="finite number"):
         press(make_model).simulate_many({"bearing.clearance": [math.nan]}, ["peak_ball_force"])
+
+
+@pytest.mark.parametrize("method", ["auto", "stepper-dp54", "stepper-rodas5p"])
+def test_members_with_faulty_numbers_are_refused_each_and_the_others_are_untouched(
+    make_model: ModelMaker, method: str
+) -> None:
+    """The driver looks at tolerances and segments as that of single runs does: no member begins that could not end."""
+    model = make_model("varying_compliance")
+    driver, family = model.ensemble_driver, choose_family(method)
+    faults = [0.0, -1e-9, np.nan, 1e-320, 1e-9, 1e-9, 1e-9]
+    count = len(faults)
+    members = make_members(model, {"bearing.clearance": np.linspace(0.0, 2e-5, count)})
+    turns = np.full(count, model.period())
+    span = Span(durations=0.2 * turns, turns=turns, starts=np.zeros(count))
+    (good,) = stretches(model, members, span, np.arange(count))
+    tolerance = 1e-6 * driver.magnitudes(good, members.initial, *moments(model, members, span, np.arange(count)))
+
+    def ends(arrays: MemberArrays, allowed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        x = members.initial.copy()
+        results = driver.run(family, arrays, x, allowed, None, ctypes.c_int(0))
+        return np.array([End(status) for status in results["status"]]), x
+
+    status, reached = ends(good, tolerance)
+    assert np.all(status == End.DONE)
+    for state in range(tolerance.shape[1]):
+        wrong = tolerance.copy()
+        wrong[:4, state] = faults[:4]
+        status, x = ends(good, wrong)
+        assert np.all(status[:4] == End.BAD_ARGUMENT)
+        assert np.array_equal(x[:4], members.initial[:4])
+        assert np.all(status[4:] == End.DONE)
+        assert np.array_equal(x[4:], reached[4:])
+    # the last member would have fewer than no segments
+    first = good.first.copy()
+    first[-1] = first[-2] - 1
+    status, x = ends(replace(good, first=first), tolerance)
+    assert status[-1] == End.BAD_ARGUMENT
+    assert np.array_equal(x[-1], members.initial[-1])
+    assert np.all(status[:-1] == End.DONE)
+    assert np.array_equal(x[:-1], reached[:-1])

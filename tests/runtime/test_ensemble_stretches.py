@@ -21,6 +21,7 @@ from raceway.runtime.ensembles.chunks import PATIENCE
 from raceway.runtime.ensembles.ensemble_driver import RESULT, EnsembleDriver, MemberArrays
 from raceway.runtime.ensembles.member_segments import moments, stretches
 from raceway.runtime.ensembles.members import Span, make_members
+from raceway.runtime.integrate.locating import Kinks
 from raceway.runtime.integrate.reductions import choose_family
 
 ModelMaker = Callable[..., Model]
@@ -146,26 +147,20 @@ def test_a_member_that_fails_in_one_stretch_does_not_go_on_in_the_next(
     assert whole.statistics.steps == cut_up.statistics.steps
 
 
+@pytest.mark.parametrize("kinks", [None, "stepped-over"])
 @pytest.mark.parametrize(
     ("scene", "cycles", "transient"), [("varying_compliance", 5.5, 0.3), ("varying_compliance", 20.0, 2.0)]
 )
 def test_members_one_by_one_are_reduced_runs_to_the_last_bit(
-    make_model: ModelMaker, scene: str, cycles: float, transient: float
+    make_model: ModelMaker, scene: str, cycles: float, transient: float, kinks: Kinks | None
 ) -> None:
     """Rattling balls carry a last digit of the tolerance to the first of the motion: both must find the same one."""
     model = make_model(scene)
     clearance = [5e-6, 2e-5, 4e-5, 8e-5]
-    found = model.simulate_many(
-        {"bearing.clearance": clearance}, OBSERVABLES, cycles=cycles, transient=transient, rtol=1e-9, lanes=False
-    )
+    given: dict[str, Any] = {"cycles": cycles, "transient": transient, "rtol": 1e-9, "kinks": kinks}
+    found = model.simulate_many({"bearing.clearance": clearance}, OBSERVABLES, lanes=False, **given)
     for k, value in enumerate(clearance):
-        single = model.reduce(
-            cycles=cycles,
-            transient=transient,
-            rtol=1e-9,
-            kinks="stepped-over",
-            parameters={"bearing.clearance": value},
-        )
+        single = model.reduce(parameters={"bearing.clearance": value}, **given)
         assert found["max:ball.force"][k] == single["ball.force"].maximum
         assert found["peak_time:ball.force"][k] == single["ball.force"].maximum_time
         assert found["rms_inner_y"][k] == single["inner.y"].rms
@@ -178,16 +173,14 @@ def test_a_member_has_its_own_limit_of_steps(
 ) -> None:
     """One that meets its limit alone meets it beside a member that turns ten times as often, and may take more."""
     model = press(make_model)
-    for module in ("ensembles.chunks", "integrate.reductions"):
-        monkeypatch.setattr(
-            f"raceway.runtime.{module}.step_limit", lambda duration, turn: 400 * math.ceil(duration / turn - 1e-9)
-        )
+    monkeypatch.setattr(
+        "raceway.runtime.integrate.limits.step_limit", lambda duration, turn: 1000 * math.ceil(duration / turn - 1e-9)
+    )
     fates = []
     for speeds in ([10.0], [10.0, 100.0]):
         columns = {SPEED: speeds}
-        found = model.simulate_many(
-            columns, ["end:inner.y"], duration=0.2 * math.pi, transient=0, rtol=1e-3, lanes=lanes
-        )
+        given: dict[str, Any] = {"duration": 0.2 * math.pi, "transient": 0, "rtol": 1e-3, "method": "stepper-dp54"}
+        found = model.simulate_many(columns, ["end:inner.y"], lanes=lanes, **given)
         fates.append(found.failures)
     assert [(failure.member, failure.status) for failure in fates[0]] == [(0, "TOO_MANY_STEPS")]
     assert fates[0] == fates[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
 import io
 import os
@@ -12,6 +13,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,11 +22,13 @@ from typer.testing import CliRunner
 
 from raceway.derive import generate
 from raceway.derive.read import scene_from_text
-from raceway.runtime import ArtefactError, Model, RequestError, load
+from raceway.runtime import ArtefactError, IntegrationError, Model, RequestError, load
 from raceway.runtime.bounds import allowed
 from raceway.runtime.cli import app
-from raceway.runtime.compiled.export import default_magnitudes, export_c
+from raceway.runtime.compiled.export import export_c
+from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.locating import tight_below
+from raceway.runtime.integrate.segments import segment_edges
 from raceway.runtime.manifest import ParameterInfo
 from raceway.runtime.parameters import resolve_parameters
 
@@ -165,18 +169,17 @@ def test_options_do_what_the_arguments_of_simulate_do(exported: Callable[..., Pr
     program = exported("varying_compliance")
     model = program.model
     arguments = ["--cycles=2.3", "--rtol=1e-11", "--samples", "37"]
-    # magnitudes, hence tolerances, belong to runs of the scene's own length in C: the last digits differ
     for method in ("rodas4", "rodas5p", "dp54", "dop853"):
         found = program.table(*arguments, "--method", method)
         solution = model.simulate(2.3, rtol=1e-11, samples_per_cycle=37, method=f"stepper-{method}")
         assert np.array_equal(found[:, 0], solution.t)
-        assert np.max(np.abs(found[:, 1:] - solution.x) / solution.statistics.magnitudes) < 1e-7
+        assert np.max(np.abs(found[:, 1:] - solution.x) / solution.statistics.magnitudes) < 1e-12
         rough = program.table("--cycles=2.3", "--rtol=1e-3", "--samples=37", f"--method={method}")
         assert np.max(np.abs(rough[:, 1:] - solution.x) / solution.statistics.magnitudes) > 1e-5
     found = program.table("--duration=0.05", "--samples=100")
     solution = model.simulate(duration=0.05, samples_per_cycle=100, method="stepper")
     assert np.array_equal(found[:, 0], solution.t)
-    assert np.max(np.abs(found[:, 1:] - solution.x) / solution.statistics.magnitudes) < 1e-5
+    assert np.max(np.abs(found[:, 1:] - solution.x) / solution.statistics.magnitudes) < 1e-12
 
 
 @pytest.mark.parametrize(
@@ -203,13 +206,12 @@ def test_options_do_what_the_arguments_of_simulate_do(exported: Callable[..., Pr
 def test_changed_parameters_move_loads_and_constants_as_in_python(
     exported: Callable[..., Program], scene: str, changes: dict[str, float]
 ) -> None:
-    """Tolerances differ, for they follow the scene's own numbers in C: hence tight ones, and a bound to match."""
     program = exported(scene)
     solution = program.model.simulate(2, parameters=changes, method="stepper-dop853", rtol=1e-12, samples_per_cycle=50)
     overrides = [f"{name}={value!r}" for name, value in changes.items()]
     found = program.table("--cycles=2", "--rtol=1e-12", "--samples=50", "--method=dop853", *overrides)
     assert np.array_equal(found[:, 0], solution.t)
-    assert np.max(np.abs(found[:, 1:] - solution.x) / np.array(solution.statistics.magnitudes)) < 1e-5
+    assert np.max(np.abs(found[:, 1:] - solution.x) / np.array(solution.statistics.magnitudes)) < 1e-12
     # and they matter
     plain = program.table("--cycles=2", "--rtol=1e-12", "--samples=50", "--method=dop853")
     assert np.max(np.abs(found[:, 1:] - plain[:, 1:]) / np.array(solution.statistics.magnitudes)) > 1e-3
@@ -240,10 +242,103 @@ def test_table_of_loads_and_many_segments_equal_python(exported: Callable[..., P
     assert "increase" in refused.stderr
 
 
-def test_magnitudes_are_those_of_a_default_run(exported: Callable[..., Program]) -> None:
-    for scene in ("punching_press", "varying_compliance"):
-        model = exported(scene).model
-        assert tuple(default_magnitudes(model)) == model.simulate(method="stepper").statistics.magnitudes
+HARMONIC = (
+    ('type = "constant"  ', 'type = "harmonic"  '),
+    (
+        'force = ["196 N", "0 N"]',
+        'mean = ["196 N", "5 N"]\namplitude = ["150 N", "80 N"]\nfrequency = "9 Hz"\nphase = "40 deg"\n#',
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes", "numbers"),
+    [
+        # each moves the sizes of the motion by a tenth and more; one keeps none of the scene's own
+        ("punching_press", (), {"bearing.clearance": 60e-6}),
+        ("punching_press", (), {"mechanism.driver.speed": 5.0, "mechanism.forces.punch.force.y": -2e5}),
+        ("punching_press_tangent", (), {"bearing.clearance": 60e-6, "bearing.outer_ring.stiffness": 4e6}),
+        ("four_bar", (), {"mechanism.driver.speed": 300.0}),
+        ("offset_slider", (), {"bearing.clearance": 60e-6}),
+        ("varying_compliance", (), {"bearing.clearance": 2e-4, "bearing.initial.inner_velocity.y": 0.3}),
+        ("varying_compliance", HARMONIC, {"load.amplitude.x": 2000.0, "shaft.speed": 400.0}),
+    ],
+)
+@pytest.mark.parametrize(
+    ("arguments", "asked"),
+    [
+        (("--cycles=1.3",), {"cycles": 1.3}),
+        (("--cycles=1", "--rtol=1.6e-9", "--method=dp54"), {"cycles": 1, "rtol": 1.6e-9, "method": "stepper-dp54"}),
+        (("--duration=0.004", "--rtol=1e-3"), {"duration": 0.004, "rtol": 1e-3}),
+    ],
+    ids=["cycles", "tight", "duration"],
+)
+def test_tolerances_follow_the_sizes_of_the_run_at_hand_as_in_python(
+    exported: Callable[..., Program],
+    scene: str,
+    changes: tuple[tuple[str, str], ...],
+    numbers: dict[str, float],
+    arguments: tuple[str, ...],
+    asked: dict[str, Any],
+) -> None:
+    """Changed parameters and lengths change magnitudes, hence steps: the same ones as those of the model."""
+    program = exported(scene, *changes)
+    model = program.model
+    asked = {"method": "stepper", **asked}
+    solution = model.simulate(parameters=numbers, samples_per_cycle=200, **asked)
+    overrides = [f"{name}={value!r}" for name, value in numbers.items()]
+    found = program.table(*arguments, "--samples=200", *overrides)
+    magnitude = np.array(solution.statistics.magnitudes)
+    assert np.array_equal(found[:, 0], solution.t)
+    assert np.max(np.abs(found[:, 1:] - solution.x) / magnitude) < 1e-12
+    # which those of the scene's own run would not give
+    scenes_own = np.array(model.simulate(method="stepper", samples_per_cycle=1).statistics.magnitudes)
+    assert np.max(np.abs(np.log(magnitude / scenes_own))) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes", "numbers", "length"),
+    [
+        ("four_bar", (), {}, 3.7),
+        ("offset_slider", (), {"mechanism.driver.speed": -40.0}, 2.0),
+        # a fast load on a slow shaft, and on one that stands: segments end before a phase gets large
+        ("varying_compliance", HARMONIC, {"shaft.speed": 0.01, "load.frequency": 3.3e6}, 700.0),
+        ("varying_compliance", HARMONIC, {"shaft.speed": 0.0, "load.frequency": 3.3e6}, 50.0),
+    ],
+)
+def test_segments_and_their_inputs_are_those_of_python_to_the_last_bit(
+    exported: Callable[..., Program],
+    tmp_path: Path,
+    scene: str,
+    changes: tuple[tuple[str, str], ...],
+    numbers: dict[str, float],
+    length: float,
+) -> None:
+    program = exported(scene, *changes)
+    model = program.model
+    inputs, resolved = model.manifest.inputs, model.numbers(numbers)
+    turn = clock.period(model.manifest, resolved.values)
+    edges = segment_edges(model, resolved, 0.0, length, turn)
+    values = np.concatenate([resolved.p, resolved.c])
+    library = tmp_path / "schedule.so"
+    sources = [str(program.folder / name) for name in ("schedule.c", "scene.c")]
+    subprocess.run(["cc", "-std=c99", "-O2", "-shared", "-fPIC", *sources, "-o", str(library), "-lm"], check=True)
+    code = ctypes.CDLL(str(library))
+    real, long, pointer = ctypes.c_double, ctypes.c_long, ctypes.c_void_p
+    given = (ctypes.addressof(ctypes.c_char.in_dll(code, "scene_inputs")), len(inputs), values.ctypes.data)
+    code.schedule_edges.restype = long
+    code.schedule_edges.argtypes = (pointer, ctypes.c_int, pointer, real, real, real, pointer)
+    code.schedule_inputs.argtypes = (pointer, ctypes.c_int, pointer, real, real, pointer)
+    code.schedule_most_segments.restype = real
+    code.schedule_most_segments.argtypes = (pointer, ctypes.c_int, pointer, real, real)
+    found = ctypes.POINTER(real)()
+    count = code.schedule_edges(*given, 0.0, length, turn, ctypes.addressof(found))
+    assert np.array_equal(np.array(found[: count + 1]), edges)
+    assert count <= code.schedule_most_segments(*given, length, turn) < 1.5 * count + 10.0
+    u = np.zeros(len(inputs))
+    for left, right in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        code.schedule_inputs(*given, left, 0.5 * (left + right), u.ctypes.data)
+        assert np.array_equal(u, clock.inputs_at(inputs, resolved.values, left, 0.5 * (left + right)))
 
 
 # code
@@ -388,6 +483,11 @@ def test_wrong_requests_name_what_was_given_and_what_is_allowed(exported: Callab
             ("--samples=1000000000",),
             "--samples: 24000000000 samples of 5 numbers were asked for. Allowed: 536870912 numbers.",
         ),
+        (
+            ("--duration=1e9", "--samples=1", "shaft.speed=0.6"),
+            "up to 95493195.77 segments, cut where a load switches and at every whole turn, were asked for. Allowed: "
+            "89478485.",
+        ),
     ],
 )
 def test_requests_that_say_two_things_or_too_much_are_refused(
@@ -524,8 +624,15 @@ def test_failed_run_prints_the_rows_it_reached(exported: Callable[..., Program])
     assert "t = " in done.stderr
     rows = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1)
     assert np.all(np.isfinite(rows))
-    # the punch begins at 237 degrees; ten samples to a degree
-    assert 2370 <= len(rows) < 2400
+    # as many as the model has: tolerances that belong to such a force let the motion go before the punch begins
+    with pytest.raises(IntegrationError) as caught:
+        program.model.simulate(
+            1, parameters={"mechanism.forces.punch.force.y": 1e300}, samples_per_cycle=3600, method="stepper"
+        )
+    partial = caught.value.partial
+    assert partial is not None
+    assert 1000 < len(partial) < 3600
+    assert np.array_equal(rows, np.column_stack([partial.t, partial.x]))
 
 
 def test_model_without_states_and_edited_folders_are_refused(tmp_path: Path, exported: Callable[..., Program]) -> None:

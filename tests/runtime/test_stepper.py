@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import resource
 import tracemalloc
@@ -16,6 +17,7 @@ from stepper_runs import ORDERS, edges_of, run, segments_between
 
 from raceway.runtime import IntegrationError, Model, RequestError, Status
 from raceway.runtime.integrate import clock
+from raceway.runtime.integrate import stepper as stepping
 from raceway.runtime.integrate.stepper import End, Family, Segments, Stepper
 
 TURN = 2.0 * np.pi
@@ -335,6 +337,56 @@ def test_faulty_calls_are_refused(rotor: Model) -> None:
             family=Family.DP54, tolerance=1e-9)  # fmt: skip
 
 
+@pytest.mark.parametrize("family", [Family.AUTO, *ORDERS])
+def test_output_times_that_no_step_would_reach_are_refused(rotor: Model, family: Family) -> None:
+    """They are not left out of a run that says it is done."""
+    numbers, begin, end = rotor.numbers(), 0.001, 0.01
+    segments = segments_between(rotor, numbers, np.array([begin, 0.005, end]))
+    for times in (
+        [begin, np.nan, end],
+        [np.nan],
+        [0.002, 0.003, np.nan],
+        [0.004, 0.002],
+        [begin, end, 0.005],
+        [np.nextafter(begin, 0.0), end],
+        [begin, np.nextafter(end, 1.0)],
+        [-np.inf, 0.002],
+        [0.002, np.inf],
+    ):
+        found = run(rotor, numbers, segments, family=family, tolerance=1e-9, output_times=np.array(times))
+        assert found.outcome.end is End.BAD_ARGUMENT, times
+        assert (found.outcome.written, found.outcome.steps) == (0, 0)
+        assert np.all(np.isnan(found.states))
+        assert np.array_equal(found.end, rotor.initial())
+    # from the begin to the end, each as often as it is wanted
+    times = np.array([begin, begin, 0.004, 0.004, 0.005, end, end])
+    found = run(rotor, numbers, segments, family=family, tolerance=1e-9, output_times=times)
+    assert (found.outcome.end, found.outcome.written) == (End.DONE, len(times))
+    assert np.array_equal(found.states[::6], [rotor.initial(), found.end])
+    assert np.array_equal(found.states[[0, 2, 5]], found.states[[1, 3, 6]])
+
+
+@pytest.mark.parametrize(("segments", "outputs"), [(-1, 0), (-1, 2), (1, -1), (0, 1)])
+def test_counts_below_zero_are_refused(rotor: Model, segments: int, outputs: int) -> None:
+    """And outputs of a run without segments that its one moment does not have."""
+    numbers, x = rotor.numbers(), rotor.initial()
+    tolerance, times, states = np.full(4, 1e-9), np.array([0.0, 0.01]), np.full((2, 4), np.nan)
+    options = stepping._Options(0, 1000, 0.0, 0.0, np.inf, tolerance.ctypes.data, None)
+    result = stepping._Result(status=-1, steps=-1, written=-1)
+    inputs, restarts = np.zeros((2, max(len(rotor.manifest.inputs), 1))), np.ones(2, dtype=np.uint8)
+    one = np.array([0.005, 0.006])
+    vectors = (vector.ctypes.data for vector in (numbers.p, numbers.c, x))
+    given = (array.ctypes.data for array in (times, inputs, restarts))
+    end = rotor.stepper._run(
+        *(ctypes.byref(options), *vectors, segments, *given, outputs, one.ctypes.data, states.ctypes.data),
+        ctypes.byref(result),
+    )
+    assert (End(end), End(result.status)) == (End.BAD_ARGUMENT, End.BAD_ARGUMENT)
+    assert (result.steps, result.written) == (0, 0)
+    assert np.array_equal(x, rotor.initial())
+    assert np.all(np.isnan(states))
+
+
 # discontinuous laws
 
 
@@ -451,10 +503,16 @@ def test_accurate_runs_take_the_high_order(press: Model) -> None:
 
 
 def test_runs_of_engineering_accuracy_stay_with_the_low_order(press: Model) -> None:
-    """There the choice is that of Dormand and Prince: its steps, and its error."""
+    """There work and error are those of Dormand and Prince: order eight takes half as many evaluations again."""
+    numbers = press.numbers()
+    whole = segments_between(press, numbers, edges_of(press, numbers, 0.0, press.period()))
     exact = press.simulate(1, method="stepper-rodas5p", rtol=1e-12, samples_per_cycle=250)
-    free = press.simulate(1, method="stepper", rtol=1e-5, samples_per_cycle=250)
-    forced = press.simulate(1, method="stepper-dp54", rtol=1e-5, samples_per_cycle=250)
-    assert free.statistics.steps == pytest.approx(forced.statistics.steps, rel=0.05)
-    errors = [float(np.max(np.abs(run.x - exact.x))) for run in (free, forced)]
+    tolerance = 1e-5 * np.array(exact.statistics.magnitudes)
+    free, forced, high = (
+        run(press, numbers, whole, family=family, tolerance=tolerance)
+        for family in (Family.AUTO, Family.DP54, Family.DOP853)
+    )
+    assert free.outcome.evaluations == pytest.approx(forced.outcome.evaluations, rel=0.05)
+    assert high.outcome.evaluations > 1.3 * forced.outcome.evaluations
+    errors = [float(np.max(np.abs(one.end - exact.x[-1]))) for one in (free, forced)]
     assert errors[0] < 1.5 * errors[1], errors

@@ -475,6 +475,8 @@ class Model:
         """Extremes with their times, mean and rms of a run behind its transient, without a stored trajectory.
 
         Parameters are those of `simulate`; the transient's turns do not count.  The memory does not grow with the run.
+        However long it takes, `progress` is told and an interrupt (Ctrl-C) heard every so many steps, a fraction of a
+        second; that changes no bit of the results.  It is given up where `simulate` gives up.
 
         Raises
         ------
@@ -514,7 +516,7 @@ class Model:
 
         The results of a member are those of a single run within the tolerance, and the same bits for any number of
         threads.  A member that fails is reported in ``failures`` and has NaN in its place.  An interrupt (Ctrl-C) ends
-        the ensemble soon, and the members finished by then are kept.
+        the ensemble within a fraction of a second, and the members finished by then are kept.
 
         Parameters
         ----------
@@ -527,8 +529,10 @@ class Model:
         transient : turns at the start that do not count
         rtol : error allowed per step, relative to each member's own magnitudes
         method : ``auto``, or one of the project's own stepper
-        kinks : ``stepped-over``, the default at any tolerance, for lanes have no other way; with ``located`` members
-            run one at a time and their steps end on the kinks of the laws, as in `simulate`
+        kinks : as in `simulate`: with ``located``, the default at tight tolerances of ``auto`` and ``stepper``, steps
+            end on the kinks of the laws and members run one at a time, for lanes cannot; with ``stepped-over`` lanes
+            serve at any tolerance, but what a step loses at a kink is above a tight one, and members agree with single
+            runs no closer than that.  ``statistics.kinks`` says which it was
         threads : default: as many as processors
         lanes : False advances one member at a time
         progress : called with the finished fraction
@@ -556,7 +560,23 @@ class Model:
     def refine_peak(
         self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max", candidates: int = 6
     ) -> Peak:
-        """Peak of an output between the samples of a run of this model (see `raceway.runtime.quantities.peaks`)."""
+        """Peak of an output of a run of this model, between its samples too (see `raceway.runtime.quantities.peaks`).
+
+        It is looked for within every step where the project's own stepper ran, between all samples as far as these tell
+        where another method did; the result's ``searched`` says which.
+
+        Parameters
+        ----------
+        solution : the run, or its steady part
+        name : an output
+        kind : which extreme
+        candidates : so many places are looked at closely at a time
+
+        Raises
+        ------
+        RequestError
+            No such output, fewer than three samples, or another `kind`.
+        """
         numbers = self.numbers(solution.parameters)
         return refine_peak(self, numbers, solution, name, kind=kind, candidates=candidates)
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 #: Smallest and largest relative tolerance [1].
 TOLERANCES = (1e-13, 1e-1)
 
-#: Most numbers that the samples of a run may hold: 4 GiB.
+#: Most numbers that the samples of a run may hold, its derivatives, or its segments: 4 GiB.
 MAX_NUMBERS = 2**29
 
 
@@ -167,11 +167,32 @@ def _check_memory(model: Model, count: int, outputs: Sequence[str]) -> None:
     wanted = set(outputs)
     columns = len(model.states) + sum(info.size for info in model.manifest.outputs if info.name in wanted)
     columns += len(model.manifest.inputs)
-    if count * columns > MAX_NUMBERS:
-        raise RequestError(
-            f"{count} samples of {columns} numbers would not fit into memory. Take fewer samples a cycle or a shorter "
-            "run, or keep extremes and means only: `Model.reduce` runs any number of cycles without samples."
-        )
+    check_memory(
+        f"{count} samples of",
+        count,
+        columns,
+        "Take fewer samples a cycle or a shorter run, or keep extremes and means only: `Model.reduce` runs any number "
+        "of cycles without samples.",
+    )
+
+
+def check_memory(what: str, rows: float, columns: int, remedy: str) -> None:
+    """Refuse what would hold more than `MAX_NUMBERS`, before there is memory for any of it.
+
+    Parameters
+    ----------
+    what : words for the rows, which "... numbers would not fit into memory" follows
+    rows : how many there would be; may be infinite
+    columns : numbers of a row
+    remedy : what to do instead
+
+    Raises
+    ------
+    RequestError
+        It would not fit.
+    """
+    if not rows * columns <= MAX_NUMBERS:
+        raise RequestError(f"{what} {columns} numbers would not fit into memory. {remedy}")
 
 
 def output_names(model: Model, asked: Sequence[str] | None) -> tuple[str, ...]:

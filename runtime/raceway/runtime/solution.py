@@ -49,6 +49,8 @@ class Statistics:
     compiled : whether generated C ran, else CasADi's virtual machine
     kinks : "stepped-over" or "located"; None for methods that do not know the kinks of the laws
     located : kinks located, None where they are stepped over
+    initial : state at its start; None where an earlier version wrote the solution
+    duration : length of the run, which may end behind the last sample [s]; None as above
     """
 
     method: str
@@ -63,6 +65,8 @@ class Statistics:
     compiled: bool
     kinks: str | None = None
     located: int | None = None
+    initial: tuple[float, ...] | None = None
+    duration: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -279,6 +283,8 @@ def _read(path: str | Path, content: bytes) -> Solution:
     manifest = Manifest.from_json(facts["raceway_manifest"], source=f"{path}, manifest")
     statistics = json.loads(facts["raceway_statistics"])
     statistics["magnitudes"] = tuple(statistics["magnitudes"])
+    if statistics.get("initial") is not None:
+        statistics["initial"] = tuple(statistics["initial"])
     columns = [np.asarray(dataset[state.name].values) for state in manifest.states]
     t = np.asarray(dataset["time"].values)
     return Solution(

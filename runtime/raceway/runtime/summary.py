@@ -13,7 +13,7 @@ import platform
 from collections.abc import Mapping
 from importlib.metadata import version
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich import box
@@ -23,6 +23,7 @@ from raceway.runtime.conditioning import conditioning, has_reactions
 from raceway.runtime.errors import SimulationError
 from raceway.runtime.integrate.clock import breakpoints
 from raceway.runtime.quantities.observables import drive_work, kinematic_frequencies, statistics, turns
+from raceway.runtime.quantities.peaks import Kind, Peak, refine_peaks
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -33,6 +34,9 @@ _TOOLS = ("raceway", "casadi", "numpy", "scipy")
 
 #: Outputs of which mean, rms and std are told besides the extremes.
 _MOTIONS = ("inner.x", "inner.y", "inner.vx", "inner.vy", "outer.x", "outer.y", "outer.vx", "outer.vy")
+
+#: The ball forces whose peaks are told, by the key they stand under.
+_BALL_FORCES = {"elastic": "ball.elastic_force", "total": "ball.force"}
 
 #: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
 _COLUMNS = ("value", "min", "max", "mean", "rms", "std")
@@ -51,7 +55,7 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     ``steady_cycles``, ``samples``, ``cycle_length``
         ``{"value": , "unit": }``
     ``reaction.<joint>.x`` and other reactions, ``drive_torque``, ``load.x``, ``load.y``
-        ``{"min": , "max": , "unit": }``
+        ``{"min": , "max": , "unit": }``; beside them ``unsearched`` as below, where it is not zero
     ``drive_work``
         work of the drive in a turn, mean over the steady turns: ``{"value": , "unit": "J"}``
     ``reaction_condition``
@@ -59,8 +63,9 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
         ``{"unscaled": , "scaled": , "unit": "1"}``; beside them ``crank_angle`` with the same two keys and a unit
     ``peak_ball_force``
         highest force of any ball, also between samples: ``{"elastic": , "total": , "unit": "N"}``; beside them, with
-        the same two keys and a unit each, ``time`` and ``ball`` of the peak (balls are counted from 1), and
-        ``sampled``, what the samples alone show
+        the same two keys and a unit each, ``time`` and ``ball`` of the peak (balls are counted from 1), ``sampled``,
+        what the samples alone show, and ``unsearched``, the intervals between samples that promised more and were not
+        looked at; and ``searched``, where was looked, in words (see `raceway.runtime.quantities.peaks.Peak`)
     ``inner.x`` and other motions of the rings
         ``{"min": , "max": , "mean": , "rms": , "std": , "unit": }``
     ``k_b`` and other derived constants
@@ -94,25 +99,40 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     if steady.cycle_length is not None:
         summary["cycle_length"] = _value(steady.cycle_length, "s", "cycle_length")
         summary["steady_cycles"] = _value((steady.t[-1] - steady.t[0]) / steady.cycle_length, "1", "steady_cycles")
-    summary |= _forces(model, steady)
+    peaks = _peaks(model, steady)
+    summary |= _forces(steady, peaks)
     summary |= _conditioning(model, steady)
-    summary |= _balls(model, steady)
+    summary |= _balls(peaks)
     summary |= _motions(steady)
     summary |= _constants(steady)
     summary["versions"] = _versions(steady)
     return summary
 
 
-def _forces(model: Model, sol: Solution) -> dict[str, Any]:
+def _peaks(model: Model, sol: Solution) -> dict[tuple[str, Kind], Peak]:
+    """Peaks of forces and torques: samples miss what a load's step and a contact's spike do between them."""
+    wanted: list[tuple[str, Kind]] = [(name, "max") for name in _BALL_FORCES.values() if name in sol.outputs]
+    for info in sol.manifest.outputs:
+        if info.name in sol.outputs and (info.name.startswith(("reaction.", "load.")) or info.name == "drive_torque"):
+            wanted += [(info.name, "min"), (info.name, "max")]
+    if not wanted:
+        return {}
+    return dict(zip(wanted, refine_peaks(model, model.numbers(sol.parameters), sol, wanted), strict=True))
+
+
+def _forces(sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
     """Extremes of reactions, load and drive torque; the work of the drive."""
     found: dict[str, Any] = {}
     for info in sol.manifest.outputs:
-        if info.name in sol.outputs and (info.name.startswith(("reaction.", "load.")) or info.name == "drive_torque"):
+        if (info.name, "max") in peaks and info.name not in _BALL_FORCES.values():
+            low, high = peaks[info.name, "min"], peaks[info.name, "max"]
             found[info.name] = {
-                "min": _extreme(model, sol, info.name, "min"),
-                "max": _extreme(model, sol, info.name, "max"),
+                "min": _finite(low.value, info.name),
+                "max": _finite(high.value, info.name),
                 "unit": info.unit,
             }
+            if low.unsearched or high.unsearched:
+                found[info.name]["unsearched"] = {"min": low.unsearched, "max": high.unsearched, "unit": "1"}
     mechanism = sol.manifest.mechanism
     length = sol.cycle_length
     if mechanism is not None and "drive_torque" in found and length is not None and turns(sol.t, length):
@@ -138,17 +158,9 @@ def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:
     return {"reaction_condition": conditions}
 
 
-def _extreme(model: Model, sol: Solution, name: str, kind: Literal["min", "max"]) -> float:
-    # samples miss what a load's step and a contact's spike do between them
-    return _finite(model.refine_peak(sol, name, kind=kind).value, name)
-
-
-def _balls(model: Model, sol: Solution) -> dict[str, Any]:
-    peaks = {
-        key: model.refine_peak(sol, name)
-        for key, name in (("elastic", "ball.elastic_force"), ("total", "ball.force"))
-        if name in sol.outputs
-    }
+def _balls(found_peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
+    """The highest force of any ball, and how it was looked for."""
+    peaks = {key: found_peaks[name, "max"] for key, name in _BALL_FORCES.items() if (name, "max") in found_peaks}
     if not peaks:
         return {}
     found: dict[str, Any] = {key: _finite(peak.value, "ball.force") for key, peak in peaks.items()}
@@ -156,6 +168,8 @@ def _balls(model: Model, sol: Solution) -> dict[str, Any]:
     found["time"] = {**{key: peak.time for key, peak in peaks.items()}, "unit": "s"}
     found["ball"] = {**{key: peak.ball for key, peak in peaks.items()}, "unit": "1"}
     found["sampled"] = {**{key: peak.sampled for key, peak in peaks.items()}, "unit": "N"}
+    found["searched"] = {key: peak.searched for key, peak in peaks.items()}
+    found["unsearched"] = {**{key: peak.unsearched for key, peak in peaks.items()}, "unit": "1"}
     return {"peak_ball_force": found}
 
 

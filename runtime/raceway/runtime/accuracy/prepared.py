@@ -23,6 +23,7 @@ from raceway.runtime.ensembles.ensemble_driver import BALL_CHANNELS, EnsembleDri
 from raceway.runtime.ensembles.members import edge_windows
 from raceway.runtime.errors import RequestError, SimulationError
 from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.limits import brief_limit
 from raceway.runtime.integrate.magnitudes import stepper_magnitudes
 from raceway.runtime.integrate.reductions import (
     SCALED_TURNS,
@@ -30,9 +31,8 @@ from raceway.runtime.integrate.reductions import (
     check_span,
     observable_aliases,
     observe,
-    step_limit,
 )
-from raceway.runtime.integrate.segments import make_segments, segment_edges
+from raceway.runtime.integrate.segments import WORK, check_count, make_segments, segment_edges
 from raceway.runtime.integrate.simulate import fill
 from raceway.runtime.integrate.stepper import METHODS as STEPPERS
 from raceway.runtime.integrate.stepper import Segments
@@ -100,8 +100,8 @@ class Prepared:
 
     @property
     def step_limit(self) -> int:
-        """Most steps that an integration may take, accepted and rejected."""
-        return step_limit(self.duration, self.turn)
+        """Most steps that an integration may take, accepted and rejected: less than a run that is the only way."""
+        return brief_limit(self.duration, self.turn)
 
     @staticmethod
     def now() -> float:
@@ -243,9 +243,10 @@ def _segments(
     model: Model, numbers: Numbers, duration: float, turn: float, start: float
 ) -> tuple[Segments, tuple[int, ...]]:
     """Segments of a run, and where its parts begin among them."""
+    times = part_times(duration, turn, start)
+    check_count(model.manifest.inputs, numbers, duration, turn, columns=WORK + 2 * len(times))
     windows = [*edge_windows(model, numbers, duration, turn, start)]
     edges = np.concatenate([windows[0], *(window[1:] for window in windows[1:])])
-    times = part_times(duration, turn, start)
     near = 1e-9 * min(turn, duration)
     closest = np.abs(edges[:, None] - times[None]).min(axis=0) if len(edges) * len(times) else np.zeros(0)
     edges = np.sort(np.concatenate([edges, times[closest > near]]))

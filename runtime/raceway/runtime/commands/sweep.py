@@ -102,7 +102,7 @@ def sweep(
         typer.Option(
             metavar="HOW",
             help="What steps do where a law has a kink or jump: stepped-over, in lanes, or located, one member at a "
-            "time. Stepped over if not given.",
+            "time. If not given, as in raceway run: located at tight tolerances.",
         ),
     ] = None,
     threads: Annotated[
@@ -117,7 +117,6 @@ def sweep(
     A member that fails is named and has no number in its place; the others are kept. Exit code 1 where all fail.
     """
     from raceway.runtime.accuracy.prepared import default_observables
-    from raceway.runtime.integrate.locating import STEPPED_OVER
 
     with reported(), warnings_shown(), Stages() as stages:
         stages("read")
@@ -130,7 +129,7 @@ def sweep(
         folder = out if out is not None else Path("results") / read.name
         check_folder(folder)
         with faults_of(scene):
-            model = load_model(read, stages, method or read.run.method, at_kinks or STEPPED_OVER)
+            model = load_model(read, stages, method or read.run.method, at_kinks, rtol)
             _ = model.ensemble_driver  # compiled here, where it is announced
 
         varied = grid(ranges)

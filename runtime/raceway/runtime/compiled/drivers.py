@@ -10,7 +10,7 @@ from pathlib import Path
 
 from raceway.runtime.accuracy.quasi_static import QuasiStatic, compile_quasi_static
 from raceway.runtime.compiled.compilers import Compiler, find_compiler
-from raceway.runtime.compiled.driver_library import HEADERS, SWITCHES
+from raceway.runtime.compiled.driver_library import ENSEMBLE_HEADERS, SWITCHES
 from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver, compile_ensemble
 from raceway.runtime.errors import ArtefactError, RequestError
 from raceway.runtime.integrate.stepper import Stepper, compile_locating_stepper, compile_stepper
@@ -45,12 +45,12 @@ class Drivers:
     def available(self) -> bool:
         """Whether there was a compiler, and the folder brought the kernels, when first asked."""
         if self._available is None:
-            self._available = self._compiled and all((self._folder / name).is_file() for name in HEADERS)
+            self._available = self._compiled and all((self._folder / name).is_file() for name in ENSEMBLE_HEADERS)
         return self._available
 
     @property
     def stepper(self) -> Stepper:
-        """The driver of single runs.
+        """The driver of single runs, with reductions.
 
         Raises
         ------

@@ -4,8 +4,9 @@ In: a generated folder.  Out: the model's kernels, the driver with its methods, 
 a CSV, a Makefile and a README.  `make` needs gcc, clang or another compiler of C99
 that knows their vector types, and nothing else.
 
-The program finds the segments of a run in C (``schedule.c``, the counterpart of `integrate/clock.py`) and evaluates
-the derived constants there, so that parameters can be changed on its command line.
+The program finds the segments of a run in C (``schedule.c``, the counterpart of `integrate/clock.py`), the magnitudes
+that tolerances are relative to (``scales.h``, as the stepper does), and evaluates the derived constants there, so that
+parameters can be changed on its command line and the numbers are those of the model in Python.
 """
 
 from __future__ import annotations
@@ -15,8 +16,6 @@ import re
 import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-
-import numpy as np
 
 from raceway.runtime.compiled.compilers import FLAGS as BASE_FLAGS
 from raceway.runtime.compiled.driver_library import DRIVER, FLAGS, SWITCHES
@@ -28,9 +27,7 @@ from raceway.runtime.compiled.export_scene import (
     scene_source,
 )
 from raceway.runtime.errors import ArtefactError, RequestError
-from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.locating import has_kinks
-from raceway.runtime.integrate.magnitudes import default_magnitudes as run_magnitudes
 from raceway.runtime.manifest import Manifest, read_artefact
 from raceway.runtime.model import Model
 
@@ -89,7 +86,7 @@ def _texts(model: Model, folder: Path) -> dict[str, str]:
     manifest = model.manifest
     texts = {
         "scene.h": scene_header(manifest),
-        "scene.c": scene_source(manifest, default_magnitudes(model)),
+        "scene.c": scene_source(manifest),
         "constants.c": constants_source(model),
     }
     if margins_of(manifest):
@@ -103,20 +100,6 @@ def _texts(model: Model, folder: Path) -> dict[str, str]:
     texts["Makefile"] = _makefile(manifest, objects, headers)
     texts["README.md"] = _readme(manifest)
     return texts
-
-
-def default_magnitudes(model: Model) -> np.ndarray:
-    """Magnitudes of the states that a run with the scene's own settings has, shape (states,)."""
-    numbers = model.numbers()
-    run = model.manifest.run
-    turn = clock.period(model.manifest, numbers.values)
-    duration = run.duration if run.duration is not None else (run.cycles or 1.0) * turn
-    if not np.isfinite(duration):
-        raise RequestError(
-            "The scene's run is given in cycles, but nothing turns in it (its speed is zero). Give its [run] a "
-            "duration."
-        )
-    return run_magnitudes(model, numbers, model.initial(), duration, turn)
 
 
 def _with_includes(source: Path, places: Sequence[Path], known: Iterable[str]) -> dict[str, str]:
@@ -196,9 +179,9 @@ Exit codes: 0 done, 1 the computation failed (the rows so far are printed), 2 th
 | `methods.h` | coefficients of the integration methods |
 | `stepper.c`, `stepper.h` and what they include | the integrator; `stepper.h` documents its one call, `raceway_run` |
 | `located.h`, and `located.c` where the laws have kinks | the same integrator, compiled so that steps end on kinks |
-| `schedule.c`, `schedule.h` | times at which loads switch, inputs in between |
+| `schedule.c`, `schedule.h` | times at which loads switch, inputs in between, moments to look at for magnitudes |
 | `main.c` | command line and CSV |
 
-Tolerances are relative to `scene_magnitudes` in `scene.c`: the sizes that positions and velocities have in a run with
-the scene's own numbers. Parameters that move the parts much further, or much less far, want other magnitudes there.
+Tolerances are relative to magnitudes: the sizes that positions and velocities get in the run that is asked for. The
+program finds them anew for every run, from its parameters, its length and its most loaded moments (`scales.h`).
 """

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import casadi
-import numpy as np
 
 from raceway.runtime.integrate.locating import has_kinks, tight_below
 from raceway.runtime.integrate.stepper import METHODS as STEPPERS
@@ -95,7 +94,6 @@ extern const scene_parameter scene_parameters[];
 extern const scene_relation scene_relations[];
 extern const char *const scene_constant_names[];
 extern const char *const scene_states[];
-extern const double scene_magnitudes[]; /* tolerances are relative to these */
 
 /* Places among parameters and, behind these, derived constants. */
 extern const int scene_initial[];
@@ -114,8 +112,8 @@ void scene_constants(const double *p, double *c);
 """
 
 
-def scene_source(manifest: Manifest, magnitudes: np.ndarray) -> str:
-    """Text of ``scene.c``: the scene's numbers; magnitudes of its states, shape (states,), that tolerances refer to."""
+def scene_source(manifest: Manifest) -> str:
+    """Text of ``scene.c``: the scene's numbers."""
     names = [*(info.name for info in manifest.parameters), *(info.name for info in manifest.constants)]
     place = {name: k for k, name in enumerate(names)}
     speed = -1
@@ -155,7 +153,6 @@ def scene_source(manifest: Manifest, magnitudes: np.ndarray) -> str:
             f"const char *const scene_constant_names[] = {{{_listed(_string(c.name) for c in manifest.constants)}}};",
             "",
             f"const char *const scene_states[] = {{{_listed(_string(s.name) for s in manifest.states)}}};",
-            f"const double scene_magnitudes[] = {{{_listed(repr(float(m)) for m in magnitudes)}}};",
             f"const int scene_initial[] = {{{_listed(str(place[name]) for name in manifest.initial)}}};",
             f"const int scene_speed = {speed};",
             "",

@@ -22,6 +22,7 @@ from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.locating import LOCATED, STEPPED_OVER, check_kinks
 from raceway.runtime.integrate.stepper import METHODS, Segments, Tangents
 from raceway.runtime.parameters import unknown_name
+from raceway.runtime.request import check_memory
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -131,6 +132,11 @@ class Directions:
     model, numbers : the model and the run's numbers
     names : parameters
     samples : number of samples of the run
+
+    Raises
+    ------
+    RequestError
+        An unknown parameter, or derivatives that would not fit into memory.
     """
 
     def __init__(self, model: Model, numbers: Numbers, names: Sequence[str], samples: int) -> None:
@@ -138,6 +144,12 @@ class Directions:
         self.names = self.chain.names
         count, lanes = len(names), model.differentiating_stepper.lanes
         self._lanes, self._blocks, self._count = lanes, -(-count // lanes), count
+        self._check_memory(
+            f"{samples} samples of derivatives of {len(model.states)} states by {count} parameters, as the driver "
+            "writes them and as they are handed out, of",
+            samples,
+            2 * len(model.states),
+        )
         self._x = self._blocked(self.chain.initial)
         self._height = max(len(model.manifest.inputs), 1)
         self.samples = np.zeros((samples, self._blocks, len(model.states), lanes))
@@ -169,9 +181,30 @@ class Directions:
         blocks = padded.reshape(columns.shape[0], self._blocks, self._lanes)
         return np.ascontiguousarray(blocks.transpose(1, 0, 2))
 
+    def _check_memory(self, what: str, rows: int, columns: int) -> None:
+        """Refuse rows of so many columns along each direction, all lanes counted, that would not fit into memory."""
+        check_memory(
+            what,
+            rows,
+            columns * self._blocks * self._lanes,
+            "Take fewer samples a cycle, a shorter run, or fewer parameters at a time.",
+        )
+
     def tangents(self, segments: Segments, first: int, count: int) -> Tangents:
-        """What the driver needs for `segments`, whose samples are `first` ... `first + count`."""
+        """What the driver needs for `segments`, whose samples are `first` ... `first + count`.
+
+        Raises
+        ------
+        RequestError
+            It would not fit into memory.
+        """
         starts = segments.times[:-1]
+        self._check_memory(
+            f"{len(starts)} segments in one call, with derivatives of their inputs and starts by {self._count} "
+            "parameters, of",
+            len(starts),
+            self._height + 1,
+        )
         u = np.zeros((len(starts), self._blocks, self._height, self._lanes))
         shift = np.zeros((len(starts), self._blocks, self._lanes))
         for k, start in enumerate(starts):
@@ -192,8 +225,12 @@ class Directions:
 
     def states(self, finished: int) -> np.ndarray:
         """Derivatives of the states at the samples, shape (finished, states, parameters)."""
-        blocks = self.samples[:finished].transpose(0, 2, 1, 3)
-        return np.ascontiguousarray(blocks.reshape(finished, blocks.shape[1], -1)[:, :, : self._count])
+        found = np.empty((finished, self.samples.shape[2], self._count))
+        # block by block: a transposed array would be copied on the way
+        for block, first in enumerate(range(0, self._count, self._lanes)):
+            columns = found[:, :, first : first + self._lanes]
+            columns[:] = self.samples[:finished, block, :, : columns.shape[2]]
+        return found
 
 
 def refuse_located(kinks: str | None) -> None:

@@ -3,6 +3,8 @@
 #ifndef RACEWAY_CONTROL_H
 #define RACEWAY_CONTROL_H
 
+#include <string.h>
+
 #include "explicit.h"
 #include "rosenbrock.h"
 
@@ -10,12 +12,21 @@ enum {
     RW_STIFF_STEPS = 12, /* steps at the stability limit before an explicit method gives up */
     RW_STIFF_LOOK = 8,   /* every so many steps it looks whether it is there */
     RW_FAMILY_LOOKS = 3, /* looks that a change of family is decided on */
-    RW_FAMILY_CHANGES = 3 /* changes of family within a segment; more only where an explicit method gives up */
+    RW_FAMILY_REST = 3,  /* decisions without asking for the largest stable step where steps are far below it */
+    RW_PATIENCE = 4      /* decisions that a linearly implicit method gets to show what it is worth */
 };
 
-/* Step size times fastest rate, in the mean over the looks.  Above the first an explicit method is held down by stability and not by
-   accuracy.  Below the second an explicit step, of which more than three cost as much as a linearly implicit one, is not. */
-static const double RW_LIMITED = 2.6, RW_WORTH_SOLVING = 4.0;
+/* Step size, in the mean over the looks, by the largest stable step of an explicit method.  Above the first an explicit method is held
+   down by stability and not by accuracy, below the second it is far from it.  Below the third a linearly implicit step, which costs more
+   than two explicit ones, is not worth it. */
+static const double RW_LIMITED = 0.9, RW_FAR_FROM_LIMIT = 0.3, RW_WORTH_SOLVING = 1.25;
+
+/* Longest of the linearly implicit steps by those of the explicit method before: below the first they are not worth it, above the second
+   the family is kept at a breakpoint. */
+static const double RW_WORTH_TRYING = 1.7, RW_WORTH_KEEPING = 3.0;
+
+/* Limits of stability of the explicit methods, step size times rate: for decay, and for DOP853 as well for oscillation without damping. */
+static const double RW_DP54_DECAY = 3.3, RW_DOP853_DECAY = 6.3, RW_DOP853_OSCILLATION = 5.9;
 
 /* Where accuracy asks for steps far below the stability limit the higher order pays, although its step costs twice as much.  Below the
    last the ring flies free. */
@@ -63,17 +74,68 @@ static inline void rw_bounds(const double *restrict A, const double *restrict B,
     }
 }
 
-/* Bound of the fastest rate of q'' = A q + B q' [1/s]: of decay or of oscillation. */
-static inline double rw_fastest_rate(const double *restrict A, const double *restrict B)
+/* Limit of stability of Dormand-Prince 5(4) for an oscillation, step size times frequency, by its damping ratio: a fit within 6 %.  It is
+   1.00 without damping, 1.38 at a ratio of 0.001, 1.87 at 0.01, 2.68 at 0.1, 3.35 at 0.4. */
+static inline double rw_dp54_oscillation(double ratio)
 {
-    double decay, squared;
-    rw_bounds(A, B, &decay, &squared);
-    const double half = 0.5 * decay, oscillation = sqrt(squared);
-    return half > oscillation ? half + sqrt(half * half - squared) : oscillation;
+    const double fit = 3.84 * pow(ratio, 0.156);
+    return fit < 1.0 ? 1.0 : fit < RW_DP54_DECAY ? fit : RW_DP54_DECAY;
 }
 
-/* Whether the linearly implicit family fits: where damping is faster than the oscillation it damps, for then an explicit method's step is
-   held down by stability and not by accuracy.  A = da/dq, B = da/dv. */
+/* Frequency [1/s] and damping ratio [1] of the fastest oscillation of q'' = A q + B q', from A^4: its size is nearly that of the largest
+   eigenvalue, its widest column nearly that mode.  `squared` bounds the squared frequency. */
+static inline double rw_fastest_mode(const double *restrict A, const double *restrict B, double squared, double *ratio)
+{
+    double power[RW_NQ * RW_NQ], product[RW_NQ * RW_NQ];
+    for (int k = 0; k < RW_NQ * RW_NQ; k++) power[k] = A[k] / squared;
+    for (int turn = 0; turn < 2; turn++) {
+        for (int i = 0; i < RW_NQ; i++)
+            for (int j = 0; j < RW_NQ; j++) {
+                double sum = 0.0;
+                for (int k = 0; k < RW_NQ; k++) sum += power[i * RW_NQ + k] * power[k * RW_NQ + j];
+                product[i * RW_NQ + j] = sum;
+            }
+        memcpy(power, product, sizeof power);
+    }
+    int mode = 0;
+    double width = 0.0, size = 0.0, damped = 0.0;
+    for (int j = 0; j < RW_NQ; j++) {
+        double column = 0.0, row = 0.0;
+        for (int i = 0; i < RW_NQ; i++) {
+            column += fabs(power[i * RW_NQ + j]);
+            row += fabs(power[j * RW_NQ + i]);
+        }
+        if (column > width) width = column, mode = j;
+        size = row > size ? row : size;
+    }
+    for (int i = 0; i < RW_NQ; i++) {
+        double sum = 0.0;
+        for (int j = 0; j < RW_NQ; j++) sum += B[i * RW_NQ + j] * power[j * RW_NQ + mode];
+        damped += fabs(sum);
+    }
+    const double frequency = sqrt(squared) * sqrt(sqrt(sqrt(size)));
+    *ratio = width > 0.0 ? 0.5 * damped / (width * frequency) : 0.0;
+    return frequency;
+}
+
+/* Largest step of Dormand-Prince 5(4) or DOP853 that is stable for q'' = A q + B q' [s]; infinite where nothing touches. */
+static inline double rw_stable_step(const double *restrict A, const double *restrict B, int dp54)
+{
+    double decay, squared, ratio;
+    rw_bounds(A, B, &decay, &squared);
+    const double half = 0.5 * decay;
+    double rate = half * half > squared ? (half + sqrt(half * half - squared)) / (dp54 ? RW_DP54_DECAY : RW_DOP853_DECAY) : 0.0;
+    if (squared > 0.0) {
+        const double frequency = rw_fastest_mode(A, B, squared, &ratio);
+        const double oscillating = frequency / (dp54 ? rw_dp54_oscillation(ratio) : RW_DOP853_OSCILLATION);
+        rate = oscillating > rate ? oscillating : rate;
+    }
+    return rate > 0.0 ? 1.0 / rate : INFINITY;
+}
+
+/* Whether the linearly implicit family fits from the start: where damping is faster than the oscillation it damps, for then an explicit
+   method's step is held down by stability and not by accuracy.  What oscillates fast may have to be followed, and steps must show that it
+   has not (family.h).  A = da/dq, B = da/dv. */
 static inline int rw_is_stiff(const double *restrict A, const double *restrict B)
 {
     double decay, squared;

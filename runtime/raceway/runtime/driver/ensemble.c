@@ -19,7 +19,7 @@ typedef struct {
     double t, step, log_error; /* t counts from the segment's start */
     int phase, method;
     rw_family family;
-    rw_rates seen;
+    rw_seen seen;
 } rw_member;
 
 typedef struct {
@@ -106,7 +106,7 @@ static void choose_start(const rw_job *job, long m)
         rw_rosenbrock work;
         rw_rosenbrock_start(&work, &n, 0.0, x, 1);
         result->evaluations++;
-        method = rw_is_stiff(work.A, work.B) ? RACEWAY_RODAS5P : RACEWAY_DP54;
+        method = rw_starts_linear(&at->seen, work.A, work.B) ? RACEWAY_RODAS5P : RACEWAY_DP54;
         result->switches += at->method != method && at->method != RACEWAY_AUTO;
     }
     at->method = method;
@@ -320,6 +320,27 @@ static void choose_steps(rw_lane_block *b)
     }
 }
 
+/* The method for the next step of a lane, from the accepted one by Dormand-Prince of this reach: see judge_family in stepper.c. */
+static int after_explicit(const rw_job *job, const rw_lane_block *b, int lane, double reach)
+{
+    const long m = b->who[lane];
+    rw_member *at = job->member + m;
+    const int wanted = rw_look_at_explicit(&at->family, at->method, reach, b->h[lane]);
+    if (wanted == RW_GO_ON) return at->method;
+    if (wanted == RW_GIVE_UP) return rw_try_linear(&at->family, &at->seen, b->h[lane]);
+    double stable = INFINITY;
+    if (wanted == RW_ASK) {
+        const rw_numbers n = member_numbers(job, m);
+        double x[RW_NX];
+        rw_rosenbrock work;
+        get(b->x, lane, x, RW_NX);
+        rw_rosenbrock_start(&work, &n, b->t[lane], x, 1);
+        job->results[m].evaluations++;
+        stable = rw_stable_step(work.A, work.B, 1);
+    }
+    return rw_after_explicit(&at->family, &at->seen, at->method, stable, 0);
+}
+
 /* Ask the rule of families about the lanes in which a step is to be looked at. */
 static void look(const rw_job *job, rw_lane_block *b, const double *looking)
 {
@@ -335,9 +356,9 @@ static void look(const rw_job *job, rw_lane_block *b, const double *looking)
             double A[RW_NQ * RW_NQ], B[RW_NQ * RW_NQ];
             get(b->linear.A, lane, A, RW_NQ * RW_NQ);
             get(b->linear.B, lane, B, RW_NQ * RW_NQ);
-            method = rw_after_linear(&at->family, &at->seen, at->method, rw_fastest_rate(A, B), b->h[lane]);
+            method = rw_after_linear(&at->family, &at->seen, at->method, rw_stable_step(A, B, 1), b->h[lane]);
         } else {
-            method = rw_after_explicit(&at->family, at->method, reach[lane], 0);
+            method = after_explicit(job, b, lane, reach[lane]);
         }
         b->changing[lane] = method == at->method ? 0.0 : 1.0;
         tell_looks(at, b, lane);
@@ -610,7 +631,7 @@ int raceway_ensemble(const raceway_ensemble_options *options, long members, cons
         if (!options->resume) {
             memset(result, 0, sizeof *result);
             memset(at, 0, sizeof *at);
-            at->seen.slowest = INFINITY;
+            at->seen.least = INFINITY;
             result->state = -1;
             result->status = RACEWAY_DONE;
         }
@@ -618,9 +639,15 @@ int raceway_ensemble(const raceway_ensemble_options *options, long members, cons
         /* what an earlier call could not bring to its end does not go on */
         if (result->status != RACEWAY_DONE) continue;
         result->segment = 0;
-        result->time = own[0];
+        if (segments < 0) result->status = RACEWAY_BAD_ARGUMENT;
+        else result->time = own[0];
         for (long i = 0; i < segments; i++)
             if (!(own[i + 1] >= own[i])) result->status = RACEWAY_BAD_ARGUMENT;
+        for (int k = 0; k < RW_NX; k++) {
+            const double error = tolerance[m * RW_NX + k];
+            /* zero, below it, not a number, or so small that its inverse is none */
+            if (!(error > 0.0 && 1.0 / error <= DBL_MAX)) result->status = RACEWAY_BAD_ARGUMENT;
+        }
         for (int k = 0; k < RW_NX; k++)
             if (!(fabs(x[m * RW_NX + k]) <= DBL_MAX)) result->status = RACEWAY_NOT_FINITE;
         if (result->status != RACEWAY_DONE || !(own[segments] > own[0])) continue;

@@ -26,7 +26,8 @@ typedef struct {
 
    members      number of members; their rows follow each other in every array
    p, c         parameters, derived constants
-   tolerance    error allowed in a step, [members][states]
+   tolerance    error allowed in a step, [members][states]; a member's status is RACEWAY_BAD_ARGUMENT where one is not positive, where its
+                times are out of order and where it has fewer than no segments
    x            states; on return those reached
    first        first segment of each member, [members + 1]
    times        ends of the segments, [segments + 1] values a member: those of member m start at first[m] + m [s]

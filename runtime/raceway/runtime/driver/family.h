@@ -1,6 +1,10 @@
 /* The rule by which `auto` changes its mind within a segment; single runs and ensembles follow it alike.
 
-   A method is judged by the reach of its steps, their size times the fastest rate.  See control.h for the family a segment starts with. */
+   An explicit method is left where its steps are as long as stability allows: by the Jacobian, for how far steps reach into a fast
+   oscillation of little damping tells the states' differences badly.  A linearly implicit one then shows what its steps are worth.  At
+   the limit the explicit method has excited the oscillation to about the tolerance, and it takes some fifty steps to damp that; then they
+   may be hundreds of times as long.  Where they are not, the explicit one comes back and rests, each time twice as long.  See control.h
+   for the family a segment starts with. */
 #ifndef RACEWAY_FAMILY_H
 #define RACEWAY_FAMILY_H
 
@@ -12,71 +16,119 @@ static const double RW_DP54_LIMIT = 3.25, RW_DOP853_LIMIT = 6.1;
 
 /* What a segment has shown about the families so far. */
 typedef struct {
-    double sum;    /* of the reach of the steps looked at */
+    double reach, size, longest; /* of the steps looked at: sums of their reaches [1] and sizes [s], the longest [s] */
+    double mean_reach, mean_size; /* at the last decision about an explicit method */
+    double room; /* largest stable step of an explicit method in the looks at a linearly implicit one [s] */
     double stable; /* step at which an explicit method is at its limit, where the last look was at a linearly implicit one [s] */
-    int looks, stiff, changes;
+    int looks, stiff;
+    int vain; /* decisions in a row at which linearly implicit steps were not worth it */
     long steps;
+    long rest;        /* decisions until the largest stable step is asked for again; steps were far below it */
+    long wait, pause; /* decisions until the explicit method may be left, and how many that will be when it comes back next */
 } rw_family;
 
-/* Rates seen by the linearly implicit methods in a run [1/s]. */
+/* What a run has shown about them. */
 typedef struct {
-    double fastest, slowest;
-} rw_rates;
+    double least, most; /* stable steps of an explicit method that the linearly implicit ones have seen [s] */
+    double left;        /* steps of the explicit method that was left within a segment; 0 where none was [s] */
+    double gain;        /* how many times as long the longest linearly implicit one was since [1] */
+} rw_seen;
 
 /* Whether an accepted step is looked at: every so many, and each while an explicit method is at its limit. */
 static inline int rw_family_looks(rw_family *family) { return family->stiff > 0 || family->steps++ % RW_STIFF_LOOK == 0; }
 
-/* Whether there have been enough looks to decide on; then their mean reach, and they are counted anew. */
-static inline int rw_family_mean(rw_family *family, double *mean)
+/* Count a step looked at; whether there have been enough to decide on. */
+static inline int rw_family_decides(rw_family *family, double reach, double h)
 {
-    if (++family->looks < RW_FAMILY_LOOKS) return 0;
-    *mean = family->sum / family->looks;
-    family->sum = 0.0;
-    family->looks = 0;
-    return 1;
+    family->reach += reach;
+    family->size += h;
+    family->longest = h > family->longest ? h : family->longest;
+    return ++family->looks >= RW_FAMILY_LOOKS;
 }
 
-/* The method for the next step, from the reach of one by an explicit method; `high_order`: whether DOP853 is to be had. */
-static inline int rw_after_explicit(rw_family *family, int method, double reach, int high_order)
+static inline void rw_family_anew(rw_family *family)
 {
-    const int dp54 = method == RACEWAY_DP54;
-    const double limit = dp54 ? RW_DP54_LIMIT : RW_DOP853_LIMIT;
-    double mean;
-    family->stiff = reach > limit ? family->stiff + 1 : 0;
-    if (family->stiff >= RW_STIFF_STEPS) {
-        *family = (rw_family){.changes = family->changes + 1};
-        return RACEWAY_RODAS5P;
-    }
-    /* nothing touches: no rate to be held down by */
-    if (!(reach > RW_FREE)) return method;
-    family->sum += reach < limit ? reach : limit;
-    if (!rw_family_mean(family, &mean)) return method;
-    if (high_order && (dp54 ? mean < RW_HIGH_ORDER : mean > RW_LOW_ORDER)) {
-        family->stiff = 0;
-        family->stable = INFINITY;
-        return dp54 ? RACEWAY_DOP853 : RACEWAY_DP54;
-    }
-    if (!dp54 || family->changes >= RW_FAMILY_CHANGES || !(mean > RW_LIMITED)) return method;
-    family->changes++;
-    family->stiff = 0;
+    family->reach = family->size = family->longest = family->room = 0.0;
+    family->looks = 0;
+}
+
+/* Leave an explicit method, whose steps cost as much as steps of Dormand-Prince 5(4) of this size. */
+static inline int rw_try_linear(rw_family *family, rw_seen *seen, double size)
+{
+    rw_family_anew(family);
+    family->stiff = family->vain = 0;
+    seen->left = size;
+    seen->gain = 0.0;
     return RACEWAY_RODAS5P;
 }
 
-/* The same after one of size h by a linearly implicit method, at whose start the fastest rate was this. */
-static inline int rw_after_linear(rw_family *family, rw_rates *seen, int method, double rate, double h)
+/* What a look at a step of an explicit method asks for: nothing; the other family at once; a decision, or one for which the largest stable
+   step has to be known. */
+enum { RW_GO_ON, RW_GIVE_UP, RW_DECIDE, RW_ASK };
+
+/* Look at a step of size h and this reach by an explicit method. */
+static inline int rw_look_at_explicit(rw_family *family, int method, double reach, double h)
 {
-    double mean;
-    /* the fastest of the run: balls that are off now come back.  Before rates have changed no ball has landed yet, and they say
-       nothing; a ring that is always loaded has shown at the start what it is */
-    seen->fastest = rate > seen->fastest ? rate : seen->fastest;
-    seen->slowest = rate < seen->slowest ? rate : seen->slowest;
-    if (!(seen->fastest > 2.0 * seen->slowest)) return method;
-    family->stable = RW_LIMITED / seen->fastest;
-    family->sum += h * seen->fastest;
-    if (!rw_family_mean(family, &mean)) return method;
-    if (family->changes >= RW_FAMILY_CHANGES || !(mean < RW_WORTH_SOLVING)) return method;
-    family->changes++;
+    const double limit = method == RACEWAY_DP54 ? RW_DP54_LIMIT : RW_DOP853_LIMIT;
+    family->stiff = reach > limit ? family->stiff + 1 : 0;
+    if (family->stiff >= RW_STIFF_STEPS) return RW_GIVE_UP;
+    /* nothing touches: no rate to be held down by */
+    if (!(reach > RW_FREE && rw_family_decides(family, reach < limit ? reach : limit, h))) return RW_GO_ON;
+    family->mean_reach = family->reach / family->looks;
+    family->mean_size = family->size / family->looks;
+    rw_family_anew(family);
+    if (family->rest == 0) return RW_ASK;
+    family->rest--;
+    return RW_DECIDE;
+}
+
+/* The method for the next step behind that; `stable`: the largest stable step of the method at hand, infinite where it was not asked for
+   [s]; `high_order`: whether DOP853 is to be had. */
+static inline int rw_after_explicit(rw_family *family, rw_seen *seen, int method, double stable, int high_order)
+{
+    const int dp54 = method == RACEWAY_DP54;
+    const double size = family->mean_size, reach = family->mean_reach;
+    if (family->wait > 0) family->wait--;
+    else if (size > RW_LIMITED * stable) return rw_try_linear(family, seen, (dp54 ? 1.0 : 0.5) * (size < stable ? size : stable));
+    const int far = stable < INFINITY && size < RW_FAR_FROM_LIMIT * stable;
+    if (far) family->rest = RW_FAMILY_REST;
+    if (!(high_order && (dp54 ? far && reach < RW_HIGH_ORDER : reach > RW_LOW_ORDER))) return method;
+    family->stiff = 0;
+    family->stable = INFINITY;
+    return dp54 ? RACEWAY_DOP853 : RACEWAY_DP54;
+}
+
+/* The method for the next step behind one of size h by a linearly implicit method, at whose start this was the largest stable step of
+   Dormand-Prince 5(4) [s]. */
+static inline int rw_after_linear(rw_family *family, rw_seen *seen, int method, double stable, double h)
+{
+    /* the least of the run: balls that are off now come back */
+    seen->least = stable < seen->least ? stable : seen->least;
+    seen->most = stable > seen->most ? stable : seen->most;
+    family->room = stable > family->room ? stable : family->room;
+    if (!rw_family_decides(family, h / seen->least, h)) return method;
+    const double reach = family->reach / family->looks, longest = family->longest;
+    /* what the explicit method would take here: not more than it took, nor than is stable by now */
+    const double explicit_step = family->room < seen->left ? family->room : seen->left;
+    rw_family_anew(family);
+    /* before the stable step has changed no ball has landed yet, and it says nothing; a ring that is always loaded has shown at the start
+       what it is */
+    const int short_ones = seen->most > 2.0 * seen->least && reach < RW_WORTH_SOLVING;
+    family->vain = longest < RW_WORTH_TRYING * explicit_step ? family->vain + 1 : 0;
+    if (longest > seen->gain * seen->left && seen->left > 0.0) seen->gain = longest / seen->left;
+    if (!short_ones && family->vain < RW_PATIENCE) return method;
+    family->stable = short_ones ? RW_LIMITED * seen->least : explicit_step;
+    family->vain = 0;
+    family->wait = family->pause;
+    family->pause = family->pause > 0 ? 2 * family->pause : 1;
+    seen->left = seen->gain = 0.0;
     return RACEWAY_DP54;
+}
+
+/* Whether a segment behind a breakpoint starts with the linearly implicit family. */
+static inline int rw_starts_linear(const rw_seen *seen, const double *restrict A, const double *restrict B)
+{
+    return seen->gain > RW_WORTH_KEEPING || rw_is_stiff(A, B);
 }
 
 #endif

@@ -244,10 +244,13 @@ static void turn_sides(rw_run *run, double time, double step)
     run->result->kinks++;
 }
 
+/* The numbers point into the run itself. */
+static void sides_here(rw_run *run) { run->numbers.border = (const double(*)[RW_NSWITCHES])run->sides.border; }
+
 static void sides_start(rw_run *run, double t)
 {
     rw_sides_start(&run->sides, &run->numbers, t, run->x, run->weight);
-    run->numbers.border = (const double(*)[RW_NSWITCHES])run->sides.border;
+    sides_here(run);
     run->onset = -INFINITY;
     run->touch = INFINITY;
 }
@@ -280,6 +283,7 @@ static int aim(rw_run *run, double t, double longest, double resolution, double 
 #define locate(run, start, t, h, error, resolution, aimed, longest) ((void)(aimed), NO_KINK)
 #define turn_sides(run, time, step) ((void)(time), (void)(step))
 #define sides_start(run, t) ((void)0)
+#define sides_here(run) ((void)0)
 #define sides_move_on(run) ((void)0)
 #define remember_touch(run, h, factor) ((void)0)
 #define forget_release(run) ((void)0)

@@ -73,7 +73,7 @@ static void reduce_step(rw_run *run, double start, double t, double h)
     }
 }
 #else
-#define reduce_start(run, start) ((void)0)
+#define reduce_start(run, start) ((void)(start))
 #define reduce_step(run, start, t, h) ((void)0)
 #endif
 

@@ -39,9 +39,13 @@ typedef struct {
     double *x;
     double next[RW_NX];
     double step;           /* proposal for the next step; 0 where it has to be estimated */
-    rw_rates seen;
+    rw_seen seen;
     double last_error;     /* logarithm of that of the last accepted step, for the PI controller */
     int method;
+    /* within the segment, of a run that goes on in another call */
+    double elapsed; /* [s] */
+    int rejected_last;
+    rw_family family;
     long outputs;
     const double *output_times;
     double *output_states;

@@ -25,33 +25,37 @@ static int choose_method(rw_run *run, double t)
 {
     rw_rosenbrock_start(&run->linear, &run->numbers, t, run->x, 1);
     run->result->evaluations++;
-    return rw_is_stiff(run->linear.A, run->linear.B) ? RACEWAY_RODAS5P : RACEWAY_DP54;
+    return rw_starts_linear(&run->seen, run->linear.A, run->linear.B) ? RACEWAY_RODAS5P : RACEWAY_DP54;
 }
 
-/* The method for the next step, from the accepted one. */
-static int judge_family(rw_run *run, rw_family *family, double h)
+/* The method for the next step, from the accepted one of size h at time t. */
+static int judge_family(rw_run *run, rw_family *family, double t, double h)
 {
     if (!rw_family_looks(family)) return run->method;
-    if (!is_explicit(run->method)) return rw_after_linear(family, &run->seen, run->method, rw_fastest_rate(run->linear.A, run->linear.B), h);
-    const int stages = run->method == RACEWAY_DP54 ? RW_DP54_STAGES : RW_DOP853_STAGES;
-    return rw_after_explicit(family, run->method, rw_explicit_stiffness(&run->plain, stages, h, run->next, run->weight), 1);
+    if (!is_explicit(run->method))
+        return rw_after_linear(family, &run->seen, run->method, rw_stable_step(run->linear.A, run->linear.B, 1), h);
+    const int dp54 = run->method == RACEWAY_DP54, stages = dp54 ? RW_DP54_STAGES : RW_DOP853_STAGES;
+    const int wanted = rw_look_at_explicit(family, run->method, rw_explicit_stiffness(&run->plain, stages, h, run->next, run->weight), h);
+    if (wanted == RW_GO_ON) return run->method;
+    if (wanted == RW_GIVE_UP) return rw_try_linear(family, &run->seen, dp54 ? h : 0.5 * h);
+    double stable = INFINITY;
+    if (wanted == RW_ASK) {
+        linearize(run, t, 1);
+        stable = rw_stable_step(run->linear.A, run->linear.B, dp54);
+    }
+    return rw_after_explicit(family, &run->seen, run->method, stable, 1);
 }
 
-/* Integrate one segment from `start` to `end`; its clock starts at zero. */
-static int run_segment(rw_run *run, double start, double end, int restart, int changeable)
+/* The first step of a segment from `start` on: its size and method, and what it starts from. */
+static void begin_segment(rw_run *run, double start, double length, double resolution, int restart, int changeable)
 {
-    raceway_result *result = run->result;
     const raceway_options *options = run->options;
-    const double length = end - start;
-    /* of time within the segment; at t = 0 the sum start + t would take steps down to the smallest of all numbers */
-    const double resolution = DBL_EPSILON * (fabs(start) > fabs(end) ? fabs(start) : fabs(end));
-    double t = 0.0;
-    if (!(length > 0.0)) return RACEWAY_DONE;
+    const double t = 0.0;
     if (run->step == 0.0) sides_start(run, t);
     if (restart || run->step == 0.0) {
         if (changeable) {
             const int chosen = choose_method(run, t);
-            result->switches += run->method != chosen && run->method != RACEWAY_AUTO;
+            run->result->switches += run->method != chosen && run->method != RACEWAY_AUTO;
             run->method = chosen;
         }
         const double estimate = options->first_step > 0.0 && run->step == 0.0 ? options->first_step : estimate_step(run, t, length);
@@ -60,14 +64,30 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
     }
     /* slopes that overflow give an estimate of zero, or none */
     if (!(run->step > 2.0 * resolution)) run->step = 2.0 * resolution;
-    int rejected_last = 0;
-    rw_family family = {0};
     forget_release(run);
     reduce_start(run, start);
     tangent_jump(run);
     if (is_explicit(run->method)) first_slope(run, t);
     else linearize(run, t, 1);
     tangent_start(run, t);
+    run->elapsed = t;
+    run->rejected_last = 0;
+    run->family = (rw_family){0};
+}
+
+/* Integrate one segment from `start` to `end`; its clock starts at zero.  `resumed`: it goes on where another call ended. */
+static int run_segment(rw_run *run, double start, double end, int restart, int changeable, int resumed)
+{
+    raceway_result *result = run->result;
+    const raceway_options *options = run->options;
+    const double length = end - start;
+    /* of time within the segment; at t = 0 the sum start + t would take steps down to the smallest of all numbers */
+    const double resolution = DBL_EPSILON * (fabs(start) > fabs(end) ? fabs(start) : fabs(end));
+    if (!(length > 0.0)) return RACEWAY_DONE;
+    if (!resumed) begin_segment(run, start, length, resolution, restart, changeable);
+    double t = run->elapsed;
+    int rejected_last = run->rejected_last;
+    rw_family family = run->family;
     while (t < length) {
         double h = run->step < options->largest_step ? run->step : options->largest_step;
         const double left = length - t;
@@ -83,6 +103,9 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
         if (aimed) last = 0;
         if (result->steps + result->rejected >= options->max_steps) {
             result->step = h;
+            run->elapsed = t;
+            run->rejected_last = rejected_last;
+            run->family = family;
             return RACEWAY_TOO_MANY_STEPS;
         }
         if (!last && run->step <= resolution) {
@@ -117,7 +140,7 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
             write_outputs(run, start, t, h, last ? end : start + (t + h));
             reduce_step(run, start, t, h);
             /* a step that was cut, or has its own pace, says nothing about the families */
-            const int chosen = changeable && met == NO_KINK && !is_paced(run) ? judge_family(run, &family, h) : run->method;
+            const int chosen = changeable && met == NO_KINK && !is_paced(run) ? judge_family(run, &family, t, h) : run->method;
             tangent_accept(run);
             memcpy(run->x, run->next, sizeof run->next);
             if (met == CUT) {
@@ -169,26 +192,61 @@ static int run_segment(rw_run *run, double start, double end, int restart, int c
     return RACEWAY_DONE;
 }
 
+/* Integrate over the segments from `first` on. */
+static int run_segments(rw_run *run, double *x, long first, long segments, const double *times, const double *inputs,
+                        const unsigned char *restarts, int resumed)
+{
+    raceway_result *result = run->result;
+    const raceway_options *options = run->options;
+    for (long i = first; i < segments; i++) {
+        result->segment = i;
+        run->numbers.u = inputs + i * RW_NU;
+        result->status = run_segment(run, times[i], times[i + 1], restarts[i], options->method == RACEWAY_AUTO, resumed && i == first);
+        if (result->status != RACEWAY_DONE) break;
+#ifdef RACEWAY_SENSITIVITIES
+        if (run->tangents) rw_explicit_rate(&run->numbers, times[i + 1] - times[i], x, run->rate_before);
+#else
+        (void)x;
+#endif
+    }
+    result->method = run->method;
+    if (result->status == RACEWAY_TOO_MANY_STEPS && options->work != NULL) memcpy(options->work, run, sizeof *run);
+    return result->status;
+}
+
+/* Whether output times follow each other from `begin` to `end`, and are numbers: one that does not would not be reached. */
+static int are_within(const double *times, long count, double begin, double end)
+{
+    for (long k = 0; k < count; k++)
+        if (!(times[k] >= (k > 0 ? times[k - 1] : begin) && times[k] <= end)) return 0;
+    return count >= 0;
+}
+
 static int run_all(rw_run *run, const raceway_options *options, const double *p, const double *c, double *x, long segments,
                    const double *times, const double *inputs, const unsigned char *restarts, long outputs, const double *output_times,
                    double *output_states, raceway_result *result)
 {
-    memset(result, 0, sizeof *result);
-    result->state = -1;
-    result->time = segments > 0 ? times[0] : 0.0;
+    if (options->resume) memcpy(run, options->work, sizeof *run);
     run->options = options;
     run->result = result;
     run->x = x;
-    run->step = 0.0;
-    run->last_error = RW_LOG_SMALL_ERROR;
-    run->seen = (rw_rates){0.0, INFINITY};
-    run->method = options->method;
     run->outputs = outputs;
     run->output_times = output_times;
     run->output_states = output_states;
     run->numbers.p = p;
     run->numbers.c = c;
-    const int changeable = options->method == RACEWAY_AUTO;
+    if (options->resume) {
+        sides_here(run);
+        result->step = 0.0;
+        return run_segments(run, x, result->segment, segments, times, inputs, restarts, 1);
+    }
+    memset(result, 0, sizeof *result);
+    result->state = -1;
+    result->time = segments > 0 ? times[0] : 0.0;
+    run->step = 0.0;
+    run->last_error = RW_LOG_SMALL_ERROR;
+    run->seen = (rw_seen){.least = INFINITY};
+    run->method = options->method;
     if (options->method < RACEWAY_AUTO || options->method > RACEWAY_DOP853) return result->status = RACEWAY_BAD_ARGUMENT;
     if (!rw_are_limits(options->first_step, options->smallest_step, options->largest_step)) return result->status = RACEWAY_BAD_ARGUMENT;
     for (int k = 0; k < RW_NX; k++) {
@@ -198,6 +256,8 @@ static int run_all(rw_run *run, const raceway_options *options, const double *p,
     }
     for (long i = 1; i <= segments; i++)
         if (!(times[i] >= times[i - 1])) return result->status = RACEWAY_BAD_ARGUMENT;
+    if (segments < 0 || !are_within(output_times, outputs, result->time, segments > 0 ? times[segments] : result->time))
+        return result->status = RACEWAY_BAD_ARGUMENT;
     if (!is_finite(x)) return result->status = RACEWAY_NOT_FINITE;
     while (result->written < outputs && output_times[result->written] <= result->time) {
         if (output_states) memcpy(output_states + result->written * RW_NX, x, RW_NX * sizeof *x);
@@ -209,17 +269,7 @@ static int run_all(rw_run *run, const raceway_options *options, const double *p,
 #endif
         result->written++;
     }
-    for (long i = 0; i < segments; i++) {
-        result->segment = i;
-        run->numbers.u = inputs + i * RW_NU;
-        result->status = run_segment(run, times[i], times[i + 1], restarts[i], changeable);
-        if (result->status != RACEWAY_DONE) break;
-#ifdef RACEWAY_SENSITIVITIES
-        if (run->tangents) rw_explicit_rate(&run->numbers, times[i + 1] - times[i], x, run->rate_before);
-#endif
-    }
-    result->method = run->method;
-    return result->status;
+    return run_segments(run, x, 0, segments, times, inputs, restarts, 0);
 }
 
 int raceway_run(const raceway_options *options, const double *p, const double *c, double *x, long segments, const double *times,
@@ -239,6 +289,7 @@ int raceway_run_tangents(const raceway_options *options, const double *p, const 
                          double *output_states, const raceway_tangents *tangents, raceway_result *result)
 {
     rw_run run;
+    if (options->work != NULL || options->resume) return result->status = RACEWAY_BAD_ARGUMENT;
     run.tangents = tangents;
     run.blocks = (rw_tangent_block *)tangents->work;
     return run_all(&run, options, p, c, x, segments, times, inputs, restarts, outputs, output_times, output_states, result);
@@ -263,7 +314,8 @@ void raceway_sizes(int *sizes)
     sizes[2] = RW_NP;
     sizes[3] = RW_NC;
     sizes[4] = RW_NB;
-    sizes[6] = (int)sizeof(raceway_options);
-    sizes[7] = (int)sizeof(raceway_result);
-    sizes[8] = (int)sizeof(raceway_tangents);
+    sizes[6] = (int)sizeof(rw_run);
+    sizes[7] = (int)sizeof(raceway_options);
+    sizes[8] = (int)sizeof(raceway_result);
+    sizes[9] = (int)sizeof(raceway_tangents);
 }

@@ -28,8 +28,8 @@ enum raceway_status {
     RACEWAY_TOO_MANY_STEPS = 1, /* max_steps reached */
     RACEWAY_STEP_TOO_SMALL = 2, /* the error test fails at the smallest step */
     RACEWAY_NOT_FINITE = 3,     /* the state or its rate is not a number even for the smallest step */
-    RACEWAY_BAD_ARGUMENT = 4    /* method unknown, times out of order, a tolerance or a largest step that is not positive, another step
-                                   that is negative; a number that is none */
+    RACEWAY_BAD_ARGUMENT = 4    /* method unknown, times out of order, an output time outside the run, a count below zero, a tolerance or a
+                                   largest step that is not positive, another step that is negative; a number that is none */
 };
 
 typedef struct {
@@ -40,6 +40,8 @@ typedef struct {
     double largest_step;     /* [s] */
     const double *tolerance; /* error allowed in a step for each state */
     double *reduction;       /* on-line reductions, see reductions.h; NULL: none.  Only with RACEWAY_REDUCTIONS */
+    void *work;              /* keeps a run that has taken all its steps, so that a later call can go on; NULL: it is not kept */
+    int resume;              /* nonzero: go on with the run kept there */
 } raceway_options;
 
 typedef struct {
@@ -67,9 +69,13 @@ typedef struct {
    inputs       u of each, row after row
    restarts     1 where the load jumps at the segment's start: the step size is estimated anew there
    outputs      number of output times
-   output_times increasing, within the run [s]
+   output_times none below the one before, from the run's begin to its end; of a run of no segments, 0 [s]
    output_states row after row, or NULL
-   Returns result->status. */
+   Returns result->status.
+
+   With `work`, of the bytes that raceway_sizes tells and aligned for double, a run may be made in several calls: one that ends for
+   having taken max_steps is followed by one with `resume`, more steps, and all else as the first left it, x, reduction and result as
+   well.  Counts are those of all calls, max_steps too, and every bit is that of a run in one call.  Not for runs with derivatives. */
 RACEWAY_EXPORT int raceway_run(const raceway_options *options, const double *p, const double *c, double *x, long segments,
                                const double *times, const double *inputs, const unsigned char *restarts, long outputs,
                                const double *output_times, double *output_states, raceway_result *result);
@@ -109,7 +115,8 @@ RACEWAY_EXPORT void raceway_magnitudes(const double *p, const double *c, const d
                                        double horizon, double *magnitude);
 #endif
 
-/* Sizes the library was compiled for: states, inputs, parameters, constants, balls, lanes; bytes of options, result and tangents. */
+/* Sizes the library was compiled for: states, inputs, parameters, constants, balls, lanes; bytes of the work of a run in several calls, of
+   options, result and tangents. */
 RACEWAY_EXPORT void raceway_sizes(int *sizes);
 
 #endif

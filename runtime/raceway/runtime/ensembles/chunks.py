@@ -19,7 +19,8 @@ import numpy as np
 from raceway.runtime.ensembles.ensemble_driver import STOPPED, EnsembleDriver, MemberNumbers
 from raceway.runtime.ensembles.member_segments import moments, stretches
 from raceway.runtime.ensembles.members import Members, Span
-from raceway.runtime.integrate.reductions import RunFailed, integrate_reduced, step_limit
+from raceway.runtime.integrate.limits import brief_limit
+from raceway.runtime.integrate.reductions import Begun, RunFailed, integrate_reduced
 from raceway.runtime.integrate.stepper import End, Family
 from raceway.runtime.integrate.stepping import STATUS_OF_END
 
@@ -166,13 +167,13 @@ def _tolerance(work: Work, which: np.ndarray) -> np.ndarray:
 
 
 def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
-    """Integrate a chunk's members, several together."""
+    """Integrate a chunk's members, several together; one that takes too many steps for that goes on alone."""
     which = chunk.members
     tolerance = _tolerance(work, which)
     x = work.members.initial[which]
     rows = work.rows[which] if work.reducing else None
     durations = work.span.durations[which]
-    limits = np.array(list(map(step_limit, durations.tolist(), work.span.turns[which].tolist())))
+    limits = np.array(list(map(brief_limit, durations.tolist(), work.span.turns[which].tolist())))
     carried = work.driver.carry(len(which))
     results = carried.results
     for arrays in stretches(work.model, work.members, work.span, which):
@@ -195,7 +196,14 @@ def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
     work.end[which] = x
     if rows is not None:
         work.rows[which] = rows
-    for place in np.flatnonzero((results["status"] != End.DONE) | (results["time"] < durations)):
+    counts = {name: int(results[name].sum()) for name in COUNTS}
+    for place in np.flatnonzero(results["status"] == End.TOO_MANY_STEPS).tolist():
+        told = results[place]
+        begun = Begun(time=float(told["time"]), steps=int(told["steps"] + told["rejected"]))
+        _alone(work, chunk, place, tolerance[place], counts, begun)
+    others = results["status"] != End.TOO_MANY_STEPS
+    failed = others & ((results["status"] != End.DONE) | (results["time"] < durations))
+    for place in np.flatnonzero(failed).tolist():
         member, told = int(which[place]), results[place]
         if told["status"] in (STOPPED, End.DONE):
             status, message = "INTERRUPTED", "Interrupted on its way."
@@ -204,45 +212,52 @@ def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
             state = f", worst state {work.model.states[told['state']]}" if told["state"] >= 0 else ""
             status, message = ending.name, f"{ending.value} Step size {told['step']:.3g} s{state}."
         work.results[member] = MemberFailure(member=member, status=status, time=float(told["time"]), message=message)
-    return {name: int(results[name].sum()) for name in COUNTS}
+    return counts
 
 
 def _one_by_one(work: Work, chunk: _Chunk) -> dict[str, int]:
     """Integrate a chunk's members by the driver of single runs."""
     tolerance = _tolerance(work, chunk.members)
     counts = dict.fromkeys(COUNTS, 0)
-    for place, member in enumerate(chunk.members.tolist()):
+    for place in range(len(chunk.members)):
         if work.stop.value:
             _note(work, chunk.members[place:], "INTERRUPTED", "Interrupted before it began.")
             break
-        duration, turn, start = (float(of[member]) for of in (work.span.durations, work.span.turns, work.span.starts))
-
-        def tell(fraction: float, place: int = place, duration: float = duration) -> None:
-            chunk.reached[place] = fraction * duration
-
-        try:
-            steps, rejected = integrate_reduced(
-                work.model,
-                work.driver,
-                work.members.numbers(work.model, member),
-                work.family,
-                tolerance[place],
-                work.end[member],
-                work.rows[member],
-                (duration, turn, start),
-                progress=tell,
-                stop=work.stop,
-            )
-        except RunFailed as fault:
-            work.results[member] = MemberFailure(
-                member=member, status=fault.status.name, time=fault.time, message=str(fault)
-            )
-            continue
-        counts["steps"] += steps
-        counts["rejected"] += rejected
-        reached = float(chunk.reached[place])
-        if reached < duration:
-            work.results[member] = MemberFailure(
-                member=member, status="INTERRUPTED", time=reached, message="Interrupted on its way."
-            )
+        _alone(work, chunk, place, tolerance[place], counts, Begun())
     return counts
+
+
+def _alone(work: Work, chunk: _Chunk, place: int, tolerance: np.ndarray, counts: dict[str, int], begun: Begun) -> None:
+    """Integrate one member of a chunk by the driver of single runs, from where it is; adds its steps to `counts`."""
+    member = int(chunk.members[place])
+    duration, turn, start = (float(of[member]) for of in (work.span.durations, work.span.turns, work.span.starts))
+
+    def tell(fraction: float) -> None:
+        chunk.reached[place] = fraction * duration
+
+    try:
+        steps, rejected = integrate_reduced(
+            work.model,
+            work.driver,
+            work.members.numbers(work.model, member),
+            work.family,
+            tolerance,
+            work.end[member],
+            work.rows[member],
+            (duration, turn, start),
+            progress=tell,
+            stop=work.stop,
+            begun=begun,
+        )
+    except RunFailed as fault:
+        work.results[member] = MemberFailure(
+            member=member, status=fault.status.name, time=fault.time, message=str(fault)
+        )
+        return
+    counts["steps"] += steps
+    counts["rejected"] += rejected
+    reached = float(chunk.reached[place])
+    if reached < duration:
+        work.results[member] = MemberFailure(
+            member=member, status="INTERRUPTED", time=reached, message="Interrupted on its way."
+        )

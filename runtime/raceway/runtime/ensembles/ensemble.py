@@ -24,7 +24,7 @@ from raceway.runtime.ensembles.ensemble_driver import LANE_FAMILIES
 from raceway.runtime.ensembles.members import Members, Span, Table, make_members, read_table
 from raceway.runtime.errors import RequestError
 from raceway.runtime.integrate import clock
-from raceway.runtime.integrate.locating import LOCATED, STEPPED_OVER, Kinks, check_kinks, has_kinks
+from raceway.runtime.integrate.locating import LOCATED, Kinks, choose_kinks, has_kinks
 from raceway.runtime.integrate.reductions import (
     channel_names,
     check_rtol,
@@ -36,6 +36,7 @@ from raceway.runtime.integrate.reductions import (
 from raceway.runtime.manifest import Manifest
 from raceway.runtime.parameters import real, unknown_name
 from raceway.runtime.printed import printed
+from raceway.runtime.request import check_memory
 
 if TYPE_CHECKING:
     import xarray
@@ -156,12 +157,21 @@ def simulate_many(
     manifest = model.manifest
     aliases = observable_aliases(channel_names(manifest))
     chosen = _observables(observables, aliases)
-    family = choose_family(method or manifest.run.method)
+    asked = method or manifest.run.method
+    family = choose_family(asked)
     tolerance = check_rtol(manifest.run.rtol if rtol is None else rtol)
-    at_kinks = STEPPED_OVER if kinks is None else check_kinks(kinks)
+    at_kinks = choose_kinks(kinks, "stepper" if asked == "auto" else asked, manifest, tolerance)
     workers = _threads(threads)
     # the table first: a wrong one is told before the driver is compiled
     columns = read_table(manifest, table)
+    count = max((len(values) for values in columns.values()), default=0)
+    # parameters, constants and what belongs to them, as arrays and for the driver: measured, with room to spare
+    check_memory(
+        f"{count} members of",
+        count,
+        3 * (len(manifest.parameters) + len(manifest.constants)) + 10,
+        "Run the table in parts of some millions of members: they do not depend on each other.",
+    )
     driver = model.ensemble_driver
     if at_kinks == LOCATED and has_kinks(manifest):
         driver = driver.with_stepper(model.locating_stepper)

@@ -45,13 +45,6 @@ def stepper_magnitudes(
     return stepper.magnitudes(numbers.p, numbers.c, initial, inputs, horizon)
 
 
-def default_magnitudes(model: Model, numbers: Numbers, initial: np.ndarray, duration: float, turn: float) -> np.ndarray:
-    """Magnitudes that a run by the stepper takes; by Python where there is none, shape (states,)."""
-    if model.has_stepper:
-        return stepper_magnitudes(model, model.stepper, numbers, initial, duration, turn)
-    return model_scales(model, numbers, initial, duration, turn).magnitude
-
-
 def model_scales(model: Model, numbers: Numbers, initial: np.ndarray, duration: float, turn: float) -> Scales:
     """Magnitudes and stiffness of a run, by Python.
 

@@ -14,7 +14,6 @@ import ctypes
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,10 +24,12 @@ from raceway.runtime.ensembles.ensemble_driver import BALL_CHANNELS, HEAD, ROWS,
 from raceway.runtime.ensembles.members import edge_windows
 from raceway.runtime.errors import RequestError, SimulationError
 from raceway.runtime.integrate import clock
+from raceway.runtime.integrate.limits import Allowance, allowance
 from raceway.runtime.integrate.locating import LOCATED, choose_kinks, has_kinks
 from raceway.runtime.integrate.magnitudes import stepper_magnitudes
+from raceway.runtime.integrate.segments import make_segments, rest_of
 from raceway.runtime.integrate.stepper import METHODS as STEPPERS
-from raceway.runtime.integrate.stepper import End, Family, Segments, Stepper
+from raceway.runtime.integrate.stepper import End, Family, Outcome, Segments, Stepper
 from raceway.runtime.integrate.stepping import STATUS_OF_END
 from raceway.runtime.integrate.whereabouts import Whereabouts, whereabouts
 from raceway.runtime.manifest import Manifest
@@ -39,11 +40,9 @@ if TYPE_CHECKING:
     from raceway.runtime.model import Model
 
 
-#: Steps allowed in a turn, on average, and in any run: a motion that grows without bound crawls before it overflows.
-#: Less than a single run with samples may take (`limits`): an ensemble has many members.
-STEPS_A_TURN = 100_000
-STEPS_A_SECOND = 1_000_000
-STEPS_A_RUN = 1_000_000
+#: Steps, accepted and rejected, that one call of the stepper takes: a fraction of a second.  Between calls progress is
+#: told, and an interrupt or the wish of an ensemble to stop is heard.
+STEPS_A_CALL = 50_000
 
 #: Turns of a run that are looked at for the magnitudes of its states.
 SCALED_TURNS = 16
@@ -226,60 +225,95 @@ def integrate_reduced(
     progress: Callable[[float], None] | None = None,
     stop: ctypes.c_int | None = None,
     stepper: Stepper | None = None,
+    begun: Begun | None = None,
 ) -> tuple[int, int]:
     """Integrate one run, adding to a reduction; `state` is brought to the end.  Returns steps, rejected steps.
+
+    A run takes calls of `STEPS_A_CALL` steps; its bits are those of one that is not cut.
 
     Parameters
     ----------
     span : duration, time of a turn, time from which on is reduced [s]
-    stop : ends the run, with the reduction as it is, when it becomes nonzero
+    progress : told the finished part between calls
+    stop : ends the run between calls, with the reduction as it is, when it becomes nonzero
     stepper : another driver of single runs with reductions
+    begun : of a run that goes on where another driver ended, with its `state` and `row`
 
     Raises
     ------
     RunFailed
-        The driver could not reach the end.
+        The driver could not reach the end, or crawls.
     """
     duration, turn, start = span
-    inputs = model.manifest.inputs
-    gates = [k for k, info in enumerate(inputs) if info.kind != "phase"]
-    before: np.ndarray | None = None
+    begun = begun or Begun()
+    allowed = allowance(duration, turn, begun.time, begun.steps)
+    before: Segments | None = None
     steps = rejected = 0
-    left = step_limit(duration, turn)
     for edges in edge_windows(model, numbers, duration, turn, start):
-        u = np.array([clock.inputs_at(inputs, numbers.values, a, 0.5 * (a + b)) for a, b in pairwise(edges)])
-        u = u.reshape(len(edges) - 1, len(inputs))
-        first = before is None or not np.array_equal(before, u[0, gates])
-        restarts = np.concatenate([[first], np.any(np.diff(u[:, gates], axis=0) != 0.0, axis=1)])
-        before = u[-1, gates]
-        outcome = (stepper or driver.stepper).run(
+        before = left = make_segments(model.manifest.inputs, numbers, edges, before)
+        if edges[-1] <= begun.time:
+            continue
+        if edges[0] < begun.time:
+            rest = rest_of(left, begun.time, model.manifest.inputs, numbers)
+            if rest is None:
+                continue
+            left = rest
+        calls = _calls(stepper or driver.stepper, model, numbers, family, tolerance, state, row, left, allowed)
+        for outcome in calls:
+            if progress is not None:
+                progress(outcome.time / duration)
+            if stop is not None and stop.value:
+                return steps + outcome.steps, rejected + outcome.rejected
+        steps += outcome.steps
+        rejected += outcome.rejected
+    return steps, rejected
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Begun:
+    """How far a run has come by another driver: time [s], and steps, accepted and rejected."""
+
+    time: float = 0.0
+    steps: int = 0
+
+
+def _calls(
+    stepper: Stepper,
+    model: Model,
+    numbers: Numbers,
+    family: Family,
+    tolerance: np.ndarray,
+    state: np.ndarray,
+    row: np.ndarray,
+    segments: Segments,
+    allowed: Allowance,
+) -> Iterator[Outcome]:
+    """Integrate over segments; what each call tells of all so far.  Errors as for `integrate_reduced`."""
+    held = stepper.hold()
+    taken = 0
+    while True:
+        outcome = stepper.run(
             family=family,
             tolerance=tolerance,
             p=numbers.p,
             c=numbers.c,
             x=state,
-            segments=Segments(times=edges, inputs=np.ascontiguousarray(u), restarts=restarts),
+            segments=segments,
             output_times=np.zeros(0),
             output_states=None,
             reduction=row,
-            max_steps=left,
+            max_steps=taken + min(STEPS_A_CALL, allowed.left),
+            held=held,
         )
-        left = max(left - outcome.steps - outcome.rejected, 1)
-        steps += outcome.steps
-        rejected += outcome.rejected
-        if outcome.end is not End.DONE:
+        more = outcome.steps + outcome.rejected - taken
+        taken += more
+        gives_up = allowed.spend(more, outcome.time)
+        if outcome.end is not End.DONE and (gives_up or outcome.end is not End.TOO_MANY_STEPS):
             place = whereabouts(model.manifest, numbers, outcome.time, state)
             raise RunFailed(outcome.end, outcome.time, outcome.step, place)
-        if progress is not None:
-            progress(float(edges[-1]) / duration)
-        if stop is not None and stop.value:
-            break
-    return steps, rejected
-
-
-def step_limit(duration: float, turn: float) -> int:
-    """Most steps of a run, accepted and rejected."""
-    return STEPS_A_RUN + STEPS_A_TURN * math.ceil(duration / turn) + math.ceil(min(STEPS_A_SECOND * duration, 1e15))
+        yield outcome
+        if outcome.end is End.DONE:
+            return
 
 
 class RunFailed(SimulationError):

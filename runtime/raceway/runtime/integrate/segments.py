@@ -17,6 +17,7 @@ from raceway.runtime.integrate import clock
 from raceway.runtime.integrate.stepper import Segments
 from raceway.runtime.manifest import InputInfo
 from raceway.runtime.parameters import Numbers
+from raceway.runtime.request import check_memory
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 #: Largest angle that a phase may reach within a segment [rad]: sines of larger ones lose digits.
 LARGEST_PHASE = 1e6
 
+#: Numbers that a segment takes besides its inputs while segments are made: ends, middles, jumps, samples.
+WORK = 5
+
 
 def time_resolution(begin: float, end: float, turn: float) -> float:
     """Times of a run closer than this are one time [s].  It does not depend on how the run is sampled."""
@@ -32,7 +36,14 @@ def time_resolution(begin: float, end: float, turn: float) -> float:
 
 
 def segment_edges(model: Model, numbers: Numbers, begin: float, end: float, turn: float) -> np.ndarray:
-    """Begin, breakpoints, whole turns and end, increasing, none twice, shape (segments + 1,) [s]."""
+    """Begin, breakpoints, whole turns and end, increasing, none twice, shape (segments + 1,) [s].
+
+    Raises
+    ------
+    RequestError
+        They would not fit into memory, or the times of a table do not increase.
+    """
+    check_count(model.manifest.inputs, numbers, end - begin, turn)
     cuts = clock.breakpoints(model.manifest.inputs, numbers.values, begin, end)
     if math.isfinite(turn):
         near = time_resolution(begin, end, turn)
@@ -46,9 +57,41 @@ def segment_edges(model: Model, numbers: Numbers, begin: float, end: float, turn
     return _short_of_rounding(model.manifest.inputs, numbers, np.concatenate([[begin], cuts, [end]]))
 
 
+def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, turn: float, columns: int = WORK) -> None:
+    """Refuse a time with more segments than fit into memory: the most that there can be, before any is made.
+
+    Parameters
+    ----------
+    length, turn : of the time, and of a turn, infinite where nothing turns [s]
+    columns : numbers that a segment takes besides its inputs
+
+    Raises
+    ------
+    RequestError
+        They would not fit.
+    """
+    count = 1.0 + length / turn + length * _fastest(inputs, numbers) / LARGEST_PHASE
+    for item in inputs:
+        if item.kind == "gate":
+            count += 2.0 * len(item.windows) * (1.0 + length * abs(numbers.values[item.rate]) / clock.TURN)
+        else:
+            count += len(item.times)
+    check_memory(
+        f"Up to {count:.10g} segments, cut where a load switches and at every whole turn, of",
+        count,
+        len(inputs) + columns,
+        "Take a shorter run, or slower loads; `Model.reduce` makes the segments of a few turns at a time.",
+    )
+
+
+def _fastest(inputs: Sequence[InputInfo], numbers: Numbers) -> float:
+    """Rate of the fastest phase [rad/s]."""
+    return max((abs(numbers.values[item.rate]) for item in inputs if item.kind == "phase"), default=0.0)
+
+
 def _short_of_rounding(inputs: Sequence[InputInfo], numbers: Numbers, edges: np.ndarray) -> np.ndarray:
     """The edges, and more where a phase would get beyond `LARGEST_PHASE` between two: a fast load on a slow shaft."""
-    fastest = max((abs(numbers.values[item.rate]) for item in inputs if item.kind == "phase"), default=0.0)
+    fastest = _fastest(inputs, numbers)
     parts = np.ceil(np.diff(edges) * fastest / LARGEST_PHASE)
     if not np.any(parts > 1.0) or not np.all(np.isfinite(parts)):
         return edges

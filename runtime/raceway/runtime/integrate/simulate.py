@@ -59,6 +59,8 @@ def simulate(
     """
     started = clocks.perf_counter()
     plan = make_plan(model, numbers, request)
+    # derivatives first: what would not fit into memory is told before there is memory for the rest
+    directions = prepare(len(plan.times)) if prepare is not None else None
     interval = (0.0, plan.duration)
     trajectory = start_trajectory(model, numbers, plan.times, plan.initial, interval, plan.turn, even=plan.even)
     method, reason, magnitude = _choose(model, numbers, request.method, plan, trajectory)
@@ -67,7 +69,6 @@ def simulate(
     failure = None
     cost = Cost()
     try:
-        directions = prepare(len(plan.times)) if prepare is not None else None
         if directions is not None and plan.sensitivity_rtol is not None:
             directions.control(plan.sensitivity_rtol, magnitude)
         fill(model, numbers, method, plan.rtol * magnitude, trajectory, cost, request.progress, directions, kinks)
@@ -143,6 +144,8 @@ def to_solution(
             rejected=cost.rejected,
             kinks=cost.kinks,
             located=cost.located,
+            initial=tuple(plan.initial.tolist()),
+            duration=plan.duration,
             segments=trajectory.passed,
             calls=trajectory.calls,
             wall_time=clocks.perf_counter() - started,

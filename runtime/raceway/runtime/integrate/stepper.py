@@ -18,6 +18,7 @@ import numpy as np
 from raceway.runtime.compiled.compile import CompiledLibrary
 from raceway.runtime.compiled.compilers import Compiler
 from raceway.runtime.compiled.driver_library import (
+    ENSEMBLE_HEADERS,
     HEADERS,
     LOCATING_HEADERS,
     address,
@@ -72,6 +73,8 @@ class _Options(ctypes.Structure):
         ("largest_step", ctypes.c_double),
         ("tolerance", ctypes.c_void_p),
         ("reduction", ctypes.c_void_p),
+        ("work", ctypes.c_void_p),
+        ("resume", ctypes.c_int),
     )
 
 
@@ -148,6 +151,22 @@ class Outcome:
     step: float
 
 
+@dataclass(slots=True, kw_only=True)
+class Held:
+    """A run that is made in several calls, between two of them.
+
+    Attributes
+    ----------
+    work : records of the driver, which read as C wrote them
+    result : what the calls so far tell; its counts are those of all
+    begun : whether there was a call
+    """
+
+    work: np.ndarray
+    result: _Result
+    begun: bool = False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tangents:
     """Directions along which a run is differentiated, in blocks of `Stepper.lanes`.
@@ -178,15 +197,18 @@ class Tangents:
 def compile_stepper(
     folder: Path, manifest: Manifest, compiler: Compiler, *, sensitivities: bool = False
 ) -> CompiledLibrary:
-    """Library of driver and kernels of a generated folder; with the derivatives of its steps where asked for.
+    """Library of driver and kernels of a generated folder: with reductions, or with the derivatives of its steps.
+
+    Reductions cost a run that does not ask for them nothing that can be measured, and the compiler a sixth more time.
 
     Raises
     ------
     CompileError
         The compiler failed.
     """
-    flags = ("-DRACEWAY_SENSITIVITIES",) if sensitivities else ()
-    return compile_driver(folder, manifest, compiler, ("stepper.c",), kind="stepper", headers=HEADERS, flags=flags)
+    headers: tuple[str, ...] = HEADERS if sensitivities else ENSEMBLE_HEADERS
+    flags = ("-DRACEWAY_SENSITIVITIES" if sensitivities else "-DRACEWAY_REDUCTIONS",)
+    return compile_driver(folder, manifest, compiler, ("stepper.c",), kind="stepper", headers=headers, flags=flags)
 
 
 def compile_locating_stepper(folder: Path, manifest: Manifest, compiler: Compiler) -> CompiledLibrary:
@@ -220,7 +242,7 @@ class Stepper:
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
         self.library = library
         records = (_Options, _Result, _Tangents)
-        code, (_, self.lanes) = open_driver(library, manifest, "raceway_sizes", records, others=2)
+        code, (_, self.lanes, self._work) = open_driver(library, manifest, "raceway_sizes", records, others=3)
         self._inputs = input_columns(manifest)
         self._code = code
         self._run = code.raceway_run
@@ -231,6 +253,10 @@ class Stepper:
             *(ctypes.POINTER(_Options), pointer, pointer, pointer, long, pointer, pointer, pointer),
             *(long, pointer, pointer, ctypes.POINTER(_Result)),
         )
+
+    def hold(self) -> Held:
+        """What a run in several calls is kept in, before its first."""
+        return Held(work=np.empty(self._work // 8 + 1), result=_Result())
 
     def run(
         self,
@@ -249,6 +275,7 @@ class Stepper:
         first_step: float = 0.0,
         smallest_step: float = 0.0,
         largest_step: float = np.inf,
+        held: Held | None = None,
     ) -> Outcome:
         """Integrate over all segments.
 
@@ -261,6 +288,10 @@ class Stepper:
         output_states : C-contiguous, shape (n, states), or None
         tangents : directions to differentiate along; the library must have been compiled with sensitivities
         reduction : row of on-line reductions to add to; the library must have been compiled with reductions
+        max_steps : accepted and rejected
+        held : from `hold`; where a call with it has taken all its steps, another goes on with the same arguments and
+            more `max_steps`, which then count those of all calls, as the counts told do.  The bits are those of one
+            call.  Not with `tangents`
         """
         inputs = padded(segments.inputs, self._inputs)
         restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
@@ -269,6 +300,9 @@ class Stepper:
             *(family, max_steps, first_step, smallest_step, largest_step, address("tolerance", tolerance), reduced)
         )
         result = _Result()
+        if held is not None:
+            result, options.work, options.resume = held.result, address("work", held.work), int(held.begun)
+            held.begun = True
         call = self._run if tangents is None else self._differentiated(tangents)
         call(
             ctypes.byref(options),

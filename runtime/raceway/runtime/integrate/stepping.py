@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from raceway.runtime.integrate.limits import STEPS_A_SECOND, STEPS_A_TURN, step_limit
+from raceway.runtime.integrate.limits import LEAST_PROGRESS, STEPS_A_LOOK, least_progress, step_limit
 from raceway.runtime.integrate.locating import LOCATED, STEPPED_OVER, Kinks, stepper_for
 from raceway.runtime.integrate.segments import part_of, rest_of
 from raceway.runtime.integrate.stepper import End, Family, Outcome
@@ -27,13 +27,9 @@ if TYPE_CHECKING:
 #: Segments that one call of the stepper takes, ...
 SEGMENTS_A_CALL = 600
 
-#: ... and steps, accepted and rejected: a fraction of a second.
-STEPS_A_CALL = 1_000_000
-
-#: A call that takes all its steps must come this far, as a fraction of the run, or as far as the limits of a turn and
-#: of a second allow, whichever is less.  What does not diverges or chatters, or is an explicit method on a stiff model:
-#: in a long run it would crawl for hours before the run's own limit is met.
-LEAST_PROGRESS = 0.01
+#: ... and steps, accepted and rejected: a fraction of a second.  Behind each call that takes them all it is looked at
+#: whether the run comes on.
+STEPS_A_CALL = STEPS_A_LOOK
 
 #: What the ways of the stepper to end mean to people.
 STATUS_OF_END = {
@@ -66,8 +62,14 @@ def step_through(
     progress: Callable[[float], None] | None = None,
     directions: Directions | None = None,
     kinks: Kinks = STEPPED_OVER,
+    reduced: Callable[[int, int, np.ndarray], np.ndarray] | None = None,
 ) -> None:
     """Fill the samples of `trajectory`; with derivatives along `directions`.
+
+    Parameters
+    ----------
+    reduced : gives the row of reductions that a call adds to, from its first and last segment (excluded) and the state
+        it begins with; not with derivatives
 
     Raises
     ------
@@ -80,13 +82,14 @@ def step_through(
     state = trajectory.initial.copy()
     span = trajectory.end - trajectory.begin
     allowed = step_limit(span, trajectory.turn)
-    least = min(LEAST_PROGRESS * span, STEPS_A_CALL * min(trajectory.turn / STEPS_A_TURN, 1.0 / STEPS_A_SECOND))
+    least = least_progress(span, trajectory.turn, LEAST_PROGRESS, STEPS_A_CALL)
     for first, last in _calls(trajectory.segments.restarts, whole=directions is not None):
         left = part_of(trajectory.segments, first, last)
         sample, stop = int(trajectory.stops[first]), int(trajectory.stops[last])
         # a sample that rounding puts beside an edge lies on it
         wanted = np.clip(trajectory.t[sample:stop], left.times[0], left.times[-1])
         step = 0.0
+        row = None if reduced is None else reduced(first, last, state)
         while True:
             start = float(left.times[0])
             outcome = stepper.run(
@@ -99,6 +102,7 @@ def step_through(
                 output_times=wanted,
                 output_states=trajectory.x[sample:stop],
                 tangents=None if directions is None else directions.tangents(left, sample, stop - sample),
+                reduction=row,
                 max_steps=STEPS_A_CALL,
                 first_step=step,
             )

@@ -41,6 +41,7 @@ from raceway.runtime.quantities.places import Place, place_of, place_slope
 from raceway.runtime.quantities.static import at_rest
 from raceway.runtime.quantities.track import Outlook, Signal, Stepping, Track, follow
 from raceway.runtime.quantities.view import Estimate, Mark, Quantity, View
+from raceway.runtime.request import check_memory
 
 if TYPE_CHECKING:
     from raceway.runtime.model import Model
@@ -49,6 +50,10 @@ Array = NDArray[np.float64]
 
 #: Fractions nearer than this to an edge are at it.
 AT_EDGE = 1e-12
+
+#: Numbers that a node takes for each state, and those that each direction adds: states, channels, and what they are
+#: made of, on the way from the driver to the quantities.  Lanes without a direction are counted where they are made.
+VALUES, SLOPES = 16, 8
 
 #: Nodes whose weights in a quantity are found at once.
 TOGETHER = 512
@@ -135,6 +140,18 @@ class Study:
         start = check_span(duration, turn, span.transient)
         return Window(duration=duration, start=start, turn=turn, cycles=span.cycles, transient=span.transient)
 
+    def _check_memory(self, window: Window, directions: int = 0, *, from_start: bool = False) -> None:
+        """Refuse nodes that would not fit into memory, before any is laid."""
+        length = window.duration - (0.0 if from_start else window.start)
+        nodes = self.per_turn * (length / window.turn if np.isfinite(window.turn) else length / window.duration)
+        derivatives = f" and derivatives by {directions} parameters" if directions else ""
+        check_memory(
+            f"{nodes:.10g} nodes, with states{derivatives}, of",
+            nodes,
+            max(len(self.model.states), 1) * (VALUES + SLOPES * directions),
+            f"Take a shorter run, samples_per_cycle below {self.per_turn}, or fewer parameters at a time.",
+        )
+
     def measure(self, numbers: Numbers, stepping: Stepping) -> Course:
         """Values of all quantities.
 
@@ -147,7 +164,9 @@ class Study:
         """
         if not self._moving:
             return self._all_at_rest(numbers, None)
-        edges = make_edges(self.model, numbers, self.window(numbers))
+        window = self.window(numbers)
+        self._check_memory(window)
+        edges = make_edges(self.model, numbers, window)
         track, places = self._follow(numbers, edges, uniform_plan(edges, self.per_turn), stepping, None)
         regular = self._regular(track)
         extremes = self._extremes(numbers, regular, stepping)
@@ -210,8 +229,9 @@ class Study:
         """
         if not self._moving:
             return None
-        directions = len(chain.names)
-        edges = make_edges(self.model, numbers, self.window(numbers), chain.derivative, directions)
+        directions, window = len(chain.names), self.window(numbers)
+        self._check_memory(window, directions, from_start=from_start)
+        edges = make_edges(self.model, numbers, window, chain.derivative, directions)
         extremes: dict[tuple[str, str], Extreme] = {}
         kinks: tuple[Kink, ...] = ()
         if self._kinked or any(KINDS[item.kind].extremes for item in self._moving):

@@ -16,8 +16,11 @@ enum { EXIT_FAILED = 1, EXIT_REQUEST = 2 };
 /* Segments of one call: so much memory does a run need at a time. */
 enum { SEGMENTS_A_CALL = 600 };
 
-/* That the samples of a run may hold: 4 GiB. */
+/* That the samples of a run may hold, or its segments: 4 GiB. */
 static const double MOST_NUMBERS = 536870912.0;
+
+/* Numbers that a segment takes while segments are sought: its end, in lists that grow twofold. */
+static const double SEGMENT_NUMBERS = 6.0;
 
 static const double SMALLEST_RTOL = 1e-13, LARGEST_RTOL = 1e-1;
 static const double TURN = 6.283185307179586476925286766559;
@@ -276,6 +279,16 @@ static double time_of_turn(const double *values)
     return speed != 0.0 ? TURN / fabs(speed) : INFINITY;
 }
 
+/* Errors allowed in a step: relative to the magnitudes that the states have in this very run. */
+static void find_tolerance(double rtol, const double *values, const double *x, const double *edges, long segments, double horizon,
+                           double *tolerance)
+{
+    double inputs[2 * SCHEDULE_MOMENTS * (SCENE_INPUTS > 0 ? SCENE_INPUTS : 1)], magnitude[SCENE_STATES];
+    const int moments = schedule_moments(scene_inputs, SCENE_INPUTS, values, edges, segments, horizon, inputs);
+    raceway_magnitudes(values, values + SCENE_PARAMETERS, x, moments, inputs, horizon, magnitude);
+    for (int i = 0; i < SCENE_STATES; i++) tolerance[i] = rtol * magnitude[i];
+}
+
 static int simulate(const request *asked, const double *values)
 {
     double tolerance[SCENE_STATES], x[SCENE_STATES], before[SCENE_INPUTS > 0 ? SCENE_INPUTS : 1] = {0.0};
@@ -289,10 +302,15 @@ static int simulate(const request *asked, const double *values)
         return EXIT_REQUEST;
     }
     const long count = wished > 1.0 ? (long)wished : 1;
-    for (int i = 0; i < SCENE_STATES; i++) {
-        tolerance[i] = asked->rtol * scene_magnitudes[i];
-        x[i] = values[scene_initial[i]];
+    const double most = schedule_most_segments(scene_inputs, SCENE_INPUTS, values, duration, turn);
+    if (!(most * SEGMENT_NUMBERS <= MOST_NUMBERS)) {
+        fprintf(stderr,
+                "error: up to %.10g segments, cut where a load switches and at every whole turn, were asked for. Allowed: %.0f. Take a "
+                "shorter run, or slower loads.\n",
+                most, floor(MOST_NUMBERS / SEGMENT_NUMBERS));
+        return EXIT_REQUEST;
     }
+    for (int i = 0; i < SCENE_STATES; i++) x[i] = values[scene_initial[i]];
     /* far above what any method needs that fits the model: what meets it crawls */
     const double steps = 2e7 + 1e7 * ceil(duration / turn) + 1e6 * duration;
     const raceway_options options = {
@@ -309,6 +327,7 @@ static int simulate(const request *asked, const double *values)
         for (long k = 0; k <= count; k++) m.times[k] = duration * ((double)k / (double)count);
         segments = schedule_edges(scene_inputs, SCENE_INPUTS, values, m.times[0], m.times[count], turn, &m.edges);
         if (segments < 0) status = -1;
+        else find_tolerance(asked->rtol, values, x, m.edges, segments, duration < turn ? duration : turn, tolerance);
     }
     printf("t");
     for (int i = 0; i < SCENE_STATES; i++) printf(",%s", scene_states[i]);

@@ -12,6 +12,9 @@ static const double ANGLE_RESOLUTION = 1e-11;
 /* Times closer than this fraction of the run are one time. */
 static const double TIME_RESOLUTION = 1e-12;
 
+/* Largest angle that a phase may reach within a segment [rad]. */
+static const double LARGEST_PHASE = 1e6;
+
 typedef struct {
     double *times;
     long count, room;
@@ -166,6 +169,66 @@ static void add_turns(time_list *list, long breakpoints, double begin, double en
     }
 }
 
+/* Rate of the fastest phase [rad/s]. */
+static double fastest_phase(const schedule_input *inputs, int count, const double *values)
+{
+    double most = 0.0;
+    for (int i = 0; i < count; i++)
+        if (inputs[i].kind == SCHEDULE_PHASE && fabs(values[inputs[i].rate]) > most) most = fabs(values[inputs[i].rate]);
+    return most;
+}
+
+/* The sorted edges with more between two where a phase would get too large: a fast load on a slow shaft. */
+static void cut_short(time_list *list, double fastest)
+{
+    time_list cut = {NULL, 0, 0, 0};
+    double longest = 0.0;
+    for (long i = 0; i + 1 < list->count; i++)
+        if (list->times[i + 1] - list->times[i] > longest) longest = list->times[i + 1] - list->times[i];
+    if (longest * fastest <= LARGEST_PHASE) return;
+    for (long i = 0; i + 1 < list->count && !cut.short_of_memory; i++) {
+        const double begin = list->times[i], length = list->times[i + 1] - begin, parts = ceil(length * fastest / LARGEST_PHASE);
+        add(&cut, begin);
+        for (double k = 1.0; k < parts && !cut.short_of_memory; k += 1.0) add(&cut, k * (length / parts) + begin);
+    }
+    if (!cut.short_of_memory) add(&cut, list->times[list->count - 1]);
+    free(list->times);
+    *list = cut;
+}
+
+double schedule_most_segments(const schedule_input *inputs, int count, const double *values, double length, double turn)
+{
+    double most = 1.0 + length / turn + length * fastest_phase(inputs, count, values) / LARGEST_PHASE;
+    for (int i = 0; i < count; i++) {
+        if (inputs[i].kind == SCHEDULE_GATE) most += 2.0 * inputs[i].windows * (1.0 + length * fabs(values[inputs[i].rate]) / TURN);
+        most += inputs[i].knots;
+    }
+    return most;
+}
+
+int schedule_moments(const schedule_input *inputs, int count, const double *values, const double *edges, long segments, double horizon,
+                     double *u)
+{
+    const int columns = count > 0 ? count : 1;
+    const double apart = (double)(segments - 1) / (SCHEDULE_MOMENTS - 1);
+    int rows = 0;
+    long before = -1;
+    for (int k = 0; k < SCHEDULE_MOMENTS; k++) {
+        const long i = k < SCHEDULE_MOMENTS - 1 ? (long)(k * apart) : segments - 1;
+        if (i == before) continue;
+        before = i;
+        const double middle = 0.5 * (edges[i] + edges[i + 1]);
+        u[rows * columns] = 0.0;
+        schedule_inputs(inputs, count, values, middle, middle, u + rows++ * columns);
+    }
+    for (int k = 0; k < SCHEDULE_MOMENTS; k++) {
+        const double moment = horizon * (k + 0.5) / SCHEDULE_MOMENTS;
+        u[rows * columns] = 0.0;
+        schedule_inputs(inputs, count, values, moment, moment, u + rows++ * columns);
+    }
+    return rows;
+}
+
 long schedule_edges(const schedule_input *inputs, int count, const double *values, double begin, double end, double turn, double **edges)
 {
     time_list list = {NULL, 0, 0, 0};
@@ -178,6 +241,11 @@ long schedule_edges(const schedule_input *inputs, int count, const double *value
         return -1;
     }
     qsort(list.times, (size_t)list.count, sizeof *list.times, by_size);
+    cut_short(&list, fastest_phase(inputs, count, values));
+    if (list.short_of_memory) {
+        free(list.times);
+        return -1;
+    }
     *edges = list.times;
     return list.count - 1;
 }

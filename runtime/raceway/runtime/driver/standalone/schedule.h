@@ -20,7 +20,13 @@ typedef struct {
     const int *heights; /* [knots] */
 } schedule_input;
 
-/* Ends of the segments of a run: its begin, every time at which a gate switches or a table has a knot, whole turns, its end.
+/* The most segments that a run may have, counted before any is made.
+
+   length, turn    of the run and of a turn [s]; the turn may be infinite */
+double schedule_most_segments(const schedule_input *inputs, int count, const double *values, double length, double turn);
+
+/* Ends of the segments of a run: its begin, every time at which a gate switches or a table has a knot, whole turns, its end, and more
+   where a phase would get so large between two that its sine loses digits.
 
    inputs, count   the model's inputs
    values          parameters and derived constants
@@ -28,6 +34,18 @@ typedef struct {
    edges           on return memory with them, increasing [s]; the caller frees it
    Returns the number of segments, or -1 where memory is short. */
 long schedule_edges(const schedule_input *inputs, int count, const double *values, double begin, double end, double turn, double **edges);
+
+/* Moments of a run that are looked at for magnitudes: so many between its edges, and so many evenly spread. */
+enum { SCHEDULE_MOMENTS = 32 };
+
+/* Inputs at the moments of a run.
+
+   edges, segments those of the run
+   horizon         a turn, or the run, that moments are evenly spread over [s]
+   u               on return the inputs, row after row: [2 SCHEDULE_MOMENTS][count, or 1 where there are none]
+   Returns the number of moments. */
+int schedule_moments(const schedule_input *inputs, int count, const double *values, const double *edges, long segments, double horizon,
+                     double *u);
 
 /* Inputs for a segment that starts at t; `inside` is a time within it, for which gates and slopes hold. */
 void schedule_inputs(const schedule_input *inputs, int count, const double *values, double t, double inside, double *u);
