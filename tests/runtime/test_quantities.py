@@ -29,10 +29,16 @@ def values(model: Model, of: list[str], **options: object) -> dict[str, float]:
 
 
 def test_names_mean_the_numbers_of_ensembles(make_model: Callable[..., Model]) -> None:
-    """Nodes and panels here, reductions inside the stepper's steps there."""
+    """Nodes and panels here, reductions inside the stepper's steps there.
+
+    Stepped over, as derivatives are: the smallest deflection of the most loaded ball lies where two balls change rank,
+    and is met to a part of a quarter step, which is longer where steps end on kinks.
+    """
     model = make_model("punching_press")
     found = values(model, ENSEMBLE, cycles=2, transient=1)
-    many = model.simulate_many({"bearing.clearance": [10e-6]}, ENSEMBLE, cycles=2, transient=1, rtol=1e-10)
+    many = model.simulate_many(
+        {"bearing.clearance": [10e-6]}, ENSEMBLE, cycles=2, transient=1, rtol=1e-10, kinks="stepped-over"
+    )
     for name in ENSEMBLE:
         assert found[name] == pytest.approx(float(many[name][0]), rel=2e-5), name
 
