@@ -87,7 +87,8 @@ static inline double rw_dp54_oscillation(double ratio)
 static inline double rw_fastest_mode(const double *restrict A, const double *restrict B, double squared, double *ratio)
 {
     double power[RW_NQ * RW_NQ], product[RW_NQ * RW_NQ];
-    for (int k = 0; k < RW_NQ * RW_NQ; k++) power[k] = A[k] / squared;
+    const double inverse = 1.0 / squared;
+    for (int k = 0; k < RW_NQ * RW_NQ; k++) power[k] = A[k] * inverse;
     for (int turn = 0; turn < 2; turn++) {
         for (int i = 0; i < RW_NQ; i++)
             for (int j = 0; j < RW_NQ; j++) {

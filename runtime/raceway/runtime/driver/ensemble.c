@@ -353,10 +353,13 @@ static void look(const rw_job *job, rw_lane_block *b, const double *looking)
         /* the lane has counted to the next look; of the steps only the rest by RW_STIFF_LOOK matters */
         if (at->family.stiff == 0) at->family.steps = 1;
         if (b->linearly) {
-            double A[RW_NQ * RW_NQ], B[RW_NQ * RW_NQ];
-            get(b->linear.A, lane, A, RW_NQ * RW_NQ);
-            get(b->linear.B, lane, B, RW_NQ * RW_NQ);
-            method = rw_after_linear(&at->family, &at->seen, at->method, rw_stable_step(A, B, 1), b->h[lane]);
+            method = at->method;
+            if (rw_look_at_linear(&at->family, b->h[lane])) {
+                double A[RW_NQ * RW_NQ], B[RW_NQ * RW_NQ];
+                get(b->linear.A, lane, A, RW_NQ * RW_NQ);
+                get(b->linear.B, lane, B, RW_NQ * RW_NQ);
+                method = rw_after_linear(&at->family, &at->seen, method, rw_stable_step(A, B, 1));
+            }
         } else {
             method = after_explicit(job, b, lane, reach[lane]);
         }

@@ -18,7 +18,6 @@ static const double RW_DP54_LIMIT = 3.25, RW_DOP853_LIMIT = 6.1;
 typedef struct {
     double reach, size, longest; /* of the steps looked at: sums of their reaches [1] and sizes [s], the longest [s] */
     double mean_reach, mean_size; /* at the last decision about an explicit method */
-    double room; /* largest stable step of an explicit method in the looks at a linearly implicit one [s] */
     double stable; /* step at which an explicit method is at its limit, where the last look was at a linearly implicit one [s] */
     int looks, stiff;
     int vain; /* decisions in a row at which linearly implicit steps were not worth it */
@@ -48,7 +47,7 @@ static inline int rw_family_decides(rw_family *family, double reach, double h)
 
 static inline void rw_family_anew(rw_family *family)
 {
-    family->reach = family->size = family->longest = family->room = 0.0;
+    family->reach = family->size = family->longest = 0.0;
     family->looks = 0;
 }
 
@@ -98,22 +97,22 @@ static inline int rw_after_explicit(rw_family *family, rw_seen *seen, int method
     return dp54 ? RACEWAY_DOP853 : RACEWAY_DP54;
 }
 
-/* The method for the next step behind one of size h by a linearly implicit method, at whose start this was the largest stable step of
-   Dormand-Prince 5(4) [s]. */
-static inline int rw_after_linear(rw_family *family, rw_seen *seen, int method, double stable, double h)
+/* Look at a step of size h by a linearly implicit method; whether there is something to decide on. */
+static inline int rw_look_at_linear(rw_family *family, double h) { return rw_family_decides(family, 0.0, h); }
+
+/* The method for the next step behind that, at whose start this was the largest stable step of Dormand-Prince 5(4) [s]. */
+static inline int rw_after_linear(rw_family *family, rw_seen *seen, int method, double stable)
 {
     /* the least of the run: balls that are off now come back */
     seen->least = stable < seen->least ? stable : seen->least;
     seen->most = stable > seen->most ? stable : seen->most;
-    family->room = stable > family->room ? stable : family->room;
-    if (!rw_family_decides(family, h / seen->least, h)) return method;
-    const double reach = family->reach / family->looks, longest = family->longest;
+    const double size = family->size / family->looks, longest = family->longest;
     /* what the explicit method would take here: not more than it took, nor than is stable by now */
-    const double explicit_step = family->room < seen->left ? family->room : seen->left;
+    const double explicit_step = stable < seen->left ? stable : seen->left;
     rw_family_anew(family);
     /* before the stable step has changed no ball has landed yet, and it says nothing; a ring that is always loaded has shown at the start
        what it is */
-    const int short_ones = seen->most > 2.0 * seen->least && reach < RW_WORTH_SOLVING;
+    const int short_ones = seen->most > 2.0 * seen->least && size < RW_WORTH_SOLVING * seen->least;
     family->vain = longest < RW_WORTH_TRYING * explicit_step ? family->vain + 1 : 0;
     if (longest > seen->gain * seen->left && seen->left > 0.0) seen->gain = longest / seen->left;
     if (!short_ones && family->vain < RW_PATIENCE) return method;

@@ -32,8 +32,10 @@ static int choose_method(rw_run *run, double t)
 static int judge_family(rw_run *run, rw_family *family, double t, double h)
 {
     if (!rw_family_looks(family)) return run->method;
-    if (!is_explicit(run->method))
-        return rw_after_linear(family, &run->seen, run->method, rw_stable_step(run->linear.A, run->linear.B, 1), h);
+    if (!is_explicit(run->method)) {
+        if (!rw_look_at_linear(family, h)) return run->method;
+        return rw_after_linear(family, &run->seen, run->method, rw_stable_step(run->linear.A, run->linear.B, 1));
+    }
     const int dp54 = run->method == RACEWAY_DP54, stages = dp54 ? RW_DP54_STAGES : RW_DOP853_STAGES;
     const int wanted = rw_look_at_explicit(family, run->method, rw_explicit_stiffness(&run->plain, stages, h, run->next, run->weight), h);
     if (wanted == RW_GO_ON) return run->method;
@@ -217,9 +219,10 @@ static int run_segments(rw_run *run, double *x, long first, long segments, const
 /* Whether output times follow each other from `begin` to `end`, and are numbers: one that does not would not be reached. */
 static int are_within(const double *times, long count, double begin, double end)
 {
-    for (long k = 0; k < count; k++)
-        if (!(times[k] >= (k > 0 ? times[k - 1] : begin) && times[k] <= end)) return 0;
-    return count >= 0;
+    if (count <= 0) return count == 0;
+    int follow = times[0] >= begin && times[count - 1] <= end;
+    for (long k = 1; k < count; k++) follow &= times[k] >= times[k - 1];
+    return follow;
 }
 
 static int run_all(rw_run *run, const raceway_options *options, const double *p, const double *c, double *x, long segments,
