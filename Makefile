@@ -18,7 +18,7 @@ BIN := $(VENV)/bin
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.ready
-	$(BIN)/raceway run scenes/punching_press.toml
+	$(BIN)/ballpass run scenes/punching_press.toml
 
 test: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest -n 2 --dist loadfile
@@ -31,14 +31,14 @@ lint: $(VENV)/.ready-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python scripts/import_contract.py
-	$(BIN)/raceway derive --check scenes/punching_press.toml
+	$(BIN)/ballpass derive --check scenes/punching_press.toml
 
 docs: $(VENV)/.ready-docs
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 
 generated: $(VENV)/.ready
-	$(BIN)/raceway derive scenes/punching_press.toml
+	$(BIN)/ballpass derive scenes/punching_press.toml
 
 trade: $(VENV)/.ready
 	$(BIN)/python -m trade

@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.runtime.certify.trade import compile_fast_math
+from ballpass.runtime.model import Model
+from ballpass.runtime.native.stepper import End, Family, Stepper
 from benchmarks.own import stepper_run
 from benchmarks.problem import BUILD, CASES, Case, Member, errors, models, parameter_sets
 from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave, spread
-from raceway.runtime.accuracy.trade import compile_fast_math
-from raceway.runtime.integrate.stepper import End, Family, Stepper
-from raceway.runtime.model import Model
 
 #: Tolerance of the runs [1].
 TOLERANCE = 1e-5

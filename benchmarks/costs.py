@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.derive import generate
+from ballpass.runtime import load
+from ballpass.runtime.model import Model
+from ballpass.runtime.native.stepper import METHODS, Family
 from benchmarks.own import Unavailable, c_numbers, hand, hand_run, stepper_run
 from benchmarks.peers import imported, numba_rate, numpy_rate
 from benchmarks.problem import BUILD, ROOT, Case, Member, parameter_sets
 from benchmarks.timing import Entry, digits, interleave, spread
-from raceway.derive import generate
-from raceway.runtime import load
-from raceway.runtime.integrate.stepper import METHODS, Family
-from raceway.runtime.model import Model
 
 #: Tolerance of the runs that steps are counted in [1].
 TOLERANCE = 1e-5

@@ -25,13 +25,13 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.runtime.many.member_segments import moments, stretches
+from ballpass.runtime.many.members import Span, make_members
+from ballpass.runtime.model import Model
+from ballpass.runtime.native.stepper import METHODS, Family, Segments
 from benchmarks.problem import CASES, Case, models, parameter_sets
 from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave, spread
-from raceway.runtime.ensembles.member_segments import moments, stretches
-from raceway.runtime.ensembles.members import Span, make_members
-from raceway.runtime.integrate.stepper import METHODS, Family, Segments
-from raceway.runtime.model import Model
 
 CYCLES, TRANSIENT, RTOL = 2, 1, 1e-6
 

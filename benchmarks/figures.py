@@ -71,8 +71,8 @@ _LIBRARIES: dict[str, tuple[str, tuple[str, ...], Look]] = {
     ),
 }
 
-#: raceway's own, and the limit.
-_STEPPER = ("raceway's stepper", Look(color="black", marker="o", line="-", width=3.0))
+#: ballpass's own, and the limit.
+_STEPPER = ("ballpass's stepper", Look(color="black", marker="o", line="-", width=3.0))
 _HAND = ("by hand in C,\nbest method", Look(color="#555555", marker="", line=(0, (1, 1)), width=1.8))
 _FAMILIES: dict[str, tuple[str, Look]] = {
     "simulate": ("model.simulate,\noutputs included", Look(color="#8a8a8a", marker="*", line="-.")),
@@ -112,7 +112,7 @@ def work_precision(path: Path, words: str, curves: dict[str, Curve]) -> None:
         axes.grid(visible=True, which="major", color="#e5e5e5", linewidth=0.6)
         _beside(axes)
     upper.set_title("a) other libraries, each by its best method at every error", loc="left")
-    lower_axes.set_title("b) raceway: methods of its own, and the limit", loc="left")
+    lower_axes.set_title("b) ballpass: methods of its own, and the limit", loc="left")
     lower_axes.set_xlabel("relative error of the quantities of interest [1]; vertical lines: errors of the table")
     upper.invert_xaxis()
     figure.suptitle(f"Work and precision, damping {words}")
@@ -202,7 +202,7 @@ def sensitivity_costs(path: Path, rows: Sequence[dict[str, Any]], words: str) ->
         ("CasADi erk, C", "CasADi erk, C", Look(color="#b8860b", marker="^", line="-.")),
         (
             "stepper, 2000 points",
-            "raceway's stepper,\n2000 points",
+            "ballpass's stepper,\n2000 points",
             Look(color="black", marker="o", line="-", width=2.6),
         ),
         ("model.simulate", "model.sensitivities,\noutputs included", Look(color="#0b5394", marker="s", line="--")),

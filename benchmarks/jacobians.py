@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.derive import generate
+from ballpass.runtime import Model, load
+from ballpass.runtime.point.jacobian import rows_of
 from benchmarks.problem import BUILD, ROOT
 from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave, spread
-from raceway.derive import generate
-from raceway.runtime import Model, load
-from raceway.runtime.derivatives.jacobian import rows_of
 
 SCENE = "punching_press_tangent"
 

@@ -8,7 +8,7 @@ import platform
 import subprocess
 from pathlib import Path
 
-from raceway.runtime.compiled.compilers import find_compiler
+from ballpass.runtime.native.compilers import find_compiler
 
 PACKAGES = ("casadi", "numpy", "scipy", "sympy", "numba", "numbalsoda", "scikit-sundae", "jax", "diffrax")
 

@@ -19,12 +19,12 @@ from typing import Any
 import casadi
 import numpy as np
 
+from ballpass.runtime.native.compile import compile_sources
+from ballpass.runtime.native.compilers import find_compiler
+from ballpass.runtime.native.kernel import Kernel
+from ballpass.runtime.native.stepper import METHODS, End, Family, Stepper
+from ballpass.runtime.run.locating import choose_kinks, stepper_for
 from benchmarks.problem import BUILD, POINTS, ROOT, Member
-from raceway.runtime.compiled.compile import compile_sources
-from raceway.runtime.compiled.compilers import find_compiler
-from raceway.runtime.compiled.kernel import Kernel
-from raceway.runtime.integrate.locating import choose_kinks, stepper_for
-from raceway.runtime.integrate.stepper import METHODS, End, Family, Stepper
 
 DECADES = tuple(10.0**-k for k in range(2, 11))
 HALVES = tuple(10.0**-k for k in np.arange(1.5, 11.1, 0.5))
@@ -102,7 +102,7 @@ def _stepper(key: str, family: Family) -> Contender:
     return Contender(
         key=key,
         label=key,
-        group="raceway",
+        group="ballpass",
         solve=lambda member, tolerance: stepper_run(member, tolerance, family)[0],
         tolerances=HALVES,
         counts=counts,
@@ -273,7 +273,7 @@ class CasadiIntegrators:
 
 
 def integrator(member: Member, plugin: str, segment: int, grid: list[float], jit: bool) -> casadi.Function:
-    """An integrator of the scaled states over a normalised segment, as in raceway.runtime.integrate.integrators."""
+    """An integrator of the scaled states over a normalised segment, as in ballpass.runtime.run.casadi_integrators."""
     model, rhs = member.model, member.model.symbolic("rhs")
     manifest = model.manifest
     sizes = {"u": len(manifest.inputs), "p": len(manifest.parameters), "c": len(manifest.constants)}
@@ -319,7 +319,7 @@ def own_contenders() -> list[Contender]:
         Contender(
             key="simulate",
             label="model.simulate, outputs included",
-            group="raceway",
+            group="ballpass",
             solve=_simulate,
             tolerances=HALVES,
         ),

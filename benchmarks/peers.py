@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from ballpass.runtime.native.compile import compile_sources
+from ballpass.runtime.native.compilers import find_compiler
 from benchmarks.own import HALVES, HAND_FLAGS, Contender, Kept, Unavailable, c_numbers
 from benchmarks.press import Press, make_load, make_loop_rate, make_vector_rate
 from benchmarks.problem import ROOT, Member
-from raceway.runtime.compiled.compile import compile_sources
-from raceway.runtime.compiled.compilers import find_compiler
 
 
 def imported(name: str) -> Any:

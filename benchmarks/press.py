@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from raceway.runtime.model import Model
+from ballpass.runtime.model import Model
 
 
 class Press(NamedTuple):

@@ -19,9 +19,9 @@ def probe(how: str, folder: Path) -> dict[str, float | bool]:
     scene, out = folder / "punching_press.toml", folder / "punching_press"
     if how != "warm":
         begun = clock()
-        from raceway.derive import generate, read_scene
+        from ballpass.derive import generate, read_scene
 
-        seconds["import raceway.derive"] = clock() - begun
+        seconds["import ballpass.derive"] = clock() - begun
         begun = clock()
         read_scene(scene)  # the scene alone; `generate` reads it again
         seconds["read"] = clock() - begun
@@ -34,9 +34,9 @@ def probe(how: str, folder: Path) -> dict[str, float | bool]:
         if not marks:
             seconds["generate: numbers only"] = end - begun
     begun = clock()
-    from raceway.runtime import load
+    from ballpass.runtime import load
 
-    seconds["import raceway.runtime"] = clock() - begun
+    seconds["import ballpass.runtime"] = clock() - begun
     begun = clock()
     model = load(out)
     stepper = model.stepper

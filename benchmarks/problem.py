@@ -16,13 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ballpass.derive import generate
+from ballpass.runtime import load
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.model import Model
+from ballpass.runtime.native.stepper import End, Family, Segments
+from ballpass.runtime.run.segments import segment_edges
 from benchmarks.press import Press, press_numbers
-from raceway.derive import generate
-from raceway.runtime import load
-from raceway.runtime.integrate.segments import segment_edges
-from raceway.runtime.integrate.stepper import End, Family, Segments
-from raceway.runtime.model import Model
-from raceway.runtime.parameters import Numbers
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build" / "benchmarks"
@@ -128,7 +128,7 @@ class Member:
 
     def model_inputs(self, t: float, inside: float) -> np.ndarray:
         """Inputs with reference time `t`, gates as they are at `inside`."""
-        from raceway.runtime.integrate import clock
+        from ballpass.runtime.run import inputs as clock
 
         return clock.inputs_at(self.model.manifest.inputs, self.numbers.values, t, inside)
 

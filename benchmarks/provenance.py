@@ -26,9 +26,9 @@ SOURCES = (
 
 #: Not among them, for they only show what was measured: the command line, and what makes the page.
 LEFT_OUT = (
-    "runtime/raceway/runtime/cli.py",
-    "runtime/raceway/runtime/commands/",
-    "runtime/raceway/runtime/figures/",
+    "runtime/ballpass/runtime/app/cli.py",
+    "runtime/ballpass/runtime/commands/",
+    "runtime/ballpass/runtime/figures/",
     "benchmarks/compared.py",
     "benchmarks/figures.py",
     "benchmarks/report.py",

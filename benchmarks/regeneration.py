@@ -59,7 +59,13 @@ def _written_by_set() -> dict[str, list[str]]:
         folder = Path(name)
         places = {"generated": folder / "generated", "cache": folder / "cache"}
         shutil.copy(ROOT / "scenes" / "punching_press.toml", folder)
-        command = ["-c", "from raceway.runtime.entry import main; main()", "run", "punching_press.toml", "--no-figures"]
+        command = [
+            "-c",
+            "from ballpass.runtime.app.entry import main; main()",
+            "run",
+            "punching_press.toml",
+            "--no-figures",
+        ]
         _run(command, folder, folder)
         before = {place: _contents(where) for place, where in places.items()}
         _run([*command, "--set", "bearing.clearance=12 um"], folder, folder)
@@ -74,7 +80,7 @@ def _run(words: list[str], where: Path, folder: Path) -> str:
     RuntimeError
         It failed.
     """
-    environment = {**os.environ, "RACEWAY_CACHE_DIR": str(folder / "cache")}
+    environment = {**os.environ, "BALLPASS_CACHE_DIR": str(folder / "cache")}
     done = subprocess.run(
         [sys.executable, *words], cwd=where, env=environment, capture_output=True, text=True, check=False
     )

@@ -122,7 +122,7 @@ def _summary(cases: Sequence[Compared]) -> list[str]:
     labels = {key: c["label"] for case in cases for key, c in case.contenders.items()} | _GROUP_WORDS
     peers = [key for key in labels if not key.startswith(("stepper", "hand-", "simulate", "numpy-"))]
     own = [case.figure("stepper", LEVELS[0]) for case in cases]
-    rows = [["**raceway**, ms a cycle", *(f"**{milliseconds(one.time if one else None)}**" for one in own)]]
+    rows = [["**ballpass**, ms a cycle", *(f"**{milliseconds(one.time if one else None)}**" for one in own)]]
     for key in ("hand-best", *(key for key in peers if key not in GROUPS["numpy-best"]), "numpy-best"):
         ratios = [case.ratio(key, "stepper", LEVELS[0]) for case in cases]
         rows.append([labels[key], *("–" if r is None else f"{float(f'{r.value:.2g}'):g}×" for r in ratios)])

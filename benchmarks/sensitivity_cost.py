@@ -20,16 +20,16 @@ from typing import Any
 import casadi
 import numpy as np
 
+from ballpass.runtime.model import Model
+from ballpass.runtime.native.compile import compile_sources
+from ballpass.runtime.native.compilers import find_compiler
+from ballpass.runtime.native.kernel import Kernel
+from ballpass.runtime.native.stepper import End, Family
+from ballpass.runtime.run.sensitivity import Chain, Directions
 from benchmarks.own import Unavailable, integrator
 from benchmarks.problem import BUILD, CASES, Case, Member, models, parameter_sets
 from benchmarks.tables import table
 from benchmarks.timing import Entry, digits, interleave, spread
-from raceway.runtime.compiled.compile import compile_sources
-from raceway.runtime.compiled.compilers import find_compiler
-from raceway.runtime.compiled.kernel import Kernel
-from raceway.runtime.derivatives.sensitivity import Chain, Directions
-from raceway.runtime.integrate.stepper import End, Family
-from raceway.runtime.model import Model
 
 #: Tolerance of the runs, and of those that CasADi's derivatives are checked at [1].
 TOLERANCE = 1e-5

@@ -19,12 +19,12 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.runtime.native.stepper import End, Family
+from ballpass.runtime.run.sensitivity import Directions
 from benchmarks import figures
 from benchmarks.problem import CASES, Case, Member, models, parameter_sets
 from benchmarks.tables import table
 from benchmarks.timing import digits, spread
-from raceway.runtime.derivatives.sensitivity import Directions
-from raceway.runtime.integrate.stepper import End, Family
 
 #: One of each kind: geometry, mass, load, elasticity, and one that moves the punch in time.
 NAMES = (

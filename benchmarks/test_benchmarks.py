@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ballpass.runtime.native.compilers import find_compiler
 from benchmarks.curves import curve, error_of
-from raceway.runtime.compiled.compilers import find_compiler
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.runtime.model import Model
 from benchmarks import hand_rate
 from benchmarks.curves import LEVELS, basis
 from benchmarks.own import Contender, Unavailable, own_contenders
@@ -36,7 +37,6 @@ from benchmarks.problem import (
     set_references,
 )
 from benchmarks.timing import REPEATS, SHORT, Entry, digits, interleave
-from raceway.runtime.model import Model
 
 #: Largest difference of the right-hand sides written by hand from the generated one [1].
 RATE_AGREEMENT = 1e-12

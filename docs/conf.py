@@ -6,10 +6,10 @@ import re
 from importlib.metadata import version as installed_version
 from typing import Any
 
-project = "raceway"
-author = "the raceway authors"
-project_copyright = "2026, the raceway authors"
-release = version = installed_version("raceway")
+project = "ballpass"
+author = "the ballpass authors"
+project_copyright = "2026, the ballpass authors"
+release = version = installed_version("ballpass")
 
 extensions = [
     "myst_parser",
@@ -19,7 +19,7 @@ extensions = [
 ]
 exclude_patterns = ["_build"]
 html_theme = "furo"
-html_title = f"raceway {release}"
+html_title = f"ballpass {release}"
 
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3

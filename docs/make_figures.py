@@ -1,6 +1,6 @@
 """Make the pictures of README and documentation anew: ``.venv/bin/python docs/make_figures.py``.
 
-Every picture is a figure of ``raceway run SCENE``, copied to ``docs/images/<scene>_<figure>.png``.
+Every picture is a figure of ``ballpass run SCENE``, copied to ``docs/images/<scene>_<figure>.png``.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from raceway.derive import generate
-from raceway.runtime import load
-from raceway.runtime.figures import draw_all
+from ballpass.derive import generate
+from ballpass.runtime import load
+from ballpass.runtime.app.figures import draw_all
 
 ROOT = Path(__file__).resolve().parent.parent
 IMAGES = ROOT / "docs" / "images"

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from raceway.derive import generate
-from raceway.runtime import Model, load
-from raceway.runtime.derivatives.sensitivity_report import SensitivityReport
-from raceway.runtime.figures.canvas import FIRST, GREY, SECOND, caption, new_figure, save, styled
-from raceway.runtime.figures.tornado import tornado
+from ballpass.derive import generate
+from ballpass.runtime import Model, load
+from ballpass.runtime.app.figures.canvas import FIRST, GREY, SECOND, caption, new_figure, save, styled
+from ballpass.runtime.app.figures.tornado import tornado
+from ballpass.runtime.certify.sensitivity_report import SensitivityReport
 
 DOCS = Path(__file__).resolve().parent
 SCENE = DOCS.parent / "scenes" / "punching_press.toml"

@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from raceway.runtime.errors import RacewayError
+from ballpass.runtime.contract.errors import BallpassError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +79,7 @@ def run_case(case: Case) -> Row:
     finding, fault = None, ""
     try:
         finding = case.run()
-    except (RacewayError, ArithmeticError, AssertionError, LookupError, TypeError, ValueError, RuntimeError):
+    except (BallpassError, ArithmeticError, AssertionError, LookupError, TypeError, ValueError, RuntimeError):
         fault = traceback.format_exc()
     return Row(case=case, finding=finding, fault=fault, seconds=time.perf_counter() - started)
 

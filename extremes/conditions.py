@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 from scipy.linalg import svdvals
 
+from ballpass.runtime.point.conditioning import ConditioningWarning, conditioning
 from extremes.case import Case, Finding
 from extremes.models import press
-from raceway.runtime.conditioning import ConditioningWarning, conditioning
 
 GROUP = "Conditioning"
 CRANK = "mechanism.bodies.crank.points.B"

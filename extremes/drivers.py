@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.runtime import IntegrationError
+from ballpass.runtime.contract.errors import RequestError
 from extremes.case import Case, Finding
 from extremes.methods import refused
 from extremes.models import press, rotor
 from extremes.physics import BEFORE_PUNCH, CRANK, OUTER, PUNCH, RATIO, ROD, ROD_CENTER, SPEED, START, WINDOW, difference
 from extremes.reference import TURN, Machine
-from raceway.runtime import IntegrationError
-from raceway.runtime.errors import RequestError
 
 GROUP = "Other drivers"
 

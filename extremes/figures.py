@@ -16,13 +16,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
+from ballpass.runtime.point.conditioning import BOUND, equilibrate
+from ballpass.runtime.run import inputs as clock
 from extremes.case import Row
 from extremes.invariants import NO_LOAD
 from extremes.models import press, rotor
 from extremes.physics import SPEED
 from extremes.reference import TURN
-from raceway.runtime.conditioning import BOUND, equilibrate
-from raceway.runtime.integrate import clock
 
 #: 1200 pixels wide, shown at 800.
 WIDTH, RESOLUTION = 8.0, 150

@@ -16,13 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ballpass.derive import generate
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import load
+from ballpass.runtime.export.c_program import export_c
+from ballpass.runtime.native.driver_library import DRIVER
 from extremes.case import Case, Finding
 from extremes.models import DAMPING, SHIPPED_DAMPING, text_of
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
-from raceway.runtime import load
-from raceway.runtime.compiled.driver_library import DRIVER
-from raceway.runtime.compiled.export import export_c
 
 GROUP = "Generated C"
 #: CasADi's function interface has arguments that a function need not use.
@@ -71,13 +71,13 @@ def _call(*command: str, **environment: str) -> subprocess.CompletedProcess[str]
 
 def compiler_warnings() -> Finding:
     """Lines that gcc says about driver, kernels and functions."""
-    with tempfile.TemporaryDirectory(prefix="raceway-extremes-") as name:
+    with tempfile.TemporaryDirectory(prefix="ballpass-extremes-") as name:
         folder = _scene("one-sided", Path(name))
         lines: list[str] = []
         # a driver's source that needs further generated headers includes them itself
         sources = [*sorted(DRIVER.glob("*.c")), folder / "model.c"]
         for source in sources:
-            for define in ((), ("-DRACEWAY_SENSITIVITIES",), ("-DRACEWAY_REDUCTIONS",)):
+            for define in ((), ("-DBALLPASS_SENSITIVITIES",), ("-DBALLPASS_REDUCTIONS",)):
                 if define and source.name != "stepper.c":
                     continue
                 said = _call("gcc", "-fsyntax-only", "-std=c99", "-fopenmp-simd", *WARNINGS, *define, f"-I{folder}",
@@ -96,7 +96,7 @@ def compiler_warnings() -> Finding:
 def sanitized_program(laws: tuple[str, ...]) -> Finding:
     """Runs of the exported program with AddressSanitizer and UndefinedBehaviorSanitizer."""
     ended: dict[int, int] = {}
-    with tempfile.TemporaryDirectory(prefix="raceway-extremes-") as name:
+    with tempfile.TemporaryDirectory(prefix="ballpass-extremes-") as name:
         for law in laws:
             program = export_c(_scene(law, Path(name)), Path(name) / law / "program")
             built = program / "checked"
@@ -129,7 +129,7 @@ def compilers() -> Finding:
         return Finding(status="skipped: the package ziglang is not installed")
     if shutil.which("gcc") is None:
         return Finding(status="skipped: no gcc")
-    with tempfile.TemporaryDirectory(prefix="raceway-extremes-") as name:
+    with tempfile.TemporaryDirectory(prefix="ballpass-extremes-") as name:
         folder = _scene("one-sided", Path(name))
         gcc, other = (
             load(folder, compiler=text).simulate(cycles=1, rtol=1e-9, samples_per_cycle=500, transient=0)

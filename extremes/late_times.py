@@ -14,11 +14,11 @@ from pathlib import Path
 import mpmath
 import numpy as np
 
+from ballpass.runtime import load_solution
+from ballpass.runtime.run import inputs as clock
 from extremes.case import Case, Finding
 from extremes.models import Change, press, text_of
 from extremes.reference import TURN
-from raceway.runtime import load_solution
-from raceway.runtime.integrate import clock
 
 GROUP = "Physics"
 SPEED = "mechanism.driver.speed"
@@ -124,18 +124,18 @@ def sampled(turns: int) -> Finding:
 
 
 def commanded(turns: int) -> Finding:
-    """Angles in the file that ``raceway run`` writes after so many turns, of the last samples."""
+    """Angles in the file that ``ballpass run`` writes after so many turns, of the last samples."""
     text = text_of(
         "punching_press",
         TOLD,
         ("samples_per_cycle = 2000", "samples_per_cycle = 16"),  # the fewest that a scene may ask for
         ("rtol = 1e-6", "rtol = 1e-2"),
     )
-    with tempfile.TemporaryDirectory(prefix="raceway-extremes-") as name:
+    with tempfile.TemporaryDirectory(prefix="ballpass-extremes-") as name:
         scene = Path(name) / "punching_press.toml"
         scene.write_text(text, encoding="utf-8")
         done = subprocess.run(
-            (sys.executable, "-c", "from raceway.runtime.cli import main; main()", "run", str(scene), "--cycles",
+            (sys.executable, "-c", "from ballpass.runtime.app.cli import main; main()", "run", str(scene), "--cycles",
              str(turns), "--transient", str(turns - 10), "--set", "mechanism.driver.start_angle=1 rad", "--set",
              "bearing.damping.ratio=2.4e-6 s*m^0.5", "--no-figures", "--json", "--out", "late"),
             cwd=name, capture_output=True, text=True, check=False, timeout=900, env=dict(os.environ),
@@ -173,13 +173,13 @@ def cases() -> list[Case]:
          False),
         ("angles after 1000.37 turns", "simulate", exact, partial(simulated, 1000.37, 500 * shaft), True, False),
         ("angles after 1000 turns at chosen times", "simulate", exact, partial(sampled, 1000), False, False),
-        ("angles after 300 turns", "raceway run", exact, partial(commanded, 300), True, False),
+        ("angles after 300 turns", "ballpass run", exact, partial(commanded, 300), True, False),
         *(
             (f"angles after 100 000 turns at {rpm:g} rpm", "simulate", exact,
              partial(simulated, 100_000.37, rpm * shaft), False, True)
             for rpm in (500.0, 60_000.0, -5000.0)
         ),
-        ("angles after 100 000 turns", "raceway run", exact, partial(commanded, 100_000), False, True),
+        ("angles after 100 000 turns", "ballpass run", exact, partial(commanded, 100_000), False, True),
         *(
             (f"motion after {words} turns", "reduce", "six turns from the exact ball angle",
              partial(late_motion, turns), turns == 150, turns > 1000)

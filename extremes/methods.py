@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.runtime import IntegrationError, Model
+from ballpass.runtime.contract.errors import BallpassError, RequestError, SimulationError
 from extremes.case import Case, Finding
 from extremes.models import HARMONIC, ROTOR_LOAD, press, rotor
 from extremes.physics import BEFORE_PUNCH, OUTER, PUNCH, RATIO, START, difference
 from extremes.reference import Machine
-from raceway.runtime import IntegrationError, Model
-from raceway.runtime.errors import RacewayError, RequestError, SimulationError
 
 GROUP = "Methods"
 METHODS = (
@@ -68,7 +68,7 @@ def crawl(method: str) -> Finding:
     said = ""
     try:
         solution = press().simulate(cycles=1, parameters=numbers, method=method, samples_per_cycle=100, transient=0)
-    except RacewayError as fault:
+    except BallpassError as fault:
         said = str(fault)
     if said:
         assert any(re.search(pattern, said, re.DOTALL) for pattern in patterns), said

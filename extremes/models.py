@@ -9,9 +9,9 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
-from raceway.runtime import Model, load
+from ballpass.derive import generate
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import Model, load
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -30,7 +30,7 @@ DAMPING = {
 
 @cache
 def _folder() -> Path:
-    folder = Path(tempfile.mkdtemp(prefix="raceway-extremes-"))
+    folder = Path(tempfile.mkdtemp(prefix="ballpass-extremes-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
 

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
-from raceway.runtime import Model
+from ballpass.runtime import Model
 
 TURN = 2.0 * math.pi
 

@@ -26,10 +26,10 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
+from ballpass.derive import generate
+from ballpass.derive.scene.read import scene_from_text
 from extremes.case import Case, Finding, run_case, select
 from extremes.models import ROOT, text_of
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
 
 GROUP = "Generated C"
 METHOD = "sanitizers"
@@ -37,7 +37,7 @@ METHOD = "sanitizers"
 BESIDE = "inside Python"
 FLAGS = "-O0 -g1 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all"
 #: Entries of the drivers that the libraries compiled by the tour must hold.
-ENTRIES = ("raceway_run", "raceway_run_tangents", "raceway_ensemble", "raceway_equilibria", "raceway_loop")
+ENTRIES = ("ballpass_run", "ballpass_run_tangents", "ballpass_ensemble", "ballpass_equilibria", "ballpass_loop")
 
 #: CasADi loads its plugins in a way that AddressSanitizer refuses; the flag it dislikes is taken off on the way.
 SHIM = """
@@ -61,19 +61,19 @@ MANY = "model.simulate_many({{'bearing.clearance': [k * 1e-6 for k in range(9)]}
 MANY += "transient=0, method='{}')"
 #: Sources, each with the function into which a fault is planted, the fault, and what runs it.
 PLANTS: tuple[tuple[str, str, str, str], ...] = (
-    ("stepper.c", "int raceway_run", BEYOND_X.format(count="RW_NX"), RUN.format("dp54")),
-    ("explicit.h", "rw_explicit_step", BEYOND, RUN.format("dop853")),
-    ("rosenbrock.h", "rw_rosenbrock_step", BEYOND, RUN.format("rodas5p")),
-    ("kernels.h", "rw_acceleration", BEYOND, RUN.format("dp54")),
-    ("kinks.h", "rw_sides_start", BEYOND,
+    ("stepper.c", "int ballpass_run", BEYOND_X.format(count="BP_NX"), RUN.format("dp54")),
+    ("explicit.h", "bp_explicit_step", BEYOND, RUN.format("dop853")),
+    ("rosenbrock.h", "bp_rosenbrock_step", BEYOND, RUN.format("rodas5p")),
+    ("kernels.h", "bp_acceleration", BEYOND, RUN.format("dp54")),
+    ("kinks.h", "bp_sides_start", BEYOND,
      "model.simulate(cycles=0.05, transient=0, outputs=[], method='stepper-dp54', kinks='located')"),
-    ("reductions.h", "rw_reduce", BEYOND, "model.reduce(cycles=0.05, transient=0)"),
-    ("ensemble.c", "int raceway_ensemble", BEYOND_X.format(count="members * RW_NX"), MANY.format("stepper-dp54")),
-    ("lanes.h", "rw_lane_linear_step", BEYOND, MANY.format("stepper-rodas5p")),
-    ("sensitivity.h", "rw_rate_tangent", BEYOND, "model.sensitivities('bearing.clearance', cycles=0.05)"),
-    ("equilibrium.c", "int raceway_equilibria", BEYOND_X.format(count="RW_NX"),
+    ("reductions.h", "bp_reduce", BEYOND, "model.reduce(cycles=0.05, transient=0)"),
+    ("ensemble.c", "int ballpass_ensemble", BEYOND_X.format(count="members * BP_NX"), MANY.format("stepper-dp54")),
+    ("lanes.h", "bp_lane_linear_step", BEYOND, MANY.format("stepper-rodas5p")),
+    ("sensitivity.h", "bp_rate_tangent", BEYOND, "model.sensitivities('bearing.clearance', cycles=0.05)"),
+    ("equilibrium.c", "int ballpass_equilibria", BEYOND_X.format(count="BP_NX"),
      "model.simulate(cycles=0.05, transient=0, outputs=[], method='quasi-static')"),
-    ("loop.c", "raceway_loop", "((volatile double *)first_out[0])[count * stride_out[0]] = 0.0;",
+    ("loop.c", "ballpass_loop", "((volatile double *)first_out[0])[count * stride_out[0]] = 0.0;",
      "model.simulate(cycles=0.05, transient=0, outputs=['drive_torque'])"),
     ("model.c", "int rhs", BEYOND, "model.kernel('rhs')({'t': 0.0, 'x': model.initial(), 'u': model.inputs_at(0.0),"
      " 'p': model.numbers().p, 'c': model.numbers().c})"),
@@ -107,7 +107,7 @@ class Outcome:
 @cache
 def _workshop() -> Path:
     """Folder with the wrapped compiler, and the cache of planted faults: what they have in common is compiled once."""
-    folder = Path(tempfile.mkdtemp(prefix="raceway-extremes-"))
+    folder = Path(tempfile.mkdtemp(prefix="ballpass-extremes-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
 
@@ -130,7 +130,7 @@ def _environment(folder: Path, root: Path = ROOT) -> dict[str, str]:
     return {
         **os.environ,
         "CC": str(compiler),
-        "RACEWAY_CACHE_DIR": str(folder / "cache"),
+        "BALLPASS_CACHE_DIR": str(folder / "cache"),
         "ASAN_OPTIONS": "detect_leaks=0:verify_asan_link_order=0",  # Python leaves memory to the system when it ends
         "UBSAN_OPTIONS": "print_stacktrace=1",
         "LD_PRELOAD": ":".join((str(shim), *libraries)),
@@ -152,7 +152,7 @@ def able() -> bool:
 def run_tour(words: tuple[str, ...] = ()) -> Outcome:
     """Run all cases that are not `long`, or those with one of the words, in a Python under sanitizers."""
     started = time.perf_counter()
-    with tempfile.TemporaryDirectory(prefix="raceway-extremes-") as name:
+    with tempfile.TemporaryDirectory(prefix="ballpass-extremes-") as name:
         done = subprocess.run(
             (sys.executable, "-m", "extremes.sanitized", *words),
             cwd=ROOT, env=_environment(Path(name)), capture_output=True, text=True, check=False, timeout=3600,
@@ -204,13 +204,13 @@ def planted(source: str, function: str, fault: str, call: str) -> Finding:
     """A fault in a copy of a source: the report must come, and name the source."""
     if not able():
         return Finding(status="skipped: gcc's libasan and libubsan are not installed")
-    with tempfile.TemporaryDirectory(prefix="raceway-extremes-") as name:
+    with tempfile.TemporaryDirectory(prefix="ballpass-extremes-") as name:
         root = Path(name)
         shutil.copytree(ROOT / "runtime", root / "runtime", ignore=shutil.ignore_patterns("__pycache__"))
         os.symlink(ROOT / "derive", root / "derive")
         text = text_of("punching_press")
         folder = generate(scene_from_text(text, "punching_press"), root / "punching_press")
-        own = root / "runtime" / "raceway" / "runtime" / "driver" / source
+        own = root / "runtime" / "ballpass" / "runtime" / "driver" / source
         path = own if own.is_file() else folder / source
         code = path.read_text(encoding="utf-8")
         begin = re.search(rf"{function}\([^;{{}}]*\)\s*\{{", code)
@@ -218,7 +218,7 @@ def planted(source: str, function: str, fault: str, call: str) -> Finding:
         path.write_text(f"{code[: begin.end()]}\n{fault}\n{code[begin.end() :]}", encoding="utf-8")
         # the digests of the manifest are of the files without the fault
         program = (
-            "import sys\nfrom raceway.runtime import load\nmodel = load(sys.argv[1], verify=False)\n"
+            "import sys\nfrom ballpass.runtime import load\nmodel = load(sys.argv[1], verify=False)\n"
             f"{call}\nprint('survived')\n"
         )
         done = subprocess.run(

@@ -1,7 +1,7 @@
 """Check the import contract: the runtime never needs the deriving half, SymPy or pint.
 
 Two routes: every import statement under runtime/ is read (the command line, `cli.py` and `commands/`, serves both
-halves and may import `raceway.derive` inside functions), and a fresh interpreter that loads the runtime's modules is
+halves and may import `ballpass.derive` inside functions), and a fresh interpreter that loads the runtime's modules is
 asked what it holds.
 """
 
@@ -14,9 +14,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FORBIDDEN = ("sympy", "pint", "raceway.derive")
+FORBIDDEN = ("sympy", "pint", "ballpass.derive")
 #: What the deriving half may use of the runtime: the contract between them.
-SHARED = ("raceway.runtime", "raceway.runtime.manifest", "raceway.runtime.errors", "raceway.runtime.folders")
+SHARED = ("ballpass.runtime", "ballpass.runtime.contract")
 
 
 def imports(path: Path) -> Iterator[tuple[int, str]]:
@@ -24,10 +24,10 @@ def imports(path: Path) -> Iterator[tuple[int, str]]:
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
-            if node.module == "raceway":
-                yield from ((node.lineno, f"raceway.{alias.name}") for alias in node.names)
-            elif node.module == "raceway.runtime":
-                known = {p.stem for p in (ROOT / "runtime/raceway/runtime").iterdir()}
+            if node.module == "ballpass":
+                yield from ((node.lineno, f"ballpass.{alias.name}") for alias in node.names)
+            elif node.module == "ballpass.runtime":
+                known = {p.stem for p in (ROOT / "runtime/ballpass/runtime").iterdir()}
                 yield from (
                     (node.lineno, f"{node.module}.{a.name}" if a.name in known else node.module) for a in node.names
                 )
@@ -38,14 +38,14 @@ def imports(path: Path) -> Iterator[tuple[int, str]]:
 def violations() -> list[str]:
     found = []
     for path in sorted((ROOT / "runtime").rglob("*.py")):
-        if path.name == "cli.py" or path.parent.name == "commands":
+        if "app" in path.parts:
             continue
         for line, name in imports(path):
             if any(name == f or name.startswith(f + ".") for f in FORBIDDEN):
                 found.append(f"{path.relative_to(ROOT)}:{line}: runtime imports {name}")
     for path in sorted((ROOT / "derive").rglob("*.py")):
         for line, name in imports(path):
-            if name.startswith("raceway.runtime") and name not in SHARED:
+            if name.startswith("ballpass.runtime") and name not in SHARED and ".contract." not in name:
                 found.append(f"{path.relative_to(ROOT)}:{line}: derive imports {name}")
     return found
 
@@ -60,7 +60,7 @@ def loaded() -> list[str]:
     code = (
         f"import importlib, sys\nfor m in {modules!r}: importlib.import_module(m)\n"
         "bad = [m for m in sorted(sys.modules) if m.split('.')[0] in ('sympy', 'pint')"
-        " or m.startswith('raceway.derive')]\nprint('\\n'.join(bad))"
+        " or m.startswith('ballpass.derive')]\nprint('\\n'.join(bad))"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return [f"loading the runtime brings {name}" for name in result.stdout.split()]

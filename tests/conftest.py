@@ -13,16 +13,16 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
-from raceway.runtime import Model, load
+from ballpass.derive import generate
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import Model, load
 
 ROOT = Path(__file__).resolve().parent.parent
 
-# The same examples on every run and on every machine, however slow it is; RACEWAY_LONG=1 draws others each time.
+# The same examples on every run and on every machine, however slow it is; BALLPASS_LONG=1 draws others each time.
 settings.register_profile(
     "repeatable",
-    derandomize=not os.environ.get("RACEWAY_LONG"),
+    derandomize=not os.environ.get("BALLPASS_LONG"),
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
 )
@@ -44,7 +44,7 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     cache = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "compiled"
     cache.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("RACEWAY_CACHE_DIR", str(cache))
+        patch.setenv("BALLPASS_CACHE_DIR", str(cache))
         yield
 
 

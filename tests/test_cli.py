@@ -1,4 +1,4 @@
-"""Claims about the command ``raceway``: what it prints where, what it leaves behind, and how it says no.
+"""Claims about the command ``ballpass``: what it prints where, what it leaves behind, and how it says no.
 
 The shipped scenes run once, in processes of their own, in one folder with a cache of its own.  The compiler of these
 tests is a wrapper that can be told to refuse: what works then has compiled nothing.
@@ -24,9 +24,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from raceway.runtime import NoCompilerWarning, load_solution
-from raceway.runtime.cli import app
-from raceway.runtime.figures import FIGURES
+from ballpass.runtime import NoCompilerWarning, load_solution
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.app.figures import FIGURES
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "scenes"
@@ -65,7 +65,7 @@ class Site:
 
 
 def command(*words: str | Path) -> list[str]:
-    return [str(Path(sysconfig.get_path("scripts")) / "raceway"), *map(str, words)]
+    return [str(Path(sysconfig.get_path("scripts")) / "ballpass"), *map(str, words)]
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     wrapper.chmod(0o755)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CC", str(wrapper))
-        patch.setenv("RACEWAY_CACHE_DIR", str(cache))
+        patch.setenv("BALLPASS_CACHE_DIR", str(cache))
 
         def start(name: str) -> subprocess.CompletedProcess[str]:
             figures = "--figures" if name == "punching_press" else "--no-figures"
@@ -100,7 +100,7 @@ def refusing(site: Site) -> Iterator[None]:
 
 
 @pytest.fixture
-def raceway(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+def ballpass(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
     """The command in this process, called in a folder."""
 
     def call(folder: Path, *words: str | Path) -> Result:
@@ -168,8 +168,8 @@ def test_results_are_the_files_that_were_promised(site: Site) -> None:
     assert summary["reaction.A.y"]["max"] >= solution.steady()["reaction.A.y"].max()
 
 
-def test_a_second_run_gives_the_same_numbers(site: Site, raceway: Callable[..., Result], tmp_path: Path) -> None:
-    result = raceway(site.folder, "run", SCENES / "four_bar.toml", "--json", "--no-figures", "--out", tmp_path)
+def test_a_second_run_gives_the_same_numbers(site: Site, ballpass: Callable[..., Result], tmp_path: Path) -> None:
+    result = ballpass(site.folder, "run", SCENES / "four_bar.toml", "--json", "--no-figures", "--out", tmp_path)
     again, first = json.loads(result.stdout), site.summary("four_bar")
     for summary in (again, first):
         del summary["wall_time"], summary["files"]  # the digest of a solution, which tells its wall time
@@ -177,12 +177,12 @@ def test_a_second_run_gives_the_same_numbers(site: Site, raceway: Callable[..., 
 
 
 def test_without_json_a_table_and_the_place_of_the_results_are_printed(
-    site: Site, raceway: Callable[..., Result], tmp_path: Path
+    site: Site, ballpass: Callable[..., Result], tmp_path: Path
 ) -> None:
     out = tmp_path / "deep" / "folder"
     words = ("run", SCENES / "varying_compliance.toml", "--out", out, "--no-figures", "--cycles", "3")
     before = contents(site.folder)
-    result = raceway(site.folder, *words, "--transient", "1")
+    result = ballpass(site.folder, *words, "--transient", "1")
     assert result.exit_code == 0, result.stderr
     assert "peak_ball_force" in result.stdout
     assert f"results in {out}: solution.nc, summary.json" in result.stdout
@@ -207,11 +207,11 @@ def test_without_json_a_table_and_the_place_of_the_results_are_printed(
     ],
 )
 def test_another_number_derives_nothing_and_compiles_nothing(
-    site: Site, raceway: Callable[..., Result], tmp_path: Path, setting: str
+    site: Site, ballpass: Callable[..., Result], tmp_path: Path, setting: str
 ) -> None:
     before = contents(site.folder, site.cache)
     words = ("run", SCENES / "punching_press.toml", "--json", "--no-figures", "--out", tmp_path, "--set", setting)
-    result = raceway(site.folder, *words)
+    result = ballpass(site.folder, *words)
     assert result.exit_code == 0, result.stderr
     assert "deriving" not in result.stderr
     # not even rewritten with the same bytes: the times of the last change are compared as well
@@ -221,23 +221,23 @@ def test_another_number_derives_nothing_and_compiles_nothing(
 
 
 def test_the_refusing_compiler_would_have_been_noticed(
-    site: Site, raceway: Callable[..., Result], tmp_path: Path, refusing: None
+    site: Site, ballpass: Callable[..., Result], tmp_path: Path, refusing: None
 ) -> None:
     nine = tmp_path / "nine.toml"
     nine.write_text(PRESS.replace("balls = 8 ", "balls = 9 "), encoding="utf-8")
-    result = raceway(tmp_path, "run", nine)
+    result = ballpass(tmp_path, "run", nine)
     says_no(result, "The C compiler failed with exit code 1", "no compiling today", "set CC", code=1)
     assert not (tmp_path / "results").exists()
 
 
 @pytest.mark.usefixtures("refusing")
-def test_set_equals_the_same_value_in_the_file(site: Site, raceway: Callable[..., Result], tmp_path: Path) -> None:
+def test_set_equals_the_same_value_in_the_file(site: Site, ballpass: Callable[..., Result], tmp_path: Path) -> None:
     plain = ("--json", "--no-figures", "--out", tmp_path / "results")
-    by_set = raceway(site.folder, "run", SCENES / "punching_press.toml", *plain, "--set", "bearing.clearance=20e-6 m")
+    by_set = ballpass(site.folder, "run", SCENES / "punching_press.toml", *plain, "--set", "bearing.clearance=20e-6 m")
     edited = tmp_path / "punching_press.toml"
     edited.write_text(PRESS.replace('clearance = "10 um"', 'clearance = "20 um"'), encoding="utf-8")
     # derived anew in an empty folder; the same structure gives the same C, which is in the cache
-    by_file = raceway(tmp_path, "run", edited, *plain)
+    by_file = ballpass(tmp_path, "run", edited, *plain)
     assert by_file.exit_code == 0, by_file.stderr
     assert "deriving equations" in by_file.stderr
     first, second = json.loads(by_set.stdout), json.loads(by_file.stdout)
@@ -263,23 +263,23 @@ WRONG = [
 
 @pytest.mark.parametrize(("name", "old", "new", "words"), WRONG, ids=[case[0] for case in WRONG])
 def test_wrong_scene_is_refused_in_words_and_nothing_is_written(
-    raceway: Callable[..., Result], tmp_path: Path, name: str, old: str, new: str, words: tuple[str, ...]
+    ballpass: Callable[..., Result], tmp_path: Path, name: str, old: str, new: str, words: tuple[str, ...]
 ) -> None:
     assert PRESS.count(old) == 1
     scene = tmp_path / "wrong.toml"
     scene.write_text(PRESS.replace(old, new), encoding="utf-8")
     for subcommand in ("run", "derive"):
-        result = raceway(tmp_path, subcommand, scene)
+        result = ballpass(tmp_path, subcommand, scene)
         says_no(result, str(scene), *words, "given:", "allowed:", "remedy:")
         assert list(tmp_path.iterdir()) == [scene]
 
 
-def test_all_faults_of_a_scene_are_told_at_once(raceway: Callable[..., Result], tmp_path: Path) -> None:
+def test_all_faults_of_a_scene_are_told_at_once(ballpass: Callable[..., Result], tmp_path: Path) -> None:
     scene = tmp_path / "wrong.toml"
     text = PRESS.replace('clearance = "10 um"', 'clearance = "10"').replace('mass = "2.55 kg"', 'mass = "-1 kg"')
     scene.write_text(text, encoding="utf-8")
     clearance, mass = (text[: text.index(key)].count("\n") + 1 for key in ('clearance = "10"', 'mass = "-1 kg"'))
-    result = raceway(tmp_path, "run", scene)
+    result = ballpass(tmp_path, "run", scene)
     says_no(result, "2 faults", f"bearing.clearance (line {clearance})", f"mechanism.bodies.rod.mass (line {mass})")
 
 
@@ -329,28 +329,28 @@ REFUSED = [
 
 @pytest.mark.parametrize(("name", "words", "said"), REFUSED, ids=[case[0] for case in REFUSED])
 def test_wrong_request_is_refused_before_anything_is_written(
-    raceway: Callable[..., Result], tmp_path: Path, name: str, words: tuple[str, ...], said: tuple[str, ...]
+    ballpass: Callable[..., Result], tmp_path: Path, name: str, words: tuple[str, ...], said: tuple[str, ...]
 ) -> None:
     (tmp_path / "file").touch()
-    result = raceway(tmp_path, "run", SCENES / "punching_press.toml", *words)
+    result = ballpass(tmp_path, "run", SCENES / "punching_press.toml", *words)
     says_no(result, *said)
     assert "compiling" not in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="the superuser may write everywhere")
-def test_folder_without_permission_is_refused(raceway: Callable[..., Result], tmp_path: Path) -> None:
+def test_folder_without_permission_is_refused(ballpass: Callable[..., Result], tmp_path: Path) -> None:
     locked = tmp_path / "locked"
     locked.mkdir(mode=0o555)
-    result = raceway(tmp_path, "run", SCENES / "punching_press.toml", "--out", locked / "results")
+    result = ballpass(tmp_path, "run", SCENES / "punching_press.toml", "--out", locked / "results")
     says_no(result, str(locked), "may not be written", "--out DIR")
-    result = raceway(tmp_path, "derive", SCENES / "punching_press.toml", "--out", locked / "generated")
+    result = ballpass(tmp_path, "derive", SCENES / "punching_press.toml", "--out", locked / "generated")
     says_no(result, str(locked), "permissions")
 
 
-def test_folder_that_cannot_be_made_is_refused_by_derive(raceway: Callable[..., Result], tmp_path: Path) -> None:
+def test_folder_that_cannot_be_made_is_refused_by_derive(ballpass: Callable[..., Result], tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    result = raceway(tmp_path, "derive", SCENES / "varying_compliance.toml", "--out", tmp_path / "file" / "generated")
+    result = ballpass(tmp_path, "derive", SCENES / "varying_compliance.toml", "--out", tmp_path / "file" / "generated")
     says_no(result, "file", "Check the path")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
@@ -359,34 +359,34 @@ def test_folder_that_cannot_be_made_is_refused_by_derive(raceway: Callable[..., 
 
 
 def test_check_tells_fresh_stale_and_missing_and_its_remedy_works(
-    raceway: Callable[..., Result], tmp_path: Path
+    ballpass: Callable[..., Result], tmp_path: Path
 ) -> None:
     scene = tmp_path / "rotor.toml"
     text = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
     scene.write_text(text, encoding="utf-8")
-    says_no(raceway(tmp_path, "derive", "--check", scene), "does not exist", f"raceway derive {scene}", code=1)
-    assert raceway(tmp_path, "derive", scene).stdout == "generated/rotor\n"
+    says_no(ballpass(tmp_path, "derive", "--check", scene), "does not exist", f"ballpass derive {scene}", code=1)
+    assert ballpass(tmp_path, "derive", scene).stdout == "generated/rotor\n"
     before = contents(tmp_path)
-    assert raceway(tmp_path, "derive", "--check", scene).exit_code == 0
+    assert ballpass(tmp_path, "derive", "--check", scene).exit_code == 0
 
     # a number is in the manifest, the text of the equations in a file of its own
     scene.write_text(text.replace('clearance = "0 um"', 'clearance = "1 um"'), encoding="utf-8")
     assert scene.read_text(encoding="utf-8") != text
-    says_no(raceway(tmp_path, "derive", "--check", scene), "stale: manifest.json.", f"raceway derive {scene}", code=1)
+    says_no(ballpass(tmp_path, "derive", "--check", scene), "stale: manifest.json.", f"ballpass derive {scene}", code=1)
     scene.write_text(text, encoding="utf-8")
     (tmp_path / "generated" / "rotor" / "EQUATIONS.md").write_text("x = 1\n", encoding="utf-8")
-    says_no(raceway(tmp_path, "derive", "--check", scene), "stale: EQUATIONS.md.", code=1)
+    says_no(ballpass(tmp_path, "derive", "--check", scene), "stale: EQUATIONS.md.", code=1)
 
-    assert raceway(tmp_path, "derive", scene).exit_code == 0
-    assert raceway(tmp_path, "derive", "--check", scene).stdout == "generated/rotor is up to date\n"
+    assert ballpass(tmp_path, "derive", scene).exit_code == 0
+    assert ballpass(tmp_path, "derive", "--check", scene).stdout == "generated/rotor is up to date\n"
     after = contents(tmp_path)
     assert {path: digest for path, (_, digest) in after.items()} == {
         path: digest for path, (_, digest) in before.items()
     }
 
 
-def test_equations_are_markdown_with_the_matrix_of_eq_1(raceway: Callable[..., Result], tmp_path: Path) -> None:
-    result = raceway(tmp_path, "equations", SCENES / "punching_press.toml")
+def test_equations_are_markdown_with_the_matrix_of_eq_1(ballpass: Callable[..., Result], tmp_path: Path) -> None:
+    result = ballpass(tmp_path, "equations", SCENES / "punching_press.toml")
     assert result.exit_code == 0
     assert re.search(r"^# \S", result.stdout, re.MULTILINE)
     assert "matrix}" in result.stdout
@@ -398,11 +398,11 @@ def test_equations_are_markdown_with_the_matrix_of_eq_1(raceway: Callable[..., R
     assert result.stdout == (ROOT / "generated" / "punching_press" / "EQUATIONS.md").read_text(encoding="utf-8")
 
 
-def test_version_and_help_are_printed(raceway: Callable[..., Result], tmp_path: Path) -> None:
-    assert re.fullmatch(r"raceway \d+\.\d+\.\d+\S*\n", raceway(tmp_path, "--version").stdout)
-    help_text = raceway(tmp_path, "--help").stdout
+def test_version_and_help_are_printed(ballpass: Callable[..., Result], tmp_path: Path) -> None:
+    assert re.fullmatch(r"ballpass \d+\.\d+\.\d+\S*\n", ballpass(tmp_path, "--version").stdout)
+    help_text = ballpass(tmp_path, "--help").stdout
     assert all(name in help_text for name in ("run", "derive", "equations", "--version"))
-    assert "--transient" in raceway(tmp_path, "run", "--help").stdout
+    assert "--transient" in ballpass(tmp_path, "run", "--help").stdout
 
 
 # ------------------------------------------------------------------------------- interruptions, and results that exist
@@ -447,26 +447,26 @@ def test_interrupted_run_leaves_no_results_and_says_so(
 
 
 def test_interruption_while_writing_leaves_nothing_half_written(
-    site: Site, raceway: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    site: Site, ballpass: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*_: Any) -> None:
         assert list(tmp_path.rglob("solution.nc")), "the solution is written before the figures"
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("raceway.runtime.figures.draw_all", interrupted)
+    monkeypatch.setattr("ballpass.runtime.app.figures.draw_all", interrupted)
     words = ("run", SCENES / "varying_compliance.toml", "--cycles", "3", "--transient", "1", "--out")
-    says_no(raceway(site.folder, *words, tmp_path / "new" / "results"), "interrupted", code=130)
+    says_no(ballpass(site.folder, *words, tmp_path / "new" / "results"), "interrupted", code=130)
     assert not list(tmp_path.iterdir())
 
 
-def test_results_are_replaced_file_by_file(site: Site, raceway: Callable[..., Result], tmp_path: Path) -> None:
+def test_results_are_replaced_file_by_file(site: Site, ballpass: Callable[..., Result], tmp_path: Path) -> None:
     scene = SCENES / "varying_compliance.toml"
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     (tmp_path / "orbit.png").write_bytes(b"of an earlier run")
     (tmp_path / "summary.json").write_text("old", encoding="utf-8")
     with (tmp_path / "summary.json").open(encoding="utf-8") as reader:
         words = ("--cycles", "3", "--transient", "1", "--no-figures", "--out", tmp_path)
-        assert raceway(site.folder, "run", scene, *words).exit_code == 0
+        assert ballpass(site.folder, "run", scene, *words).exit_code == 0
         assert reader.read() == "old"  # who reads the old file reads it to its end
     # a figure of another run would pass for one of this
     assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.txt", "solution.nc", "summary.json"]
@@ -475,13 +475,13 @@ def test_results_are_replaced_file_by_file(site: Site, raceway: Callable[..., Re
     assert np.isfinite(load_solution(tmp_path / "solution.nc")["inner.x"]).all()
 
 
-@pytest.mark.filterwarnings("default::raceway.runtime.NoCompilerWarning")
+@pytest.mark.filterwarnings("default::ballpass.runtime.NoCompilerWarning")
 def test_without_a_compiler_a_warning_names_the_cost_and_the_numbers_agree(
-    site: Site, raceway: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    site: Site, ballpass: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("raceway.runtime.compiled.compile.find_compiler", lambda command: None)
+    monkeypatch.setattr("ballpass.runtime.native.compile.find_compiler", lambda command: None)
     words = ("run", SCENES / "punching_press.toml", "--json", "--no-figures", "--out", tmp_path)
-    result = raceway(site.folder, *words)
+    result = ballpass(site.folder, *words)
     assert result.exit_code == 0, result.stderr
     assert issubclass(NoCompilerWarning, UserWarning)
     assert "warning: No C compiler was found" in result.stderr
@@ -494,20 +494,20 @@ def test_without_a_compiler_a_warning_names_the_cost_and_the_numbers_agree(
 
 @pytest.mark.parametrize(("setting", "option"), [("run.cycles=3", "--cycles 3"), ("run.rtol=1e-8", "--rtol 1e-8")])
 def test_a_run_setting_given_as_a_parameter_is_told_its_option(
-    raceway: Callable[..., Result], tmp_path: Path, setting: str, option: str
+    ballpass: Callable[..., Result], tmp_path: Path, setting: str, option: str
 ) -> None:
-    says_no(raceway(tmp_path, "run", SCENES / "varying_compliance.toml", "--set", setting), option)
+    says_no(ballpass(tmp_path, "run", SCENES / "varying_compliance.toml", "--set", setting), option)
 
 
 def test_a_large_file_is_told_before_it_is_written_and_its_size_behind(
-    site: Site, raceway: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    site: Site, ballpass: Callable[..., Result], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With a bound that a short run passes."""
     words = ("run", SCENES / "varying_compliance.toml", "--no-figures", "--out", tmp_path / "out", "--cycles", "3")
-    quiet = raceway(site.folder, *words, "--transient", "1")
+    quiet = ballpass(site.folder, *words, "--transient", "1")
     assert "note" not in quiet.stderr
-    monkeypatch.setattr("raceway.runtime.cli.LARGE", 1000)
-    told = raceway(site.folder, *words, "--transient", "1")
+    monkeypatch.setattr("ballpass.runtime.app.cli.LARGE", 1000)
+    told = ballpass(site.folder, *words, "--transient", "1")
     count = len(load_solution(tmp_path / "out" / "solution.nc"))
     assert f"note: {count} samples, about " in told.stderr
     size = (tmp_path / "out" / "solution.nc").stat().st_size

@@ -10,7 +10,7 @@ import pytest
 import typer.main
 from rich.emoji import Emoji
 
-from raceway.runtime.cli import app
+from ballpass.runtime.app.cli import app
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "cli.md"
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
@@ -21,8 +21,8 @@ OPTION = re.compile(r"--[a-z][a-z-]*")
 def sections() -> dict[str, str]:
     """Text of the page's sections by command."""
     _, *parts = re.split(r"^## ", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
-    named = {match[1]: part for part in parts if (match := re.match(r"`raceway ([a-z]+) ", part))}
-    assert len(named) == sum(part.startswith("`raceway ") for part in parts)
+    named = {match[1]: part for part in parts if (match := re.match(r"`ballpass ([a-z]+) ", part))}
+    assert len(named) == sum(part.startswith("`ballpass ") for part in parts)
     return named
 
 

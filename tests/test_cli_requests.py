@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from raceway.derive import SceneError
-from raceway.derive.read import scene_from_text
-from raceway.runtime import Model, RequestError, load_solution
-from raceway.runtime.cli import app
-from raceway.runtime.errors import ArtefactError
-from raceway.runtime.manifest import Manifest
-from raceway.runtime.manifest.json_text import DIGEST, text_digest
+from ballpass.derive import SceneError
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import Model, RequestError, load_solution
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.json_text import DIGEST, text_digest
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = ROOT / "scenes" / "varying_compliance.toml"
@@ -37,7 +37,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 @pytest.fixture(scope="module")
-def raceway(site: Path) -> Callable[..., Result]:
+def ballpass(site: Path) -> Callable[..., Result]:
     def call(*words: str | Path) -> Result:
         return CliRunner().invoke(app, [*map(str, words)])
 
@@ -45,11 +45,11 @@ def raceway(site: Path) -> Callable[..., Result]:
 
 
 def test_a_shaft_at_rest_runs_for_a_time_and_comes_to_rest_at_the_static_point(
-    site: Path, raceway: Callable[..., Result]
+    site: Path, ballpass: Callable[..., Result]
 ) -> None:
     """3.9937 um is the static deflection with a ball on the load line; transients fall like exp(-t/0.2 s)."""
     words = ("--duration", "2500 ms", "--transient", "0", "--set", "shaft.speed=0 rpm", "--no-figures", "--out", "rest")
-    done = raceway("run", SCENE, *words)
+    done = ballpass("run", SCENE, *words)
     assert done.exit_code == 0, done.output
     solution = load_solution(site / "rest" / "solution.nc")
     assert solution.t[-1] == 2.5
@@ -74,9 +74,9 @@ def test_a_shaft_at_rest_runs_for_a_time_and_comes_to_rest_at_the_static_point(
     ],
 )
 def test_contradictions_and_nonsense_end_with_exit_code_2_and_no_folder(
-    site: Path, raceway: Callable[..., Result], words: tuple[str, ...], told: str
+    site: Path, ballpass: Callable[..., Result], words: tuple[str, ...], told: str
 ) -> None:
-    done = raceway("run", SCENE, *words, "--out", "never")
+    done = ballpass("run", SCENE, *words, "--out", "never")
     assert done.exit_code == 2, done.output
     assert told in done.stderr
     assert "error: error" not in done.stderr

@@ -1,4 +1,4 @@
-"""``raceway sensitivity``: what it prints and writes, and its exit codes."""
+"""``ballpass sensitivity``: what it prints and writes, and its exit codes."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 from matplotlib.image import imread
 from typer.testing import CliRunner, Result
 
-from raceway.runtime.cli import app
-from raceway.runtime.quantities.study import Course, Study
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.ask.study import Course, Study
 
 SCENE = Path(__file__).resolve().parent.parent / "scenes" / "punching_press_tangent.toml"
 SHORT = ["--cycles", "0.4", "--transient", "0", "--set", "bearing.clearance=-60 um"]
@@ -25,7 +25,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def raceway(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., Result]:
+def ballpass(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., Result]:
     def call(*words: str) -> Result:
         monkeypatch.chdir(folder)
         monkeypatch.setenv("COLUMNS", "80")
@@ -34,8 +34,8 @@ def raceway(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Callable[..., Resu
     return call
 
 
-def test_the_report_is_printed_written_and_drawn(raceway: Callable[..., Result], folder: Path) -> None:
-    result = raceway(*SHORT, *ASKED, "--out", "out")
+def test_the_report_is_printed_written_and_drawn(ballpass: Callable[..., Result], folder: Path) -> None:
+    result = ballpass(*SHORT, *ASKED, "--out", "out")
     assert result.exit_code == 0, result.output
     assert "verified" in result.stdout
     assert "peak_ball_force" in result.stdout
@@ -49,7 +49,7 @@ def test_the_report_is_printed_written_and_drawn(raceway: Callable[..., Result],
         assert picture[..., :3].std() > 0.05
 
 
-def test_patterns_choose_parameters_and_the_table_says_where_one_is_zero(raceway: Callable[..., Result]) -> None:
+def test_patterns_choose_parameters_and_the_table_says_where_one_is_zero(ballpass: Callable[..., Result]) -> None:
     words = [
         *SHORT[:-2],
         "--set",
@@ -59,7 +59,7 @@ def test_patterns_choose_parameters_and_the_table_says_where_one_is_zero(raceway
         "--wrt",
         "bearing.c[lo]*",
     ]
-    result = raceway(*words, "--no-check")
+    result = ballpass(*words, "--no-check")
     assert result.exit_code == 0, result.output
     before, _, behind = result.stdout.partition("parameter is 0")
     assert "bearing.contact" in before
@@ -67,8 +67,8 @@ def test_patterns_choose_parameters_and_the_table_says_where_one_is_zero(raceway
     assert "bearing.contact" not in behind
 
 
-def test_json_is_one_object_and_nothing_else(raceway: Callable[..., Result]) -> None:
-    result = raceway(*SHORT, *ASKED, "--json", "--no-check")
+def test_json_is_one_object_and_nothing_else(ballpass: Callable[..., Result]) -> None:
+    result = ballpass(*SHORT, *ASKED, "--json", "--no-check")
     assert result.exit_code == 0
     report = json.loads(result.stdout)
     assert [row["certificate"]["verdict"] for row in report["sensitivities"]] == ["not checked"] * 4
@@ -76,7 +76,7 @@ def test_json_is_one_object_and_nothing_else(raceway: Callable[..., Result]) -> 
 
 
 def test_a_disagreement_ends_with_exit_code_1_and_both_numbers(
-    raceway: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+    ballpass: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plain = Study.differentiate
 
@@ -84,9 +84,9 @@ def test_a_disagreement_ends_with_exit_code_1_and_both_numbers(
         course = plain(self, *arguments, **more)  # type: ignore[arg-type]
         return replace(course, estimates=tuple(replace(item, slope=1.05 * item.slope) for item in course.estimates))
 
-    right = json.loads(raceway(*SHORT, *ASKED, "--json").stdout)["sensitivities"][0]
+    right = json.loads(ballpass(*SHORT, *ASKED, "--json").stdout)["sensitivities"][0]
     monkeypatch.setattr(Study, "differentiate", wrong)
-    result = raceway(*SHORT, *ASKED)
+    result = ballpass(*SHORT, *ASKED)
     assert result.exit_code == 1
     assert "disagrees" in result.stdout
     said = " ".join(result.stderr.split())
@@ -104,8 +104,8 @@ def test_a_disagreement_ends_with_exit_code_1_and_both_numbers(
     ],
 )
 def test_wrong_requests_end_with_exit_code_2_and_a_hint(
-    raceway: Callable[..., Result], words: list[str], hint: str
+    ballpass: Callable[..., Result], words: list[str], hint: str
 ) -> None:
-    result = raceway(*SHORT, *words)
+    result = ballpass(*SHORT, *words)
     assert result.exit_code == 2
     assert hint in " ".join(result.stderr.split())

@@ -1,4 +1,4 @@
-"""Claims about ``raceway sweep``: its grid is that of single runs, a failing member costs no other; its refusals."""
+"""Claims about ``ballpass sweep``: its grid is that of single runs, a failing member costs no other; its refusals."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ import xarray
 from matplotlib.image import imread
 from typer.testing import CliRunner, Result
 
-from raceway.derive import read_scene
-from raceway.runtime import load
-from raceway.runtime.cli import app
-from raceway.runtime.commands.ranges import MOST, read_ranges
-from raceway.runtime.errors import RequestError
-from raceway.runtime.figures.canvas import GREY
-from raceway.runtime.figures.sweep import LUMINANCE, VariedAxis, draw_sweep
+from ballpass.derive import read_scene
+from ballpass.runtime import load
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.app.commands.ranges import MOST, read_ranges
+from ballpass.runtime.app.figures.canvas import GREY
+from ballpass.runtime.app.figures.sweep import LUMINANCE, VariedAxis, draw_sweep
+from ballpass.runtime.contract.errors import RequestError
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = ROOT / "scenes" / "varying_compliance.toml"

@@ -1,4 +1,4 @@
-"""Claims about ``raceway trade`` and ``raceway run --error``: what they print and leave behind, what they use again."""
+"""Claims about ``ballpass trade`` and ``ballpass run --error``: what they print, leave and use again."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from raceway.derive import read_scene
-from raceway.runtime import RequestError, load, load_trade
-from raceway.runtime.accuracy.stored_trade import FILE_NAME
-from raceway.runtime.cli import app
-from raceway.runtime.commands.trade import key_of, models_of, read_error, stored_trade
+from ballpass.derive import read_scene
+from ballpass.runtime import RequestError, load, load_trade
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.app.commands.trade import key_of, models_of, read_error, stored_trade
+from ballpass.runtime.certify.stored_trade import FILE_NAME
 
 ROOT = Path(__file__).resolve().parent.parent
 NAME = "varying_compliance"
@@ -94,7 +94,7 @@ def test_a_measurement_is_used_again_until_the_scene_changes(place: Path) -> Non
     changed = replace(scene, quantities=(replace(number, value=2.0 * number.value), *scene.quantities[1:]))
     for other in (key_of(changed, None, 3), key_of(scene, ["peak_ball_force"], 3), key_of(scene, None, 4)):
         assert stored_trade(stored.parent, other) is None
-    newer = {**key, "versions": {**key["versions"], "raceway": "99"}}
+    newer = {**key, "versions": {**key["versions"], "ballpass": "99"}}
     assert stored_trade(stored.parent, newer) is None
 
 
@@ -219,7 +219,7 @@ def test_a_stored_measurement_serves_python_as_it_serves_the_command(place: Path
 
 def test_a_folder_without_a_measurement_of_this_version_says_what_to_do(place: Path, tmp_path: Path) -> None:
     with pytest.raises(
-        RequestError, match=r"trade\.json: cannot be read \(No such file or directory\)\. .*raceway trade"
+        RequestError, match=r"trade\.json: cannot be read \(No such file or directory\)\. .*ballpass trade"
     ):
         load_trade(tmp_path)
     data = json.loads((place / "results" / NAME / FILE_NAME).read_text(encoding="utf-8"))

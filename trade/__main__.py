@@ -2,8 +2,8 @@
 
     python -m trade [--scenes NAME ...] [--members N] [--calibration N]
 
-Writes docs/trade.md, docs/images/trade_<scene>.png, results/<scene>/trade.json as `raceway trade` does, and
-runtime/raceway/runtime/accuracy/ladder.json, with which a search begins where there is no trade.
+Writes docs/trade.md, docs/images/trade_<scene>.png, results/<scene>/trade.json as `ballpass trade` does, and
+runtime/ballpass/runtime/accuracy/ladder.json, with which a search begins where there is no trade.
 How to read it: every number on the page comes from here; errors are relative to a reference made by two methods, times
 are of the processor for the integration alone, and all ratios are of times measured in one run, interleaved.
 """
@@ -17,13 +17,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from raceway.derive import read_scene
-from raceway.runtime.accuracy.calibration import Calibration, calibrate
-from raceway.runtime.accuracy.candidates import prefer, rungs
-from raceway.runtime.accuracy.ladder import TABLE, table_of
-from raceway.runtime.accuracy.prepared import check_observables
-from raceway.runtime.accuracy.stored_trade import FILE_NAME, to_plain
-from raceway.runtime.accuracy.trade import (
+from ballpass.derive import read_scene
+from ballpass.runtime.app.commands.shared import Stages, check_folder
+from ballpass.runtime.app.commands.trade import MODELS, folders_of, key_of, load_models
+from ballpass.runtime.app.figures.canvas import save
+from ballpass.runtime.app.figures.trade import draw_trade
+from ballpass.runtime.certify.calibration import Calibration, calibrate
+from ballpass.runtime.certify.candidates import prefer, rungs
+from ballpass.runtime.certify.ladder import TABLE, table_of
+from ballpass.runtime.certify.prepared import check_observables
+from ballpass.runtime.certify.stored_trade import FILE_NAME, to_plain
+from ballpass.runtime.certify.trade import (
     FULL,
     TARGETS,
     Configuration,
@@ -32,11 +36,7 @@ from raceway.runtime.accuracy.trade import (
     compile_fast_math,
     measure_trade,
 )
-from raceway.runtime.accuracy.trade_report import milliseconds, percent, simplifications, table
-from raceway.runtime.commands.shared import Stages, check_folder
-from raceway.runtime.commands.trade import MODELS, folders_of, key_of, load_models
-from raceway.runtime.figures.canvas import save
-from raceway.runtime.figures.trade import draw_trade
+from ballpass.runtime.certify.trade_report import milliseconds, percent, simplifications, table
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
@@ -92,7 +92,7 @@ def page(results: list[Result], minutes: float) -> str:
     parts = [
         "# Speed for accuracy, measured",
         "<!-- Written by `make trade`. Do not edit. -->",
-        "What an error of the result costs, on the five shipped scenes. `raceway trade SCENE` makes the same table "
+        "What an error of the result costs, on the five shipped scenes. `ballpass trade SCENE` makes the same table "
         "for your own; [how to use it](howto/accuracy.md).",
         f"Errors are relative, the 95 % point over {first.members} parameter sets within {100 * first.spread:g} % of "
         "the scene's (contact makes single runs a lottery). The reference is Rodas5P at rtol 1e-11, checked by "

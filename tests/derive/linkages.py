@@ -9,10 +9,10 @@ from typing import Any
 
 import sympy as sp
 
-from raceway.derive.linkage import Linkage, derive_linkage
-from raceway.derive.numeric import Evaluator
-from raceway.derive.reactions import Reactions, derive_reactions
-from raceway.derive.scene import (
+from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
+from ballpass.derive.mechanism.numeric import Evaluator
+from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
+from ballpass.derive.scene.records import (
     AppliedForce,
     AppliedTorque,
     Body,

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from raceway.derive.explicit_tableaus import ExplicitTableau
-from raceway.derive.rosenbrock_tableaus import RosenbrockTableau
-from raceway.derive.tableaus import Row, Rows
+from ballpass.derive.methods.explicit import ExplicitTableau
+from ballpass.derive.methods.rosenbrock import RosenbrockTableau
+from ballpass.derive.methods.tableaus import Row, Rows
 
 Vector = NDArray[np.inexact]
 Slope = Callable[[float, Vector], Vector]

@@ -11,9 +11,9 @@ import pytest
 import sympy as sp
 from scene_texts import PRESS, ROTOR
 
-from raceway.derive.lower import Functions, lower
-from raceway.derive.read import scene_from_text
-from raceway.derive.system import System, derive
+from ballpass.derive.lower.functions import Functions, lower
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.system import System, derive
 
 
 def symbol(name: str) -> sp.Symbol:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from raceway.derive import SceneError, check, derive, equations, generate, read_scene
-from raceway.derive.emit import signature
-from raceway.derive.read import scene_from_text
-from raceway.runtime.manifest import read_manifest
+from ballpass.derive import SceneError, check, derive, generate, read_scene
+from ballpass.derive.emit.folder import equations, signature
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime.contract import read_manifest
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
@@ -31,7 +31,7 @@ def test_committed_artefact_is_reproduced_byte_for_byte() -> None:
 def test_same_bytes_in_another_process_with_another_hash_seed(name: str, tmp_path: Path) -> None:
     scene = ROOT / "scenes" / f"{name}.toml"
     generate(scene, tmp_path / "here")
-    code = f"from raceway.derive import generate; generate({str(scene)!r}, {str(tmp_path / 'there')!r})"
+    code = f"from ballpass.derive import generate; generate({str(scene)!r}, {str(tmp_path / 'there')!r})"
     subprocess.run([sys.executable, "-c", code], check=True, env={**os.environ, "PYTHONHASHSEED": "4711"})
     assert contents(tmp_path / "here") == contents(tmp_path / "there")
 

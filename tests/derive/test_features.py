@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from raceway.derive import generate, read_scene
-from raceway.derive.features import cost, count_operations, features
-from raceway.derive.read import scene_from_text
-from raceway.derive.scene import Scene
+from ballpass.derive import generate, read_scene
+from ballpass.derive.features import cost, count_operations, features
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.scene.records import Scene
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")

@@ -10,8 +10,8 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from raceway.derive import hertz
-from raceway.derive.visitor import Visitor
+from ballpass.derive.bearing import hertz
+from ballpass.derive.lower.visitor import Visitor
 
 BALL, PITCH = 7.9375e-3, 33.5e-3
 COMPLIANCE = 2 * (1 - 0.3**2) / 207e9

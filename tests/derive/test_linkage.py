@@ -25,11 +25,11 @@ from linkages import (
     watt_six_bar,
 )
 
-from raceway.derive.errors import LinkageError, SceneError
-from raceway.derive.kinematics import dot
-from raceway.derive.linkage import Linkage, check_assembly, derive_linkage
-from raceway.derive.numeric import Evaluator
-from raceway.derive.scene import Joint
+from ballpass.derive.mechanism.kinematics import dot
+from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
+from ballpass.derive.mechanism.numeric import Evaluator
+from ballpass.derive.scene.errors import LinkageError, SceneError
+from ballpass.derive.scene.records import Joint
 
 TURN = np.linspace(0.0, 2 * np.pi, 61)
 STEP = 1e-30  # of complex differentiation: no difference is taken, so no digits are lost

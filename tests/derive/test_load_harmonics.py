@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from raceway.derive import SceneError
-from raceway.derive.read import scene_from_text
-from raceway.runtime import Model
+from ballpass.derive import SceneError
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import Model
 
 COUNT = 4
 CHANGES = (

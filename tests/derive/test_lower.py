@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from raceway.derive import derive, lower
-from raceway.derive.lower import operations
-from raceway.derive.read import scene_from_text
-from raceway.derive.system import System
-from raceway.derive.terms import TIME
-from raceway.derive.visitor import Visitor
-from raceway.runtime import Model
+from ballpass.derive import derive
+from ballpass.derive.lower.functions import functions as lower
+from ballpass.derive.lower.functions import operations
+from ballpass.derive.lower.visitor import Visitor
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.system import System
+from ballpass.derive.terms import TIME
+from ballpass.runtime import Model
 
 SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
 

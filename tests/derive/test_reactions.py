@@ -21,10 +21,10 @@ from linkages import (
     watt_six_bar,
 )
 
-from raceway.derive.errors import LinkageError
-from raceway.derive.linkage import Linkage
-from raceway.derive.numeric import Evaluator
-from raceway.derive.reactions import Reactions
+from ballpass.derive.mechanism.linkage import Linkage
+from ballpass.derive.mechanism.numeric import Evaluator
+from ballpass.derive.mechanism.reactions import Reactions
+from ballpass.derive.scene.errors import LinkageError
 
 STATES = 200
 

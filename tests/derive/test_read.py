@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scene_texts import PRESS, ROTOR, SCENES, edited
 
-from raceway.derive.errors import SceneError
-from raceway.derive.read import parse_override, read_scene, scene_from_text, with_values
-from raceway.derive.scene import (
+from ballpass.derive.scene.errors import SceneError
+from ballpass.derive.scene.read import parse_override, read_scene, scene_from_text, with_values
+from ballpass.derive.scene.records import (
     EquivalentMass,
     GivenContact,
     HarmonicLoad,
@@ -24,7 +24,7 @@ from raceway.derive.scene import (
     Scene,
     TableLoad,
 )
-from raceway.derive.units import parse_quantity
+from ballpass.derive.scene.units import parse_quantity
 
 FILES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
 

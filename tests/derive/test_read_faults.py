@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from scene_texts import PRESS, ROTOR, SCENES, edited
 
-from raceway.derive.errors import SceneError
-from raceway.derive.read import read_scene, scene_from_text
-from raceway.runtime.errors import RacewayError
+from ballpass.derive.scene.errors import SceneError
+from ballpass.derive.scene.read import read_scene, scene_from_text
+from ballpass.runtime.contract.errors import BallpassError
 
 
 def faults(text: str, name: str = "press") -> SceneError:
@@ -491,7 +491,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     ]:
         with pytest.raises(SceneError, match=word) as caught:
             read_scene(path)
-        assert isinstance(caught.value, RacewayError)
+        assert isinstance(caught.value, BallpassError)
         assert isinstance(caught.value, ValueError)
 
 

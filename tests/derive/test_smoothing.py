@@ -9,14 +9,15 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from raceway.derive import SceneError, derive, generate, lower
-from raceway.derive.laws import RAMP_ERROR, SMOOTHED_HERTZ_ERROR
-from raceway.derive.read import scene_from_text
-from raceway.derive.system import System
-from raceway.runtime import Model
-from raceway.runtime.derivatives.differences import richardson
-from raceway.runtime.errors import RequestError
-from raceway.runtime.manifest import read_manifest
+from ballpass.derive import SceneError, derive, generate
+from ballpass.derive.bearing.laws import RAMP_ERROR, SMOOTHED_HERTZ_ERROR
+from ballpass.derive.lower.functions import functions as lower
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.system import System
+from ballpass.runtime import Model
+from ballpass.runtime.certify.differences import richardson
+from ballpass.runtime.contract import read_manifest
+from ballpass.runtime.contract.errors import RequestError
 
 CONTACT = ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n')
 WIDTH = 0.05e-6
@@ -153,7 +154,7 @@ def test_scenes_without_the_key_know_nothing_of_it(scene_text: Callable[..., str
     system = derive(scene_from_text(scene_text(name), name))
     assert not any("smoothing" in p.name for p in system.parameters)
     text = (folder / "kernels.h").read_text(encoding="utf-8")
-    law = text[text.index("rw_law(") :]
+    law = text[text.index("bp_law(") :]
     law = law[: law.index("\n}")]
     damping = system.scene.bearing.damping.law if system.scene.bearing else "none"
     assert law.count("<") + law.count(">") <= {"none": 1, "one-sided": 2, "tangent": 2}[damping]

@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 import sympy as sp
 
-from raceway.derive import generate, laws
-from raceway.derive.read import scene_from_text
-from raceway.derive.switching import Switching, find_switching
+from ballpass.derive import generate
+from ballpass.derive.bearing import laws
+from ballpass.derive.lower.switching import Switching, find_switching
+from ballpass.derive.scene.read import scene_from_text
 
 DELTA, RATE, STIFFNESS, COEFFICIENT, WIDTH, RATE_WIDTH = sp.symbols("delta rate k c w w_v", real=True)
 

@@ -16,10 +16,10 @@ from reference_steps import ReferenceStep, Vector, explicit_step, floats, rosenb
 from scipy.integrate import DOP853 as ScipyDop853
 from scipy.integrate import RK45
 
-from raceway.derive.explicit_tableaus import DOP853, DORMAND_PRINCE_54, ErrorEstimate, ExplicitTableau
-from raceway.derive.order_conditions import PRECISION, Tree, rooted_trees
-from raceway.derive.rosenbrock_tableaus import RODAS4, RODAS5P, RosenbrockTableau
-from raceway.derive.tableaus import Row, TableauError, nested_powers
+from ballpass.derive.methods.explicit import DOP853, DORMAND_PRINCE_54, ErrorEstimate, ExplicitTableau
+from ballpass.derive.methods.order_conditions import PRECISION, Tree, rooted_trees
+from ballpass.derive.methods.rosenbrock import RODAS4, RODAS5P, RosenbrockTableau
+from ballpass.derive.methods.tableaus import Row, TableauError, nested_powers
 
 Tableau = ExplicitTableau | RosenbrockTableau
 EXPLICIT = (DORMAND_PRINCE_54, DOP853)

@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from raceway.derive.units import KINDS, QuantityError, parse_quantity
-from raceway.runtime.errors import RacewayError
+from ballpass.derive.scene.units import KINDS, QuantityError, parse_quantity
+from ballpass.runtime.contract.errors import BallpassError
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_a_text_that_is_no_quantity_is_refused_with_a_remedy(
         parse_quantity(text, unit)
     assert problem in caught.value.problem
     assert remedy in caught.value.remedy
-    assert isinstance(caught.value, RacewayError)
+    assert isinstance(caught.value, BallpassError)
     for part in (caught.value.problem, caught.value.given, caught.value.allowed, caught.value.remedy):
         assert part
         assert part in str(caught.value)
@@ -201,7 +201,7 @@ def test_sizes_agree_with_pints_own_conversion(name: str) -> None:
 
 def test_pint_is_not_asked_before_the_first_quantity() -> None:
     code = (
-        "import pint, raceway.derive.units as u; assert u._registry.cache_info().currsize == 0; "
+        "import pint, ballpass.derive.scene.units as u; assert u._registry.cache_info().currsize == 0; "
         "u.parse_quantity('6 mm', 'm'); assert u._registry.cache_info().currsize == 1"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

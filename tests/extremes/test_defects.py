@@ -9,16 +9,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from raceway.runtime import IntegrationError, Model
-from raceway.runtime.conditioning import ConditioningWarning
-from raceway.runtime.errors import RequestError, SimulationError
-from raceway.runtime.integrate import clock
-from raceway.runtime.integrate.limits import brief_limit, step_limit
-from raceway.runtime.integrate.magnitudes import model_scales
-from raceway.runtime.integrate.segments import LARGEST_PHASE, segment_edges
-from raceway.runtime.integrate.whereabouts import whereabouts
-from raceway.runtime.status import Status
-from raceway.runtime.summary import render_summary, summarize
+from ballpass.runtime import IntegrationError, Model
+from ballpass.runtime.app.summary import render_summary, summarize
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.status import Status
+from ballpass.runtime.point.conditioning import ConditioningWarning
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.failure_location import whereabouts
+from ballpass.runtime.run.limits import brief_limit, step_limit
+from ballpass.runtime.run.magnitudes import model_scales
+from ballpass.runtime.run.segments import LARGEST_PHASE, segment_edges
 
 ModelMaker = Callable[..., Model]
 OUTER = "bearing.outer_ring"
@@ -95,9 +95,9 @@ def test_an_explicit_method_on_a_stiff_model_is_given_up_after_bounded_work(
     # it took a hundred million steps, and Ctrl-C was not heard meanwhile
     model = needs_stepper(make_model("punching_press"))
     numbers = {"bearing.damping.ratio": 2.5e-4, f"{OUTER}.mass": 1e-3}
-    monkeypatch.setattr("raceway.runtime.integrate.stepping.step_limit", lambda duration, turn: 200_000)
-    monkeypatch.setattr("raceway.runtime.integrate.stepping.STEPS_A_CALL", 100_000)
-    monkeypatch.setattr("raceway.runtime.integrate.stepping.LEAST_PROGRESS", 0.0)
+    monkeypatch.setattr("ballpass.runtime.run.stepping.step_limit", lambda duration, turn: 200_000)
+    monkeypatch.setattr("ballpass.runtime.run.stepping.STEPS_A_CALL", 100_000)
+    monkeypatch.setattr("ballpass.runtime.run.stepping.LEAST_PROGRESS", 0.0)
     with pytest.raises(IntegrationError, match=r"more steps than allowed.*explicit method crawls on a stiff") as caught:
         model.simulate(cycles=1, parameters=numbers, method="stepper-dp54", transient=0)
     assert caught.value.status is Status.TOO_MANY_STEPS

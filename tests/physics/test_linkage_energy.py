@@ -18,9 +18,9 @@ sys.path.append(str(Path(__file__).parents[1] / "derive"))
 
 from linkages import DEGREE, Machine, crank_slider, evaluate, four_bar, moving_guide, offset_slider, watt_six_bar
 
-from raceway.derive.linkage import Linkage
-from raceway.derive.numeric import Evaluator
-from raceway.derive.reactions import Reactions
+from ballpass.derive.mechanism.linkage import Linkage
+from ballpass.derive.mechanism.numeric import Evaluator
+from ballpass.derive.mechanism.reactions import Reactions
 
 PUNCH = 8964.8
 WINDOW = (237.0, 267.0)

@@ -8,9 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from raceway.derive import derive, lower
-from raceway.derive.read import scene_from_text
-from raceway.runtime import Model
+from ballpass.derive import derive
+from ballpass.derive.lower.functions import functions as lower
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import Model
 
 GIVEN = 'stiffness = "13.34e9 N/m^1.5"'
 HERTZ = """inner_groove_radius = "4.1275 mm"

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from raceway.runtime import Model
+from ballpass.runtime import Model
 
 
 @pytest.mark.parametrize(

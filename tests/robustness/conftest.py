@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
-from raceway.runtime.compiled import compile as compiling
+from ballpass.derive import generate
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime.native import compile as compiling
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = ROOT / "scenes"

@@ -1,6 +1,6 @@
 """How long the tests of limits take.
 
-RACEWAY_LONG=1 lets hypothesis draw more scenes, and others of them on every run, kills more processes and runs more
+BALLPASS_LONG=1 lets hypothesis draw more scenes, and others of them on every run, kills more processes and runs more
 simulations.
 """
 
@@ -11,7 +11,7 @@ import os
 from hypothesis import settings
 
 #: Whether the long profile was asked for.
-LONG = bool(os.environ.get("RACEWAY_LONG"))
+LONG = bool(os.environ.get("BALLPASS_LONG"))
 
 
 def examples(quick: int, long: int) -> settings:

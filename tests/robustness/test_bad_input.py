@@ -23,12 +23,12 @@ from hypothesis import strategies as st
 from profiles import LONG, examples
 from typer.testing import CliRunner
 
-from raceway.derive import SceneError, derive, generate
-from raceway.derive.read import parse_override, read_scene, scene_from_text, with_values
-from raceway.derive.scene import Scene
-from raceway.runtime import Model, RequestError, load
-from raceway.runtime.cli import app
-from raceway.runtime.compiled.export import export_c
+from ballpass.derive import SceneError, derive, generate
+from ballpass.derive.scene.read import parse_override, read_scene, scene_from_text, with_values
+from ballpass.derive.scene.records import Scene
+from ballpass.runtime import Model, RequestError, load
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.export.c_program import export_c
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")

@@ -16,14 +16,14 @@ import pytest
 from profiles import LONG
 from typer.testing import CliRunner
 
-from raceway.derive import check, generate
-from raceway.derive.read import scene_from_text
-from raceway.derive.replace_folder import GENERATED
-from raceway.runtime import CacheWarning, CompileError, RequestError, load, load_solution
-from raceway.runtime.cli import app
-from raceway.runtime.compiled import compile as compiling
-from raceway.runtime.errors import ArtefactError
-from raceway.runtime.manifest import read_manifest
+from ballpass.derive import check, generate
+from ballpass.derive.emit.replace_folder import GENERATED
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import CacheWarning, CompileError, RequestError, load, load_solution
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.contract import read_manifest
+from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.native import compile as compiling
 
 SOURCE = "double twice(double x) { return 2.0 * x; }\n"
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
@@ -66,7 +66,7 @@ def test_an_edited_file_of_an_artefact_is_named_and_refused(rotor: Path, name: s
         with pytest.raises(ArtefactError) as caught:
             load(rotor)
         assert name in str(caught.value)
-        assert "raceway derive" in str(caught.value)
+        assert "ballpass derive" in str(caught.value)
         assert (rotor / name).read_bytes() == content
     (rotor / name).write_bytes(whole)
     load(rotor)
@@ -94,8 +94,8 @@ def test_an_edit_of_the_code_is_taken_where_it_is_meant(rotor: Path) -> None:
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("schema", 99, "schema 99 was given, this version of raceway reads schema"),
-        ("schema", "2", "this version of raceway reads schema"),
+        ("schema", 99, "schema 99 was given, this version of ballpass reads schema"),
+        ("schema", "2", "this version of ballpass reads schema"),
         ("versions", [["casadi", "3.7.1"]], r"written with CasADi 3\.7\.1, while 3\.\d+\.\d+ is installed"),
         ("versions", [], "written with CasADi none, while"),
         ("scene", "../../x", "scene: a letter, then letters, digits and _, is expected, not '../../x'"),
@@ -108,7 +108,7 @@ def test_a_manifest_of_something_else_is_refused_with_a_remedy(
     rotor: Path, key: str, value: object, words: str
 ) -> None:
     """The digest is right: whoever wrote it was another version, or wished the reader ill."""
-    from raceway.runtime.manifest import DIGEST, text_digest, text_of
+    from ballpass.runtime.contract import DIGEST, text_digest, text_of
 
     document = json.loads((rotor / "manifest.json").read_text(encoding="utf-8"))
     del document[DIGEST]
@@ -117,7 +117,7 @@ def test_a_manifest_of_something_else_is_refused_with_a_remedy(
     (rotor / "manifest.json").write_text(text_of(document), encoding="utf-8")
     with pytest.raises(ArtefactError, match=words) as caught:
         load(rotor)
-    assert "raceway derive" in str(caught.value)
+    assert "ballpass derive" in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_functions_cut_short_are_an_error_and_no_crash(rotor: Path) -> None:
     stored = (rotor / "model.casadi").read_bytes()
     (rotor / "model.casadi").write_bytes(stored[: len(stored) // 2])
     code = (
-        "import sys; from raceway.runtime import load; from raceway.runtime.errors import ArtefactError\n"
+        "import sys; from ballpass.runtime import load; from ballpass.runtime.contract.errors import ArtefactError\n"
         "try: load(sys.argv[1], verify=False).symbolic('rhs')\n"
         "except ArtefactError as fault: print(fault); sys.exit(2)\n"
     )
@@ -172,7 +172,7 @@ def test_functions_cut_short_are_an_error_and_no_crash(rotor: Path) -> None:
 def test_deriving_into_a_folder_with_other_files_deletes_nothing(
     tmp_path: Path, kept: Callable[[Path], dict[str, bytes]]
 ) -> None:
-    """Once, `raceway derive SCENE --out .` emptied the folder it was called in."""
+    """Once, `ballpass derive SCENE --out .` emptied the folder it was called in."""
     home = tmp_path / "home"
     (home / "photos").mkdir(parents=True)
     (home / "photos" / "one.jpg").write_bytes(b"precious")
@@ -180,8 +180,8 @@ def test_deriving_into_a_folder_with_other_files_deletes_nothing(
     before = kept(home)
     result = CliRunner().invoke(app, ["derive", str(SCENES / "varying_compliance.toml"), "--out", str(home)])
     assert result.exit_code == 2
-    assert "holds other files (photos, thesis.tex), and none that raceway derive wrote" in result.stderr
-    assert "Allowed: a folder that is empty, new, or was written by raceway derive" in result.stderr
+    assert "holds other files (photos, thesis.tex), and none that ballpass derive wrote" in result.stderr
+    assert "Allowed: a folder that is empty, new, or was written by ballpass derive" in result.stderr
     assert kept(home) == before
 
 
@@ -285,7 +285,7 @@ def test_a_damaged_library_never_ends_a_process(cache: Path, rotor: Path, tmp_pa
         path.unlink()  # this process goes on with what it has mapped
         path.write_bytes(content[: len(content) // 2])
     code = (
-        "import sys, warnings; from raceway.runtime import load; warnings.simplefilter('always')\n"
+        "import sys, warnings; from ballpass.runtime import load; warnings.simplefilter('always')\n"
         "print(load(sys.argv[1]).simulate(cycles=0.2).x[-1].tobytes().hex())"
     )
     done = subprocess.run(
@@ -300,7 +300,7 @@ def test_a_cache_emptied_while_it_is_used_is_no_trouble(cache: Path, rotor: Path
     """Functions are looked up when they are first called, the stepper is compiled when it is first asked for."""
     expected = load(rotor).simulate(cycles=0.2, method="erk").x
     code = (
-        "import shutil, sys; from raceway.runtime import load; model = load(sys.argv[1]); shutil.rmtree(sys.argv[2])\n"
+        "import shutil, sys; from ballpass.runtime import load; model = load(sys.argv[1]); shutil.rmtree(sys.argv[2])\n"
         "print(model.simulate(cycles=0.2, method='erk').x.tobytes().hex()); shutil.rmtree(sys.argv[2])\n"
         "load(sys.argv[1]).simulate(cycles=0.2)"
     )

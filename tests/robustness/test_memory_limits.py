@@ -13,16 +13,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
-from raceway.runtime import Model, RequestError, load, request
-from raceway.runtime.derivatives.sensitivity import Directions
-from raceway.runtime.integrate.segments import WORK, segment_edges
-from raceway.runtime.integrate.stepper import Family
-from raceway.runtime.integrate.trajectory import start_trajectory
-from raceway.runtime.quantities.quantities import parse_quantity
-from raceway.runtime.quantities.study import Span, Study
-from raceway.runtime.quantities.track import Stepping
+from ballpass.derive import generate
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import Model, RequestError, load
+from ballpass.runtime.ask.quantities import parse_quantity
+from ballpass.runtime.ask.study import Span, Study
+from ballpass.runtime.ask.track import Stepping
+from ballpass.runtime.native.stepper import Family
+from ballpass.runtime.run import request
+from ballpass.runtime.run.segments import WORK, segment_edges
+from ballpass.runtime.run.sensitivity import Directions
+from ballpass.runtime.run.trajectory import start_trajectory
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 

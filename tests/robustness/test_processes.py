@@ -28,15 +28,15 @@ import numpy as np
 import pytest
 from profiles import LONG
 
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
-from raceway.derive.replace_folder import replace_folder
-from raceway.runtime import CacheWarning, CompileError, RequestError, load, load_solution
-from raceway.runtime.compiled import compile as compiling
-from raceway.runtime.compiled import compilers
-from raceway.runtime.errors import ArtefactError
-from raceway.runtime.manifest import folder as folders_manifest
-from raceway.runtime.manifest import read_artefact, read_manifest
+from ballpass.derive import generate
+from ballpass.derive.emit.replace_folder import replace_folder
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import CacheWarning, CompileError, RequestError, load, load_solution
+from ballpass.runtime.contract import folder as folders_manifest
+from ballpass.runtime.contract import read_artefact, read_manifest
+from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.native import compile as compiling
+from ballpass.runtime.native import compilers
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 ROTOR = (SCENES / "varying_compliance.toml").read_text(encoding="utf-8")
@@ -77,7 +77,7 @@ def shown(folder: Path) -> list[str]:
 REPLACING = """
     import itertools, shutil, sys
     from pathlib import Path
-    from raceway.derive.replace_folder import replace_folder
+    from ballpass.derive.emit.replace_folder import replace_folder
     target, *sources = map(Path, sys.argv[1:])
     print("ready", flush=True)
     for source in itertools.cycle(sources):
@@ -249,7 +249,7 @@ def test_a_killed_compiler_leaves_no_library_or_a_whole_one(cache: Path, tmp_pat
     code = """
         import sys
         from pathlib import Path
-        from raceway.runtime.compiled import compile as compiling
+        from ballpass.runtime.native import compile as compiling
         compiler = compiling.find_compiler()
         print("ready", flush=True)
         for k in range(100):
@@ -271,7 +271,7 @@ def test_a_killed_compiler_leaves_no_library_or_a_whole_one(cache: Path, tmp_pat
 def test_a_killed_process_leaves_the_old_solution_or_the_new_one(rotor: Path, tmp_path: Path) -> None:
     code = """
         import itertools, sys
-        from raceway.runtime import load_solution
+        from ballpass.runtime import load_solution
         one, other = map(load_solution, sys.argv[2:])
         print("ready", flush=True)
         for solution in itertools.cycle((one, other)):
@@ -292,8 +292,8 @@ def test_a_killed_process_leaves_the_old_solution_or_the_new_one(rotor: Path, tm
 # --------------------------------------------------------------------------------------------------------------- Ctrl-C
 
 
-def raceway(*words: object, cwd: Path, env: dict[str, str] | None = None, **options: Any) -> subprocess.Popen[str]:
-    command = [str(Path(sysconfig.get_path("scripts")) / "raceway"), *map(str, words)]
+def ballpass(*words: object, cwd: Path, env: dict[str, str] | None = None, **options: Any) -> subprocess.Popen[str]:
+    command = [str(Path(sysconfig.get_path("scripts")) / "ballpass"), *map(str, words)]
     return subprocess.Popen(
         command,
         cwd=cwd,
@@ -317,8 +317,8 @@ def scene(tmp_path: Path) -> Path:
 TELLING = """
 import os, sys
 def tell(event, words):
-    if event == "import" and words[0] == "raceway.runtime.cli" and "RACEWAY_BEGUN" in os.environ:
-        os.write(int(os.environ.pop("RACEWAY_BEGUN")), b".")
+    if event == "import" and words[0] == "ballpass.runtime.app.cli" and "BALLPASS_BEGUN" in os.environ:
+        os.write(int(os.environ.pop("BALLPASS_BEGUN")), b".")
 sys.addaudithook(tell)
 """
 
@@ -331,8 +331,8 @@ def begun(folder: Path, *words: object, cwd: Path) -> Iterator[subprocess.Popen[
     places = os.pathsep.join(filter(None, (str(folder), os.environ.get("PYTHONPATH"))))
     reading, writing = os.pipe()
     try:
-        env = {"PYTHONPATH": places, "RACEWAY_BEGUN": str(writing)}
-        process = raceway(*words, cwd=cwd, env=env, pass_fds=(writing,))
+        env = {"PYTHONPATH": places, "BALLPASS_BEGUN": str(writing)}
+        process = ballpass(*words, cwd=cwd, env=env, pass_fds=(writing,))
     finally:
         os.close(writing)
     with process, open(reading, "rb") as told:
@@ -355,7 +355,7 @@ def test_an_interrupt_at_any_moment_ends_with_130_and_whole_files(
         "results",
         *(() if LONG else ("--no-figures",)),
     )
-    with raceway(*words, cwd=tmp_path) as process:
+    with ballpass(*words, cwd=tmp_path) as process:
         out, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors
     old = kept(tmp_path / "results")
@@ -385,7 +385,7 @@ def test_an_interrupt_after_the_work_is_done_takes_nothing_back() -> None:
     """While the interpreter shuts down Python has given its handler away: the process ended by the signal, code -2."""
     code = """
         import os, signal
-        from raceway.runtime import cli
+        from ballpass.runtime.app import cli
 
         class Last:
             def __del__(self, kill=os.kill, me=os.getpid(), number=signal.SIGINT):
@@ -404,15 +404,15 @@ def test_an_interrupt_is_said_once_wherever_a_command_is(within: str) -> None:
     """Before and behind what a command reports itself, typer ends with 130 and without a word."""
     code = f"""
         import contextlib, os, signal, sys
-        from raceway.runtime import cli
-        from raceway.runtime.commands.shared import reported
+        from ballpass.runtime.app import cli
+        from ballpass.runtime.app.commands.shared import reported
 
         @cli.app.command()
         def late():
             with {within}:
                 os.kill(os.getpid(), signal.SIGINT)
 
-        sys.argv = ["raceway", "late"]
+        sys.argv = ["ballpass", "late"]
         cli.main()
     """
     with python(code) as process:
@@ -426,7 +426,7 @@ def test_an_interrupt_that_an_import_turns_into_something_else_is_one_still() ->
     """Python 3.11 wraps what `__set_name__` raises in a RuntimeError: once a traceback and exit code 1."""
     code = """
         import os, signal, sys
-        from raceway.runtime import cli
+        from ballpass.runtime.app import cli
         def broken():
             class Name:
                 def __set_name__(self, owner, name):
@@ -447,7 +447,7 @@ def test_an_interrupt_where_python_ignores_exceptions_is_heard_all_the_same() ->
     """In a callback of a weak reference it was printed with a traceback, and the run went on to its end."""
     code = """
         import os, signal, time, weakref
-        from raceway.runtime import cli
+        from ballpass.runtime.app import cli
         def collecting():
             class Thing:
                 pass
@@ -474,7 +474,7 @@ def test_an_interrupt_while_compiling_ends_the_compiler_and_its_children(
         encoding="utf-8",
     )
     script.chmod(0o755)
-    with raceway("run", scene, cwd=tmp_path, env={"CC": str(script)}) as process:
+    with ballpass("run", scene, cwd=tmp_path, env={"CC": str(script)}) as process:
         while not (note.exists() and note.read_text().strip()):
             assert process.poll() is None, process.communicate()[1]
             time.sleep(0.02)
@@ -494,7 +494,7 @@ def test_an_interrupt_while_the_compiler_is_started_ends_it_as_well(tmp_path: Pa
     """
     code = """
         import os, signal, subprocess, sys
-        from raceway.runtime.compiled import compilers
+        from ballpass.runtime.native import compilers
 
         real, started = subprocess._fork_exec, []
         def fork(*words):
@@ -626,7 +626,7 @@ def test_without_any_program_on_the_path_the_model_runs_in_the_virtual_machine(s
     env = {"PATH": str(tmp_path / "nothing"), "CC": "", "PYTHONPATH": str(tmp_path)}
     # a compiler from PyPI would be found without a path
     (tmp_path / "sitecustomize.py").write_text("import sys; sys.modules['ziglang'] = None\n", encoding="utf-8")
-    with raceway(*words, cwd=tmp_path, env=env) as process:
+    with ballpass(*words, cwd=tmp_path, env=env) as process:
         out, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors
     assert "No C compiler was found" in errors
@@ -636,7 +636,7 @@ def test_without_any_program_on_the_path_the_model_runs_in_the_virtual_machine(s
 def test_two_processes_on_one_cold_cache_both_get_the_right_library(cache: Path, rotor: Path) -> None:
     code = """
         import sys
-        from raceway.runtime import load
+        from ballpass.runtime import load
         print(load(sys.argv[1]).simulate(cycles=0.2).x.tobytes().hex())
     """
     running = [python(code, rotor) for _ in range(2)]
@@ -687,11 +687,11 @@ def test_a_full_disk_is_told_with_a_remedy_and_leaves_no_halves(
 ) -> None:
     full(small_disk)
     place = small_disk / what
-    env = {"RACEWAY_CACHE_DIR": str(place)} if what == "cache" else {}
+    env = {"BALLPASS_CACHE_DIR": str(place)} if what == "cache" else {}
     (tmp_path / "here").mkdir()
     words: tuple[object, ...] = ("run", scene, "--cycles", "2", "--transient", "1", "--no-figures")
     words = {"cache": words, "generated": ("derive", scene, "--out", place), "results": (*words, "--out", place)}[what]
-    with raceway(*words, cwd=tmp_path / "here", env=env) as process:
+    with ballpass(*words, cwd=tmp_path / "here", env=env) as process:
         out, errors = process.communicate(timeout=300)
     assert process.returncode == (1 if what == "cache" else 2), errors
     assert out == ""
@@ -707,8 +707,8 @@ def test_a_limit_of_file_size_is_told_and_the_old_solution_stays(rotor: Path, tm
     before = target.read_bytes()
     code = """
         import resource, sys
-        from raceway.runtime import load_solution
-        from raceway.runtime.errors import RequestError
+        from ballpass.runtime import load_solution
+        from ballpass.runtime.contract.errors import RequestError
         solution = load_solution(sys.argv[1])
         resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
         try:
@@ -747,7 +747,7 @@ def test_a_read_only_folder_is_told_with_a_remedy(
     scene: Path, tmp_path: Path, read_only: Path, words: tuple[str, ...]
 ) -> None:
     (tmp_path / "here").mkdir()
-    with raceway(words[0], scene, *words[1:], read_only / "x", cwd=tmp_path / "here") as process:
+    with ballpass(words[0], scene, *words[1:], read_only / "x", cwd=tmp_path / "here") as process:
         out, errors = process.communicate(timeout=300)
     assert process.returncode == 2, errors
     assert out == ""
@@ -763,7 +763,7 @@ def test_a_read_only_cache_warns_and_names_the_folder_that_is_taken_instead(
     monkeypatch.setenv(compiling.CACHE_VARIABLE, str(read_only))
     compiler = compiling.find_compiler()
     assert compiler is not None
-    with pytest.warns(CacheWarning, match=r"cannot be written .* this time into (\S+),.*RACEWAY_CACHE_DIR") as caught:
+    with pytest.warns(CacheWarning, match=r"cannot be written .* this time into (\S+),.*BALLPASS_CACHE_DIR") as caught:
         library = compiling.compile_sources((source,), compiler)
     assert str(library.path.parent) in str(caught[0].message)
     with warnings.catch_warnings():
@@ -772,12 +772,12 @@ def test_a_read_only_cache_warns_and_names_the_folder_that_is_taken_instead(
 
 
 def test_a_home_that_cannot_be_written_is_a_warning(scene: Path, tmp_path: Path) -> None:
-    env = {"HOME": "/dev/null", "XDG_CACHE_HOME": "", "RACEWAY_CACHE_DIR": ""}
+    env = {"HOME": "/dev/null", "XDG_CACHE_HOME": "", "BALLPASS_CACHE_DIR": ""}
     words = ("run", scene, "--cycles", "2", "--transient", "1", "--json", "--no-figures")
-    with raceway(*words, cwd=tmp_path, env=env) as process:
+    with ballpass(*words, cwd=tmp_path, env=env) as process:
         out, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors
-    assert "/dev/null/.cache/raceway cannot be written" in errors
+    assert "/dev/null/.cache/ballpass cannot be written" in errors
     assert "this time into" in errors
     assert '"compiled": true' in out
 
@@ -795,7 +795,7 @@ def test_no_folder_at_all_to_compile_in_is_refused_in_words(
     monkeypatch.setattr(compiling.tempfile, "mkdtemp", nowhere)
     compiler = compiling.find_compiler()
     assert compiler is not None
-    with pytest.raises(RequestError, match=r"Neither the cache .* nor a temporary folder .*RACEWAY_CACHE_DIR"):
+    with pytest.raises(RequestError, match=r"Neither the cache .* nor a temporary folder .*BALLPASS_CACHE_DIR"):
         compiling.compile_sources((source,), compiler)
 
 

@@ -20,15 +20,17 @@ import numpy as np
 import pytest
 from profiles import LONG
 
-from raceway.runtime import RequestError, Solution, folders, load, load_results, results
-from raceway.runtime.results import FILES, SOLUTION, SUMMARY, write_results
+from ballpass.runtime import RequestError, Solution, load, load_results
+from ballpass.runtime.app import results
+from ballpass.runtime.app.results import FILES, SOLUTION, SUMMARY, write_results
+from ballpass.runtime.contract import folders
 
 FIGURES = ("orbit.png", "forces.png")
 
 WRITING = """
     import itertools, sys
     from pathlib import Path
-    from raceway.runtime.results import SOLUTION, write_results
+    from ballpass.runtime.app.results import SOLUTION, write_results
     target, *sources = map(Path, sys.argv[2:])
     runs = [{path.name: path.read_bytes() for path in sorted(source.iterdir())} for source in sources]
     print("ready", flush=True)
@@ -159,7 +161,7 @@ def test_an_end_between_any_two_moves_leaves_a_whole_run(
 
 
 def load_solution_times(run: Path) -> np.ndarray:
-    from raceway.runtime import load_solution
+    from ballpass.runtime import load_solution
 
     return load_solution(run / SOLUTION).t[[0, -1]]
 
@@ -174,7 +176,7 @@ def test_files_of_two_runs_are_refused_by_name(tmp_path: Path, runs: tuple[Path,
 
 
 def test_results_without_summary_or_of_another_version_are_refused(tmp_path: Path, runs: tuple[Path, Path]) -> None:
-    with pytest.raises(RequestError, match=r"summary\.json: cannot be read.*`raceway run`"):
+    with pytest.raises(RequestError, match=r"summary\.json: cannot be read.*`ballpass run`"):
         load_results(tmp_path)
     put(tmp_path / "rotor", runs[0], 0)
     for text in ("", "[]", "{}", '{"files": 3}', "[" * 100_000):
@@ -204,7 +206,7 @@ def test_a_failure_while_writing_changes_nothing(
 def test_where_somebody_works_the_folder_itself_stays(
     tmp_path: Path, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`raceway run SCENE --out .`: a shell whose folder was exchanged sees nothing any more."""
+    """`ballpass run SCENE --out .`: a shell whose folder was exchanged sees nothing any more."""
     target = tmp_path / "rotor"
     put(target, runs[0], 0)
     monkeypatch.chdir(target)
@@ -292,7 +294,7 @@ def test_two_processes_that_write_one_folder_take_turns(tmp_path: Path, runs: tu
 def test_a_lock_that_another_program_keeps_delays_and_no_more(
     tmp_path: Path, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`flock FOLDER raceway run ...` holds one for as long as the run lasts."""
+    """`flock FOLDER ballpass run ...` holds one for as long as the run lasts."""
     waited: list[float] = []
     monkeypatch.setattr(folders.time, "sleep", waited.append)
     now = iter(np.arange(0.0, 1000.0, 0.5))

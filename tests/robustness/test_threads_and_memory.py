@@ -19,14 +19,13 @@ import numpy as np
 import pytest
 from profiles import LONG
 
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
-from raceway.runtime import ArtefactError, Model, load
-from raceway.runtime.accuracy import quasi_static
-from raceway.runtime.compiled.compile import compile_sources, find_compiler
-from raceway.runtime.compiled.driver_library import DRIVER
-from raceway.runtime.ensembles import ensemble_driver
-from raceway.runtime.integrate import stepper
+from ballpass.derive import generate
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import ArtefactError, Model, load
+from ballpass.runtime.certify import quasi_static
+from ballpass.runtime.native import ensemble_driver, stepper
+from ballpass.runtime.native.compile import compile_sources, find_compiler
+from ballpass.runtime.native.driver_library import DRIVER
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
@@ -79,7 +78,7 @@ def test_concurrent_calls_give_the_bits_of_serial_ones(press: Path, own: bool) -
 MANY = """
     import sys
     import numpy as np
-    from raceway.runtime import load
+    from ballpass.runtime import load
 
     def resident():  # [bytes]
         with open("/proc/self/statm") as stream:
@@ -123,7 +122,7 @@ def test_a_process_with_models_at_work_in_threads_ends_well(press: Path) -> None
     """At the end of an interpreter nothing calls into code that is gone, whoever still holds what."""
     code = """
         import sys, threading
-        from raceway.runtime import load
+        from ballpass.runtime import load
         model = load(sys.argv[1])
         kept = [model.simulate(cycles=0.1), model.kernel("rhs"), model.function("outputs"), model.stepper]
         stop = threading.Event()
@@ -147,12 +146,12 @@ def test_a_process_with_models_at_work_in_threads_ends_well(press: Path) -> None
 
 
 LAYOUTS = {
-    "raceway_options": stepper._Options,
-    "raceway_result": stepper._Result,
-    "raceway_tangents": stepper._Tangents,
-    "raceway_ensemble_options": ensemble_driver._Options,
-    "raceway_equilibrium_options": quasi_static._Options,
-    "raceway_equilibrium_result": quasi_static._Result,
+    "ballpass_options": stepper._Options,
+    "ballpass_result": stepper._Result,
+    "ballpass_tangents": stepper._Tangents,
+    "ballpass_ensemble_options": ensemble_driver._Options,
+    "ballpass_equilibrium_options": quasi_static._Options,
+    "ballpass_equilibrium_result": quasi_static._Result,
 }
 
 
@@ -195,9 +194,9 @@ def test_a_driver_of_other_records_is_refused_before_it_is_called(
     record = LAYOUTS[name]
     longer = type(record.__name__, (ctypes.Structure,), {"_fields_": (*record._fields_, ("later", ctypes.c_double))})
     driver, module = {
-        "raceway_ensemble_options": (model.ensemble_driver, ensemble_driver),
-        "raceway_equilibrium_options": (model.quasi_static, quasi_static),
-        "raceway_equilibrium_result": (model.quasi_static, quasi_static),
+        "ballpass_ensemble_options": (model.ensemble_driver, ensemble_driver),
+        "ballpass_equilibrium_options": (model.quasi_static, quasi_static),
+        "ballpass_equilibrium_result": (model.quasi_static, quasi_static),
     }.get(name, (model.stepper, stepper))
     library = model.ensemble_driver.stepper.library if driver is model.ensemble_driver else driver.library
     type(driver)(library, model.manifest)
@@ -234,7 +233,7 @@ def test_arrays_live_as_long_as_c_reads_them(monkeypatch: pytest.MonkeyPatch, wh
     driver = object.__new__(ensemble_driver.EnsembleDriver)
     driver._inputs = 1
     driver._code = SimpleNamespace(
-        raceway_ensemble=reading, raceway_ensemble_magnitudes=reading, raceway_ensemble_work=lambda _: 8
+        ballpass_ensemble=reading, ballpass_ensemble_magnitudes=reading, ballpass_ensemble_work=lambda _: 8
     )
     states, moments = np.zeros((3, 4)), np.arange(4)
     members = ensemble_driver.MemberArrays(

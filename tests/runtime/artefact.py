@@ -14,7 +14,7 @@ from pathlib import Path
 
 import casadi as ca
 
-from raceway.runtime import manifest as mf
+from ballpass.runtime import contract as mf
 
 BALLS = 3
 DEFAULTS = {

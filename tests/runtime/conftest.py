@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from virtual import virtual_model
 
-from raceway.runtime import Model
-from raceway.runtime.accuracy import prepared
-from raceway.runtime.integrate.stepper import Outcome, Stepper
+from ballpass.runtime import Model
+from ballpass.runtime.certify import prepared
+from ballpass.runtime.native.stepper import Outcome, Stepper
 
 
 @pytest.fixture(scope="session")

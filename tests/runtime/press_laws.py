@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from raceway.runtime import Model
+from ballpass.runtime import Model
 
 #: The law that the shipped scene has.
 LAW = 'law = "one-sided"\nratio = "0.25e-5 s*mm^0.5"'

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from raceway.runtime import Model
-from raceway.runtime.integrate import clock
-from raceway.runtime.integrate.segments import segment_edges
-from raceway.runtime.integrate.stepper import Family, Outcome, Segments
-from raceway.runtime.parameters import Numbers
+from ballpass.runtime import Model
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.stepper import Family, Outcome, Segments
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.segments import segment_edges
 
 #: The four methods a user can name, by order of convergence and order of their dense output.
 ORDERS = {Family.RODAS4: (4, 3), Family.RODAS5P: (5, 4), Family.DP54: (5, 4), Family.DOP853: (8, 7)}

@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from raceway.derive import SceneError
-from raceway.derive.read import scene_from_text
-from raceway.derive.values import value_bounds, value_relations, with_values
-from raceway.runtime import Model, RequestError
+from ballpass.derive import SceneError
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.scene.values import value_bounds, value_relations, with_values
+from ballpass.runtime import Model, RequestError
 
 
 @pytest.mark.parametrize(

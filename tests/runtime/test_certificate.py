@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from raceway.runtime import Model, RequestError
-from raceway.runtime.derivatives.certificate import Verdict, by_differences, compare, noise_of
-from raceway.runtime.quantities.study import Course, Study
+from ballpass.runtime import Model, RequestError
+from ballpass.runtime.ask.study import Course, Study
+from ballpass.runtime.certify.certificate import Verdict, by_differences, compare, noise_of
 
 PRELOADED = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.0}
 

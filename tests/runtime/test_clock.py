@@ -10,9 +10,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from raceway.runtime.errors import RequestError
-from raceway.runtime.integrate import clock
-from raceway.runtime.manifest import InputInfo
+from ballpass.runtime.contract import InputInfo
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.run import inputs as clock
 
 TURN = 2.0 * math.pi
 GATE = InputInfo(name="gate", kind="gate", offset="start", rate="speed", windows=(("w.start", "w.end"),))

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from artefact import write_folder
 
-from raceway.runtime import CacheWarning, CompileError, NoCompilerWarning, RequestError, load
-from raceway.runtime.compiled import compile, compilers
+from ballpass.runtime import CacheWarning, CompileError, NoCompilerWarning, RequestError, load
+from ballpass.runtime.native import compile, compilers
 
 SOURCE = "double twice(double x) { return 2.0 * x; }\n"
 
@@ -81,7 +81,7 @@ def test_content_flags_compiler_versions_and_processor_all_enter_the_key(
     with monkeypatch.context() as patch:
         patch.setattr(compile, "_processor", lambda: "another")
         keys.append(compile.library_key((source,), compiler))
-    for package in ("casadi", "raceway"):
+    for package in ("casadi", "ballpass"):
         with monkeypatch.context() as patch:
             real = compile.importlib.metadata.version
             patch.setattr(
@@ -205,7 +205,7 @@ def test_changed_number_recompiles_nothing_and_changed_structure_does(
 def test_two_processes_loading_at_once_both_get_a_whole_library(cache: Path, tmp_path: Path) -> None:
     folder = write_folder(tmp_path / "model")
     code = (
-        "import sys; from raceway.runtime import load; m = load(sys.argv[1]); "
+        "import sys; from ballpass.runtime import load; m = load(sys.argv[1]); "
         "print(m.simulate(cycles=0.2).x[-1].tobytes().hex())"
     )
     running = [

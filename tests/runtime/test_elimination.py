@@ -10,23 +10,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
-from raceway.runtime.compiled.compile import find_compiler
-from raceway.runtime.compiled.driver_library import DRIVER, FLAGS
+from ballpass.derive import generate
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime.native.compile import find_compiler
+from ballpass.runtime.native.driver_library import DRIVER, FLAGS
 
 #: The driver's factorization and what it makes of a right-hand side, as it uses them in a stage.
 HARNESS = """
 #include <math.h>
 #include "rosenbrock.h"
-int size(void) { return RW_NQ; }
+int size(void) { return BP_NQ; }
 int solve(const double *A, const double *B, double s, const double *R, double *kv)
 {
-    rw_matrix m;
-    if (!rw_factorize(&m, A, B, s)) return -1;
-    for (int i = 0; i < RW_NQ; i++) {
+    bp_matrix m;
+    if (!bp_factorize(&m, A, B, s)) return -1;
+    for (int i = 0; i < BP_NQ; i++) {
         kv[i] = 0.0;
-        for (int j = 0; j < RW_NX; j++) kv[i] += m.solve[j][i] * R[j];
+        for (int j = 0; j < BP_NX; j++) kv[i] += m.solve[j][i] * R[j];
     }
     return m.pivoted;
 }

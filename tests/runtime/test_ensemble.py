@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 from press_laws import press
 
-from raceway.runtime import Model, RequestError, SimulationError
-from raceway.runtime.ensembles.ensemble import EnsembleResult
-from raceway.runtime.ensembles.ensemble_driver import EnsembleDriver, MemberArrays, MemberNumbers
-from raceway.runtime.ensembles.member_segments import inputs_of, moments, stretches
-from raceway.runtime.ensembles.members import Members, Span, edge_windows, make_members
-from raceway.runtime.integrate import clock
-from raceway.runtime.integrate.magnitudes import MOMENTS, model_scales
-from raceway.runtime.integrate.reductions import SCALED_TURNS, choose_family
-from raceway.runtime.integrate.segments import segment_edges
-from raceway.runtime.integrate.stepper import End
+from ballpass.runtime import Model, RequestError, SimulationError
+from ballpass.runtime.many.ensemble import EnsembleResult
+from ballpass.runtime.many.member_segments import inputs_of, moments, stretches
+from ballpass.runtime.many.members import Members, Span, edge_windows, make_members
+from ballpass.runtime.native.ensemble_driver import EnsembleDriver, MemberArrays, MemberNumbers
+from ballpass.runtime.native.stepper import End
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.magnitudes import MOMENTS, model_scales
+from ballpass.runtime.run.reductions import SCALED_TURNS, choose_family
+from ballpass.runtime.run.segments import segment_edges
 
 ModelMaker = Callable[..., Model]
 OBSERVABLES = (

@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 from press_laws import press
 
-from raceway.runtime import Model
-from raceway.runtime.ensembles import chunks, member_segments
-from raceway.runtime.ensembles.chunks import PATIENCE
-from raceway.runtime.ensembles.ensemble_driver import RESULT, EnsembleDriver, MemberArrays
-from raceway.runtime.ensembles.member_segments import moments, stretches
-from raceway.runtime.ensembles.members import Span, make_members
-from raceway.runtime.integrate.locating import Kinks
-from raceway.runtime.integrate.reductions import choose_family
+from ballpass.runtime import Model
+from ballpass.runtime.many import chunks, member_segments
+from ballpass.runtime.many.chunks import PATIENCE
+from ballpass.runtime.many.member_segments import moments, stretches
+from ballpass.runtime.many.members import Span, make_members
+from ballpass.runtime.native.ensemble_driver import RESULT, EnsembleDriver, MemberArrays
+from ballpass.runtime.run.locating import Kinks
+from ballpass.runtime.run.reductions import choose_family
 
 ModelMaker = Callable[..., Model]
 OBSERVABLES = ("max:ball.force", "peak_time:ball.force", "min:inner.y", "rms_inner_y", "end:inner.vx")
@@ -174,7 +174,7 @@ def test_a_member_has_its_own_limit_of_steps(
     """One that meets its limit alone meets it beside a member that turns ten times as often, and may take more."""
     model = press(make_model)
     monkeypatch.setattr(
-        "raceway.runtime.integrate.limits.step_limit", lambda duration, turn: 1000 * math.ceil(duration / turn - 1e-9)
+        "ballpass.runtime.run.limits.step_limit", lambda duration, turn: 1000 * math.ceil(duration / turn - 1e-9)
     )
     fates = []
     for speeds in ([10.0], [10.0, 100.0]):
@@ -260,7 +260,7 @@ def test_runs_of_ten_million_turns_need_little_memory_and_hear_an_interrupt(make
     folder = press(make_model)._drivers._folder
     code = """
         import json, os, resource, signal, sys, threading, time
-        from raceway.runtime import load
+        from ballpass.runtime import load
 
         model = load(sys.argv[1])
         asked = {"bearing.clearance": [k * 1e-6 for k in range(4, 12)]}, ["max:ball.force"]

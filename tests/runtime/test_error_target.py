@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from raceway.runtime import Model, RequestError
-from raceway.runtime.accuracy.calibration import calibrate
-from raceway.runtime.accuracy.candidates import prefer, rungs
-from raceway.runtime.accuracy.companion import chosen_part
-from raceway.runtime.accuracy.error_target import TargetMissed, estimated, like_those_measured, meet_target
-from raceway.runtime.accuracy.ladder import LADDER, STIFF_LADDER, errors, first_rung, table_of
-from raceway.runtime.accuracy.parts import integrate_parts
-from raceway.runtime.accuracy.prepared import default_observables, prepare
-from raceway.runtime.accuracy.trade import (
+from ballpass.runtime import Model, RequestError
+from ballpass.runtime.certify.calibration import calibrate
+from ballpass.runtime.certify.candidates import prefer, rungs
+from ballpass.runtime.certify.companion import chosen_part
+from ballpass.runtime.certify.error_target import TargetMissed, estimated, like_those_measured, meet_target
+from ballpass.runtime.certify.ladder import LADDER, STIFF_LADDER, errors, first_rung, table_of
+from ballpass.runtime.certify.parts import integrate_parts
+from ballpass.runtime.certify.prepared import default_observables, prepare
+from ballpass.runtime.certify.trade import (
     FULL,
     TARGETS,
     Configuration,
@@ -26,7 +26,7 @@ from raceway.runtime.accuracy.trade import (
     full_configurations,
     measure_trade,
 )
-from raceway.runtime.integrate.reductions import column
+from ballpass.runtime.run.reductions import column
 
 MEMBERS = 12
 PEAK = "peak_ball_force"

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from raceway.runtime import Model
-from raceway.runtime.cli import app
+from ballpass.runtime import Model
+from ballpass.runtime.app.cli import app
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -20,17 +20,17 @@ import pytest
 from artefact import write_folder
 from typer.testing import CliRunner
 
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
-from raceway.runtime import ArtefactError, IntegrationError, Model, RequestError, load
-from raceway.runtime.bounds import allowed
-from raceway.runtime.cli import app
-from raceway.runtime.compiled.export import export_c
-from raceway.runtime.integrate import clock
-from raceway.runtime.integrate.locating import tight_below
-from raceway.runtime.integrate.segments import segment_edges
-from raceway.runtime.manifest import ParameterInfo
-from raceway.runtime.parameters import resolve_parameters
+from ballpass.derive import generate
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import ArtefactError, IntegrationError, Model, RequestError, load
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.contract import ParameterInfo
+from ballpass.runtime.contract.bounds import allowed
+from ballpass.runtime.contract.parameters import resolve_parameters
+from ballpass.runtime.export.c_program import export_c
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.locating import tight_below
+from ballpass.runtime.run.segments import segment_edges
 
 SCENES = ("punching_press", "punching_press_tangent", "four_bar", "offset_slider", "varying_compliance")
 WARNINGS = "-Wall -Wextra -Wconversion -Wshadow -pedantic -Werror"

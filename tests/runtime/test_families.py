@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from stepper_runs import edges_of, run, segments_between
 
-from raceway.runtime import Model
-from raceway.runtime.integrate.stepper import Family, Outcome
+from ballpass.runtime import Model
+from ballpass.runtime.native.stepper import Family, Outcome
 
 Make = Callable[..., Model]
 

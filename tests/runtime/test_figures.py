@@ -19,12 +19,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.text import Annotation, Text
 
-from raceway.runtime import Model, Solution
-from raceway.runtime.errors import RequestError
-from raceway.runtime.figures import FIGURES, draw, draw_all
-from raceway.runtime.figures.canvas import INK, PALE, SAND, SIGNAL
-from raceway.runtime.figures.mechanism import draw_mechanism
-from raceway.runtime.figures.record import gather
+from ballpass.runtime import Model, Solution
+from ballpass.runtime.app.figures import FIGURES, draw, draw_all
+from ballpass.runtime.app.figures.canvas import INK, PALE, SAND, SIGNAL
+from ballpass.runtime.app.figures.mechanism import draw_mechanism
+from ballpass.runtime.app.figures.record import gather
+from ballpass.runtime.contract.errors import RequestError
 
 Run = tuple[Model, Solution]
 NAMES = [kind.name for kind in FIGURES]
@@ -265,7 +265,8 @@ def test_palette_keeps_its_order_in_greyscale() -> None:
 
 
 def test_figures_leave_pyplot_alone() -> None:
-    code = "import sys, raceway.runtime.figures; sys.exit('matplotlib.pyplot' in sys.modules or 'sympy' in sys.modules)"
+    unwanted = "'matplotlib.pyplot' in sys.modules or 'sympy' in sys.modules"
+    code = f"import sys, ballpass.runtime.app.figures; sys.exit({unwanted})"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

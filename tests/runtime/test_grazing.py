@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from raceway.runtime import Model
-from raceway.runtime.derivatives.grazing import Grazing, describe, find_grazing, merge_grazing
-from raceway.runtime.derivatives.sensitivity_report import SensitivityReport
-from raceway.runtime.figures.tornado import tornado
+from ballpass.runtime import Model
+from ballpass.runtime.app.figures.tornado import tornado
+from ballpass.runtime.certify.grazing import Grazing, describe, find_grazing, merge_grazing
+from ballpass.runtime.certify.sensitivity_report import SensitivityReport
 
 #: Ball and time [s].
 PLACES = ((1, 0.1), (5, 0.1), (2, 0.2))

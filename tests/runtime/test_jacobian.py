@@ -12,14 +12,14 @@ import pytest
 from scipy.integrate import quad
 from typer.testing import CliRunner
 
-from raceway.runtime import Model
-from raceway.runtime.cli import app
-from raceway.runtime.derivatives import jacobian_check
-from raceway.runtime.derivatives.certificate import Verdict
-from raceway.runtime.derivatives.differences import richardson
-from raceway.runtime.derivatives.jacobian import Directions, directions_of, output_tangents, quantity_values
-from raceway.runtime.derivatives.jacobian_check import checked_jacobian
-from raceway.runtime.errors import RequestError
+from ballpass.runtime import Model
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.certify import jacobian_check
+from ballpass.runtime.certify.certificate import Verdict
+from ballpass.runtime.certify.differences import richardson
+from ballpass.runtime.certify.jacobian_check import checked_jacobian
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.point.jacobian import Directions, directions_of, output_tangents, quantity_values
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -204,7 +204,7 @@ def test_a_run_compiles_no_jacobians(
     make_model: Callable[..., Model], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = make_model("varying_compliance", ("balls = 8", "balls = 7"))
-    monkeypatch.setenv("RACEWAY_CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("BALLPASS_CACHE_DIR", str(tmp_path))
     model.simulate(duration=0.01, method="erk")
     assert not list(tmp_path.glob("*_jacobians-*"))
     model.jacobian("ball.force", "states")

@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from raceway.derive import derive, generate, lower
-from raceway.derive.lower import Functions
-from raceway.derive.read import scene_from_text
-from raceway.derive.system import System
-from raceway.runtime.compiled.compile import compile_sources, find_compiler
-from raceway.runtime.compiled.driver_library import DRIVER, FLAGS
+from ballpass.derive import derive, generate
+from ballpass.derive.lower.functions import Functions
+from ballpass.derive.lower.functions import functions as lower
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.system import System
+from ballpass.runtime.native.compile import compile_sources, find_compiler
+from ballpass.runtime.native.driver_library import DRIVER, FLAGS
 
 #: The driver's own functions, one point a call: as a stage within a step sees it, and as the start of a step does.
 SHIM = """
@@ -23,21 +24,21 @@ SHIM = """
 
 void at_stage(double t, double h, const double *x, const double *u, const double *p, const double *c, double *dx)
 {
-    const rw_numbers n = {u, p, c};
+    const bp_numbers n = {u, p, c};
     static const double nodes[3] = {0.0, 0.3, 1.0};
-    double w[3][RW_NW];
-    rw_stages(&n, t, h, nodes, 3, w);
-    for (int i = 0; i < 3; i++) rw_rate(&n, w[i], x, dx + i * RW_NX);
+    double w[3][BP_NW];
+    bp_stages(&n, t, h, nodes, 3, w);
+    for (int i = 0; i < 3; i++) bp_rate(&n, w[i], x, dx + i * BP_NX);
 }
 
 void at_end(double t, double h, const double *x, const double *u, const double *p, const double *c, double *dx,
             double *A, double *B, double *at)
 {
-    const rw_numbers n = {u, p, c};
+    const bp_numbers n = {u, p, c};
     static const double nodes[1] = {0.3};
-    double w[1][RW_NW], end[RW_NW], rate[RW_NW];
-    rw_stages_and_end(&n, t, h, nodes, 1, w, end, rate);
-    rw_linearize(&n, end, rate, x, dx, A, B, at);
+    double w[1][BP_NW], end[BP_NW], rate[BP_NW];
+    bp_stages_and_end(&n, t, h, nodes, 1, w, end, rate);
+    bp_linearize(&n, end, rate, x, dx, A, B, at);
 }
 """
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from raceway.runtime import Model
-from raceway.runtime.cli import app
-from raceway.runtime.derivatives.linearize import KinkWarning
-from raceway.runtime.derivatives.statics import FreeRingWarning
+from ballpass.runtime import Model
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.point.equilibrium import FreeRingWarning
+from ballpass.runtime.point.linearize import KinkWarning
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 AT_REST = {"shaft.speed": 0.0}

@@ -10,10 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from stepper_runs import ORDERS, segments_between
 
-from raceway.runtime import Model, load_solution
-from raceway.runtime.errors import RequestError
-from raceway.runtime.integrate.stepper import Family, Outcome, Stepper
-from raceway.runtime.summary import render_summary, summarize
+from ballpass.runtime import Model, load_solution
+from ballpass.runtime.app.summary import render_summary, summarize
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.native.stepper import Family, Outcome, Stepper
 
 Make = Callable[..., Model]
 

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from artefact import manifest as made_manifest
 
-from raceway.runtime import manifest as mf
-from raceway.runtime.errors import ArtefactError
+from ballpass.runtime import contract as mf
+from ballpass.runtime.contract.errors import ArtefactError
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def test_round_trip_gives_the_same_record_and_the_same_bytes(folder: Path) -> No
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda d: d.update(schema=99), ["schema 99", "reads schema 2", "raceway derive"]),
+        (lambda d: d.update(schema=99), ["schema 99", "reads schema 2", "ballpass derive"]),
         (lambda d: d.pop("schema"), ["schema None"]),
         (lambda d: d.update(colour="red"), ["colour: unknown key"]),
         (lambda d: d.pop("inputs"), ["inputs: missing"]),
@@ -97,7 +97,7 @@ def test_not_finite_numbers_are_refused(folder: Path) -> None:
 
 
 def test_missing_folder_says_how_to_make_one(tmp_path: Path) -> None:
-    with pytest.raises(ArtefactError, match="raceway derive SCENE"):
+    with pytest.raises(ArtefactError, match="ballpass derive SCENE"):
         mf.read_manifest(tmp_path / "nowhere")
 
 
@@ -114,9 +114,9 @@ def test_edited_and_missing_files_are_all_named(folder: Path) -> None:
 
 def test_importing_the_manifest_or_the_runtime_loads_nothing_heavy() -> None:
     code = (
-        "import sys, raceway.runtime.manifest; "
+        "import sys, ballpass.runtime.contract; "
         "heavy = {'casadi', 'numpy', 'xarray'} & set(sys.modules); assert not heavy, heavy; "
-        "from raceway.runtime import load, Solution; "
-        "wrong = {'sympy', 'pint', 'raceway.derive'} & set(sys.modules); assert not wrong, wrong"
+        "from ballpass.runtime import load, Solution; "
+        "wrong = {'sympy', 'pint', 'ballpass.derive'} & set(sys.modules); assert not wrong, wrong"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from raceway.runtime.errors import RequestError
-from raceway.runtime.quantities.observables import (
+from ballpass.runtime.ask.observables import (
     ball_angles,
     drive_work,
     kinematic_frequencies,
@@ -19,7 +18,8 @@ from raceway.runtime.quantities.observables import (
     stroboscopic_points,
     turns,
 )
-from raceway.runtime.quantities.spectrum import amplitude_spectrum, whole_cycles
+from ballpass.runtime.ask.spectrum import amplitude_spectrum, whole_cycles
+from ballpass.runtime.contract.errors import RequestError
 
 TURN = 2.0 * np.pi
 INCH = 25.4e-3

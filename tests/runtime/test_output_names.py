@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 from virtual import virtual_model
 
-from raceway.runtime import Model, RequestError
+from ballpass.runtime import Model, RequestError
 
 
 @pytest.fixture(scope="module")

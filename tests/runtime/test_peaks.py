@@ -11,8 +11,8 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from raceway.runtime import IntegrationError, Model, load_solution
-from raceway.runtime.summary import summarize
+from ballpass.runtime import IntegrationError, Model, load_solution
+from ballpass.runtime.app.summary import summarize
 
 ModelMaker = Callable[..., Model]
 
@@ -194,8 +194,8 @@ def test_a_run_that_failed_has_the_peak_of_what_there_is(
 ) -> None:
     model = make_model("offset_slider")
     whole = model.simulate(2, transient=0, parameters=SPIKES[0])
-    monkeypatch.setattr("raceway.runtime.integrate.stepping.STEPS_A_CALL", 2500)
-    monkeypatch.setattr("raceway.runtime.integrate.stepping.step_limit", lambda *_: 5000)
+    monkeypatch.setattr("ballpass.runtime.run.stepping.STEPS_A_CALL", 2500)
+    monkeypatch.setattr("ballpass.runtime.run.stepping.step_limit", lambda *_: 5000)
     with pytest.raises(IntegrationError) as caught:
         model.simulate(2, transient=0, parameters=SPIKES[0])
     partial = caught.value.partial

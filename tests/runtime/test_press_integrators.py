@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from raceway.runtime import Model, Solution
+from ballpass.runtime import Model, Solution
 
 METHODS = ("erk", "rosenbrock", "cvodes", "stepper")
 LAWS = {"punching_press": "one-sided", "punching_press_tangent": "tangent"}

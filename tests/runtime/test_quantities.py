@@ -9,9 +9,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from raceway.runtime import Model, RequestError
-from raceway.runtime.quantities.kinds import KINDS
-from raceway.runtime.quantities.quantities import parse_quantity
+from ballpass.runtime import Model, RequestError
+from ballpass.runtime.ask.kinds import KINDS
+from ballpass.runtime.ask.quantities import parse_quantity
 
 ENSEMBLE = [
     "peak_ball_force",

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from raceway.runtime import IntegrationError, Model
-from raceway.runtime.accuracy.quasi_static_runs import QuasiStaticFailed
-from raceway.runtime.status import Status
+from ballpass.runtime import IntegrationError, Model
+from ballpass.runtime.certify.quasi_static_runs import QuasiStaticFailed
+from ballpass.runtime.contract.status import Status
 
 SCENES = ("varying_compliance", "punching_press", "four_bar", "offset_slider")
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from press_laws import LAWS, press
 
-from raceway.runtime import Model, RequestError, SimulationError
-from raceway.runtime.integrate.reductions import Reduction
+from ballpass.runtime import Model, RequestError, SimulationError
+from ballpass.runtime.run.reductions import Reduction
 
 ModelMaker = Callable[..., Model]
 BALLS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")

@@ -15,14 +15,15 @@ import numpy as np
 import pytest
 from press_laws import press
 
-from raceway.runtime import IntegrationError, Model
-from raceway.runtime.ensembles import chunks
-from raceway.runtime.integrate import clock, limits, reductions, stepping
-from raceway.runtime.integrate.magnitudes import stepper_magnitudes
-from raceway.runtime.integrate.reductions import RunFailed, channel_names
-from raceway.runtime.integrate.segments import make_segments, segment_edges
-from raceway.runtime.integrate.stepper import METHODS, End, Outcome, Stepper
-from raceway.runtime.status import Status
+from ballpass.runtime import IntegrationError, Model
+from ballpass.runtime.contract.status import Status
+from ballpass.runtime.many import chunks
+from ballpass.runtime.native.stepper import METHODS, End, Outcome, Stepper
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import limits, reductions, stepping
+from ballpass.runtime.run.magnitudes import stepper_magnitudes
+from ballpass.runtime.run.reductions import RunFailed, channel_names
+from ballpass.runtime.run.segments import make_segments, segment_edges
 
 ModelMaker = Callable[..., Model]
 CLEARANCE = "bearing.clearance"
@@ -124,7 +125,7 @@ def test_members_one_by_one_tell_progress_within_a_turn(
         return chunks.run_chunks(work, *given)
 
     monkeypatch.setattr(Stepper, "run", interrupted)
-    monkeypatch.setattr("raceway.runtime.ensembles.ensemble.run_chunks", noted)
+    monkeypatch.setattr("ballpass.runtime.many.ensemble.run_chunks", noted)
     found = model.simulate_many({CLEARANCE: [1e-5, 1.1e-5]}, ["rms:inner.y"], cycles=1, transient=0, threads=1, **more)
     assert [failure.status for failure in found.failures] == ["INTERRUPTED"] * 2
     assert found.failures[0].time == pytest.approx(calls[2].time, rel=1e-12)
@@ -137,7 +138,7 @@ def test_an_interrupt_is_heard_while_a_run_crawls(make_model: ModelMaker) -> Non
     folder = press(make_model)._drivers._folder
     code = """
         import json, os, signal, sys, threading, time
-        from raceway.runtime import load
+        from ballpass.runtime import load
 
         model = load(sys.argv[1])
         stiff = {"bearing.outer_ring.stiffness": 5e15}
@@ -249,7 +250,7 @@ def test_a_member_that_goes_on_alone_is_the_run_it_was(make_model: ModelMaker, m
     alone = model.simulate_many({name: column[2:] for name, column in columns.items()}, names, **given).statistics
     limit, run = limits.brief_limit, reductions.integrate_reduced
     monkeypatch.setattr(
-        "raceway.runtime.ensembles.chunks.brief_limit",
+        "ballpass.runtime.many.chunks.brief_limit",
         lambda duration, turn: alone.steps // 2 if turn > 0.2 else limit(duration, turn),
     )
     begun: list[reductions.Begun] = []
@@ -258,7 +259,7 @@ def test_a_member_that_goes_on_alone_is_the_run_it_was(make_model: ModelMaker, m
         begun.append(more["begun"])
         return run(*arguments, **more)
 
-    monkeypatch.setattr("raceway.runtime.ensembles.chunks.integrate_reduced", noted)
+    monkeypatch.setattr("ballpass.runtime.many.chunks.integrate_reduced", noted)
     found = model.simulate_many(columns, names, **given)
     assert found.failures == ()
     (there,) = begun

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from raceway.runtime import Model, RequestError
-from raceway.runtime.derivatives.certificate import Verdict
+from ballpass.runtime import Model, RequestError
+from ballpass.runtime.certify.certificate import Verdict
 
 # preload keeps every ball in contact; the run covers the start of the punch's window
 PRELOADED = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.05}

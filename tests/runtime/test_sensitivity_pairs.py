@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from raceway.runtime import Model
-from raceway.runtime.derivatives.certificate import Verdict
-from raceway.runtime.derivatives.sensitivity_report import Sensitivity
+from ballpass.runtime import Model
+from ballpass.runtime.certify.certificate import Verdict
+from ballpass.runtime.certify.sensitivity_report import Sensitivity
 
 TABLE = Path(__file__).resolve().parents[2] / "build" / "sensitivity_pairs.md"
 

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
-from raceway.runtime import Model, RequestError, load
-from raceway.runtime.accuracy.error_target import Search, like_those_measured, meet_target
-from raceway.runtime.accuracy.prepared import prepare
-from raceway.runtime.accuracy.stored_trade import from_plain, to_plain
-from raceway.runtime.accuracy.trade import FULL, Configuration, Trade, measure_trade
-from raceway.runtime.commands.trade import models_of
+from ballpass.derive import generate
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import Model, RequestError, load
+from ballpass.runtime.app.commands.trade import models_of
+from ballpass.runtime.certify.error_target import Search, like_those_measured, meet_target
+from ballpass.runtime.certify.prepared import prepare
+from ballpass.runtime.certify.stored_trade import from_plain, to_plain
+from ballpass.runtime.certify.trade import FULL, Configuration, Trade, measure_trade
 
 FIXED = "the outer ring fixed"
 PEAK = "peak_ball_force"

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from artefact import DEFAULTS, write_folder
 
-from raceway.runtime import IntegrationError, Model, RequestError, Status, load, load_solution
-from raceway.runtime.compiled import compile
-from raceway.runtime.compiled.kernel import EvaluationError
-from raceway.runtime.integrate.integrators import CvodesIntegrator, Frozen, GeneratedIntegrator, Method
+from ballpass.runtime import IntegrationError, Model, RequestError, Status, load, load_solution
+from ballpass.runtime.native import compile
+from ballpass.runtime.native.kernel import EvaluationError
+from ballpass.runtime.run.casadi_integrators import CvodesIntegrator, Frozen, GeneratedIntegrator, Method
 
 METHODS = ("erk", "rosenbrock", "cvodes")
 TURN = 2.0 * math.pi
@@ -181,8 +181,8 @@ def test_integrator_that_returns_no_numbers_is_stopped_at_that_piece(
             return block * np.nan if frozen.u[1] else block
 
     broken = Method(make=lambda m: Failing(m, "erk"), required=())
-    monkeypatch.setattr("raceway.runtime.integrate.integrators.METHODS", {"broken": broken})
-    monkeypatch.setattr("raceway.runtime.integrate.simulate.METHODS", {"broken": broken})
+    monkeypatch.setattr("ballpass.runtime.run.casadi_integrators.METHODS", {"broken": broken})
+    monkeypatch.setattr("ballpass.runtime.run.simulate.METHODS", {"broken": broken})
     # the push starts at a quarter turn
     changes = {"driver.start_angle": 0.0, "push.window.start": TURN / 4, "push.window.end": TURN / 2}
     with pytest.raises(IntegrationError) as caught:
@@ -219,7 +219,7 @@ def test_a_call_that_fails_loses_no_sample_before_its_failure(
     assert whole.statistics.segments == 1
     for place in ("integrators", "simulate"):
         broken = {"failing": Method(make=Failing, required=())}
-        monkeypatch.setattr(f"raceway.runtime.integrate.{place}.METHODS", broken)
+        monkeypatch.setattr(f"ballpass.runtime.run.{place}.METHODS", broken)
     with pytest.raises(IntegrationError, match="integrator could not go on") as caught:
         model.simulate(method="failing", **request)
     kept = caught.value.partial

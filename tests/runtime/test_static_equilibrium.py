@@ -11,10 +11,10 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import minimize
 
-from raceway.runtime import Model
-from raceway.runtime.derivatives.differences import richardson
-from raceway.runtime.derivatives.statics import FreeRingWarning
-from raceway.runtime.errors import RequestError, SimulationError
+from ballpass.runtime import Model
+from ballpass.runtime.certify.differences import richardson
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.point.equilibrium import FreeRingWarning
 
 GIVEN = 'stiffness = "13.34e9 N/m^1.5"'
 HERTZ = """inner_groove_radius = "4.1275 mm"

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from stepper_runs import ORDERS, edges_of, run, segments_between
 
-from raceway.runtime import IntegrationError, Model, RequestError, Status
-from raceway.runtime.integrate import clock
-from raceway.runtime.integrate import stepper as stepping
-from raceway.runtime.integrate.stepper import End, Family, Segments, Stepper
+from ballpass.runtime import IntegrationError, Model, RequestError, Status
+from ballpass.runtime.native import stepper as stepping
+from ballpass.runtime.native.stepper import End, Family, Segments, Stepper
+from ballpass.runtime.run import inputs as clock
 
 TURN = 2.0 * np.pi
 
@@ -244,8 +244,8 @@ def test_run_of_too_many_steps_tells_and_keeps_its_samples(
     press: Model, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
     whole = press.simulate(1, method=method, samples_per_cycle=400)
-    monkeypatch.setattr("raceway.runtime.integrate.stepping.STEPS_A_CALL", 600)
-    monkeypatch.setattr("raceway.runtime.integrate.stepping.step_limit", lambda *_: 600)
+    monkeypatch.setattr("ballpass.runtime.run.stepping.STEPS_A_CALL", 600)
+    monkeypatch.setattr("ballpass.runtime.run.stepping.step_limit", lambda *_: 600)
     with pytest.raises(IntegrationError, match="600 steps for the last") as caught:
         press.simulate(1, method=method, samples_per_cycle=400)
     assert caught.value.status is Status.TOO_MANY_STEPS
@@ -430,7 +430,7 @@ def test_driver_has_no_allocator_to_call(press: Model) -> None:
     for name in (b"malloc", b"calloc", b"realloc", b"free", b"alloca", b"fopen", b"printf"):
         assert b"\0" + name + b"\0" not in code
     # names are kept as such: what the driver does call, and offers, is there
-    assert b"\0raceway_run\0" in code
+    assert b"\0ballpass_run\0" in code
     assert b"\0pow\0" in code
 
 

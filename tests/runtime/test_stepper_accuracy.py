@@ -10,8 +10,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from stepper_runs import ORDERS, edges_of, run, segments_between
 
-from raceway.runtime import Model
-from raceway.runtime.integrate.stepper import METHODS, Family
+from ballpass.runtime import Model
+from ballpass.runtime.native.stepper import METHODS, Family
 
 SCENES = ("punching_press", "punching_press_tangent", "four_bar", "offset_slider", "varying_compliance")
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from raceway.runtime import Model, Solution
-from raceway.runtime.errors import SimulationError
-from raceway.runtime.summary import render_summary, summarize
+from ballpass.runtime import Model, Solution
+from ballpass.runtime.app.summary import render_summary, summarize
+from ballpass.runtime.contract.errors import SimulationError
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from raceway.runtime import Model, RequestError
-from raceway.runtime.accuracy.error_target import meet_target
-from raceway.runtime.accuracy.prepared import prepare
-from raceway.runtime.accuracy.stored_trade import from_plain, to_plain
-from raceway.runtime.accuracy.trade import (
+from ballpass.runtime import Model, RequestError
+from ballpass.runtime.app.figures.canvas import save
+from ballpass.runtime.app.figures.trade import draw_trade
+from ballpass.runtime.certify.error_target import meet_target
+from ballpass.runtime.certify.prepared import prepare
+from ballpass.runtime.certify.stored_trade import from_plain, to_plain
+from ballpass.runtime.certify.trade import (
     FULL,
     Configuration,
     Measured,
@@ -23,9 +25,7 @@ from raceway.runtime.accuracy.trade import (
     measure_trade,
     perturbed,
 )
-from raceway.runtime.accuracy.trade_report import percent, words
-from raceway.runtime.figures.canvas import save
-from raceway.runtime.figures.trade import draw_trade
+from ballpass.runtime.certify.trade_report import percent, words
 
 CONSTANT = (
     'type = "constant"                       # or "harmonic" (mean, amplitude, frequency, phase), or "table" '

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from raceway.derive import generate
-from raceway.derive.read import scene_from_text
-from raceway.runtime import Model
-from raceway.runtime.manifest import read_manifest
+from ballpass.derive import generate
+from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime import Model
+from ballpass.runtime.contract import read_manifest
 
 
 def virtual_model(text: str, folder: Path) -> Model:

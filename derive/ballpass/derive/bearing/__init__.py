@@ -1,0 +1,1 @@
+"""Ball bearings: geometry, Hertz contact, equations of motion, laws."""

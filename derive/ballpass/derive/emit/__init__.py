@@ -1,0 +1,1 @@
+"""From functions to files: C, headers, manifest, EQUATIONS.md."""

@@ -1,0 +1,168 @@
+"""C99 text of small CasADi functions, to be inlined.
+
+In: an SX function.  Out: a ``static inline`` function whose body is straight-line code over local scalars.
+CasADi's own
+code generator passes everything through pointer tables, which no compiler turns into SIMD lanes; this text it does.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+_UNARY = {
+    ca.OP_NEG: "-{0}",
+    ca.OP_NOT: "!{0}",
+    ca.OP_SQ: "{0} * {0}",
+    ca.OP_TWICE: "2.0 * {0}",
+    ca.OP_INV: "1.0 / {0}",
+    ca.OP_ASSIGN: "{0}",
+    ca.OP_SQRT: "sqrt({0})",
+    ca.OP_SIN: "bp_sin1({0})",
+    ca.OP_COS: "bp_cos1({0})",
+    ca.OP_TAN: "tan({0})",
+    ca.OP_ATAN: "atan({0})",
+    ca.OP_ASIN: "asin({0})",
+    ca.OP_ACOS: "acos({0})",
+    ca.OP_EXP: "exp({0})",
+    ca.OP_LOG: "log({0})",
+    ca.OP_TANH: "tanh({0})",
+    ca.OP_FABS: "fabs({0})",
+    ca.OP_SIGN: "(double)(({0} > 0.0) - ({0} < 0.0))",
+}
+_BINARY = {
+    ca.OP_ADD: "{0} + {1}",
+    ca.OP_SUB: "{0} - {1}",
+    ca.OP_MUL: "{0} * {1}",
+    ca.OP_DIV: "{0} / {1}",
+    ca.OP_POW: "pow({0}, {1})",
+    ca.OP_CONSTPOW: "pow({0}, {1})",
+    ca.OP_ATAN2: "atan2({0}, {1})",
+    ca.OP_FMIN: "fmin({0}, {1})",
+    ca.OP_FMAX: "fmax({0}, {1})",
+    ca.OP_LT: "(double)({0} < {1})",
+    ca.OP_LE: "(double)({0} <= {1})",
+    ca.OP_EQ: "(double)({0} == {1})",
+    ca.OP_NE: "(double)({0} != {1})",
+    ca.OP_AND: "(double)({0} != 0.0 && {1} != 0.0)",
+    ca.OP_OR: "(double)({0} != 0.0 || {1} != 0.0)",
+    # a selection, not a product: what is not selected may be NaN
+    ca.OP_IF_ELSE_ZERO: "({0} != 0.0 ? {1} : 0.0)",
+}
+
+
+def print_function(
+    function: ca.Function,
+    *,
+    prefix: str,
+    description: str,
+    scalars: frozenset[str] = frozenset(),
+    lanes: str = "",
+    varying: frozenset[str] = frozenset(),
+    strided: frozenset[str] = frozenset(),
+) -> str:
+    """C99 text of an SX function.
+
+    Every argument is ``const double *restrict``, every result ``double *restrict``, both dense and column-major;
+    arguments named in `scalars` are passed by value.
+
+    Parameters
+    ----------
+    lanes : C constant; where given, the function is evaluated for so many points in one loop that compilers turn
+        into SIMD
+        lanes.  Results, and arguments named in `varying`, then hold that many values for each entry, next to each other
+    varying : arguments that differ from lane to lane
+    strided : arguments that are the same in all lanes, one column of such results: their entries are `lanes` apart
+
+    Raises
+    ------
+    TypeError
+        An operation has no C text here, or a result is sparse.
+    """
+    by_value = scalars - varying if lanes else scalars
+    arguments = [_argument(function.name_in(k), by_value) for k in range(function.n_in())]
+    results = [f"double *restrict {function.name_out(k)}" for k in range(function.n_out())]
+    for k in range(function.n_out()):
+        if not function.sparsity_out(k).is_dense():
+            raise TypeError(f"{function.name()}: the result {function.name_out(k)} is sparse; make it dense first")
+    name = f"{prefix}{function.name()}{'_lanes' if lanes else ''}"
+    lines = [f"/* {description} */", f"static inline void {name}({', '.join(arguments + results)})", "{"]
+    lines += _unused(function)
+    if lanes:
+        lines += ["#pragma omp simd", f"    for (int lane = 0; lane < {lanes}; lane++) {{"]
+    indent = "        " if lanes else "    "
+    declared: set[int] = set()
+    inverses = _shared_divisors(function)
+    for k in range(function.n_instructions()):
+        operation, out, take = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+        if operation == ca.OP_OUTPUT:
+            place = f"{out[1]} * {lanes} + lane" if lanes else str(out[1])
+            lines.append(f"{indent}{function.name_out(out[0])}[{place}] = w{take[0]};")
+            continue
+        if operation == ca.OP_INPUT:
+            name = function.name_in(take[0])
+            place = str(take[1])
+            if lanes and name in varying:
+                place = f"{take[1]} * {lanes} + lane"
+            elif lanes and name in strided:
+                place = f"{take[1]} * {lanes}"
+            text = name if name in by_value else f"{name}[{place}]"
+        elif operation == ca.OP_CONST:
+            text = _literal(function.instruction_constant(k))
+        elif k in inverses:
+            name, first = inverses[k]
+            if first:
+                lines.append(f"{indent}const double {name} = 1.0 / w{take[1]};")
+            text = f"w{take[0]} * {name}"
+        elif operation in _UNARY:
+            text = _UNARY[operation].format(f"w{take[0]}")
+        elif operation in _BINARY:
+            text = _BINARY[operation].format(f"w{take[0]}", f"w{take[1]}")
+        else:
+            raise TypeError(f"{function.name()}: operation {operation} has no C text")
+        lines.append(f"{indent}{'' if out[0] in declared else 'double '}w{out[0]} = {text};")
+        declared.add(out[0])
+    lines += ["    }", "}"] if lanes else ["}"]
+    return "\n".join(lines)
+
+
+def _shared_divisors(function: ca.Function) -> dict[int, tuple[str, bool]]:
+    """Divisions by a number that other divisions share, by instruction: the name of its inverse, and whether it is
+    the first.
+
+    A division costs as much as several products, and vectors of them more so.
+    """
+    made_by: dict[int, int] = {}
+    divisions: dict[int, list[int]] = {}
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        if operation == ca.OP_DIV:
+            divisions.setdefault(made_by[function.instruction_input(k)[1]], []).append(k)
+        if operation != ca.OP_OUTPUT:
+            made_by[function.instruction_output(k)[0]] = k
+    shared = [places for places in divisions.values() if len(places) > 1]
+    return {k: (f"i{number}", k == places[0]) for number, places in enumerate(shared) for k in places}
+
+
+def _argument(name: str, by_value: frozenset[str]) -> str:
+    return f"double {name}" if name in by_value else f"const double *restrict {name}"
+
+
+def print_array(name: str, values: list[float]) -> str:
+    """``static const double`` array; never of length zero, which C does not know."""
+    body = ", ".join(_literal(v) for v in values) or "0.0"
+    return f"static const double {name}[{max(len(values), 1)}] = {{{body}}};"
+
+
+def _literal(value: float) -> str:
+    text = repr(float(value))
+    return text if any(mark in text for mark in ".en") else text + ".0"
+
+
+def _unused(function: ca.Function) -> list[str]:
+    """Silence warnings on arguments a model does not need."""
+    used = {
+        function.instruction_input(k)[0]
+        for k in range(function.n_instructions())
+        if function.instruction_id(k) == ca.OP_INPUT
+    }
+    return [f"    (void){function.name_in(k)};" for k in range(function.n_in()) if k not in used]

@@ -1,0 +1,255 @@
+"""What of a scene costs what: the parts a scene names, and the operations that each adds to the generated functions.
+
+In: a scene.  Out: its features, each with the path of the lines that ask for it and the same scene without it; and
+operation counts of every function.  The share of a feature is measured, not estimated: the scene is derived and
+lowered once more without it, and the counts are compared.  Features share subexpressions, so shares need not add up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+from ballpass.derive.lower.functions import lower, operations
+from ballpass.derive.scene.records import (
+    Bearing,
+    ConstantLoad,
+    Damping,
+    EquivalentMass,
+    InitialState,
+    InnerRing,
+    Mechanism,
+    Quantity,
+    Scene,
+    Shaft,
+    Vector,
+)
+from ballpass.derive.system import derive
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Feature:
+    """A part of the model that a scene asks for.
+
+    Attributes
+    ----------
+    name : short name for people, "outer ring"
+    path : where the scene asks for it, "bearing.outer_ring"
+    modelled : what it adds to the model
+    without : the scene without it, None where no scene can do without
+    """
+
+    name: str
+    path: str
+    modelled: str
+    without: Scene | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cost:
+    """Operations of the generated functions, and how many of them a feature adds.
+
+    Attributes
+    ----------
+    functions : function name to its arithmetic operations
+    added : feature name to function name to operations that vanish without the feature
+    """
+
+    functions: dict[str, int]
+    added: dict[str, dict[str, int]]
+
+
+def features(scene: Scene) -> tuple[Feature, ...]:
+    """Parts of a scene, in the order of the scene file."""
+    return tuple(_features(scene))
+
+
+def count_operations(scene: Scene) -> dict[str, int]:
+    """Arithmetic operations of each generated function of a scene, by name; the stepper's as ``kernel.<name>``.
+
+    Raises
+    ------
+    SceneError
+        The scene cannot be derived.
+    """
+    lowered = lower(derive(scene))
+    counts = {f.name(): operations(f) for f, _ in lowered.functions}
+    if lowered.kernels is not None:
+        counts |= {f"kernel.{k.function.name()}": operations(k.function) for k in lowered.kernels.functions}
+    return counts
+
+
+def cost(scene: Scene, progress: Callable[[str], None] | None = None) -> Cost:
+    """Operations of a scene's functions, and what each feature adds to them.
+
+    Parameters
+    ----------
+    progress : called with the name of each feature that is left out
+    """
+    full = count_operations(scene)
+    added: dict[str, dict[str, int]] = {}
+    for feature in features(scene):
+        if feature.without is None:
+            continue
+        if progress is not None:
+            progress(feature.name)
+        rest = count_operations(feature.without)
+        added[feature.name] = {name: count - rest.get(name, 0) for name, count in full.items()}
+    return Cost(functions=full, added=added)
+
+
+def _features(scene: Scene) -> Iterator[Feature]:
+    mechanism, bearing = scene.mechanism, scene.bearing
+    if mechanism is not None:
+        yield from _of_mechanism(scene, mechanism)
+    if scene.load is not None:
+        yield Feature(
+            name="load",
+            path="load",
+            modelled=f"{type(scene.load).__name__.removesuffix('Load').lower()} force on the inner ring",
+            without=replace(scene, load=_no_load()) if not _is_free(scene) else None,
+        )
+    if bearing is not None:
+        yield from _of_bearing(scene, bearing)
+
+
+def _of_mechanism(scene: Scene, mechanism: Mechanism) -> Iterator[Feature]:
+    count = len(mechanism.bodies)
+    yield Feature(
+        name="mechanism",
+        path="mechanism",
+        modelled=f"inertia of {count} moving {'body' if count == 1 else 'bodies'} at constant drive speed, hinge "
+        "reactions in closed form",
+        without=_without_mechanism(scene, mechanism),
+    )
+    if mechanism.gravity is not None:
+        yield Feature(
+            name="gravity",
+            path="mechanism.gravity",
+            modelled="weight of every moving body of the mechanism",
+            without=replace(scene, mechanism=replace(mechanism, gravity=None)),
+        )
+    for force in mechanism.forces:
+        rest = tuple(f for f in mechanism.forces if f.name != force.name)
+        yield Feature(
+            name=f"force {force.name}",
+            path=f"mechanism.forces.{force.name}",
+            modelled=f"force on {force.body}.{force.point}" + _windows(len(force.windows)),
+            without=replace(scene, mechanism=replace(mechanism, forces=rest)),
+        )
+    for torque in mechanism.torques:
+        others = tuple(t for t in mechanism.torques if t.name != torque.name)
+        yield Feature(
+            name=f"torque {torque.name}",
+            path=f"mechanism.torques.{torque.name}",
+            modelled=f"torque on {torque.body}" + _windows(len(torque.windows)),
+            without=replace(scene, mechanism=replace(mechanism, torques=others)),
+        )
+
+
+def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
+    if bearing.load_harmonics is not None:
+        yield Feature(
+            name="load harmonics",
+            path="bearing.load_harmonics",
+            modelled=f"the joint's reaction as its mean and {bearing.load_harmonics} harmonics of the driver's angle",
+            without=replace(scene, bearing=replace(bearing, load_harmonics=None)),
+        )
+    yield Feature(
+        name="ball contacts",
+        path="bearing.contact",
+        modelled=f"{bearing.balls} balls at the cage's angles, Hertz force of each",
+        without=None,
+    )
+    if bearing.contact.smoothing is not None:
+        sharp = replace(bearing, contact=replace(bearing.contact, smoothing=None))
+        yield Feature(
+            name="contact smoothing",
+            path="bearing.contact.smoothing",
+            modelled="contact onset smoothed over a given width: second derivatives exist",
+            without=_without_smoothing(scene, sharp, "bearing.contact.smoothing"),
+        )
+    if bearing.damping.law != "none":
+        undamped = replace(bearing, damping=Damping(law="none", coefficient=None, ratio=None))
+        yield Feature(
+            name="contact damping",
+            path="bearing.damping",
+            modelled=f"law {bearing.damping.law} at each ball",
+            without=_keep(scene, "ball.damping_force", bearing=undamped),
+        )
+    if bearing.damping.smoothing is not None:
+        kinked = replace(bearing, damping=replace(bearing.damping, smoothing=None))
+        yield Feature(
+            name="damping smoothing",
+            path="bearing.damping.smoothing",
+            modelled="kink of the one-sided law at rest smoothed over a given speed",
+            without=_without_smoothing(scene, kinked, "bearing.damping.smoothing"),
+        )
+    if bearing.inner.damping is not None:
+        free = replace(bearing, inner=InnerRing(mass=bearing.inner.mass, damping=None))
+        yield Feature(
+            name="inner ring damping",
+            path="bearing.inner_ring.damping",
+            modelled="viscous damping of the inner ring to the frame",
+            without=replace(scene, bearing=free),
+        )
+    if bearing.outer is not None:
+        start = bearing.initial
+        fixed = replace(
+            bearing, outer=None, initial=InitialState(position=start.position[:2], velocity=start.velocity[:2])
+        )
+        yield Feature(
+            name="outer ring",
+            path="bearing.outer_ring",
+            modelled="outer ring on an elastic, damped housing: two coordinates more",
+            without=_keep(scene, "outer", bearing=fixed),
+        )
+
+
+def _without_smoothing(scene: Scene, bearing: Bearing, path: str) -> Scene:
+    return replace(scene, bearing=bearing, quantities=tuple(q for q in scene.quantities if q.path != path))
+
+
+def _windows(count: int) -> str:
+    return "" if count == 0 else f", within {count} window{'s' if count > 1 else ''} of the driver's angle"
+
+
+def _no_load() -> ConstantLoad:
+    return ConstantLoad(force=Vector(kind="zero"))
+
+
+def _is_free(scene: Scene) -> bool:
+    return isinstance(scene.load, ConstantLoad) and scene.load.force.kind == "zero"
+
+
+def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
+    """The bearing alone on its shaft, unloaded; None where there is no bearing."""
+    bearing = scene.bearing
+    if bearing is None:
+        return None
+    mass = bearing.inner.mass
+    quantities = scene.quantities
+    if isinstance(mass, EquivalentMass):
+        number = Quantity(
+            path="bearing.inner_ring.mass", value=1.0, unit="kg", description="Mass of the inner ring", latex="m_i"
+        )
+        quantities = (*quantities, number)
+        bearing = replace(bearing, inner=InnerRing(mass=number, damping=bearing.inner.damping))
+    return replace(
+        scene,
+        mechanism=None,
+        shaft=Shaft(speed=mechanism.driver.speed),
+        load=_no_load(),
+        bearing=replace(bearing, joint=None, share=None),
+        quantities=quantities,
+        outputs=_patterns(scene, "reaction", "drive", "body"),
+    )
+
+
+def _keep(scene: Scene, *vanished: str, bearing: Bearing) -> Scene:
+    return replace(scene, bearing=bearing, outputs=_patterns(scene, *vanished))
+
+
+def _patterns(scene: Scene, *vanished: str) -> tuple[str, ...]:
+    """Output patterns without those of a feature that is left out."""
+    return tuple(p for p in scene.outputs if not p.startswith(vanished)) or ("inner.*",)

@@ -1,0 +1,1 @@
+"""From SymPy to CasADi: functions, kernels, derivatives."""

@@ -1,0 +1,125 @@
+"""Kernels for runs that end their steps on kinks: switching functions of a ball, and its force with sides held.
+
+In: the generic ball, and the kernel that gathers the numbers of its law.  Out: `SwitchKernels`, written to
+``switches.h``; None for a model whose laws have no kinks, which has no such file.
+
+ball_switches     (delta, rate, k) -> g              switching functions, zero at the kinks
+ball_held_force   (delta, rate, k, b) -> F           the law of a ball with borders b in place of zeros of g
+ball_held_slopes  (delta, rate, k, b) -> F, Fd, Fv   and its slopes by deflection and rate
+
+The numbers k are those of `kernels`: a run that locates kinks has the parameters and constants of one that does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import sympy as sp
+
+from ballpass.derive.bearing.equations import Ball
+from ballpass.derive.emit.c_printer import print_array, print_function
+from ballpass.derive.lower.switching import Switch, find_switching
+from ballpass.derive.lower.visitor import Visitor
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SwitchKernels:
+    """Switches of a ball's force, and the functions of them; `rates`: whether rates of deflection enter the force."""
+
+    switches: tuple[Switch, ...]
+    rates: bool
+    functions: ca.Function
+    held: tuple[ca.Function, ...]
+
+
+def switch_kernels(ball: Ball, visit: Visitor, p: ca.SX, c: ca.SX, numbers: ca.Function) -> SwitchKernels | None:
+    """Kernels of a ball's switches, None where its force has none.
+
+    Parameters
+    ----------
+    visit : visitor of run-time functions that adds no derived constants
+    p, c : symbols of parameters and constants
+    numbers : the kernel ``law_numbers``, (p, c) -> k
+
+    Raises
+    ------
+    TypeError
+        A switch depends on numbers that the law does not.
+    """
+    definitions = {d.symbol: d.expression for d in ball.definitions}
+    forces = [f for f in (ball.elastic_force, ball.damping_force) if f is not None]
+    parts = [definitions[f] for f in forces]
+    found = find_switching(parts, ball.deflection, ball.deflection_rate, pairs=ball.count % 2 == 0)
+    if not found.switches:
+        return None
+    delta, rate = ca.SX.sym("delta"), ca.SX.sym("rate")
+    borders = ca.SX.sym("b", len(found.switches))
+    given = {s.border: borders[k] for k, s in enumerate(found.switches)}
+    law = visit.child({ball.deflection: delta, ball.deflection_rate: rate, **given}, {})
+    entries = ca.SX.sym("k", numbers.size1_out(0))
+    inside = _entries(numbers, p, c, entries)
+
+    def made(name: str, results: dict[str, sp.Expr | list[sp.Expr]], *, holds: bool) -> ca.Function:
+        takes = {"delta": delta, "rate": rate, "k": entries, **({"b": borders} if holds else {})}
+        values = [ca.vertcat(*(law(e) for e in (v if isinstance(v, list) else [v]))) for v in results.values()]
+        values = ca.cse([ca.densify(v) for v in ca.substitute(values, [p, c], inside)])
+        function = ca.Function(name, [*takes.values()], values, [*takes], [*results], {"allow_free": True})
+        if function.has_free():
+            raise TypeError(f"{name} needs {', '.join(function.get_free())}, which the law of a ball does not")
+        return function
+
+    slopes = {"Fd": sp.diff(found.force, ball.deflection), "Fv": sp.diff(found.force, ball.deflection_rate)}
+    return SwitchKernels(
+        switches=found.switches,
+        rates=ball.deflection_rate in definitions,
+        functions=made("ball_switches", {"g": [s.function for s in found.switches]}, holds=False),
+        held=(
+            made("ball_held_force", {"F": found.force}, holds=True),
+            made("ball_held_slopes", {"F": found.force, **slopes}, holds=True),
+        ),
+    )
+
+
+def _entries(numbers: ca.Function, p: ca.SX, c: ca.SX, entries: ca.SX) -> list[ca.SX]:
+    """p and c with the entries of k in the places that these were gathered from."""
+    replaced = [ca.SX(p), ca.SX(c)]
+    read: dict[int, tuple[int, int]] = {}
+    for k in range(numbers.n_instructions()):
+        out, take = numbers.instruction_output(k), numbers.instruction_input(k)
+        if numbers.instruction_id(k) == ca.OP_INPUT:
+            read[out[0]] = (take[0], take[1])
+        elif numbers.instruction_id(k) == ca.OP_OUTPUT and take[0] in read:
+            argument, entry = read[take[0]]
+            replaced[argument][entry] = entries[out[1]]
+    return replaced
+
+
+def switches_header(kernels: SwitchKernels) -> str:
+    """Text of switches.h."""
+    switches = kernels.switches
+    scalars = frozenset({"delta", "rate"})
+    words = {
+        "ball_switches": "Switching functions of one ball [m, or m/s]",
+        "ball_held_force": "Force of one ball with its sides held [N]",
+        "ball_held_slopes": "Force of one ball with its sides held [N] and its slopes",
+    }
+    parts = [
+        "/* Generated by ballpass derive. Do not edit. */",
+        "#ifndef BALLPASS_SWITCHES_H\n#define BALLPASS_SWITCHES_H",
+        f"enum {{ BP_NSWITCHES = {len(switches)} }};",
+        "/* Whether rates of deflection are computed; a force that has no use for them has none. */\n"
+        f"enum {{ BP_RATES = {int(kernels.rates)} }};",
+        "/* Where the force above a kink, or below it, ends at a branch point; where a kink is one of the rate. */\n"
+        + print_array("bp_ends_above", [float(s.ends_above) for s in switches])
+        + "\n"
+        + print_array("bp_ends_below", [float(s.ends_below) for s in switches])
+        + "\n"
+        + print_array("bp_switch_of_rate", [float(s.of_rate) for s in switches]),
+        *(
+            print_function(f, prefix="bp_", description=words[f.name()] + ".", scalars=scalars)
+            for f in (kernels.functions, *kernels.held)
+        ),
+        "#endif",
+    ]
+    return "\n\n".join(parts) + "\n"

@@ -1,0 +1,1 @@
+"""Planar linkages: order of assembly, kinematics, reactions."""

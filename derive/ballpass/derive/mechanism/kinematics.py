@@ -1,0 +1,229 @@
+"""Plane motion of a rigid body in symbols, and the ledger that keeps every expression small.
+
+A `Ledger` turns an expression into a named symbol and remembers the definition; a `Pose` says where a body is and how
+it moves, and gives the motion of any of its points.  Vectors are pairs (x, y) of SymPy expressions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import sympy as sp
+
+from ballpass.derive.scene.records import FRAME, Mechanism
+from ballpass.derive.terms import Definition, components
+
+#: Plane vector: x and y components.
+Pair = tuple[sp.Expr, sp.Expr]
+
+ZERO: Pair = (sp.S.Zero, sp.S.Zero)
+
+
+def add(*vectors: Pair) -> Pair:
+    """Sum of plane vectors."""
+    return sp.Add(*(v[0] for v in vectors)), sp.Add(*(v[1] for v in vectors))
+
+
+def scale(factor: sp.Expr, vector: Pair) -> Pair:
+    """Vector times a scalar."""
+    return factor * vector[0], factor * vector[1]
+
+
+def subtract(left: Pair, right: Pair) -> Pair:
+    """Difference of plane vectors."""
+    return left[0] - right[0], left[1] - right[1]
+
+
+def dot(left: Pair, right: Pair) -> sp.Expr:
+    """Scalar product."""
+    return left[0] * right[0] + left[1] * right[1]
+
+
+def cross(left: Pair, right: Pair) -> sp.Expr:
+    """Component of the vector product out of the plane, positive counter-clockwise."""
+    return left[0] * right[1] - left[1] * right[0]
+
+
+def quarter_turn(vector: Pair) -> Pair:
+    """The vector turned by 90 degrees counter-clockwise."""
+    return -vector[1], vector[0]
+
+
+def subscript(name: str) -> str:
+    """A scene name as an upright LaTeX subscript."""
+    return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """Position [m], velocity [m/s] and acceleration [m/s^2] of a point in the frame's axes."""
+
+    position: Pair
+    velocity: Pair
+    acceleration: Pair
+
+
+AT_REST = Motion(position=ZERO, velocity=ZERO, acceleration=ZERO)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pose:
+    """Where a body is and how it moves.
+
+    Attributes
+    ----------
+    body : name of the body
+    cos, sin : of the angle of the body's x axis from +x [1]
+    rate : angular velocity, counter-clockwise [rad/s]; structurally zero for a slider on a fixed guide
+    acceleration : angular acceleration [rad/s^2]
+    anchor : the body point, in body axes, from which other points are reached [m]
+    anchor_motion : its motion
+    origin : motion of the body's origin
+    center_of_mass : motion of the centre of mass; its accelerations are defined symbols where they are not trivial
+    """
+
+    body: str
+    cos: sp.Expr
+    sin: sp.Expr
+    rate: sp.Expr
+    acceleration: sp.Expr
+    anchor: Pair
+    anchor_motion: Motion
+    origin: Motion
+    center_of_mass: Motion
+
+    def rotate(self, vector: Pair) -> Pair:
+        """A vector given in body axes, in the frame's axes."""
+        return rotate(self.cos, self.sin, vector)
+
+    def motion(self, point: Pair) -> Motion:
+        """Motion of the body point with coordinates `point` [m] in body axes."""
+        arm = self.rotate(subtract(point, self.anchor))
+        return carried(self.anchor_motion, arm, self.rate, self.acceleration)
+
+
+def rotate(cos: sp.Expr, sin: sp.Expr, vector: Pair) -> Pair:
+    """The vector turned counter-clockwise by the angle with this cosine and sine."""
+    x, y = vector
+    return cos * x - sin * y, sin * x + cos * y
+
+
+def carried(anchor: Motion, arm: Pair, rate: sp.Expr, acceleration: sp.Expr) -> Motion:
+    """Motion of a point that a rotating body carries at `arm` [m] from its point with the motion `anchor`."""
+    turned = quarter_turn(arm)
+    return Motion(
+        position=add(anchor.position, arm),
+        velocity=add(anchor.velocity, scale(rate, turned)),
+        acceleration=add(anchor.acceleration, scale(acceleration, turned), scale(-(rate**2), arm)),
+    )
+
+
+class Ledger:
+    """Ordered definitions of one derivation: ``symbol := expression``."""
+
+    def __init__(self) -> None:
+        self._definitions: list[Definition] = []
+
+    @property
+    def definitions(self) -> tuple[Definition, ...]:
+        """What has been named so far; each uses earlier ones only."""
+        return tuple(self._definitions)
+
+    def define(self, name: str, expression: sp.Expr, unit: str, description: str, latex: str) -> sp.Symbol:
+        """Give the expression a name and return its symbol."""
+        symbol = sp.Symbol(name, real=True)
+        sentence = description[0].upper() + description[1:]
+        self._definitions.append(
+            Definition(symbol=symbol, expression=expression, unit=unit, description=sentence, latex=latex)
+        )
+        return symbol
+
+    def name(self, name: str, expression: sp.Expr, unit: str, description: str, latex: str) -> sp.Expr:
+        """As `define`, but numbers and symbols, which need no name, stay themselves."""
+        expression = sp.sympify(expression)
+        if expression.is_number or expression.is_Symbol:
+            return expression
+        return self.define(name, expression, unit, description, latex)
+
+    def name_motion(self, name: str, motion: Motion, words: str, mark: str) -> Motion:
+        """Name position, velocity and acceleration of a point: ``name.x``, ``.y``, ``.vx`` ... ``.ay``."""
+        return Motion(
+            position=self.name_pair(name, "", motion.position, "m", f"position of {words}", f"AXIS_{{{mark}}}"),
+            velocity=self.name_pair(
+                name, "v", motion.velocity, "m/s", f"velocity of {words}", rf"\dot{{AXIS}}_{{{mark}}}"
+            ),
+            acceleration=self.name_pair(
+                name, "a", motion.acceleration, "m/s^2", f"acceleration of {words}", rf"\ddot{{AXIS}}_{{{mark}}}"
+            ),
+        )
+
+    def name_pair(self, name: str, prefix: str, pair: Pair, unit: str, description: str, latex: str) -> Pair:
+        """Name the components of a vector: ``name.<prefix>x`` and ``name.<prefix>y``; AXIS in `latex` becomes x, y."""
+        x, y = (
+            self.name(f"{name}.{prefix}{axis}", value, unit, f"{axis} {description}", latex.replace("AXIS", axis))
+            for axis, value in zip("xy", pair, strict=True)
+        )
+        return x, y
+
+
+def place(
+    ledger: Ledger,
+    mechanism: Mechanism,
+    body: str,
+    *,
+    cos: sp.Expr,
+    sin: sp.Expr,
+    rate: sp.Expr,
+    acceleration: sp.Expr,
+    anchor: Pair,
+    anchor_motion: Motion,
+) -> Pose:
+    """The `Pose` of a moving body; the acceleration of its centre of mass gets names for the equations of motion."""
+    center = components(mechanism.body(body).center_of_mass)
+    bare = Pose(
+        body=body,
+        cos=cos,
+        sin=sin,
+        rate=rate,
+        acceleration=acceleration,
+        anchor=anchor,
+        anchor_motion=anchor_motion,
+        origin=anchor_motion,
+        center_of_mass=anchor_motion,
+    )
+    mass_point = bare.motion(center)
+    named = ledger.name_pair(
+        f"body.{body}.center_of_mass",
+        "a",
+        mass_point.acceleration,
+        "m/s^2",
+        f"acceleration of the centre of mass of {body}",
+        rf"\ddot{{AXIS}}_{{o,{subscript(body)}}}",
+    )
+    return replace(
+        bare,
+        origin=bare.motion(ZERO),
+        center_of_mass=replace(mass_point, acceleration=named),
+    )
+
+
+def frame_pose() -> Pose:
+    """The frame: at rest, its axes those of the plane."""
+    return Pose(
+        body=FRAME,
+        cos=sp.S.One,
+        sin=sp.S.Zero,
+        rate=sp.S.Zero,
+        acceleration=sp.S.Zero,
+        anchor=ZERO,
+        anchor_motion=AT_REST,
+        origin=AT_REST,
+        center_of_mass=AT_REST,
+    )
+
+
+def body_point(mechanism: Mechanism, body: str, point: str) -> Pair:
+    """Coordinates [m] of a named point in the axes of its body or of the frame."""
+    if body == FRAME:
+        return components(next(p.position for p in mechanism.frame_points if p.name == point))
+    return components(mechanism.body(body).point(point))

@@ -1,0 +1,178 @@
+"""From geometry to kinematics: positions, velocities and accelerations of a planar linkage with one driver.
+
+In: a `Mechanism`, the driver's angle and speed as expressions.  Out: one frozen `Linkage`.  Structure only: numbers are
+symbols named by their path in the scene (law 1).  The driver turns at constant speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import sympy as sp
+
+from ballpass.derive.mechanism.assembly import assemble, point_name
+from ballpass.derive.mechanism.dyads.dyad import Dyad, Margin
+from ballpass.derive.mechanism.dyads.rrp import place_rrp
+from ballpass.derive.mechanism.dyads.rrr import place_rrr
+from ballpass.derive.mechanism.kinematics import Ledger, Motion, Pair, Pose, body_point, frame_pose, place, subscript
+from ballpass.derive.mechanism.sweep import locked_positions
+from ballpass.derive.scene.errors import LinkageError
+from ballpass.derive.scene.records import FRAME, Joint, Mechanism
+from ballpass.derive.terms import Definition
+
+#: Name of the centre of mass among the points for drawing.
+CENTER_OF_MASS = "center_of_mass"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlacedPoint:
+    """Place [m] of a point of a body, or of its centre of mass, in the frame's axes."""
+
+    body: str
+    point: str
+    x: sp.Expr
+    y: sp.Expr
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Linkage:
+    """Kinematics of a linkage as functions of the driver's angle and speed.
+
+    Attributes
+    ----------
+    angle : of the driven body's x axis from +x [rad]
+    speed : of the driven body [rad/s], constant
+    driver : the driver's joint
+    driven : the driven body
+    definitions : ordered; each uses parameters, `angle`, `speed` and earlier symbols only
+    poses : by body, in the order of assembly; the frame is none of them
+    dyads : in the order of assembly
+    margins : one per dyad, in the same order
+    points : all points of the frame and of the bodies, and the centres of mass, for drawing
+    """
+
+    angle: sp.Expr
+    speed: sp.Expr
+    driver: Joint
+    driven: str
+    definitions: tuple[Definition, ...]
+    poses: Mapping[str, Pose]
+    dyads: tuple[Dyad, ...]
+    margins: tuple[Margin, ...]
+    points: tuple[PlacedPoint, ...]
+
+    def pose(self, body: str) -> Pose:
+        """Pose of a moving body or of the frame."""
+        return frame_pose() if body == FRAME else self.poses[body]
+
+    def motion(self, mechanism: Mechanism, body: str, point: str) -> Motion:
+        """Motion of a named point of a body."""
+        return self.pose(body).motion(body_point(mechanism, body, point))
+
+
+def derive_linkage(mechanism: Mechanism, angle: sp.Expr, speed: sp.Expr) -> Linkage:
+    """Derive the kinematics of a linkage.
+
+    Parameters
+    ----------
+    mechanism : bodies, joints and driver
+    angle : driver's angle [rad], as the equations shall show it
+    speed : driver's speed [rad/s], constant
+
+    Raises
+    ------
+    LinkageError
+        wrong mobility, a driver that is not a revolute joint on the frame, bodies that no sequence of dyads reaches, a
+        branch that is missing, of the wrong kind, or set where it means nothing.
+    """
+    assembly = assemble(mechanism)
+    ledger = Ledger()
+    poses = {FRAME: frame_pose()}
+    driven = _place_driven(ledger, mechanism, assembly.driver, assembly.driven, angle, speed)
+    poses[driven.body] = driven
+    dyads, margins = [], []
+    for group in assembly.groups:
+        placed = (place_rrr if group.kind == "RRR" else place_rrp)(ledger, mechanism, group, poses)
+        for pose in placed.poses:
+            poses[pose.body] = pose
+        dyads.append(placed.dyad)
+        margins.append(placed.margin)
+    moving = {name: pose for name, pose in poses.items() if name != FRAME}
+    return Linkage(
+        angle=angle,
+        speed=speed,
+        driver=assembly.driver,
+        driven=assembly.driven,
+        definitions=ledger.definitions,
+        poses=MappingProxyType(moving),
+        dyads=tuple(dyads),
+        margins=tuple(margins),
+        points=_points(mechanism, poses),
+    )
+
+
+def check_assembly(linkage: Linkage, values: Mapping[str, float]) -> None:
+    """Refuse numbers with which the linkage locks somewhere in a turn of the driver.
+
+    Parameters
+    ----------
+    linkage : from `derive_linkage`
+    values : SI value of every parameter, by its path
+
+    Raises
+    ------
+    LinkageError
+        a dyad that cannot be assembled, or only just (a dead centre): names the joint and the crank angle in degrees.
+    KeyError
+        a parameter without a value.
+    """
+    driven = linkage.poses[linkage.driven]
+    faults = locked_positions(linkage.definitions, linkage.margins, linkage.dyads, driven, values)
+    if faults:
+        raise LinkageError(faults)
+
+
+def _place_driven(
+    ledger: Ledger, mechanism: Mechanism, driver: Joint, body: str, angle: sp.Expr, speed: sp.Expr
+) -> Pose:
+    mark = subscript(body)
+    cos = ledger.define(f"body.{body}.cos", sp.cos(angle), "1", f"cosine of the angle of {body}", f"c_{{{mark}}}")
+    sin = ledger.define(f"body.{body}.sin", sp.sin(angle), "1", f"sine of the angle of {body}", f"s_{{{mark}}}")
+    # Zero, but a symbol: Eq. (1) prints the crank's moment of inertia with it.
+    acceleration = ledger.define(
+        f"body.{body}.angular_acceleration",
+        sp.S.Zero,
+        "rad/s^2",
+        f"angular acceleration of {body}: the driver's speed is constant",
+        rf"\ddot{{\varphi}}_{{{mark}}}",
+    )
+    pivot = frame_pose().motion(body_point(mechanism, FRAME, point_name(driver, FRAME)))
+    return place(
+        ledger,
+        mechanism,
+        body,
+        cos=cos,
+        sin=sin,
+        rate=speed,
+        acceleration=acceleration,
+        anchor=body_point(mechanism, body, point_name(driver, body)),
+        anchor_motion=pivot,
+    )
+
+
+def _points(mechanism: Mechanism, poses: Mapping[str, Pose]) -> tuple[PlacedPoint, ...]:
+    points = []
+    for name in (p.name for p in mechanism.frame_points):
+        points.append(_placed(FRAME, name, poses[FRAME].motion(body_point(mechanism, FRAME, name)).position))
+    for body in mechanism.bodies:
+        pose = poses[body.name]
+        for name in (p.name for p in body.points):
+            points.append(_placed(body.name, name, pose.motion(body_point(mechanism, body.name, name)).position))
+        points.append(_placed(body.name, CENTER_OF_MASS, pose.center_of_mass.position))
+    return tuple(points)
+
+
+def _placed(body: str, point: str, position: Pair) -> PlacedPoint:
+    return PlacedPoint(body=body, point=point, x=position[0], y=position[1])

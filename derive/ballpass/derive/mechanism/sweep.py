@@ -1,0 +1,108 @@
+"""Can the linkage be assembled at every crank angle?  A sweep over one turn with the numbers of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import sympy as sp
+
+from ballpass.derive.mechanism.dyads.dyad import Dyad, Margin
+from ballpass.derive.mechanism.kinematics import Pose
+from ballpass.derive.mechanism.numeric import Evaluator
+from ballpass.derive.scene.errors import Fault
+from ballpass.derive.terms import Definition
+
+#: Margins up to this are a dead centre: the transmission angle is below 3e-5 rad, and forces grow like its inverse [1].
+DEAD_CENTER = 1e-9
+#: Step of the sweep [deg].
+STEP = 0.5
+
+Array = npt.NDArray[np.float64]
+
+
+def locked_positions(
+    definitions: Sequence[Definition],
+    margins: Sequence[Margin],
+    dyads: Sequence[Dyad],
+    driven: Pose,
+    values: Mapping[str, float],
+) -> list[Fault]:
+    """One fault for each dyad that cannot be assembled somewhere in a turn.
+
+    Every margin is swept over a turn in steps of `STEP`, and each of its minima is refined.
+
+    Parameters
+    ----------
+    definitions, margins, dyads : of a `Linkage`; a margin for each dyad, in the same order
+    driven : pose of the driven body, whose cosine and sine are swept
+    values : SI value of every parameter, by its path
+
+    Raises
+    ------
+    KeyError
+        a parameter without a value.
+    """
+    evaluator = Evaluator(definitions, [m.expression for m in margins], given=(driven.cos, driven.sin))
+    parameters: dict[sp.Symbol, Any] = {sp.Symbol(name, real=True): np.float64(v) for name, v in values.items()}
+
+    def sweep(degrees: Array) -> Array:
+        radians = np.deg2rad(degrees)
+        # Beyond the limit of one dyad the next one has no numbers: not a warning, but what is looked for.
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            rows = evaluator({**parameters, driven.cos: np.cos(radians), driven.sin: np.sin(radians)})
+        return np.array([np.broadcast_to(row, degrees.shape) for row in rows], dtype=float)
+
+    grid = np.arange(0.0, 360.0, STEP)
+    swept = sweep(grid)
+    faults = []
+    for row, (margin, dyad) in enumerate(zip(margins, dyads, strict=True)):
+        # Where an earlier dyad has failed, this one has no place to start from.
+        reachable = np.all(swept[:row] > DEAD_CENTER, axis=0)
+        here = np.where(np.isnan(swept[row]), -np.inf, swept[row])
+        here = np.where(reachable, here, np.inf)
+        angle, least = _least(sweep, row, grid, here)
+        if least <= DEAD_CENTER:
+            faults.append(_fault(margin, dyad, angle, least, grid[here <= DEAD_CENTER]))
+    return faults
+
+
+def _least(sweep: Callable[[Array], Array], row: int, grid: Array, here: Array) -> tuple[float, float]:
+    """Angle [deg] and value of the least margin of one dyad; minima of the grid are refined to 1e-6 deg."""
+    lowest = int(np.argmin(here))
+    best = float(grid[lowest]), float(here[lowest])
+    if best[1] <= DEAD_CENTER:
+        return best
+    for start in grid[(here <= np.roll(here, 1)) & (here <= np.roll(here, -1)) & np.isfinite(here)]:
+        center, half = float(start), STEP
+        while half > 1e-6:
+            fine = np.linspace(center - half, center + half, 21)
+            values = sweep(fine)[row]
+            values = np.where(np.isnan(values), np.inf, values)
+            lowest = int(np.argmin(values))
+            center, half = float(fine[lowest]), half / 10
+            if values[lowest] < best[1]:
+                best = center % 360.0, float(values[lowest])
+    return best
+
+
+def _fault(margin: Margin, dyad: Dyad, angle: float, least: float, closed: Array) -> Fault:
+    joints = ", ".join(dyad.joints)
+    if np.isneginf(least):
+        problem = f"the dyad at joint {margin.joint} has no finite position at {angle:.4g} deg: is a length zero?"
+        given = f"joints {joints} of {dyad.bodies[0]} and {dyad.bodies[1]}"
+    else:
+        verb = "locks (dead centre)" if abs(least) <= DEAD_CENTER else "cannot be assembled"
+        problem = f"the linkage {verb} at joint {margin.joint} at a crank angle of {angle:.4f} deg"
+        given = f"{margin.description}: {least:.6g} there"
+        if closed.size > 1:
+            given += f", not positive at {closed.size * STEP:.4g} of the 360 deg of a turn"
+    return Fault(
+        key=f"mechanism.joints.{margin.joint}",
+        problem=problem,
+        given=given,
+        allowed=f"above {DEAD_CENTER:g} at every crank angle",
+        remedy=f"change the lengths between joints {joints}, or shorten the crank",
+    )

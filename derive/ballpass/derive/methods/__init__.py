@@ -1,0 +1,1 @@
+"""Tableaus of the integration methods and their order conditions."""

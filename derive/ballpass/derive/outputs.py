@@ -1,0 +1,138 @@
+"""Outputs: everything a scene's model can report, and which of it the scene asks for.
+
+In: the derived parts of a model.  Out: `Output` after `Output`, each an expression in the model's symbols.
+"""
+
+from __future__ import annotations
+
+from fnmatch import fnmatchcase
+
+import sympy as sp
+
+from ballpass.derive.bearing.equations import BearingModel
+from ballpass.derive.mechanism.linkage import Linkage
+from ballpass.derive.mechanism.reactions import Reactions
+from ballpass.derive.scene.errors import Fault, SceneError
+from ballpass.derive.scene.records import Mechanism
+from ballpass.derive.variables import DRIVER_ANGLE, Output
+
+
+def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr]) -> list[Output]:
+    """What a bearing reports, in the order it is listed: rings, balls, sums over the balls, load."""
+    out: list[Output] = []
+    for c in bearing.coordinates:
+        out.append(Output(name=c.name, expression=c.position, unit="m", description=f"Position {c.description}"))
+    for c in bearing.coordinates:
+        out.append(
+            Output(name=str(c.velocity), expression=c.velocity, unit="m/s", description=f"Velocity {c.description}")
+        )
+    ball = bearing.ball
+    per_ball = [
+        ("ball.deflection", ball.deflection, "m", "Deflection of each ball, Eq. (6)"),
+        ("ball.elastic_force", ball.elastic_force, "N", "Elastic force of each ball, Eq. (4)"),
+    ]
+    if ball.damping_force is not None:
+        per_ball.append(("ball.damping_force", ball.damping_force, "N", "Damping force of each ball, Eq. (10)"))
+    per_ball.append(("ball.force", ball.force, "N", "Elastic and damping force of each ball"))
+    out += [Output(name=n, expression=e, unit=u, description=d, per_ball=True) for n, e, u, d in per_ball]
+    for axis, total in zip("xy", ball.sums, strict=True):
+        out.append(
+            Output(
+                name=f"ring_force.{axis}",
+                expression=total.symbol,
+                unit="N",
+                description=f"Force of the inner ring on the balls along {axis}, Eqs. (8) and (9)",
+            )
+        )
+    for axis, force in zip("xy", load, strict=True):
+        out.append(
+            Output(
+                name=f"load.{axis}",
+                expression=force,
+                unit="N",
+                description=f"External load on the inner ring along {axis}",
+            )
+        )
+    return out
+
+
+def mechanism_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactions) -> list[Output]:
+    """What a mechanism reports, in the order it is listed: reactions, drive, angles of the bodies."""
+    out: list[Output] = []
+    for joint in mechanism.joints:
+        first, second = joint.bodies
+        for axis, force in zip("xy", reactions.joint_force[joint.name], strict=True):
+            out.append(
+                Output(
+                    name=f"reaction.{joint.name}.{axis}",
+                    expression=force,
+                    unit="N",
+                    description=f"Force of the {second} on the {first} at {joint.name} along {axis}",
+                )
+            )
+        if joint.name in reactions.joint_moment:
+            out.append(
+                Output(
+                    name=f"reaction.{joint.name}.moment",
+                    expression=reactions.joint_moment[joint.name],
+                    unit="N*m",
+                    description=f"Moment of the {second} on the {first} at {joint.name}",
+                )
+            )
+    out.append(
+        Output(
+            name="drive_torque",
+            expression=reactions.drive_torque,
+            unit="N*m",
+            description="Torque of the drive on the driven body, counter-clockwise",
+        )
+    )
+    out.append(
+        Output(
+            name="drive_angle",
+            expression=DRIVER_ANGLE,
+            unit="rad",
+            description="Angle of the driven body, within the turn",
+        )
+    )
+    for body in mechanism.bodies:
+        pose = linkage.poses[body.name]
+        out.append(
+            Output(
+                name=f"body.{body.name}.angle",
+                expression=sp.atan2(pose.sin, pose.cos),
+                unit="rad",
+                description=f"Angle of the x axis of the {body.name} from +x",
+            )
+        )
+    return out
+
+
+def is_asked(patterns: tuple[str, ...], name: str) -> bool:
+    """Whether one of a scene's patterns names the output."""
+    return any(fnmatchcase(name, p) for p in patterns)
+
+
+def select_outputs(available: list[Output], patterns: tuple[str, ...]) -> tuple[Output, ...]:
+    """Outputs that the patterns name, in the order of `available`.
+
+    Raises
+    ------
+    SceneError
+        A pattern names none of them.
+    """
+    names = [o.name for o in available]
+    faults = [
+        Fault(
+            key="run.outputs",
+            problem="no output of this scene matches",
+            given=repr(pattern),
+            allowed=", ".join(names),
+            remedy="correct or remove the pattern",
+        )
+        for pattern in patterns
+        if not any(fnmatchcase(name, pattern) for name in names)
+    ]
+    if faults:
+        raise SceneError(faults)
+    return tuple(o for o in available if is_asked(patterns, o.name))

@@ -1,0 +1,314 @@
+"""A scene file to a `Scene`.
+
+In: the path of a TOML file, or its text.  Out: the frozen record in SI, every value checked.  A scene is data: nothing
+in it is evaluated.  All faults of a file are raised together, as one `SceneError`.
+
+The schema is in `read_mechanism.py`, `read_bearing.py` and here; the checks of values, which `--set` repeats, in
+`values.py`.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ballpass.derive.scene.errors import Fault, SceneError
+from ballpass.derive.scene.read_bearing import read_bearing, read_load, read_shaft
+from ballpass.derive.scene.read_mechanism import read_mechanism
+from ballpass.derive.scene.records import Run, Scene
+from ballpass.derive.scene.schema import Collector, Table, listing
+from ballpass.derive.scene.toml_lines import deep_key, index_lines
+from ballpass.derive.scene.units import show
+from ballpass.derive.scene.values import parse_override, quantities_of, value_faults, with_values
+
+__all__ = ["METHODS", "parse_override", "read_scene", "scene_from_text", "with_values"]
+
+METHODS = (
+    "auto",
+    "stepper",
+    "stepper-rodas4",
+    "stepper-rodas5p",
+    "stepper-dp54",
+    "stepper-dop853",
+    "rosenbrock",
+    "erk",
+    "cvodes",
+    "quasi-static",
+)
+#: Largest file that is read [bytes]; the largest sensible one is a table of loads.
+MAX_FILE_SIZE = 8_000_000
+_TABLES = ("mechanism", "shaft", "load", "bearing", "run")
+
+
+def read_scene(path: str | Path) -> Scene:
+    """Read a scene file.
+
+    The scene's name is the file's stem.
+
+    Raises
+    ------
+    SceneError
+        With all faults of the file.
+    """
+    file = Path(path)
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(MAX_FILE_SIZE + 1)
+    except OSError as error:
+        raise _unreadable(
+            file, error.strerror or type(error).__name__, "give the path of a scene file (TOML)"
+        ) from None
+    except ValueError:  # a NUL in the path
+        raise _unreadable(file, "this is no path", "give the path of a scene file (TOML)") from None
+    if len(data) > MAX_FILE_SIZE:
+        raise _unreadable(file, f"the file is larger than {MAX_FILE_SIZE} bytes", "give a scene file (TOML)")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise _unreadable(file, "the file is not text in UTF-8", "save the file as UTF-8", line) from None
+    return _scene(text, file.stem, str(file))
+
+
+def scene_from_text(text: str, name: str) -> Scene:
+    """Read a scene from the text of its file.
+
+    Raises
+    ------
+    SceneError
+        With all faults of the text.
+    """
+    return _scene(text, name, None)
+
+
+def _unreadable(file: Path, problem: str, remedy: str, line: int | None = None) -> SceneError:
+    fault = Fault(
+        key="",
+        problem=f"the scene file cannot be read: {problem}",
+        given=show(str(file), 200),
+        allowed="",
+        remedy=remedy,
+        line=line,
+    )
+    return SceneError([fault], source=file)
+
+
+def _scene(text: str, name: str, source: str | None) -> Scene:
+    data = _parse(text, source)
+    collector = Collector(lines=index_lines(text))
+    collector.check_name((), name, "scene")
+    if not any(key in data for key in _TABLES):
+        collector.fault(
+            (),
+            "the file describes nothing" if data else "the file is empty",
+            given=listing(list(data)[:10]),
+            allowed="tables " + listing(_TABLES),
+            remedy="copy one of the files in scenes/ and change it",
+        )
+        raise SceneError(collector.faults, source=source)
+    scene = _read(Table(collector, (), data), name)
+    lines = collector.lines
+    collector.faults += [
+        replace(fault, line=lines.find(tuple(fault.key.split(".")))) for fault in value_faults(scene, collector.given)
+    ]
+    if collector.faults:
+        # In the order of the file; faults of the whole file first.
+        raise SceneError(sorted(collector.faults, key=lambda fault: fault.line or 0), source=source)
+    return scene
+
+
+def _parse(text: str, source: str | None) -> dict[str, Any]:
+    deep = deep_key(text)
+    if deep is not None:
+        fault = Fault(
+            key="",
+            problem="a key with more than 64 dots",
+            given=show(text.split("\n")[deep - 1].strip()),
+            allowed="keys of a few parts, as in mechanism.bodies.crank",
+            remedy="check whether this is a scene file (TOML)",
+            line=deep,
+        )
+        raise SceneError([fault], source=source)
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        # tomllib raises ValueError itself for integers of more than 4300 digits.
+        message = str(error) if isinstance(error, tomllib.TOMLDecodeError) else type(error).__name__
+        place = re.search(r"\(at line (\d+), column (\d+)\)", message)
+        lines = text.split("\n")
+        line = int(place.group(1)) if place else max(len(lines), 1)
+        fault = Fault(
+            key="",
+            problem=f"this is not TOML: {message}",
+            given=show(lines[line - 1].strip()) if 0 < line <= len(lines) else "",
+            allowed='key = "value", [table], comments after "#"',
+            remedy="check quotes, brackets and commas in this line and in the one before it",
+            line=line,
+        )
+        raise SceneError([fault], source=source) from None
+
+
+def _read(root: Table, name: str) -> Scene:
+    with root:
+        title = _read_title(root, name)
+        root.know(*_TABLES)
+        mechanism, driven = read_mechanism(root.table("mechanism")) if root.has("mechanism") else (None, None)
+        has_bearing = root.has("bearing")
+        if mechanism is None and not has_bearing:
+            root.fault(
+                "",
+                "the scene has neither a mechanism nor a bearing",
+                allowed="[mechanism], [bearing] or both",
+                remedy="add one of the two tables",
+            )
+        shaft = load = bearing = None
+        if mechanism is not None or not has_bearing:
+            _refuse_loads(root, "mechanism" if mechanism is not None else "")
+        else:
+            shaft = read_shaft(root.table("shaft", "speed"))
+            load = read_load(root.table("load", "type"))
+        if has_bearing:
+            bearing = read_bearing(root.table("bearing"), mechanism, driven)
+        run, outputs = _read_run(root.table("run", "cycles or duration, and outputs"))
+        quantities = tuple(quantities_of((mechanism, shaft, load, bearing)))
+    return Scene(
+        name=name,
+        title=title,
+        mechanism=mechanism,
+        shaft=shaft,
+        load=load,
+        bearing=bearing,
+        outputs=outputs,
+        run=run,
+        quantities=quantities,
+    )
+
+
+def _read_title(root: Table, name: str) -> str:
+    if not root.has("title"):
+        return name
+    title = root.text("title", "Punching machine") or name
+    if not title.isprintable() or len(title) > 200:
+        root.fault(
+            "title",
+            "the title is no single line",
+            given=show(title),
+            allowed="at most 200 printable characters",
+            remedy="shorten the title; put the rest into a comment",
+        )
+    return title
+
+
+def _refuse_loads(root: Table, because: str) -> None:
+    for key in ("shaft", "load"):
+        if root.has(key):
+            root.fault(
+                key,
+                "the mechanism turns and loads the bearing" if because else "there is no bearing to turn and load",
+                given=f"[{key}]",
+                allowed=f"[{key}] only in a scene with [bearing] and without [mechanism]",
+                remedy=f"delete [{key}]" + (", or delete [mechanism]" if because else ", or add [bearing]"),
+            )
+
+
+def _read_run(table: Table) -> tuple[Run, tuple[str, ...]]:
+    with table as run:
+        run.know("cycles", "duration", "transient_cycles", "samples_per_cycle", "method", "rtol", "outputs")
+        both = [key for key in ("cycles", "duration") if key in run.data]
+        if len(both) != 1 and not run.missing:
+            run.fault(
+                "",
+                "the length of the run is given twice" if both else "the length of the run is missing",
+                given=listing(both),
+                allowed='either cycles, as in 4, or duration, as in "0.5 s"',
+                remedy="delete one of the two" if both else "add cycles = 4",
+            )
+        cycles = run.number("cycles", example="4") if "cycles" in both else None
+        duration = (
+            run.quantity("duration", "s", "Duration of the run", "", example="0.5 s").value
+            if "duration" in both
+            else None
+        )
+        for key, length in (("cycles", cycles), ("duration", duration)):
+            if length is not None and length <= 0.0:
+                run.fault(
+                    key,
+                    "the run has no length",
+                    given=show(run.data[key]),
+                    allowed="a value above zero",
+                    remedy="give a positive value",
+                )
+        transient = run.number("transient_cycles", example="2", default=0.0)
+        _check_transient(run, transient, cycles)
+        rtol = run.number("rtol", example="1e-6", default=1e-6)
+        if rtol < 1e-13 or rtol > 1e-1:
+            run.fault(
+                "rtol",
+                "the relative tolerance lies outside its bounds",
+                given=show(run.data.get("rtol")),
+                allowed="a number from 1e-13 to 0.1",
+                remedy="write rtol = 1e-6 where nothing speaks for another value",
+            )
+        outputs = _read_outputs(run)
+        return (
+            Run(
+                cycles=cycles,
+                duration=duration,
+                transient_cycles=transient,
+                samples_per_cycle=run.integer("samples_per_cycle", 16, 1_000_000, example="2000", default=2000),
+                method=run.choice("method", METHODS, default="auto") or "auto",
+                rtol=rtol,
+            ),
+            outputs,
+        )
+
+
+def _check_transient(run: Table, transient: float, cycles: float | None) -> None:
+    if transient < 0.0:
+        run.fault(
+            "transient_cycles",
+            "the value is negative",
+            given=show(run.data["transient_cycles"]),
+            allowed="zero or a value above it",
+            remedy="write 0 to keep the whole run",
+        )
+    elif cycles is not None and cycles > 0.0 and transient >= cycles:
+        run.fault(
+            "transient_cycles",
+            "the transient cycles fill the whole run",
+            given=f"{transient:g} of {cycles:g} cycles",
+            allowed="fewer than cycles",
+            remedy="run more cycles, or drop fewer",
+        )
+
+
+def _read_outputs(run: Table) -> tuple[str, ...]:
+    example = '["inner.*", "ball.force"]'
+    given = run.take("outputs", example)
+    if given is None:
+        return ()
+    if not isinstance(given, list) or not given:
+        run.fault(
+            "outputs",
+            "this is no list of names of outputs",
+            given=show(given),
+            allowed=f"a list of names and patterns, as in {example}",
+            remedy=f"write outputs = {example}",
+        )
+        return ()
+    patterns = []
+    for number, pattern in enumerate(given, start=1):
+        if isinstance(pattern, str) and pattern.strip() and len(pattern) <= 200:
+            patterns.append(pattern.strip())
+            continue
+        run.fault(
+            "outputs",
+            f"entry {number} is no name of an output",
+            given=show(pattern),
+            allowed='a name or a pattern, as in "inner.y" or "inner.*"',
+            remedy="delete the entry, or write a name",
+        )
+    return tuple(patterns)

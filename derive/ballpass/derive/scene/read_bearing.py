@@ -1,0 +1,454 @@
+"""The tables [shaft], [load] and [bearing] of a scene file to their records.
+
+In: the tables.  Out: records, possibly with placeholders where faults were noted (see `schema.py`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ballpass.derive.scene.read_mechanism import words_of_force
+from ballpass.derive.scene.records import (
+    DAMPING_LAWS,
+    FRAME,
+    Bearing,
+    ConstantLoad,
+    Damping,
+    EquivalentMass,
+    GivenContact,
+    HarmonicLoad,
+    HertzContact,
+    InitialState,
+    InnerRing,
+    Load,
+    Material,
+    Mechanism,
+    OuterRing,
+    Quantity,
+    Shaft,
+    TableLoad,
+)
+from ballpass.derive.scene.schema import Table, listing, suggest
+from ballpass.derive.scene.units import show
+
+_HERTZ_KEYS = ("inner_groove_radius", "outer_groove_radius", "young_modulus", "poisson_ratio")
+FEWEST_BALLS, MOST_BALLS = 3, 200
+MOST_HARMONICS = 32
+
+
+def read_shaft(table: Table) -> Shaft:
+    """Speed of the inner ring where no mechanism turns it."""
+    with table:
+        return Shaft(
+            speed=table.quantity("speed", "rad/s", "Speed of the shaft", r"\omega", example="1200 rpm"),
+        )
+
+
+def read_load(table: Table) -> Load | None:
+    """Load on the inner ring where no mechanism makes it; None, with a fault, where its type is unknown."""
+    with table:
+        kind = table.choice("type", ("constant", "harmonic", "table"))
+        if kind == "constant":
+            return ConstantLoad(force=table.vector("force", "N", words_of_force("the load on the inner ring", "F")))
+        if kind == "harmonic":
+            return HarmonicLoad(
+                mean=table.vector("mean", "N", words_of_force("the mean load on the inner ring", r"\bar F")),
+                amplitude=table.vector(
+                    "amplitude", "N", words_of_force("the amplitude of the load on the inner ring", r"\hat F")
+                ),
+                frequency=table.quantity("frequency", "Hz", "Frequency of the load", "f", example="50 Hz"),
+                phase=table.quantity("phase", "rad", "Phase of the load at the start", r"\varphi", example="0 deg"),
+            )
+        if kind == "table":
+            return TableLoad(
+                time=_read_column(table, "time", "s", "Time of row {} of the load's table", "t_{{{}}}"),
+                x=_read_column(table, "x", "N", "x component of the load in row {} of its table", "F_{{x,{}}}"),
+                y=_read_column(table, "y", "N", "y component of the load in row {} of its table", "F_{{y,{}}}"),
+            )
+        table.know(*table.data)
+    return None
+
+
+def _read_column(table: Table, key: str, unit: str, description: str, latex: str) -> tuple[Quantity, ...]:
+    example = f'["0 {unit}", "1 {unit}"]'
+    allowed = f'{example}, or {{ values = [0, 1], unit = "{unit}" }}'
+    given = table.take(key, example)
+    if given is None:
+        return ()
+    values: Any = given
+    suffix = ""
+    if isinstance(given, dict):
+        with table.table(key) as column:
+            values, column_unit = column.take("values", "[0, 1]"), column.text("unit", unit)
+        if values is None or column_unit is None:
+            return ()
+        suffix = column_unit
+    if not isinstance(values, list) or not values:
+        table.fault(
+            key,
+            "this is no column of numbers",
+            given=show(given),
+            allowed=allowed,
+            remedy="write a list with one value for each row",
+        )
+        return ()
+    return tuple(
+        table.collector.quantity(
+            (*table.path, key, str(row)),
+            f"{value!r} {suffix}" if suffix and isinstance(value, int | float) and abs(value) < 1e300 else value,
+            unit,
+            description.format(row),
+            latex.format(row),
+        )
+        for row, value in enumerate(values, start=1)
+    )
+
+
+def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None) -> Bearing:
+    """The bearing; with a mechanism it must sit at the driver's joint.
+
+    `driven` is the driven body, None where there is no mechanism or the driver has a fault.
+    """
+    with table:
+        table.know("joint", "share", "balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle", "contact")
+        table.know("damping", "inner_ring", "outer_ring", "initial", "load_harmonics")
+        joint, share = _read_place(table, mechanism, driven)
+        support = _read_outer_ring(table)
+        return Bearing(
+            joint=joint,
+            share=share,
+            load_harmonics=_read_load_harmonics(table, mechanism),
+            balls=table.integer("balls", FEWEST_BALLS, MOST_BALLS, example="8"),
+            ball_diameter=table.quantity("ball_diameter", "m", "Ball diameter", "D_w", example="7.9375 mm"),
+            pitch_diameter=table.quantity(
+                "pitch_diameter", "m", "Diameter of the circle of ball centres", "D_{pw}", example="33.5 mm"
+            ),
+            clearance=table.quantity("clearance", "m", "Diametral clearance of the bearing", "P_d", example="10 um"),
+            ball_angle=table.quantity(
+                "ball_angle",
+                "rad",
+                "Angle of the first ball at the start",
+                r"\theta_0",
+                example="0 deg",
+                default="0 deg",
+            ),
+            contact=_read_contact(table),
+            damping=_read_damping(table),
+            inner=_read_inner_ring(table, mechanism is not None),
+            outer=support,
+            initial=_read_initial(table, moving_outer=support is not None),
+        )
+
+
+def _read_load_harmonics(table: Table, mechanism: Mechanism | None) -> int | None:
+    """How many harmonics of the mechanism's load are kept; None for all of it."""
+    if not table.has("load_harmonics"):
+        return None
+    if mechanism is None:
+        table.fault(
+            "load_harmonics",
+            "there is no mechanism whose load could be cut to harmonics",
+            given=show(table.data["load_harmonics"]),
+            allowed="this key beside a [mechanism] only",
+            remedy='delete it; a harmonic load is [load] with type = "harmonic"',
+        )
+        return None
+    return table.integer("load_harmonics", 1, MOST_HARMONICS, example="8")
+
+
+def _read_place(table: Table, mechanism: Mechanism | None, driven: str | None) -> tuple[str | None, Quantity | None]:
+    if mechanism is None:
+        for key in ("joint", "share"):
+            if table.has(key):
+                table.fault(
+                    key,
+                    "there is no mechanism to load the bearing",
+                    given=show(table.data[key]),
+                    allowed="joint and share only in a scene with [mechanism]",
+                    remedy="delete the key, or describe the mechanism",
+                )
+        return None, None
+    share = table.quantity("share", "1", "Share of the joint's reaction that the bearing carries", "s", example="0.5")
+    name = table.text("joint", mechanism.driver.joint or "A")
+    if not name or not mechanism.joints:
+        return name, share
+    joint = next((joint for joint in mechanism.joints if joint.name == name), None)
+    names = [joint.name for joint in mechanism.joints]
+    if joint is None:
+        table.fault(
+            "joint",
+            f"there is no joint {show(name)}",
+            given=show(name),
+            allowed=listing(names),
+            remedy=suggest(name, names, "name the driver's joint"),
+        )
+    elif driven is not None and (joint.kind != "revolute" or joint.bodies != (FRAME, driven)):
+        table.fault(
+            "joint",
+            "the bearing must sit at the driver's joint: its inner ring turns with the driver",
+            given=f"{show(name)}, a {joint.kind} joint with bodies {listing(joint.bodies)}",
+            allowed=f'"{mechanism.driver.joint}"',
+            remedy=f'write joint = "{mechanism.driver.joint}"',
+        )
+    return name, share
+
+
+def _read_contact(table: Table) -> HertzContact | GivenContact:
+    with table.table("contact", "groove radii and elastic constants, or stiffness") as contact:
+        if contact.has("stiffness"):
+            contact.know(*_HERTZ_KEYS, "ball_material")
+            extra = [key for key in (*_HERTZ_KEYS, "ball_material") if key in contact.data]
+            if extra:
+                contact.fault(
+                    "stiffness",
+                    "the contact stiffness is given twice: as a number and by geometry",
+                    given=f"stiffness and {listing(extra)}",
+                    allowed=f"either stiffness, or {listing(_HERTZ_KEYS)}",
+                    remedy=f"delete stiffness, or delete {listing(extra)}",
+                )
+            return GivenContact(
+                stiffness=contact.quantity(
+                    "stiffness",
+                    "N/m^1.5",
+                    "Contact stiffness of a ball between both raceways",
+                    "k_b",
+                    example="8.6e9 N/m^1.5",
+                ),
+                smoothing=_read_smoothing(contact),
+            )
+        if not contact.missing and not any(key in contact.data for key in _HERTZ_KEYS):
+            contact.know(*_HERTZ_KEYS, "ball_material")
+            contact.fault(
+                "",
+                "nothing gives the contact stiffness",
+                given=listing(list(contact.data)),
+                allowed=f"either stiffness, or {listing(_HERTZ_KEYS)}",
+                remedy='write the four keys of the geometry, or stiffness = "8.6e9 N/m^1.5"',
+            )
+            contact.missing = True
+        return HertzContact(
+            inner_groove_radius=contact.quantity(
+                "inner_groove_radius",
+                "m",
+                "Groove curvature radius of the inner raceway",
+                "r_i",
+                example="4.1275 mm",
+            ),
+            outer_groove_radius=contact.quantity(
+                "outer_groove_radius",
+                "m",
+                "Groove curvature radius of the outer raceway",
+                "r_e",
+                example="4.206875 mm",
+            ),
+            ring=_read_material(contact, "rings", "E", r"\nu"),
+            ball=_read_ball_material(contact),
+            smoothing=_read_smoothing(contact),
+        )
+
+
+def _read_smoothing(contact: Table) -> Quantity | None:
+    return contact.optional_quantity("smoothing", "m", "Half width of the smoothed contact onset", r"w_\delta")
+
+
+def _read_ball_material(contact: Table) -> Material | None:
+    if not contact.has("ball_material"):
+        return None
+    with contact.table("ball_material", "young_modulus and poisson_ratio") as material:
+        return _read_material(material, "balls", "E_w", r"\nu_w")
+
+
+def _read_material(table: Table, part: str, young: str, poisson: str) -> Material:
+    return Material(
+        young_modulus=table.quantity("young_modulus", "Pa", f"Young's modulus of the {part}", young, example="207 GPa"),
+        poisson_ratio=table.quantity("poisson_ratio", "1", f"Poisson's ratio of the {part}", poisson, example="0.3"),
+    )
+
+
+def _read_damping(table: Table) -> Damping:
+    with table.table("damping", "law and ratio") as damping:
+        law = damping.choice("law", DAMPING_LAWS)
+        damping.know("coefficient", "ratio", "smoothing")
+        present = [key for key in ("coefficient", "ratio") if key in damping.data]
+        coefficient = ratio = smoothing = None
+        if law in ("one-sided", "one-sided-gated"):
+            smoothing = damping.optional_quantity(
+                "smoothing", "m/s", "Half width of the smoothed kink of the damping at rest", "w_v"
+            )
+        elif law is not None and "smoothing" in damping.data:
+            damping.fault(
+                "smoothing",
+                f'the law "{law}" has no kink at rest',
+                given=show(damping.data["smoothing"]),
+                allowed='smoothing with the laws "one-sided" and "one-sided-gated"',
+                remedy="delete the key; smoothing in [bearing.contact] smooths what happens at contact",
+            )
+        if law == "none":
+            for key in present:
+                damping.fault(
+                    key,
+                    'the law "none" has no coefficient',
+                    given=show(damping.data[key]),
+                    remedy="delete the key, or name another law",
+                )
+        elif law == "tangent":
+            if "coefficient" in present:
+                damping.fault(
+                    "coefficient",
+                    'the law "tangent" takes its coefficient from the slope of the contact force',
+                    given=show(damping.data["coefficient"]),
+                    allowed='ratio, a time, as in "0.25e-5 s"',
+                    remedy='write ratio = "0.25e-5 s" instead, or name the law "one-sided"',
+                )
+            if "ratio" in present or not present:
+                ratio = damping.quantity(
+                    "ratio",
+                    "s",
+                    "Damping time constant: damping over tangent stiffness of the contact",
+                    r"\beta",
+                    example="0.25e-5 s",
+                    wrong_dimension='write a time, as in "0.25e-5 s": the law "tangent" multiplies the slope of the '
+                    "contact force [N/m]",
+                )
+        elif law is not None:
+            if len(present) != 1:
+                damping.fault(
+                    "",
+                    "the coefficient is given twice" if present else "the coefficient is missing",
+                    given=" and ".join(f"{key} = {show(damping.data[key])}" for key in present) or "neither",
+                    allowed='either coefficient (as in "683 N*s/m") or ratio (as in "0.25e-5 s*mm^0.5")',
+                    remedy="delete one of the two" if present else 'add coefficient = "683 N*s/m", or a ratio',
+                )
+            if "coefficient" in present:
+                coefficient = damping.quantity(
+                    "coefficient", "N*s/m", "Damping coefficient of a ball's contacts", "c_b", example="683 N*s/m"
+                )
+            if "ratio" in present:
+                ratio = damping.quantity(
+                    "ratio",
+                    "s*m^0.5",
+                    "Ratio of damping coefficient to contact stiffness of a ball",
+                    r"\beta",
+                    example="0.25e-5 s*mm^0.5",
+                    wrong_dimension=f'the law "{law}" multiplies k_b [N/m^1.5]: write the paper\'s number as '
+                    '"0.25e-5 s*mm^0.5"; for a time, as in "0.25e-5 s", name the law "tangent"',
+                )
+    return Damping(law=law or "none", coefficient=coefficient, ratio=ratio, smoothing=smoothing)
+
+
+def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:
+    with table.table("inner_ring", "mass or equivalent_mass") as ring:
+        damping = ring.optional_quantity(
+            "damping", "N*s/m", "Viscous damping of the inner ring's motion to the frame", "c_i"
+        )
+        ring.know("mass", "equivalent_mass")
+        by_eq_3 = "equivalent_mass" in ring.data
+        if not ring.missing and by_eq_3 == ("mass" in ring.data):
+            ring.fault(
+                "",
+                "the moved mass is given twice" if by_eq_3 else "the moved mass is missing",
+                given="mass and equivalent_mass" if by_eq_3 else "neither mass nor equivalent_mass",
+                allowed='either mass (as in "0.4 kg") or the table equivalent_mass, Eq. (3)',
+                remedy="delete one of the two" if by_eq_3 else 'add mass = "0.4 kg"',
+            )
+            ring.missing = True
+        if not by_eq_3:
+            mass = ring.quantity("mass", "kg", "Mass moved by the inner ring", "m_{ei}", example="0.4 kg")
+            return InnerRing(mass=mass, damping=damping)
+        if not with_mechanism:
+            ring.fault(
+                "equivalent_mass",
+                "Eq. (3) takes the mass of the driven body, and there is no mechanism",
+                given=show(ring.data["equivalent_mass"]),
+                allowed='mass, as in "0.4 kg"',
+                remedy='write mass = "0.4 kg" instead',
+            )
+        with ring.table("equivalent_mass", "ring, crankpin and crank") as parts:
+            return InnerRing(
+                mass=EquivalentMass(
+                    ring=parts.quantity("ring", "kg", "Mass of the inner ring", "m_i", example="0.032 kg"),
+                    crankpin=parts.quantity("crankpin", "kg", "Mass of the crankpin", "m_x", example="0.05 kg"),
+                    crank=parts.choice("crank", ("whole", "half")) or "whole",
+                ),
+                damping=damping,
+            )
+
+
+def _read_outer_ring(table: Table) -> OuterRing | None:
+    with table.table("outer_ring", "support") as ring:
+        support = ring.choice("support", ("elastic", "fixed"))
+        keys = ("mass", "stiffness", "damping")
+        ring.know(*keys)
+        if support == "elastic":
+            return OuterRing(
+                mass=ring.quantity(
+                    "mass", "kg", "Mass of the outer ring and what moves with it", "m_o", example="0.5 kg"
+                ),
+                stiffness=ring.quantity(
+                    "stiffness", "N/m", "Stiffness between outer ring and frame", "k_p", example="50 N/um"
+                ),
+                damping=ring.quantity(
+                    "damping", "N*s/m", "Damping between outer ring and frame", "c_p", example="500 N*s/m"
+                ),
+            )
+        if support == "fixed":
+            for key in keys:
+                if key in ring.data:
+                    ring.fault(
+                        key,
+                        "a fixed outer ring does not move",
+                        given=show(ring.data[key]),
+                        allowed='nothing besides support = "fixed"',
+                        remedy='delete the key, or write support = "elastic"',
+                    )
+    return None
+
+
+def _read_initial(table: Table, *, moving_outer: bool) -> InitialState:
+    position: list[Quantity] = []
+    velocity: list[Quantity] = []
+    with table.table("initial", required=False) as initial:
+        for part, subscript in (("inner", "i"), ("outer", "o")):
+            initial.know(part, f"{part}_velocity")
+            if part == "outer" and not moving_outer:
+                _refuse_outer(initial, table)
+                continue
+            position += _read_pair(initial, part, "m", f"Centre of the {part} ring at the start", ("", subscript))
+            velocity += _read_pair(
+                initial,
+                f"{part}_velocity",
+                "m/s",
+                f"Velocity of the {part} ring at the start",
+                (r"\dot ", subscript),
+            )
+    return InitialState(position=tuple(position), velocity=tuple(velocity))
+
+
+def _refuse_outer(initial: Table, table: Table) -> None:
+    ring = table.data.get("outer_ring")
+    if not isinstance(ring, dict) or ring.get("support") != "fixed":  # the support itself has a fault
+        return
+    for key in ("outer", "outer_velocity"):
+        if key in initial.data:
+            initial.fault(
+                key,
+                "a fixed outer ring has no initial state",
+                given=show(initial.data[key]),
+                remedy='delete the key, or write support = "elastic" in [bearing.outer_ring]',
+            )
+
+
+def _read_pair(initial: Table, key: str, unit: str, description: str, latex: tuple[str, str]) -> list[Quantity]:
+    example = f'["0 {unit}", "0 {unit}"]'
+    given = initial.data.get(key, [f"0 {unit}", f"0 {unit}"])
+    if not isinstance(given, list) or len(given) != 2:
+        initial.fault(
+            key, "these are not two components", given=show(given), allowed=example, remedy=f"write {key} = {example}"
+        )
+        return []
+    return [
+        initial.collector.quantity(
+            (*initial.path, key, axis), value, unit, f"{description}, {axis}", f"{latex[0]}{axis}_{{{latex[1]}}}(0)"
+        )
+        for axis, value in zip("xy", given, strict=True)
+    ]

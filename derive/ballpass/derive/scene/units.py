@@ -1,0 +1,409 @@
+"""Text with a unit to a number in SI.
+
+In: what stands in a scene file ("611.7 kg*mm^2", 0.5).  Out: one float in the SI unit the key asks for.
+
+A scene is data, so nothing in it is evaluated: the grammar below is read by a small parser of its own, and pint is
+asked for one thing only, the size of a unit of a given name.
+
+::
+
+    quantity = number [unit]
+    number   = decimal with a point, "6", "-0.5", "0.25e-5"
+    unit     = factor { ("*" | "·" | "/" | blank) factor }      from left to right
+    factor   = ( name | "1" | "(" unit ")" ) [ ("^" | "**") exponent | "²" | "³" ]
+    exponent = [sign] decimal | "(" [sign] decimal ["/" decimal] ")"
+
+Two things differ from pint.  The radian counts as a dimension: "Hz" and "rad/s" are different things here, where pint
+would silently lose a factor of 2 pi.  Arithmetic is rational: "0.3567 kg" and "356.7 g" are the same float, and
+1 rpm is 2 pi/60 rad/s rounded once.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+import pint
+from pint.util import UnitsContainer
+
+from ballpass.runtime.contract.errors import RequestError
+
+#: Longest text read as a quantity; the longest sensible one has some thirty characters.
+MAX_LENGTH = 100
+#: Largest power of a unit; rational arithmetic with "m^1000000" would not end.
+MAX_EXPONENT = 12
+
+
+class QuantityError(RequestError):
+    """Text that is no quantity of the unit asked for.
+
+    Parameters
+    ----------
+    problem : what is wrong, in one clause
+    given : what was given
+    allowed : what may stand there
+    remedy : what to do
+    """
+
+    def __init__(self, *, problem: str, given: str, allowed: str, remedy: str) -> None:
+        self.problem, self.given, self.allowed, self.remedy = problem, given, allowed, remedy
+        super().__init__(f"{problem}; given: {given}; allowed: {allowed}; remedy: {remedy}")
+
+
+#: SI unit of a key → what it measures, and how to write it.
+KINDS: dict[str, tuple[str, str]] = {
+    "1": ("a plain number", "0.5"),
+    "kg": ("a mass", "0.36 kg"),
+    "kg*m^2": ("a moment of inertia", "611.7 kg*mm^2"),
+    "m": ("a length", "6 mm"),
+    "m/s": ("a velocity", "2 mm/s"),
+    "m/s^2": ("an acceleration", "9.81 m/s^2"),
+    "rad": ("an angle", "237 deg"),
+    "rad/s": ("a speed of rotation", "500 rpm"),
+    "N": ("a force", "8964.8 N"),
+    "N*m": ("a torque", "20 N*m"),
+    "N/m": ("a stiffness", "50 N/um"),
+    "N/m^1.5": ("a contact stiffness", "8.6e9 N/m^1.5"),
+    "N*s/m": ("a damping coefficient", "500 N*s/m"),
+    "s": ("a time", "0.5 s"),
+    "s*m^0.5": ("a damping ratio c_b/k_b", "0.25e-5 s*mm^0.5"),
+    "Pa": ("an elastic modulus", "207 GPa"),
+    "Hz": ("a frequency", "50 Hz"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnitSize:
+    """A unit: `exact` times `rounded` of its base units, which are pairs of name and power in order of name."""
+
+    exact: Fraction
+    rounded: float
+    base: tuple[tuple[str, Fraction], ...]
+
+
+class _GrammarError(Exception):
+    """Why a text is no unit; `parse_quantity` turns it into a `QuantityError`."""
+
+    def __init__(self, problem: str, remedy: str) -> None:
+        super().__init__(problem)
+        self.problem, self.remedy = problem, remedy
+
+
+def parse_quantity(given: object, unit: str) -> float:
+    """Value in SI of what stands in a scene file.
+
+    Parameters
+    ----------
+    given : text such as "6 mm"; a plain number only where `unit` is "1"
+    unit : SI unit of the result, one of `KINDS` or any other text of the same grammar
+
+    Returns
+    -------
+    float
+        Finite value [`unit`]
+
+    Raises
+    ------
+    QuantityError
+        No number, no unit or an unknown one, another dimension, not finite, offset or logarithmic unit, text too long.
+    """
+    kind, example = KINDS.get(unit, (f"a quantity in {unit}", f"1 {unit}"))
+    allowed = f'{kind}, as in "{example}"' if unit != "1" else f"{kind}, as in {example}"
+
+    def refuse(problem: str, remedy: str) -> QuantityError:
+        return QuantityError(problem=problem, given=show(given), allowed=allowed, remedy=remedy)
+
+    if isinstance(given, bool) or not isinstance(given, str | int | float):
+        what = "a truth value" if isinstance(given, bool) else _type_name(given)
+        raise refuse(f"{what} instead of {kind}", f"write {_quoted(example, unit)}")
+    if not isinstance(given, str):
+        value = _plain_number(given)
+        if value is None:
+            raise refuse("the number is not finite", "give a finite number")
+        if unit != "1":
+            raise refuse("the unit is missing", f'write the number as text with its unit, "{show(given)} <unit>"')
+        return value
+
+    text = given.strip()
+    if len(text) > MAX_LENGTH:
+        raise refuse(f"a text of {len(text)} characters is no quantity", f"use at most {MAX_LENGTH} characters")
+    match = _NUMBER.match(text)
+    if match is None:
+        if re.match(r"[+-]?(nan|inf)", text, re.IGNORECASE):
+            raise refuse("the number is not finite", "give a finite number")
+        raise refuse("no number in front", f"write a number, then its unit, as in {_quoted(example, unit)}")
+    rest = text[match.end() :].strip()
+    if re.match(r"[,'_]\s*[0-9]", rest):
+        raise refuse("a number with a comma or another mark between its digits", 'write a decimal point: "6.5", "1000"')
+    try:
+        size = unit_size(rest)
+    except _GrammarError as error:
+        raise refuse(error.problem, error.remedy) from None
+    target = unit_size(unit)
+    if size.base != target.base:
+        raise refuse(*_dimension_fault(rest, size, target, kind, example, unit))
+    try:
+        number = Fraction(match.group())
+        value = float(number * size.exact / target.exact) * (size.rounded / target.rounded)
+    except OverflowError:
+        value = math.inf
+    if not math.isfinite(value):
+        raise refuse("the number is not finite", "give a finite number")
+    if value == 0.0 and number != 0:
+        raise refuse("the number is too small to be told from zero", 'write "0" where zero is meant')
+    return value
+
+
+def show(given: object, limit: int = 60) -> str:
+    """What stands in the file, as people would write it, shortened to `limit` characters."""
+    if isinstance(given, str):
+        text = f'"{given[:limit]}"'
+    elif isinstance(given, bool):
+        text = "true" if given else "false"
+    elif isinstance(given, int) and given.bit_length() > 256:
+        text = "an integer of more than 77 digits"
+    elif isinstance(given, dict):
+        text = "{ " + ", ".join(f"{key} = {_show_inner(value)}" for key, value in list(given.items())[:6]) + " }"
+    elif isinstance(given, list):
+        text = "[" + ", ".join(_show_inner(value) for value in given[:6]) + ("]" if len(given) <= 6 else ", ...]")
+    else:
+        text = str(given)
+    text = "".join(character if character.isprintable() else "?" for character in text)
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def _show_inner(given: object) -> str:
+    """What stands inside a list or table; the depth of a file's tables has no bound, that of a message has."""
+    return "..." if isinstance(given, dict | list) else show(given, 20)
+
+
+@lru_cache(maxsize=512)
+def unit_size(text: str) -> UnitSize:
+    """Size of the unit written as `text`; the empty text is "1"."""
+    tokens: list[tuple[str, str]] = []
+    position = 0
+    while position < len(text):
+        match = _TOKEN.match(text, position)
+        if match is None or match.lastgroup is None:
+            raise _GrammarError(
+                f"the character {show(text[position])} has no place in a unit",
+                'write units with names, "*", "/" and "^", as in "N*s/m" or "N/m^1.5"',
+            )
+        tokens.append((match.lastgroup, match.group()))
+        position = match.end()
+    reader = _UnitReader(tokens=[token for token in tokens if token[0] != "blank"])
+    return reader.read()
+
+
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3}(?![0-9]))?")
+_TOKEN = re.compile(
+    r"(?P<blank>[ \t]+)|(?P<name>[^\W\d²³][^\W²³]*|[%°])|(?P<number>[0-9]+(?:\.[0-9]+)?)"
+    r"|(?P<power>\*\*|\^)|(?P<times>[*·⋅])|(?P<over>/)|(?P<open>\()|(?P<close>\))|(?P<sign>[+-])|(?P<raised>[²³])"
+)
+_RAISED = {"²": Fraction(2), "³": Fraction(3)}
+
+
+@dataclass(slots=True, kw_only=True)
+class _UnitReader:
+    """Recursive descent over the tokens of one unit; depth is bounded by the length of a quantity's text."""
+
+    tokens: list[tuple[str, str]]
+    index: int = 0
+
+    def read(self) -> UnitSize:
+        if not self.tokens:
+            return UnitSize(exact=Fraction(1), rounded=1.0, base=())
+        if self._peek() == "over":  # "250 /s"
+            self.tokens.insert(0, ("number", "1"))
+        size = self._product()
+        if self.index != len(self.tokens):
+            raise self._misplaced()
+        return size
+
+    def _peek(self) -> str:
+        return self.tokens[self.index][0] if self.index < len(self.tokens) else "end"
+
+    def _next(self) -> str:
+        self.index += 1
+        return self.tokens[self.index - 1][1]
+
+    def _misplaced(self) -> _GrammarError:
+        first = self.index == 0
+        if self._peek() in ("sign", "power", *(("times",) if first else ("number",))):
+            return _GrammarError(
+                f"{show(self.tokens[self.index][1])} makes this a computation, which is not done here",
+                "write the result: one number and its unit",
+            )
+        what = show(self.tokens[self.index][1]) if self.index < len(self.tokens) else "the end of the text"
+        return _GrammarError(
+            f"{what} stands where no unit can go on", 'write units with names, "*", "/" and "^", as in "kg*m^2/s"'
+        )
+
+    def _product(self) -> UnitSize:
+        size = self._factor()
+        while (word := self._peek()) not in ("end", "close"):
+            if word in ("times", "over"):
+                self._next()
+            elif word not in ("name", "open"):
+                raise self._misplaced()
+            size = _multiply(size, self._factor(), -1 if word == "over" else 1)
+        return size
+
+    def _factor(self) -> UnitSize:
+        word = self._peek()
+        if word == "name":
+            size = _named_size(self._next())
+        elif word == "number" and self.tokens[self.index][1] == "1":
+            self._next()
+            size = UnitSize(exact=Fraction(1), rounded=1.0, base=())
+        elif word == "open":
+            self._next()
+            size = self._product()
+            if self._peek() != "close":
+                raise self._misplaced()
+            self._next()
+        else:
+            raise self._misplaced()
+        if self._peek() == "power":
+            self._next()
+            return _power(size, self._exponent())
+        if self._peek() == "raised":
+            return _power(size, _RAISED[self._next()])
+        return size
+
+    def _exponent(self) -> Fraction:
+        enclosed = self._peek() == "open"
+        if enclosed:
+            self._next()
+        sign = -1 if self._peek() == "sign" and self._next() == "-" else 1
+        exponent = sign * self._decimal()
+        if enclosed:
+            if self._peek() == "over":
+                self._next()
+                divisor = self._decimal()
+                if divisor == 0:
+                    raise _GrammarError("a power with the denominator 0", 'write the power as in "m^1.5" or "m^(3/2)"')
+                exponent /= divisor
+            if self._peek() != "close":
+                raise self._misplaced()
+            self._next()
+        if abs(exponent) > MAX_EXPONENT:
+            raise _GrammarError(
+                "the power of a unit is too large", f"use powers between -{MAX_EXPONENT} and {MAX_EXPONENT}"
+            )
+        return exponent
+
+    def _decimal(self) -> Fraction:
+        if self._peek() != "number":
+            raise self._misplaced()
+        return Fraction(self._next())
+
+
+def _multiply(left: UnitSize, right: UnitSize, sign: int) -> UnitSize:
+    base = dict(left.base)
+    for name, power in right.base:
+        base[name] = base.get(name, Fraction(0)) + sign * power
+    return UnitSize(
+        exact=left.exact * right.exact**sign,
+        rounded=left.rounded * right.rounded**sign,
+        base=tuple(sorted((name, power) for name, power in base.items() if power)),
+    )
+
+
+def _power(size: UnitSize, exponent: Fraction) -> UnitSize:
+    base = tuple((name, power * exponent) for name, power in size.base if exponent)
+    try:
+        if exponent.denominator == 1:
+            whole = int(exponent)
+            return UnitSize(exact=size.exact**whole, rounded=size.rounded**whole, base=base)
+        # An irrational factor such as mm^0.5 is rounded; it stays apart so that the rest is not.
+        rounded = (float(size.exact) * size.rounded) ** float(exponent)
+    except (OverflowError, ZeroDivisionError):
+        rounded = math.inf
+    if not (math.isfinite(rounded) and rounded > 0.0):
+        raise _GrammarError("the size of the unit is not a finite number", "use units nearer to SI")
+    return UnitSize(exact=Fraction(1), rounded=rounded, base=base)
+
+
+@lru_cache(maxsize=1)
+def _registry() -> pint.UnitRegistry[Any]:
+    """Pint's registry in rational arithmetic; made at the first use, because reading its definitions takes 0.2 s."""
+    return pint.UnitRegistry(non_int_type=Fraction, cache_folder=None)
+
+
+@lru_cache(maxsize=512)
+def _named_size(name: str) -> UnitSize:
+    registry = _registry()
+    try:
+        # A container instead of text: pint's parser of expressions is not used.
+        unit = UnitsContainer({registry.get_name("deg" if name == "°" else name): 1})
+        zero, one = (registry.Quantity(Fraction(number), unit).to_root_units() for number in (0, 1))
+    except (pint.UndefinedUnitError, pint.DefinitionSyntaxError):
+        raise _GrammarError(f"no unit is called {show(name)}", _unit_hint(name)) from None
+    except TypeError:  # a logarithmic unit (dB), which rational arithmetic cannot hold
+        raise _not_proportional(name) from None
+    if zero.magnitude != 0:
+        raise _not_proportional(name)
+    return UnitSize(
+        exact=Fraction(str(one.magnitude)),
+        rounded=1.0,
+        base=tuple(sorted((str(base), Fraction(str(power))) for base, power in one.unit_items())),
+    )
+
+
+def _not_proportional(name: str) -> _GrammarError:
+    return _GrammarError(f'"{name}" is an offset or logarithmic unit', "use a unit that is proportional to its SI unit")
+
+
+def _unit_hint(name: str) -> str:
+    if re.fullmatch(r"[kMm]?N[mn]*m?", name):
+        return 'write products with "*", as in "N*m"'
+    if re.search(r"\d", name):
+        return 'write powers with "^", as in "mm^2"'
+    return 'use a unit such as m, mm, um, kg, s, N, Pa, deg, rad, rpm, Hz; products with "*", as in "N*m"'
+
+
+def _dimension_fault(
+    rest: str, size: UnitSize, target: UnitSize, kind: str, example: str, unit: str
+) -> tuple[str, str]:
+    """Problem and remedy for a unit of another dimension than `target`."""
+    if not rest:
+        return "the unit is missing", f'add the unit, as in "{example}"'
+    problem = f'the unit "{show(rest).strip(chr(34))}" has the wrong dimension for {kind}'
+    without_angle = [item for item in size.base if item[0] != "radian"]
+    if without_angle == [item for item in target.base if item[0] != "radian"]:
+        if unit == "rad/s":
+            return (
+                problem,
+                f'cycles per second are not rad/s: write "rpm", "rad/s" or "turn/s" instead of "{rest}"',
+            )
+        if unit == "Hz":
+            return problem, f'a frequency counts cycles: write "Hz" or "1/s" instead of "{rest}"'
+        if unit == "rad":
+            return problem, 'write the angle in "deg" or "rad"'
+    if unit == "1":
+        return problem, "leave out the unit"
+    if rest in ("Nm", "kNm"):
+        return problem, f'write products with "*": "{rest[:-1]}*m"'
+    return problem, f'use a unit as in "{example}" (SI: {unit})'
+
+
+def _plain_number(given: float) -> float | None:
+    try:
+        value = float(given)
+    except OverflowError:  # an integer of more than 308 digits
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _quoted(example: str, unit: str) -> str:
+    return example if unit == "1" else f'"{example}"'
+
+
+def _type_name(given: object) -> str:
+    names = {"dict": "a table", "list": "a list", "datetime": "a date", "date": "a date", "time": "a time of day"}
+    return names.get(type(given).__name__, "something else")

@@ -1,0 +1,451 @@
+"""The numbers of a scene: list them, check them, replace them.
+
+In: a `Scene`.  Out: its quantities; the faults of their values; a scene with other values.  The checks here are all
+that need nothing but numbers, so that a value from ``--set`` meets the same ones as a value from the file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from difflib import get_close_matches
+from typing import Any, cast
+
+from ballpass.derive.scene.errors import Fault, SceneError
+from ballpass.derive.scene.records import (
+    Bearing,
+    EquivalentMass,
+    HarmonicLoad,
+    HertzContact,
+    Mechanism,
+    Quantity,
+    Scene,
+    TableLoad,
+    Vector,
+    Window,
+)
+from ballpass.derive.scene.units import QuantityError, parse_quantity, show
+
+#: What stands in the file beside quantities, for the message where somebody asks to override it.
+_STRUCTURE = (
+    "bearing.balls",
+    "bearing.joint",
+    "bearing.damping.law",
+    "bearing.outer_ring.support",
+    "mechanism.driver.joint",
+)
+_TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What a value must satisfy: > above, >= least, <= most, < below; None bounds nothing."""
+
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+    below: float | None = None
+
+
+def quantities_of(record: object) -> Iterator[Quantity]:
+    """Every quantity of a record, in the order of its fields."""
+    if isinstance(record, Quantity):
+        yield record
+    elif isinstance(record, tuple):
+        for item in record:
+            yield from quantities_of(item)
+    elif is_dataclass(record) and not isinstance(record, type):
+        for field in fields(record):
+            yield from quantities_of(getattr(record, field.name))
+
+
+def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
+    """Faults of the values: signs, bounds, and what they must be to each other.
+
+    Parameters
+    ----------
+    scene : NaN stands for a value that has been reported before; it passes every check
+    given : text of a value by path, where the file has one; others are shown in SI
+    """
+    checker = _Checker(given)
+    if scene.mechanism is not None:
+        _check_mechanism(checker, scene.mechanism)
+    if isinstance(scene.load, HarmonicLoad):
+        checker.positive(scene.load.frequency)
+    if isinstance(scene.load, TableLoad):
+        _check_table(checker, scene.load)
+    if scene.bearing is not None:
+        _check_bearing(checker, scene.bearing)
+    _check_run(checker, scene)
+    return checker.faults
+
+
+def value_bounds(scene: Scene) -> dict[str, Bounds]:
+    """What each quantity alone must satisfy, by path; quantities that may have any value are not in it."""
+    checker = _Checker({})
+    if scene.mechanism is not None:
+        _check_mechanism(checker, scene.mechanism)
+    if isinstance(scene.load, HarmonicLoad):
+        checker.positive(scene.load.frequency)
+    if scene.bearing is not None:
+        _check_bearing(checker, scene.bearing)
+    return checker.bounds
+
+
+def value_relations(scene: Scene) -> tuple[tuple[str, float, str], ...]:
+    """What quantities must be to each other: (path, factor, other path) for ``value > factor * other value``."""
+    bearing = scene.bearing
+    if bearing is None:
+        return ()
+    ball, pitch = bearing.ball_diameter.path, bearing.pitch_diameter.path
+    # the balls fit side by side on the pitch circle, a hair's breadth apart
+    relations = [(pitch, (1.0 - 1e-12) / math.sin(math.pi / bearing.balls) if bearing.balls > 1 else 1.0, ball)]
+    relations.append((bearing.clearance.path, -1.0, ball))  # see `_check_preload`
+    if isinstance(bearing.contact, HertzContact):
+        grooves = (bearing.contact.inner_groove_radius, bearing.contact.outer_groove_radius)
+        relations += [(radius.path, 0.5, ball) for radius in grooves]
+    return tuple(relations)
+
+
+def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
+    """The scene with other values.
+
+    Parameters
+    ----------
+    values : SI values by path
+
+    Raises
+    ------
+    SceneError
+        An unknown path, a value that is not finite, or one that the same key of a file could not have.
+    """
+    known = {quantity.path: quantity for quantity in scene.quantities}
+    faults = []
+    changed: dict[str, Quantity] = {}
+    for path, value in values.items():
+        if path not in known:
+            faults.append(_unknown_path(path, list(known)))
+        elif not math.isfinite(value):
+            faults.append(
+                Fault(
+                    key=path,
+                    problem="the number is not finite",
+                    given=repr(float(value)),
+                    allowed=f"a finite number [{known[path].unit}]",
+                    remedy="give a finite number",
+                )
+            )
+        else:
+            changed[path] = replace(known[path], value=float(value))
+    if faults:
+        raise SceneError(faults)
+    result = cast(Scene, _replaced(scene, changed))
+    faults = value_faults(result, {})
+    if faults:
+        raise SceneError(faults)
+    return result
+
+
+def parse_override(scene: Scene, text: str) -> tuple[str, float]:
+    """Path and SI value of ``"bearing.clearance=20 um"``.
+
+    Raises
+    ------
+    SceneError
+        No "=", an unknown path (the nearest ones are named), or no quantity of its unit.
+    """
+    path, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        raise SceneError(
+            [
+                Fault(
+                    key=path,
+                    problem="an override without a value",
+                    given=show(text),
+                    allowed="PATH=VALUE",
+                    remedy='write the value with its unit behind "=", as in "bearing.clearance=20 um"',
+                )
+            ]
+        )
+    check_path(scene, path)
+    units = {quantity.path: quantity.unit for quantity in scene.quantities}
+    try:
+        return path, parse_quantity(value, units[path])
+    except QuantityError as error:
+        fault = Fault(key=path, problem=error.problem, given=error.given, allowed=error.allowed, remedy=error.remedy)
+        raise SceneError([fault]) from None
+
+
+def check_path(scene: Scene, path: str) -> None:
+    """Refuse a path that is none of the scene's numbers.
+
+    Raises
+    ------
+    SceneError
+        The nearest paths are named; what decides the structure of the model is told from what does not exist.
+    """
+    known = [quantity.path for quantity in scene.quantities]
+    if path not in known:
+        raise SceneError([_unknown_path(path, known)])
+
+
+def _unknown_path(path: str, known: Sequence[str]) -> Fault:
+    if path in _STRUCTURE or path.startswith("run."):
+        return Fault(
+            key=path,
+            problem="this is no number of the model"
+            + ("" if path.startswith("run.") else ": it decides which equations are derived"),
+            given=show(path),
+            allowed="paths of quantities",
+            remedy="change it in the scene file" + ("" if path.startswith("run.") else " and derive the model again"),
+        )
+    near = get_close_matches(path[:200], known, n=3, cutoff=0.5)
+    last = path.rpartition(".")[2]
+    near += [name for name in known if name.rpartition(".")[2] == last and name not in near][: 3 - len(near)]
+    return Fault(
+        key=path,
+        problem="the scene has no quantity of this path",
+        given=show(path),
+        allowed=", ".join(near) if near else f"one of {len(known)} paths, such as {', '.join(known[:5])}",
+        remedy=f'did you mean "{near[0]}"?' if near else "write the path as its keys stand in the scene file",
+    )
+
+
+def _replaced(record: Any, changed: Mapping[str, Quantity]) -> Any:
+    if isinstance(record, Quantity):
+        return changed.get(record.path, record)
+    if isinstance(record, tuple):
+        return tuple(_replaced(item, changed) for item in record)
+    if is_dataclass(record) and not isinstance(record, type):
+        return replace(
+            record, **{field.name: _replaced(getattr(record, field.name), changed) for field in fields(record)}
+        )
+    return record
+
+
+class _Checker:
+    """Notes faults, and the bounds it checks; a comparison with NaN is false, so every check asks for what is wrong."""
+
+    def __init__(self, given: Mapping[str, str]) -> None:
+        self.given = given
+        self.faults: list[Fault] = []
+        self.bounds: dict[str, Bounds] = {}
+
+    def show(self, quantity: Quantity) -> str:
+        unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+        return self.given.get(quantity.path, f"{quantity.value:.9g}{unit}")
+
+    def fault(self, path: str, problem: str, given: str, allowed: str, remedy: str) -> None:
+        self.faults.append(Fault(key=path, problem=problem, given=given, allowed=allowed, remedy=remedy))
+
+    def positive(self, quantity: Quantity | None, remedy: str = "give a positive value") -> None:
+        if quantity is None:
+            return
+        self.bounds[quantity.path] = Bounds(above=0.0)
+        if quantity.value <= 0.0:
+            what = "zero" if quantity.value == 0.0 else "negative"
+            self.fault(quantity.path, f"the value is {what}", self.show(quantity), "a value above zero", remedy)
+
+    def not_negative(self, quantity: Quantity | None, remedy: str = "give zero or a positive value") -> None:
+        if quantity is None:
+            return
+        self.bounds[quantity.path] = Bounds(least=0.0)
+        if quantity.value < 0.0:
+            self.fault(quantity.path, "the value is negative", self.show(quantity), "zero or a value above it", remedy)
+
+
+def _check_mechanism(checker: _Checker, mechanism: Mechanism) -> None:
+    points = list(mechanism.frame_points)
+    for body in mechanism.bodies:
+        checker.positive(body.mass, "every moving body has a mass: give it, small where it hardly matters")
+        checker.positive(body.inertia, "give a positive value, or delete the key for a body that does not rotate")
+        _check_polar(checker, body.center_of_mass)
+        points += body.points
+    for point in points:
+        if point.position.kind == "axis":
+            checker.positive(point.position.first, "give a positive length, or write the point as [x, y]")
+        _check_polar(checker, point.position)
+    for force in mechanism.forces:
+        _check_polar(checker, force.force)
+    windows = [window for force in mechanism.forces for window in force.windows]
+    windows += [window for torque in mechanism.torques for window in torque.windows]
+    for window in windows:
+        _check_window(checker, window)
+
+
+def _check_polar(checker: _Checker, vector: Vector) -> None:
+    if vector.kind == "polar":
+        checker.not_negative(vector.first, "give the amount, and turn the angle by 180 deg")
+
+
+def _check_window(checker: _Checker, window: Window) -> None:
+    span = window.end.value - window.start.value
+    if span == 0.0 or abs(span) >= _TURN * (1.0 - 1e-12):
+        checker.fault(
+            window.end.path,
+            "the window is empty or as long as a whole turn",
+            f"start {checker.show(window.start)}, end {checker.show(window.end)}",
+            "two angles that differ, by less than a turn; from start counter-clockwise to end",
+            "give another end, or delete the window for a load that always acts",
+        )
+
+
+def _check_table(checker: _Checker, load: TableLoad) -> None:
+    rows = {"time": len(load.time), "x": len(load.x), "y": len(load.y)}
+    if min(rows.values()) == 0:  # reported when it was read
+        return
+    if min(rows.values()) != max(rows.values()):
+        checker.fault(
+            "load",
+            "the columns of the table differ in length",
+            ", ".join(f"{name}: {count}" for name, count in rows.items()),
+            "three columns of one length",
+            "give every row a time, x and y",
+        )
+    elif len(load.time) < 2:
+        checker.fault(
+            "load.time",
+            "the table has too few rows",
+            str(len(load.time)),
+            "two rows or more",
+            'add rows, or write type = "constant"',
+        )
+    for before, behind in zip(load.time, load.time[1:], strict=False):
+        if behind.value <= before.value:
+            checker.fault(
+                behind.path,
+                "the time does not increase",
+                f"{checker.show(behind)} after {checker.show(before)}",
+                "strictly increasing times",
+                "sort the rows by time; write a jump as two rows with a short time between them",
+            )
+
+
+def _check_bearing(checker: _Checker, bearing: Bearing) -> None:
+    if bearing.share is not None:
+        checker.bounds[bearing.share.path] = Bounds(least=0.0, most=1.0)
+    if bearing.share is not None and (bearing.share.value < 0.0 or bearing.share.value > 1.0):
+        checker.fault(
+            bearing.share.path,
+            "the share lies outside its bounds",
+            checker.show(bearing.share),
+            "a number from 0 to 1",
+            "give the part of the joint's reaction that this bearing carries: 0.5 for one of a pair",
+        )
+    checker.positive(bearing.ball_diameter)
+    checker.positive(bearing.pitch_diameter)
+    _check_balls(checker, bearing)
+    _check_preload(checker, bearing)
+    if isinstance(bearing.contact, HertzContact):
+        _check_hertz(checker, bearing.contact, bearing.ball_diameter)
+    else:
+        checker.positive(bearing.contact.stiffness)
+    for width in (bearing.contact.smoothing, bearing.damping.smoothing):
+        if width is not None:
+            checker.positive(width, "give a small width, or delete the key for the law itself")
+    checker.not_negative(bearing.damping.coefficient)
+    checker.not_negative(bearing.damping.ratio)
+    if isinstance(bearing.inner.mass, EquivalentMass):
+        checker.positive(bearing.inner.mass.ring)
+        # Zero is a crankpin whose mass is part of the crank's.
+        checker.not_negative(bearing.inner.mass.crankpin)
+    else:
+        checker.positive(bearing.inner.mass)
+    checker.not_negative(bearing.inner.damping)
+    if bearing.outer is not None:
+        checker.positive(bearing.outer.mass, 'give the moved mass, or write support = "fixed"')
+        checker.not_negative(bearing.outer.stiffness)
+        checker.not_negative(bearing.outer.damping)
+
+
+def _check_balls(checker: _Checker, bearing: Bearing) -> None:
+    ball, pitch = bearing.ball_diameter, bearing.pitch_diameter
+    if ball.value <= 0.0 or pitch.value <= 0.0:
+        return
+    if pitch.value <= ball.value:
+        checker.fault(
+            pitch.path,
+            "the pitch diameter does not exceed the ball diameter",
+            f"pitch diameter {checker.show(pitch)}, ball diameter {checker.show(ball)}",
+            "a pitch diameter above the ball diameter",
+            "check both: the pitch diameter is about the mean of bore and outside diameter",
+        )
+        return
+    room = pitch.value * math.sin(math.pi / bearing.balls)
+    if room < ball.value:
+        most = int(math.pi / math.asin(ball.value / pitch.value))
+        checker.fault(
+            "bearing.balls",
+            "the balls do not fit on the pitch circle",
+            f"{bearing.balls} balls of {ball.value:.6g} m, {room:.6g} m from centre to centre",
+            f"at most {most} balls of this diameter on this circle",
+            "check ball count, ball diameter and pitch diameter",
+        )
+
+
+def _check_preload(checker: _Checker, bearing: Bearing) -> None:
+    """A preload as large as a ball leaves no room for one.  A clearance may be of any width: it is a free ring then."""
+    ball, clearance = bearing.ball_diameter, bearing.clearance
+    if ball.value <= 0.0 or not -clearance.value >= ball.value:
+        return
+    checker.fault(
+        clearance.path,
+        "the preload (a negative clearance) is as large as a ball",
+        f"{checker.show(clearance)}, ball diameter {checker.show(ball)}",
+        f"a diametral clearance above -{ball.value:.9g} m, the ball diameter",
+        'check its unit: clearances are some micrometres, "10 um"',
+    )
+
+
+def _check_hertz(checker: _Checker, contact: HertzContact, ball: Quantity) -> None:
+    for radius in (contact.inner_groove_radius, contact.outer_groove_radius):
+        checker.positive(radius)
+        if 0.0 < radius.value <= 0.5 * ball.value:
+            checker.fault(
+                radius.path,
+                "the groove is not wider than the ball",
+                f"groove radius {checker.show(radius)}, ball diameter {checker.show(ball)}",
+                f"a radius above half the ball diameter, {0.5e3 * ball.value:.6g} mm",
+                "give 0.51 to 0.54 of the ball diameter, as deep groove ball bearings have",
+            )
+    for material in (contact.ring, contact.ball):
+        if material is None:
+            continue
+        checker.positive(material.young_modulus)
+        poisson = material.poisson_ratio
+        checker.bounds[poisson.path] = Bounds(above=-1.0, below=0.5)
+        if poisson.value <= -1.0 or poisson.value >= 0.5:
+            checker.fault(
+                poisson.path,
+                "Poisson's ratio lies outside its bounds",
+                checker.show(poisson),
+                "a number between -1 and 0.5, bounds excluded",
+                "give about 0.3 for steel",
+            )
+
+
+def _check_run(checker: _Checker, scene: Scene) -> None:
+    source = scene.mechanism.driver if scene.mechanism is not None else scene.shaft
+    if source is None:
+        return
+    run, speed = scene.run, source.speed
+    if speed.value == 0.0 and run.cycles is not None:
+        checker.fault(
+            "run.cycles",
+            "nothing turns, so there are no cycles",
+            f"{speed.path} = {checker.show(speed)}",
+            "a duration where the speed is zero",
+            'write duration = "0.5 s" instead of cycles (or run with --duration "0.5 s"), or give a speed',
+        )
+    if run.duration is None or not run.transient_cycles > 0.0:
+        return
+    turns = run.duration * abs(speed.value) / _TURN
+    if turns <= run.transient_cycles:
+        checker.fault(
+            "run.transient_cycles",
+            "the transient cycles fill the whole run",
+            f"{run.transient_cycles:g} cycles of {turns:g} in {run.duration:g} s",
+            "fewer cycles than the run has",
+            "run longer, or drop fewer cycles (--transient 0)",
+        )

@@ -1,0 +1,396 @@
+"""The command line: ``ballpass run | derive | equations``.
+
+The one module that knows both halves; it imports `ballpass.derive` where a command needs it.  Messages and progress go
+to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 the request was wrong, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import sys
+import threading
+from importlib.metadata import version
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from ballpass.runtime.app.commands.explain import explain
+from ballpass.runtime.app.commands.jacobian import jacobian, linearize
+from ballpass.runtime.app.commands.options import (
+    Cycles,
+    Duration,
+    Figures,
+    Json,
+    ResultsFolder,
+    SceneFile,
+    Settings,
+    Tolerance,
+)
+from ballpass.runtime.app.commands.sensitivity import sensitivity
+from ballpass.runtime.app.commands.shared import (
+    Stages,
+    check_folder,
+    checked_kinks,
+    complain,
+    faults_of,
+    faults_of_turns,
+    load_model,
+    note,
+    read_duration,
+    read_with_settings,
+    reported,
+    warnings_shown,
+)
+from ballpass.runtime.app.commands.sweep import sweep
+from ballpass.runtime.app.commands.trade import read_error, trade, usable_trade
+from ballpass.runtime.app.entry import INTERRUPTED, leave_at_once
+from ballpass.runtime.contract.errors import RequestError
+
+if TYPE_CHECKING:
+    from ballpass.derive import Scene
+    from ballpass.runtime.model import Model
+    from ballpass.runtime.run.solution import Solution
+
+#: Bytes of samples that are written without a word.
+LARGE = 200_000_000
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Planar mechanisms and the ball bearings they load: from a scene file to derived equations, generated C, a "
+    "simulation and figures. Start with: ballpass run scenes/punching_press.toml",
+    epilog="Results go to stdout, messages and progress to stderr. Exit codes: 0 done, 1 the computation failed, 2 the "
+    "request was wrong.",
+)
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"ballpass {version('ballpass')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Options of `ballpass` itself; the commands have their own."""
+
+
+@app.command()
+def run(
+    scene: SceneFile,
+    cycles: Cycles = None,
+    duration: Duration = None,
+    transient: Annotated[
+        float | None, typer.Option(metavar="N", help="Turns at the start that summary and figures leave out.")
+    ] = None,
+    set_: Settings = None,
+    rtol: Tolerance = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Integrator: auto, stepper (or stepper-rodas4, -rodas5p, -dp54, -dop853), erk, rosenbrock, "
+            "cvodes; or quasi-static, the rings in equilibrium at each instant.",
+        ),
+    ] = None,
+    kinks: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOW",
+            help="What the stepper does where a law has a kink or jump: stepped-over, left to error control, or "
+            "located, so that its steps end there. Default: located at tight tolerances of auto and stepper.",
+        ),
+    ] = None,
+    error: Annotated[
+        str | None,
+        typer.Option(
+            metavar="E",
+            help="Relative error wanted, as 1% or 0.01, instead of method and rtol: both are chosen, and the error of "
+            "the run is estimated.",
+        ),
+    ] = None,
+    of: Annotated[
+        list[str] | None,
+        typer.Option("--of", metavar="Q", help="Quantity that --error is about: peak_ball_force. May be repeated."),
+    ] = None,
+    full_model: Annotated[
+        bool, typer.Option("--full-model", help="With --error: take no simpler model, however accurate and fast.")
+    ] = False,
+    out: ResultsFolder = None,
+    json_: Json = False,
+    figures: Figures = True,
+) -> None:
+    """Simulate a scene; write solution, summary and figures.
+
+    Derives and compiles what is stale in generated/<scene>. What is not given here is as the scene's run table says.
+    """
+    with reported(), warnings_shown(), Stages() as stages:
+        stages("read")
+        seconds = read_duration(duration, cycles)
+        read, asked, overrides = read_with_settings(scene, set_ or [], seconds, transient)
+        _check_request(asked, cycles, transient, rtol, method)
+        at_kinks = checked_kinks(kinks, method or read.run.method, error)
+        target = read_error(error, of, method, rtol)
+        folder = out if out is not None else Path("results") / read.name
+        check_folder(folder)
+        with faults_of(scene):
+            model = load_model(read, stages, method or read.run.method, kinks, rtol)
+        measured = usable_trade(folder, asked, read) if target is not None else None
+        stages("simulate")
+        solution = model.simulate(
+            cycles=cycles,
+            duration=seconds,
+            transient=transient,
+            parameters=overrides,
+            method=method,
+            rtol=rtol,
+            kinks=at_kinks,
+            progress=stages.fraction,
+            error=target,
+            of=of,
+            trade=measured,
+            models="full" if full_model else "any",
+        )
+        if measured is not None and solution.accuracy is not None and solution.accuracy.model in measured.folders:
+            # the solution is of the model that was chosen, which may be a simpler one
+            model = measured.model(solution.accuracy.model)
+        _note_size(solution)
+        summary, files = _write_results(model, solution, folder, stages, figures=figures)
+    from ballpass.runtime.app.summary import render_summary
+
+    if json_:
+        typer.echo(json.dumps(summary, indent=2, allow_nan=False))
+    else:
+        console = Console()
+        console.print(render_summary(summary))
+        if solution.accuracy is not None:
+            console.print(solution.accuracy.words, highlight=False, soft_wrap=True, markup=False)
+        size = _size((folder / "solution.nc").stat().st_size)
+        told = f"results in {folder}: {', '.join(files)} (solution.nc: {size})"
+        console.print(told, highlight=False, soft_wrap=True, markup=False)
+
+
+@app.command()
+def derive(
+    scene: SceneFile,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder to write; generated/<scene> if not given.")
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Write nothing; exit 1 where the folder differs from what is derived today.")
+    ] = False,
+) -> None:
+    """Derive the equations of a scene and generate its C, functions, manifest and EQUATIONS.md."""
+    from ballpass import derive as deriving
+
+    with reported(), warnings_shown(), Stages() as stages, faults_of(scene):
+        if check:
+            stages("check")
+            result = deriving.check(scene, out)
+        else:
+            folder = deriving.generate(scene, out, progress=stages)
+    if not check:
+        typer.echo(str(folder))
+    elif result.stale:
+        state = f"is stale: {', '.join(result.stale)}" if result.folder.is_dir() else "does not exist"
+        command = f"ballpass derive {scene}" + (f" --out {out}" if out is not None else "")
+        complain(f"{result.folder} {state}. Run: {command}")
+        raise typer.Exit(1)
+    else:
+        typer.echo(f"{result.folder} is up to date")
+
+
+@app.command()
+def equations(scene: SceneFile) -> None:
+    """Print the derived equations of a scene as Markdown with LaTeX."""
+    from ballpass import derive as deriving
+
+    with reported(), faults_of(scene):
+        text = deriving.equations(deriving.derive(deriving.read_scene(scene)))
+    typer.echo(text, nl=False)
+
+
+@app.command()
+def export(
+    scene: SceneFile,
+    c: Annotated[
+        bool, typer.Option("--c", help="A C99 program with the model, the stepper, a Makefile and a main.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder to write; export/<scene> if not given.")
+    ] = None,
+) -> None:
+    """Write a scene as a program that runs without Python: make, and it prints the motion as CSV."""
+    from ballpass.derive import generate, read_scene
+
+    with reported(), warnings_shown():
+        if not c:
+            raise RequestError("export: no format was given. Allowed: --c, a program in C99.")
+        with Stages() as stages, faults_of(scene):
+            stages("read")
+            read = read_scene(scene)
+            folder = out if out is not None else Path("export") / read.name
+            check_folder(folder)
+            generated = generate(read, progress=stages)
+            stages("export")
+            # here, for it brings CasADi
+            from ballpass.runtime.export.c_program import export_c
+
+            export_c(generated, folder)
+    typer.echo(str(folder))
+
+
+app.command()(explain)
+app.command()(jacobian)
+app.command()(linearize)
+app.command()(sensitivity)
+app.command()(sweep)
+app.command()(trade)
+
+
+def _check_request(
+    scene: Scene, cycles: float | None, transient: float | None, rtol: float | None, method: str | None
+) -> None:
+    """Refuse options that no model can follow, before anything is derived or written."""
+    from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
+    from ballpass.runtime.contract.parameters import unknown_name
+    from ballpass.runtime.native.stepper import METHODS as STEPPERS
+    from ballpass.runtime.run.casadi_integrators import METHODS
+    from ballpass.runtime.run.request import TOLERANCES
+
+    faults = []
+    known = ("auto", *STEPPERS, QUASI_STATIC, *METHODS)
+    if method is not None and method not in known:
+        faults.append(f"--method: {unknown_name('method', method, known)}")
+    if rtol is not None and not TOLERANCES[0] <= rtol <= TOLERANCES[1]:
+        faults.append(
+            f"--rtol: {rtol:g} lies outside its bounds. Allowed: {TOLERANCES[0]:g} to {TOLERANCES[1]:g}. "
+            "Take 1e-6 where nothing speaks for another value."
+        )
+    faults += faults_of_turns(cycles, transient)
+    if faults:
+        raise RequestError("\n".join(faults))
+    shaft = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
+    speed = abs(shaft.value) if shaft is not None else 0.0
+    if cycles is not None and speed == 0.0:
+        raise RequestError(
+            f"--cycles: {cycles:g} turns were asked for, but nothing turns in this scene. Give it a speed, or a "
+            'time instead of turns: --duration "0.5 s".'
+        )
+    turns = cycles if cycles is not None else scene.run.cycles
+    if turns is None:
+        turns = (scene.run.duration or 0.0) * speed / math.tau
+    dropped = scene.run.transient_cycles if transient is None else transient
+    if dropped > 0.0 and turns <= dropped:
+        raise RequestError(
+            f"The run of {turns:g} turns lies within its {dropped:g} transient turns: nothing is left to report. "
+            f"Allowed: fewer transient turns than turns. Simulate more (--cycles {dropped + 2:g}) or drop fewer "
+            "(--transient 0)."
+        )
+
+
+def _note_size(solution: Solution) -> None:
+    """Say so before a file is written that is larger than most people expect."""
+    if solution.nbytes > LARGE:
+        note(
+            f"{len(solution)} samples, about {_size(solution.nbytes)}; fewer with samples_per_cycle, none with "
+            "Model.reduce."
+        )
+
+
+def _size(count: int) -> str:
+    """Bytes for people."""
+    return f"{count / 1e6:.0f} MB" if count >= 1e6 else f"{math.ceil(count / 1e3)} kB"
+
+
+def _write_results(
+    model: Model, solution: Solution, folder: Path, stages: Stages, *, figures: bool
+) -> tuple[dict[str, Any], list[str]]:
+    """Write solution, summary and figures in the place of those of an earlier run.
+
+    Returns
+    -------
+    The summary, and the names of the files.
+    """
+    from ballpass.runtime.app.results import SOLUTION, write_results
+    from ballpass.runtime.app.summary import summarize
+
+    stages("write")
+    summary = summarize(model, solution)
+    if solution.accuracy is not None:
+        summary["accuracy"] = solution.accuracy.plain()
+
+    def write(made: Path) -> dict[str, Any]:
+        solution.save(made / SOLUTION)
+        if figures:
+            from ballpass.runtime.app.figures import draw_all
+
+            stages("draw")
+            draw_all(model, solution, made)
+        return summary
+
+    return write_results(folder, write, figures=_figures(folder))
+
+
+def _figures(folder: Path) -> list[str]:
+    """Names of the figures that an earlier run may have left in a folder."""
+    if not any(folder.glob("*.png")):
+        return []
+    from ballpass.runtime.app.figures import FIGURES
+
+    return [f"{kind.name}.png" for kind in FIGURES]
+
+
+def main() -> None:
+    """Run the command line; `ballpass.runtime.app.entry` is where the command begins.
+
+    An interrupt (Ctrl-C) ends it with exit code 130 wherever it arrives: within a command, between two, or while a
+    module is imported, where Python may turn it into another exception.
+    """
+    heard: list[int] = []
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        heard.append(number)
+        signal.default_int_handler(number, frame)
+
+    def swallowed(told: sys.UnraisableHookArgs) -> None:
+        """An interrupt that arrived where Python ignores exceptions, as in a callback of a weak reference: again."""
+        if not (heard and issubclass(told.exc_type, KeyboardInterrupt)):
+            sys.__unraisablehook__(told)
+            return
+        again = threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT))  # sent here it would be swallowed as well
+        again.daemon = True
+        again.start()
+
+    before = sys.unraisablehook
+    if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, leave_at_once):  # else somebody wants it ignored
+        signal.signal(signal.SIGINT, hear)
+        sys.unraisablehook = swallowed
+    try:
+        app()
+    except (Exception, KeyboardInterrupt):  # whatever an interrupt became; all else shows itself
+        if not heard:
+            raise
+        complain(INTERRUPTED)
+        sys.exit(130)
+    except SystemExit as ended:
+        # typer makes a silent end of an interrupt that arrives before or behind what a command reports itself
+        if heard and isinstance(getattr(ended.__context__, "__cause__", None), KeyboardInterrupt):
+            complain(INTERRUPTED)
+        raise
+    finally:
+        # what is done is done: while the interpreter shuts down it would end the process by the signal itself
+        if signal.getsignal(signal.SIGINT) is hear:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+        sys.unraisablehook = before

@@ -1,0 +1,230 @@
+"""``ballpass explain``: what a scene models and why, what it does not, what that costs, and what it means for a run."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.console import Console, Group
+from rich.markup import escape
+from rich.padding import Padding
+from rich.table import Table
+
+from ballpass.runtime.app.commands.options import Json, SceneFile, Settings
+from ballpass.runtime.app.commands.shared import Stages, faults_of, load_model, read_with_settings, reported
+from ballpass.runtime.contract.smoothness import WORDS
+
+if TYPE_CHECKING:
+    from ballpass.derive import Scene
+    from ballpass.derive.features import Cost
+    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.point.explain import Explanation
+
+#: Names of derivatives and of the values that they are taken of, which the table sums up.
+_DERIVATIVE = re.compile(r"_jac(_[a-z])?$|_tangent$|_quantities$|^static_forces$")
+
+#: What no scene can ask for; said, so that nobody takes the model for more than it is.
+_NEVER = (
+    "lubricant film and friction of the contacts",
+    "slip of the cage and of the balls; their inertia and centrifugal force",
+    "axial motion and tilting of the rings",
+    "elasticity of the mechanism's bodies and of the rings themselves",
+    "variation of the drive's speed",
+)
+
+
+def explain(
+    scene: SceneFile,
+    set_: Settings = None,
+    json_: Json = False,
+) -> None:
+    """Say what a scene models and which of its lines asked for it, what it does not, the cost of each part, and the
+    time scales that decide about the method. Simulates nothing."""
+    from ballpass.derive.features import cost
+
+    with reported(), Stages() as stages:
+        stages("read")
+        read, _, overrides = read_with_settings(scene, set_ or [])
+        with faults_of(scene):
+            model = load_model(read, stages, "erk")
+            stages("counting operations")
+            counted = cost(read)
+        stages("looking at time scales")
+        said = model.explain(overrides)
+    report = _report(scene, read, counted, said, model.manifest)
+    if json_:
+        typer.echo(json.dumps(report, indent=2, allow_nan=False))
+    else:
+        Console().print(_render(report), highlight=False)
+
+
+def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest: Manifest) -> dict[str, Any]:
+    """All that is said, as plain numbers and text; angles in degrees, everything else SI."""
+    from ballpass.derive.features import features
+    from ballpass.derive.scene.toml_lines import index_lines
+
+    lines = index_lines(path.read_text(encoding="utf-8"))
+    kernels = {k.removeprefix("kernel."): v for k, v in counted.functions.items() if k.startswith("kernel.")}
+    parts: list[dict[str, Any]] = []
+    named = features(scene)
+    for feature in named:
+        added = counted.added.get(feature.name)
+        rest = None
+        if added is None and feature.path == "bearing.contact" and "rhs" in counted.functions:
+            rest = _rest([(f.path, counted.added[f.name]["rhs"]) for f in named if f.name in counted.added], counted)
+        parts.append(
+            {
+                "name": feature.name,
+                "path": feature.path,
+                "line": lines.find(tuple(feature.path.split("."))),
+                "what": feature.modelled,
+                "operations": None if added is None else {k: v for k, v in added.items() if v},
+                "rest": rest,
+            }
+        )
+    return {
+        "scene": scene.name,
+        "mechanism": scene.mechanism is not None,
+        "title": scene.title,
+        "file": str(path),
+        "modelled": parts,
+        "not_modelled": [*_absent(scene), *_NEVER],
+        "states": list(said.states),
+        "outputs": list(said.outputs),
+        "functions": {f.name: {"operations": f.operations, "what": f.description} for f in manifest.functions},
+        "step": _step(kernels, scene.bearing.balls if scene.bearing else 0),
+        "breakpoints": [
+            {"time": b.time, "angle_deg": math.degrees(b.angle), "cause": b.cause} for b in said.breakpoints
+        ],
+        "turn": said.turn if math.isfinite(said.turn) else None,
+        "smoothness": [{"law": law, "is": kind, "words": WORDS[kind]} for law, kind in said.smoothness],
+        "time_scales": [
+            asdict(s) | {"angle_deg": math.degrees(s.angle), "stiffness": _number(s.stiffness)} for s in said.scales
+        ],
+        "without_equilibrium": list(said.unsupported),
+        "method": {"auto": said.method, "reason": said.reason},
+    }
+
+
+def _rest(shares: list[tuple[str, int]], counted: Cost) -> int:
+    """Operations of the right-hand side that no part adds by itself; a part within another counts with that one."""
+    paths = [path for path, _ in shares]
+    within = [
+        any(path.startswith(f"{other}.") for other in paths)
+        or (path == "bearing.load_harmonics" and "mechanism" in paths)
+        for path in paths
+    ]
+    return counted.functions["rhs"] - sum(v for (_, v), inner in zip(shares, within, strict=True) if not inner)
+
+
+def _step(kernels: dict[str, int], balls: int) -> dict[str, int]:
+    """Operations of one evaluation of the right-hand side in the stepper, by part."""
+    if not kernels:
+        return {}
+    # each ball turns its direction, projects the motion and adds its force to two sums
+    around = 2 * 3 + 4 + 1 + 4
+    parts = {
+        "load and mechanism": kernels["stage"],
+        "motion of the rings": kernels["relative"] + kernels["acceleration"],
+        "ball contacts": balls * (kernels["law"] + around),
+    }
+    return parts | {"all": sum(parts.values())}
+
+
+def _absent(scene: Scene) -> list[str]:
+    """What this scene could name and does not, and how it would."""
+    out = []
+    mechanism, bearing = scene.mechanism, scene.bearing
+    if mechanism is None:
+        out.append("a mechanism: the load is given ([mechanism])")
+    else:
+        if mechanism.gravity is None:
+            out.append("weight of the mechanism's bodies (mechanism.gravity)")
+        if not mechanism.forces and not mechanism.torques:
+            out.append("forces and torques of the process ([mechanism.forces.NAME], [mechanism.torques.NAME])")
+    if bearing is None:
+        out.append("a bearing: forces of the mechanism only ([bearing])")
+        return out
+    if bearing.damping.law == "none":
+        out.append("damping at the balls (bearing.damping)")
+    if bearing.inner.damping is None:
+        out.append("viscous damping of the inner ring to the frame (bearing.inner_ring.damping)")
+    if bearing.outer is None:
+        out.append('motion of the outer ring (bearing.outer_ring, support = "elastic")')
+    return out
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _render(report: dict[str, Any]) -> Group:
+    share = "share of rhs"
+    total = report["functions"].get("rhs", {}).get("operations", 0)
+    modelled = Table("part", "line", "what", share, title="Modelled", title_justify="left", box=None, pad_edge=False)
+    modelled.columns[3].justify = "right"
+    for part in report["modelled"]:
+        counts, name = part["operations"], part["name"]
+        added = part["rest"] if counts is None else counts.get("rhs", 0)
+        if part["rest"] is not None:
+            name = "rest: ball contacts and rings"
+        cell = "" if added is None or not total else f"{added} ({100 * added / total:.0f} %)"
+        line = "" if part["line"] is None else str(part["line"])
+        modelled.add_row(escape(name), line, escape(part["what"]), cell)
+
+    functions = Table(
+        "function", "operations", "what", title="Generated functions", title_justify="left", box=None, pad_edge=False
+    )
+    functions.columns[1].justify = "right"
+    queries = 0
+    for name, info in report["functions"].items():
+        if _DERIVATIVE.search(name):
+            queries += 1
+        elif info["operations"]:
+            functions.add_row(name, str(info["operations"]), escape(info["what"]))
+    functions.add_row("for derivatives", "", f"{queries} functions, compiled when a query first needs them (--json)")
+
+    angle = "crank angle" if report["mechanism"] else "shaft angle"
+    scales = Table(
+        *("at", angle, "fastest decay", "fastest frequency f", "slowest rate", "decay / (2π f)"),
+        title="Time scales of small motions",
+        caption="decay / (2π f): of a single mode, up to 1, its damping ratio; above 3 decay bounds explicit steps",
+        title_justify="left",
+        caption_justify="left",
+        box=None,
+        pad_edge=False,
+    )
+    for entry in report["time_scales"]:
+        stiffness = entry["stiffness"]
+        scales.add_row(
+            entry["name"],
+            f"{entry['angle_deg']:.0f}°",
+            f"{entry['decay']:.3g} 1/s",
+            f"{entry['frequency'] / math.tau:.3g} Hz",
+            f"{entry['slowest']:.3g} 1/s",
+            "" if stiffness is None else f"{stiffness:.2g}",
+        )
+
+    blocks: list[Any] = [f"[bold]{escape(report['title'])}[/]", "", modelled, ""]
+    blocks += [
+        "[italic]Not modelled[/]",
+        *(Padding(f"- {escape(text)}", (0, 0, 0, 2)) for text in report["not_modelled"]),
+    ]
+    blocks += ["", f"[italic]States[/] {', '.join(report['states']) or 'none'}", "", functions]
+    if report["step"]:
+        parts = ", ".join(f"{name} {count}" for name, count in report["step"].items() if name != "all")
+        blocks += ["", f"[italic]One evaluation in the stepper[/] {report['step']['all']} operations: {parts}"]
+    where = "; ".join(f"{b['angle_deg']:.4g}° {b['cause']}" for b in report["breakpoints"]) or "none"
+    blocks += ["", f"[italic]Breakpoints of the first turn[/] {escape(where)}"]
+    laws = "; ".join(f"{entry['law']}: {entry['words']}" for entry in report["smoothness"]) or "no contact laws"
+    blocks += [f"[italic]Smoothness[/] {escape(laws)}"]
+    if report["time_scales"]:
+        blocks += ["", scales]
+    blocks += [f"no equilibrium at {escape(text)}" for text in report["without_equilibrium"]]
+    blocks += ["", f"[italic]Method[/] auto takes {report['method']['auto']}: {escape(report['method']['reason'])}"]
+    return Group(*blocks)

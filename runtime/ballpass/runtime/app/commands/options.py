@@ -1,0 +1,42 @@
+"""Options that several commands of ``ballpass`` have, each with one name, one meaning and one help text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+SceneFile = Annotated[
+    Path,
+    typer.Argument(help="Scene file (TOML). The folder scenes/ has some to copy.", show_default=False),
+]
+
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="PATH=VALUE",
+        help='Another value for a number of the scene: --set bearing.clearance="20 um". May be repeated.',
+    ),
+]
+
+Cycles = Annotated[float | None, typer.Option(metavar="N", help="Turns of driver or shaft to simulate.")]
+
+Duration = Annotated[
+    str | None,
+    typer.Option(metavar="TIME", help='Time to simulate instead of turns: --duration "0.5 s", also at speed 0.'),
+]
+
+#: Of commands that give numbers of the steady motion; ``ballpass run`` keeps the transient in its solution.
+Transient = Annotated[float | None, typer.Option(metavar="N", help="Turns at the start that do not count.")]
+
+Tolerance = Annotated[float | None, typer.Option(metavar="R", help="Relative tolerance of the integrator.")]
+
+ResultsFolder = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder of the results; results/<scene> if not given.")
+]
+
+Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object on stdout, nothing else.")]
+
+Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")]

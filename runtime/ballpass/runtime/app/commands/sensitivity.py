@@ -1,0 +1,127 @@
+"""``ballpass sensitivity``: which parameters move what, with a certificate for each number."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from ballpass.runtime.app.commands.options import Cycles, Json, SceneFile, Settings, Transient
+from ballpass.runtime.app.commands.shared import (
+    Stages,
+    check_folder,
+    complain,
+    faults_of,
+    load_model,
+    read_with_settings,
+    reported,
+    warnings_shown,
+)
+
+#: Rows of a table on the terminal.
+ROWS = 15
+
+
+def sensitivity(
+    scene: SceneFile,
+    of: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="Q",
+            help="Quantity: max:ball.force (or peak_ball_force), rms:inner.y, value:inner.y@240deg, "
+            "amplitude:inner.y@bpfo, drive_work, static_deflection@240deg ... May be repeated. Peak ball force and "
+            "motion of the rings if none is given.",
+        ),
+    ] = None,
+    wrt: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="P",
+            help='Parameter by its path in the scene, or a pattern, as "bearing.*". May be repeated. All if none is '
+            "given.",
+        ),
+    ] = None,
+    set_: Settings = None,
+    cycles: Cycles = None,
+    transient: Transient = None,
+    rtol: Annotated[
+        float | None, typer.Option(metavar="R", help="Tolerance of the states; tight if not given.")
+    ] = None,
+    sensitivity_rtol: Annotated[
+        float | None, typer.Option(metavar="R", help="Tolerance of the derivatives; tight if not given.")
+    ] = None,
+    method: Annotated[
+        str, typer.Option(metavar="NAME", help="Of the derivatives: auto, a stepper's name, or erk.")
+    ] = "auto",
+    check: Annotated[
+        str,
+        typer.Option("--check", metavar="ROUTE", help="Second route: differences, erk (forward) or adjoint (of erk)."),
+    ] = "differences",
+    no_check: Annotated[bool, typer.Option("--no-check", help="Give derivatives without certificates.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for report and charts; none are written if not given.")
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Differentiate quantities of interest by parameters, and check every derivative by a second route.
+
+    Exit code 1 where the two routes disagree; both numbers are told. Charts rank what moves a quantity most.
+    """
+    with reported(), warnings_shown(), Stages() as stages:
+        stages("read")
+        read, _, overrides = read_with_settings(scene, set_ or [])
+        if out is not None:
+            check_folder(out)
+        with faults_of(scene):
+            model = load_model(read, stages, method)
+        begun: list[str] = []
+
+        def progress(words: str, fraction: float) -> None:
+            if words not in begun:
+                begun.append(words)
+                stages(words)
+            stages.fraction(fraction)
+
+        report = model.sensitivity(
+            of or None,
+            wrt or None,
+            cycles,
+            transient=transient,
+            parameters=overrides,
+            method=method,
+            check=False if no_check else check,  # type: ignore[arg-type]  # wrong words are refused with a message
+            rtol=rtol,
+            sensitivity_rtol=sensitivity_rtol,
+            progress=progress,
+        )
+        written: list[Path] = []
+        if out is not None:
+            from ballpass.runtime.app.figures.tornado import draw_tornados
+
+            stages("draw")
+            out.mkdir(parents=True, exist_ok=True)
+            place = out / "sensitivity.json"
+            place.write_text(json.dumps(report.to_json(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+            written = [place, *draw_tornados(report, out)]
+    from ballpass.runtime.certify.sensitivity_table import render_report
+
+    if json_:
+        typer.echo(json.dumps(report.to_json(), indent=2, allow_nan=False))
+    else:
+        console = Console()
+        console.print(render_report(report, top=ROWS))
+        if written:
+            names = ", ".join(path.name for path in written)
+            console.print(f"results in {out}: {names}", highlight=False, soft_wrap=True, markup=False)
+    if report.disagreements:
+        first = report.disagreements[0]
+        complain(
+            f"{len(report.disagreements)} of {len(report.pairs)} derivatives disagree with their second route, "
+            f"{first.check.route}, first d({first.quantity})/d({first.parameter}): {first.derivative:.9g} and "
+            f"{'no number' if first.check.value is None else format(first.check.value, '.9g')} {first.unit}. "
+            "Do not rely on them; take a tighter --rtol and --sensitivity-rtol, or fewer turns."
+        )
+        raise typer.Exit(1)

@@ -1,0 +1,140 @@
+"""The loaded bearing at one moment: rings, balls, ball forces and the load, with displacements exaggerated.
+
+Radii are true to scale; clearance and the displacement of the inner ring against the outer one, a thousandth of them,
+are multiplied with one factor, which the caption states.  A ball that overlaps the raceways is deflected.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.patches import Annulus, Circle
+
+from ballpass.runtime.app.figures.canvas import INK, SIGNAL
+from ballpass.runtime.app.figures.record import Array, Record
+
+#: White for unloaded, dark for the highest load: the order survives greyscale.
+_LOAD_COLOURS = LinearSegmentedColormap.from_list("load", ("#ffffff", "#f4c95d", "#d1495b", "#4a0e23"))
+
+
+def draw_bearing(axes: Axes, record: Record, sample: int) -> float:
+    """Draw the bearing at a sample of the record.
+
+    Returns
+    -------
+    the factor by which clearance and displacement are exaggerated [1]
+    """
+    pitch = record.parameter("bearing.pitch_diameter")
+    ball = record.parameter("bearing.ball_diameter")
+    clearance = record.parameter("bearing.clearance")
+    _, forces = record.ball_force()
+    force = forces[sample]
+    offset = ring_centre(record, "inner", sample) - ring_centre(record, "outer", sample)
+    factor = _exaggeration(0.25 * ball, max(abs(clearance) / 2.0, float(np.hypot(*offset))))
+    inner, outer, gap = factor * offset, np.zeros(2), factor * clearance / 4.0
+
+    wall = 0.42 * ball
+    inner_raceway, outer_raceway = (pitch - ball) / 2.0 - gap, (pitch + ball) / 2.0 + gap
+    look: dict[str, Any] = {"facecolor": "#ced4da", "edgecolor": INK, "linewidth": 1.2}
+    axes.add_patch(Annulus((0.0, 0.0), outer_raceway + wall, wall, **look))
+    axes.add_patch(Annulus((float(inner[0]), float(inner[1])), inner_raceway, wall, **look))
+    shaft = Circle(tuple(inner), inner_raceway - wall, facecolor="#f8f9fa", edgecolor="none")
+    axes.add_patch(shaft)
+
+    highest = max(float(np.max(force)), 1e-12)
+    scale = Normalize(0.0, highest)
+    for number, (angle, load) in enumerate(
+        zip(record.ball_angles(float(record.t[sample])), force, strict=True), start=1
+    ):
+        direction = np.array([np.cos(angle), np.sin(angle)])
+        # a ball touches both raceways where it is loaded: half-way between them
+        radius = (_reach(inner, inner_raceway, direction) + _reach(outer, outer_raceway, direction)) / 2.0
+        centre = radius * direction
+        colour = _LOAD_COLOURS(float(scale(max(load, 0.0))))
+        axes.add_patch(Circle(tuple(centre), ball / 2.0, facecolor=colour, edgecolor="black", linewidth=0.9, zorder=3))
+        bright = float(np.dot(colour[:3], (0.2126, 0.7152, 0.0722))) > 0.45
+        axes.text(
+            centre[0],
+            centre[1],
+            str(number),
+            ha="center",
+            va="center",
+            fontsize=8.5,
+            color="black" if bright else "white",
+            zorder=4,
+        )
+        if load > 0.02 * highest:
+            place = (outer_raceway + wall + 0.42 * ball) * direction + outer
+            axes.text(place[0], place[1], _newton(load), ha="center", va="center", fontsize=8, color="#212529")
+    _draw_load(axes, record, sample, inner, 0.92 * (inner_raceway - wall))
+    reach = outer_raceway + wall + 0.85 * ball
+    axes.set_xlim(-reach, reach)
+    axes.set_ylim(-reach, reach)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    assert axes.figure is not None  # the axes were made by a figure
+    bar = axes.figure.colorbar(
+        ScalarMappable(scale, _LOAD_COLOURS), ax=axes, shrink=0.6, pad=0.01, aspect=25, panchor=False
+    )
+    bar.set_label("contact load [N]", fontsize=9)
+    return factor
+
+
+def ring_centre(record: Record, ring: str, sample: int) -> Array:
+    """Centre of a ring at a sample, (2,) [m]."""
+    if ring == "outer" and not record.has("outer.x", "outer.y"):
+        return np.zeros(2)  # fixed
+    return np.array([record.solution[f"{ring}.x"][sample], record.solution[f"{ring}.y"][sample]])
+
+
+def _reach(centre: Array, radius: float, direction: Array) -> float:
+    """Distance from the origin along `direction` to the circle."""
+    along = float(np.dot(centre, direction))
+    return along + float(np.sqrt(max(radius**2 - float(np.dot(centre, centre)) + along**2, 0.0)))
+
+
+def _exaggeration(shown: float, actual: float) -> float:
+    """Largest of 1, 2, 5, 10, 20 ... that keeps `actual` [m] within `shown` [m]."""
+    if actual <= 0.0:
+        return 1.0
+    decade = 10.0 ** np.floor(np.log10(shown / actual))
+    return float(max(1.0, decade * max(digit for digit in (1.0, 2.0, 5.0) if digit * decade <= shown / actual)))
+
+
+def _draw_load(axes: Axes, record: Record, sample: int, centre: Array, length: float) -> None:
+    loads = record.ring_load()
+    if loads is None:
+        return
+    load = loads[sample]
+    size = float(np.hypot(*load))
+    if size == 0.0:
+        return
+    start, end = centre - 0.9 * length * load / size, centre + 0.9 * length * load / size
+    axes.annotate(
+        "",
+        xy=tuple(end),
+        xytext=tuple(start),
+        arrowprops={"arrowstyle": "-|>", "color": SIGNAL, "linewidth": 3, "mutation_scale": 20},
+    )
+    # beside the arrow, as far as the words' half width and half height ask for
+    normal = np.array([load[1], -load[0]]) / size
+    normal = normal if normal[0] > 0.0 else -normal
+    place = centre + (0.46 * abs(normal[0]) + 0.22 * abs(normal[1]) + 0.06) * length * normal
+    axes.text(
+        place[0],
+        place[1],
+        f"load\n{_newton(size)}",
+        ha="center",
+        va="center",
+        fontsize=9,
+        color=SIGNAL,
+        fontweight="bold",
+    )
+
+
+def _newton(value: float) -> str:
+    return f"{value:.0f} N" if value < 9999.5 else f"{value / 1e3:.3g} kN"

@@ -1,0 +1,118 @@
+"""Which figures exist, what each needs, and writing them.
+
+In: a `Model` and its `Solution`.  Out: PNG files, the same bytes for the same run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
+
+from ballpass.runtime.app.figures import loads, moment, motion
+from ballpass.runtime.app.figures.canvas import save
+from ballpass.runtime.app.figures.record import Record, gather
+from ballpass.runtime.contract.errors import RequestError
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+    from ballpass.runtime.run.solution import Solution
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FigureKind:
+    """A figure: name of its file, what it shows, whether a record has what it needs, and how it is drawn."""
+
+    name: str
+    description: str
+    possible: Callable[[Record], bool]
+    draw: Callable[[Record], Figure]
+
+
+def _load_curve_possible(record: Record) -> bool:
+    if record.manifest.mechanism is None or not record.turns:
+        return False
+    return record.ring_load() is not None or bool(loads.reaction_joints(record))
+
+
+def _spectra_possible(record: Record) -> bool:
+    return record.has("inner.x", "inner.y") and (record.cycle_length is None or bool(record.turns))
+
+
+FIGURES: tuple[FigureKind, ...] = (
+    FigureKind(
+        name="load_curve",
+        description="joint reaction and load on the inner ring over the crank angle (Fig. 4)",
+        possible=_load_curve_possible,
+        draw=loads.load_curve,
+    ),
+    FigureKind(
+        name="orbit",
+        description="path of the inner ring's centre (Fig. 5)",
+        possible=lambda record: record.has("inner.x", "inner.y"),
+        draw=motion.orbit,
+    ),
+    FigureKind(
+        name="spectra",
+        description="displacement amplitude spectra along x and y (Fig. 6)",
+        possible=_spectra_possible,
+        draw=motion.spectra,
+    ),
+    FigureKind(
+        name="phase_portrait",
+        description="velocity over displacement along x with stroboscopic points (Fig. 7)",
+        possible=lambda record: record.has("inner.x", "inner.vx"),
+        draw=motion.phase_portrait,
+    ),
+    FigureKind(
+        name="ball_loads",
+        description="contact load of every ball over two turns (Fig. 8)",
+        possible=lambda record: record.has("ball.force") or record.has("ball.elastic_force"),
+        draw=loads.ball_loads,
+    ),
+    FigureKind(
+        name="peak_moment",
+        description="mechanism and loaded bearing at the moment of the highest ball force",
+        possible=lambda record: record.manifest.mechanism is not None or moment.can_draw_bearing(record),
+        draw=moment.peak_moment,
+    ),
+)
+
+
+def draw(name: str, model: Model, solution: Solution) -> Figure:
+    """One figure by name, as a matplotlib figure.
+
+    Raises
+    ------
+    RequestError
+        There is no such figure, or the run lacks the outputs or the whole turn it needs.
+    """
+    kinds = {kind.name: kind for kind in FIGURES}
+    if name not in kinds:
+        raise RequestError(f"figure {name!r} does not exist; allowed: {', '.join(kinds)}")
+    kind, record = kinds[name], gather(model, solution)
+    if not kind.possible(record):
+        raise RequestError(
+            f"figure {name!r} ({kind.description}) cannot be drawn of this run: it lacks the outputs or a whole steady "
+            f"turn; its outputs are {', '.join(info.name for info in record.manifest.outputs)}; "
+            "ask for more in run.outputs of the scene, or for more cycles"
+        )
+    return kind.draw(record)
+
+
+def draw_all(model: Model, solution: Solution, folder: Path) -> list[Path]:
+    """Write every figure for which the outputs exist, as PNG, into `folder`.
+
+    Left out are figures whose outputs were not asked for, and, for a steady part shorter than a turn, load curve and
+    spectra.
+
+    Returns
+    -------
+    files written, in the order of `FIGURES`
+    """
+    record = gather(model, solution)
+    folder.mkdir(parents=True, exist_ok=True)
+    return [save(kind.draw(record), folder / f"{kind.name}.png") for kind in FIGURES if kind.possible(record)]

@@ -1,0 +1,161 @@
+"""Load curve (Fig. 4 of the paper) and contact load of every ball (Fig. 8)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ballpass.runtime.app.figures.canvas import (
+    FIRST,
+    GREY,
+    INK,
+    PALE,
+    SECOND,
+    caption,
+    degree_axis,
+    new_figure,
+    styled,
+)
+from ballpass.runtime.app.figures.record import Array, Record
+
+
+def reaction_joints(record: Record) -> tuple[str, ...]:
+    """Joints to show in the load curve: the bearing's, without a bearing all whose reaction was asked for."""
+    mechanism, bearing = record.manifest.mechanism, record.manifest.bearing
+    if mechanism is None:
+        return ()
+    names = tuple(joint[0] for joint in mechanism.joints)
+    if bearing is not None:
+        names = tuple(name for name in names if name == bearing.joint)
+    return tuple(name for name in names if record.has(f"reaction.{name}.x", f"reaction.{name}.y"))
+
+
+@styled
+def load_curve(record: Record) -> Figure:
+    """Joint reactions, load on the inner ring and drive torque over the crank angle of the last turn."""
+    joints = reaction_joints(record)
+    ring_load = record.ring_load()
+    with_torque = record.has("drive_torque")
+    if not joints:
+        joints = ("",)  # only the load on the ring was asked for
+    rows = len(joints) + with_torque
+    figure = new_figure(1.3 + 1.9 * rows)
+    grid = figure.add_gridspec(rows, 2)
+    angle, order = _last_turn(record)
+    panels: list[Axes] = []
+    for row, joint in enumerate(joints):
+        for column, axis in enumerate("xy"):
+            axes = figure.add_subplot(grid[row, column])
+            title = axis
+            if joint:
+                first, second = _bodies(record, joint)
+                title = f"{axis} at {joint}: {second} on {first}"
+                _curve(axes, angle, record.solution[f"reaction.{joint}.{axis}"][order], FIRST, "reaction of the joint")
+            if ring_load is not None and row == 0:
+                _curve(axes, angle, ring_load[order, column], SECOND, "load on the inner ring")
+            axes.set_title(title)
+            axes.set_ylabel(f"force along {axis} [N]")
+            panels.append(axes)
+    if with_torque:
+        axes = figure.add_subplot(grid[rows - 1, :])
+        _curve(axes, angle, record.solution["drive_torque"][order], FIRST, "")
+        axes.set_title("torque of the drive on the driven body")
+        axes.set_ylabel("torque [N·m]")
+        panels.append(axes)
+    _flatten_noise(panels[: 2 * len(joints)])
+    windows = record.gate_windows()
+    for axes in panels:
+        degree_axis(axes)
+        axes.axhline(0.0, color=GREY, linewidth=0.6)
+        for start, end in windows:
+            for shift in (0.0, -360.0):
+                axes.axvspan(np.degrees(start) + shift, np.degrees(end) + shift, color=PALE, linewidth=0, zorder=0)
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high + 0.05 * (high - low))
+    for axes in panels[-1:] if with_torque else panels[-2:]:
+        axes.set_xlabel("crank angle [°]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper right", ncols=2, bbox_to_anchor=(0.995, 0.995))
+    shaded = " Shaded: an applied load acts." if windows else ""
+    caption(
+        figure,
+        "Load curve of the inner ring" if record.manifest.bearing is not None else "Joint reactions and drive torque",
+        f"One turn; x and y have their own scales.{shaded} Counter-clockwise torque is positive. {record.settings()}.",
+    )
+    return figure
+
+
+def _flatten_noise(panels: list[Axes]) -> None:
+    """A component that is zero but for rounding gets an axis on which it looks so."""
+    heights = [max(float(np.max(np.abs(line.get_ydata()))) for line in axes.get_lines()) for axes in panels]
+    for axes, height in zip(panels, heights, strict=True):
+        if height < 1e-9 * max(heights):
+            axes.set_ylim(-0.01 * max(heights), 0.01 * max(heights))
+
+
+def _last_turn(record: Record) -> tuple[Array, Array]:
+    """Crank angles of the last turn, increasing, within a turn [deg], and the samples' indices in that order."""
+    turn = record.turns[-1]
+    # the last sample of a turn repeats the first one's angle
+    index = np.arange(turn.start, turn.stop - 1)
+    angle = np.degrees(record.crank_angle()[index]) % 360.0
+    order = np.argsort(angle, kind="stable")
+    return angle[order], index[order]
+
+
+def _bodies(record: Record, joint: str) -> tuple[str, str]:
+    mechanism = record.manifest.mechanism
+    assert mechanism is not None  # a joint's name comes from it
+    return next((item[2], item[4]) for item in mechanism.joints if item[0] == joint)
+
+
+def _curve(axes: Axes, angle: Array, values: Array, look: dict[str, object], label: str) -> None:
+    # close the turn: the curve starts and ends at the frame of the axes
+    closed_angle = np.concatenate((angle[-1:] - 360.0, angle, angle[:1] + 360.0))
+    closed = np.concatenate((values[-1:], values, values[:1]))
+    axes.plot(closed_angle, closed, label=label, **look)  # type: ignore[arg-type]
+
+
+@styled
+def ball_loads(record: Record) -> Figure:
+    """Contact load of every ball over the last two turns, one strip per ball, all at one scale."""
+    words, force = record.ball_force()
+    window = record.last_turns(2)
+    force = force[window]
+    balls = force.shape[1]
+    if record.turns:
+        angle = np.degrees(record.crank_angle()[window])
+        along = angle - 360.0 * np.floor(min(angle[0], angle[-1]) / 360.0 + 1e-9)
+        label = "crank angle [°]" if record.manifest.mechanism is not None else "angle of the shaft [°]"
+    else:
+        along, label = record.t[window] * 1e3, "time [ms]"
+    top = max(float(np.max(force)), 1e-12)
+    bottom = min(float(np.min(force)), 0.0)
+    figure = new_figure(1.5 + max(0.5 * balls, 2.0))
+    strips = figure.subplots(balls, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for number, axes in enumerate(strips, start=1):
+        axes.fill_between(along, 0.0, force[:, number - 1], color=INK, alpha=0.35, linewidth=0)
+        axes.plot(along, force[:, number - 1], color=INK, linewidth=0.9)
+        for start, end in record.gate_windows() if record.turns else ():
+            first, last = np.degrees(start), np.degrees(end)
+            for turn in range(-1, int(along.max() // 360.0) + 1):
+                axes.axvspan(first + 360.0 * turn, last + 360.0 * turn, color=PALE, linewidth=0, zorder=0)
+        axes.set_ylim(min(1.1 * bottom, 0.0), 1.1 * top)
+        axes.locator_params(axis="y", nbins=2)
+        axes.text(1.01, 0.4, f"ball {number}", transform=axes.transAxes, fontsize=9, va="center")
+    strips[-1].set_xlim(float(along.min()), float(along.max()))
+    if record.turns:
+        degree = 90.0 * max(1.0, np.ceil((along.max() - along.min()) / 1080.0))
+        strips[-1].set_xticks(np.arange(np.ceil(along.min() / degree) * degree, along.max() + 1e-6, degree))
+    strips[-1].set_xlabel(label)
+    figure.supylabel("contact load [N]", fontsize=9.5)
+    shown = "last two turns" if len(record.turns) >= 2 else "last turn" if record.turns else "the whole record"
+    shaded = " Shaded: an applied load acts." if record.gate_windows() and record.turns else ""
+    caption(
+        figure,
+        "Contact load of every ball",
+        f"{words.capitalize()}, {shown}; all strips at one scale, highest sample {top:.4g} N.{shaded} "
+        f"{record.settings()}.",
+    )
+    return figure

@@ -1,0 +1,83 @@
+"""The mechanism and the loaded bearing at the moment of the highest ball force."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ballpass.runtime.app.figures.bearing import draw_bearing, ring_centre
+from ballpass.runtime.app.figures.canvas import caption, new_figure, styled
+from ballpass.runtime.app.figures.mechanism import draw_mechanism
+from ballpass.runtime.app.figures.record import Record
+
+
+def can_draw_bearing(record: Record) -> bool:
+    """Whether ring position and a ball force were asked for."""
+    if record.manifest.bearing is None or not record.has("inner.x", "inner.y"):
+        return False
+    return record.has("ball.force") or record.has("ball.elastic_force")
+
+
+@styled
+def peak_moment(record: Record) -> Figure:
+    """Mechanism, bearing, or both side by side.
+
+    The moment is that of the highest sample of the ball force; without a bearing, of the greatest drive torque.
+    """
+    with_mechanism = record.manifest.mechanism is not None
+    with_bearing = can_draw_bearing(record)
+    sample, reason = _moment(record)
+    figure = new_figure(5.6)
+    text = ""
+    if with_mechanism and with_bearing:
+        left, right = figure.subplots(1, 2, width_ratios=(0.8, 1.0))
+        draw_mechanism(left, record, sample)
+        factor = draw_bearing(right, record, sample)
+    elif with_bearing:
+        factor = draw_bearing(figure.add_subplot(), record, sample)
+    else:
+        draw_mechanism(figure.add_subplot(), record, sample)
+    if with_mechanism:
+        words = "force on the frame" if with_bearing else "forces on the frame"
+        if record.applied_forces(float(record.t[sample])):
+            words += ", applied force (dark)"
+        words += ", dashed paths of the joints. "
+        text += f"Left: {words}" if with_bearing else words.capitalize()
+    if with_bearing:
+        words, _ = record.ball_force()
+        text += f"Bearing: balls coloured by {words}; clearance and displacement between the rings ×{factor:g}"
+        if (
+            record.manifest.bearing is not None
+            and record.manifest.bearing.outer_ring
+            and record.has("outer.x", "outer.y")
+        ):
+            moved = 1e6 * np.hypot(*ring_centre(record, "outer", sample))
+            text += f", the outer ring itself has moved by {moved:.3g} µm"
+        text += ". "
+    when = f"At t = {record.t[sample] * 1e3:.4g} ms"
+    if with_mechanism:
+        when += f", crank angle {np.degrees(record.crank_angle()[sample]) % 360.0:.1f}°"
+    subject = "Mechanism and bearing" if with_mechanism and with_bearing else "Bearing" if with_bearing else "Mechanism"
+    title = f"{subject} at the {reason}" + (_between_samples(record) if with_bearing else "")
+    caption(figure, title, f"{when}. {text}{record.settings()}.")
+    return figure
+
+
+def _between_samples(record: Record) -> str:
+    """For the title: the peak between the samples, as a summary tells it, where the samples miss some of it."""
+    if len(record.solution) < 3:
+        return ""
+    name = "ball.force" if record.has("ball.force") else "ball.elastic_force"
+    peak = record.model.refine_peak(record.solution, name)
+    shown, true = f"{peak.sampled:.4g}", f"{peak.value:.4g}"
+    return "" if shown == true else f"\n{shown} N; between the samples it reaches {true} N"
+
+
+def _moment(record: Record) -> tuple[int, str]:
+    """Sample to draw, and why."""
+    if can_draw_bearing(record):
+        _, force = record.ball_force()
+        return int(np.argmax(np.max(force, axis=1))), "highest sample of the ball force"
+    if record.has("drive_torque"):
+        return int(np.argmax(np.abs(record.solution["drive_torque"]))), "highest sample of the drive torque"
+    return 0, "start of the steady part"

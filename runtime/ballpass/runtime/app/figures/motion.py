@@ -1,0 +1,207 @@
+"""Motion of the inner ring: orbit (Fig. 5 of the paper), spectra (Fig. 6), phase portrait (Fig. 7)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from scipy.interpolate import CubicHermiteSpline
+
+from ballpass.runtime.app.figures.canvas import GREY, INK, SAND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.app.figures.record import Array, Record
+from ballpass.runtime.ask.observables import orbits, stroboscopic_points
+from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
+
+#: Points drawn between two samples where velocities are known: a resonance has but ten samples a period.
+_FINER = 8
+
+#: Ratio of the extents from which equal scales would leave a sliver.
+_SLIVER = 4.0
+
+
+def _path(record: Record, window: slice, axis: str) -> tuple[Array, Array, Array]:
+    """Times [s], positions [m] and velocities [m/s] of the inner ring, between samples by the Hermite cubic.
+
+    Without the velocity among the outputs: the samples, and no velocities.
+    """
+    t, x = record.t[window], record.solution[f"inner.{axis}"][window]
+    if not record.has(f"inner.v{axis}"):
+        return t, x, np.zeros(0)
+    curve = CubicHermiteSpline(t, x, record.solution[f"inner.v{axis}"][window])
+    fine = np.append((t[:-1, None] + np.diff(t)[:, None] * np.arange(_FINER) / _FINER).ravel(), t[-1])
+    return fine, np.asarray(curve(fine), dtype=float), np.asarray(curve(fine, 1), dtype=float)
+
+
+@styled
+def orbit(record: Record) -> Figure:
+    """Path of the inner ring's centre: the last turn dark, the steady turns before it light and wide under it."""
+    last = record.last_turns(1)
+    figure = new_figure(5.4)
+    axes = figure.add_subplot()
+    if last.start > 0:
+        x, y = (1e6 * _path(record, slice(0, last.start + 1), axis)[1] for axis in "xy")
+        # wide, to be seen where the last turn covers it
+        axes.plot(x, y, color=SAND, linewidth=2.4, label="steady turns before it")
+    (t, x, _), (_, y, _) = (_path(record, last, axis) for axis in "xy")
+    x, y = 1e6 * x, 1e6 * y
+    axes.plot(x, y, color=INK, linewidth=1.1, label="last turn" if record.turns else "path")
+    _highlight_windows(axes, record, t, x, y)
+    axes.plot(
+        x[0], y[0], "o", color="white", markeredgecolor=INK, markersize=8, label="start of the last turn", zorder=4
+    )
+    axes.plot(x[-1], y[-1], "s", color=INK, markersize=4, label="end of the last turn", zorder=5)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    wide, high = (max(float(np.ptp(record.solution[f"inner.{axis}"])), 1e-15) for axis in "xy")
+    equal = max(wide, high) < _SLIVER * min(wide, high)
+    if equal:
+        axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("x of the inner ring's centre [µm]")
+    axes.set_ylabel("y of the inner ring's centre [µm]")
+    scales = "Equal scales." if equal else "Each axis has a scale of its own."
+    gap = ""
+    if record.cycle_length is not None and record.turns:
+        path = orbits(
+            record.t, record.solution["inner.x"], record.solution["inner.y"], cycle_length=record.cycle_length
+        )[-1]
+        gap = f" Start and end of the last turn are {1e6 * path.gap:.3g} µm apart."
+    caption(figure, "Orbit of the inner ring's centre", f"{scales}{gap} {record.settings()}.")
+    return figure
+
+
+def _highlight_windows(axes: Axes, record: Record, t: Array, x: Array, y: Array) -> None:
+    """The part of the path on which an applied load acts, thick."""
+    angle = record.crank_angle(t)
+    label = "an applied load acts"
+    for start, end in record.gate_windows():
+        inside = (angle - start) % (2.0 * np.pi) < end - start
+        axes.plot(np.where(inside, x, np.nan), np.where(inside, y, np.nan), color=SIGNAL, linewidth=1.9, label=label)
+        label = "_nolegend_"
+
+
+@styled
+def spectra(record: Record) -> Figure:
+    """Displacement amplitude spectra along x and y, with crank harmonics and ball-pass frequency marked."""
+    length = record.cycle_length
+    # a mechanism repeats each turn: its harmonics fall on lines.  Without one a window keeps the leakage low
+    window: Window = "boxcar" if record.manifest.mechanism is not None else "hann"
+    lines = {
+        axis: amplitude_spectrum(record.t, record.solution[f"inner.{axis}"] * 1e6, cycle_length=length, window=window)
+        for axis in "xy"
+    }
+    marks = record.frequencies()
+    figure = new_figure(5.6)
+    panels = figure.subplots(2, 1, sharex=True, sharey=True)
+    peak = max(float(np.max(s.amplitude)) for s in lines.values())
+    floor = max(peak * 1e-4, 1e-12)
+    limit = _shown_range(list(lines.values()), shaft=marks.shaft if marks else 0.0)
+    for axes, (axis, spectrum), letter in zip(panels, lines.items(), "ab", strict=True):
+        shown = (spectrum.frequency > 0.0) & (spectrum.frequency <= limit)
+        axes.set_yscale("log")
+        axes.set_ylim(floor, 4.0 * peak)
+        if marks is not None and marks.shaft > 0.0:
+            _mark(axes, marks.shaft, limit, color="#adb5bd", style=(0, (1, 1.5)), width=0.7)
+            _mark(axes, marks.ball_pass_outer, limit, color=SIGNAL, style=(0, (6, 2)), width=1.2)
+        axes.vlines(
+            spectrum.frequency[shown], floor, np.maximum(spectrum.amplitude[shown], floor), color=INK, linewidth=1.2
+        )
+        dots = shown & (spectrum.amplitude > floor)
+        axes.plot(spectrum.frequency[dots], spectrum.amplitude[dots], "o", color=INK, markersize=2.6)
+        axes.grid(visible=False, axis="x")
+        axes.set_title(f"{letter}) {axis} direction")
+        axes.set_ylabel("amplitude [µm]")
+    panels[-1].set_xlim(0.0, limit)
+    panels[-1].set_xlabel("frequency [Hz]")
+    spectrum = lines["x"]
+    cycles = (
+        "the whole record"
+        if spectrum.cycles is None
+        else f"{spectrum.cycles} whole turn{'s' if spectrum.cycles != 1 else ''}"
+    )
+    weighting = "no window" if window == "boxcar" else "Hann window"
+    text = f"Amplitude, mean removed, {cycles}, {weighting}, lines {spectrum.resolution:.3g} Hz apart."
+    if marks is not None and marks.shaft > 0.0:
+        crank = "crank" if record.manifest.mechanism is not None else "shaft"
+        figure.legend(
+            handles=[
+                Line2D([], [], color="#868e96", linestyle=(0, (1, 1.5)), linewidth=1.2),
+                Line2D([], [], color=SIGNAL, linestyle=(0, (6, 2)), linewidth=1.4),
+            ],
+            labels=[
+                f"{crank} harmonics, {marks.shaft:.4g} Hz",
+                f"ball pass (BPFO) and multiples, {marks.ball_pass_outer:.4g} Hz",
+            ],
+            loc="upper right",
+            ncols=2,
+            bbox_to_anchor=(0.995, 0.995),
+        )
+        text += _unresolved(marks.ball_pass_outer, marks.shaft, spectrum.resolution, crank)
+    caption(figure, "Displacement spectra", f"{text} {record.settings()}.")
+    return figure
+
+
+def _mark(
+    axes: Axes, frequency: float, limit: float, *, color: str, style: tuple[float, tuple[float, ...]], width: float
+) -> None:
+    for multiple in range(1, int(limit / frequency) + 1):
+        axes.axvline(multiple * frequency, color=color, linestyle=style, linewidth=width, zorder=0.5)
+
+
+def _shown_range(spectra: list[AmplitudeSpectrum], *, shaft: float) -> float:
+    """Upper end of the frequency axis [Hz].
+
+    Above it lines stay below 1 % of the highest; at least 12, at most 60 harmonics of a turn are shown.
+    """
+    top = max(float(np.max(s.amplitude)) for s in spectra)
+    wanted = max((float(s.frequency[s.amplitude >= 0.01 * top][-1]) for s in spectra if top > 0.0), default=0.0)
+    end = min(float(s.frequency[-1]) for s in spectra)
+    if shaft > 0.0:
+        wanted = min(max(1.1 * wanted, 12.5 * shaft), 60.5 * shaft)
+    return min(max(wanted, end / 50.0), end)
+
+
+def _unresolved(ball_pass: float, shaft: float, resolution: float, crank: str) -> str:
+    """A warning where the record is too short to tell ball pass and its nearest crank harmonic apart."""
+    order = max(round(ball_pass / shaft), 1)
+    distance = abs(ball_pass - order * shaft)
+    if distance >= resolution:
+        return ""
+    needed = f"; telling them apart takes {int(np.ceil(shaft / distance))} turns" if distance > 1e-6 * shaft else ""
+    return f" Ball pass and {crank} harmonic {order} are {distance:.3g} Hz apart, within one line{needed}."
+
+
+@styled
+def phase_portrait(record: Record) -> Figure:
+    """Velocity over displacement along x, with the stroboscopic point of each turn."""
+    _, x, v = _path(record, slice(0, record.t.size), "x")
+    figure = new_figure(5.2)
+    axes = figure.add_subplot()
+    axes.plot(1e6 * x, 1e3 * v, color=INK, linewidth=0.8, alpha=0.85, label="steady turns" if record.turns else "path")
+    text = "Nothing turns: no stroboscopic points."
+    if record.cycle_length is not None:
+        points = stroboscopic_points(
+            record.t, record.solution["inner.x"], record.solution["inner.vx"], cycle_length=record.cycle_length
+        )
+        axes.plot(
+            points.position * 1e6,
+            points.velocity * 1e3,
+            "o",
+            color=SAND,
+            markeredgecolor="black",
+            markeredgewidth=0.9,
+            markersize=7.5,
+            label="stroboscopic points, once a turn",
+            zorder=5,
+        )
+        count = points.time.size
+        angle = (
+            np.degrees(record.parameter(record.manifest.mechanism.start_angle)) if record.manifest.mechanism else 0.0
+        )
+        what = "crank" if record.manifest.mechanism else "shaft"
+        text = f"{count} stroboscopic point{'' if count == 1 else 's'}, at {what} angle {angle % 360.0:g}°."
+    axes.axhline(0.0, color=GREY, linewidth=0.6)
+    axes.set_xlabel("x of the inner ring's centre [µm]")
+    axes.set_ylabel("velocity along x [mm/s]")
+    figure.legend(loc="upper right", ncols=2, bbox_to_anchor=(0.995, 0.995))
+    caption(figure, "Phase portrait along x", f"{text} {record.settings()}.")
+    return figure

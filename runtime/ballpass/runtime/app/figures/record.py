@@ -1,0 +1,195 @@
+"""What every figure needs of a run, gathered once.
+
+In: a `Model` and its `Solution`.  Out: a frozen `Record`: the steady part, its turns, angles, and what a caption says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.ask.observables import KinematicFrequencies, ball_angles, kinematic_frequencies, turns
+from ballpass.runtime.contract import force_components
+
+if TYPE_CHECKING:
+    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.model import Model
+    from ballpass.runtime.run.solution import Solution
+
+Array = NDArray[np.float64]
+
+#: Name of the body that does not move.
+FRAME = "frame"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Record:
+    """The steady part of a run.
+
+    Attributes
+    ----------
+    solution : steady cycles only
+    cycle_length : one turn of driver or shaft [s]; None when nothing turns
+    turns : whole turns of the steady part, oldest first; empty without them
+    """
+
+    model: Model
+    solution: Solution
+    cycle_length: float | None
+    turns: tuple[slice, ...]
+
+    @property
+    def manifest(self) -> Manifest:
+        """Of the model that ran."""
+        return self.solution.manifest
+
+    @property
+    def t(self) -> Array:
+        """Times [s]."""
+        return self.solution.t
+
+    def has(self, *names: str) -> bool:
+        """Whether all these outputs were asked for."""
+        return all(name in self.solution.outputs or name in self.solution.states for name in names)
+
+    def parameter(self, name: str) -> float:
+        """Value of a parameter or, where none has this name, of a derived constant [SI]."""
+        values = self.solution.parameters
+        return float(values[name]) if name in values else float(self.solution.constants[name])
+
+    def last_turns(self, count: int) -> slice:
+        """The last whole turns, at most `count`; the whole record where it holds none."""
+        if not self.turns:
+            return slice(0, self.t.size)
+        chosen = self.turns[-count:]
+        return slice(chosen[0].start, chosen[-1].stop)
+
+    def crank_angle(self, t: Array | None = None) -> Array:
+        """Angle of the driven body (shaft: from its place at t = 0) at `t` or the samples, not wrapped, (n,) [rad]."""
+        time = self.t if t is None else t
+        mechanism, bearing = self.manifest.mechanism, self.manifest.bearing
+        if mechanism is not None:
+            return self.parameter(mechanism.start_angle) + self.parameter(mechanism.speed) * time
+        if bearing is not None:
+            return self.parameter(bearing.shaft_speed) * time
+        return np.zeros_like(time)
+
+    def gate_windows(self) -> tuple[tuple[float, float], ...]:
+        """Windows of the crank angle in which some load acts, start in [0, 2 pi), end behind it [rad]."""
+        full = 2.0 * np.pi
+        found = []
+        for item in self.manifest.inputs:
+            for start, end in item.windows:
+                first = self.parameter(start)
+                found.append((first % full, first % full + (self.parameter(end) - first) % full))
+        return tuple(found)
+
+    def frequencies(self) -> KinematicFrequencies | None:
+        """Kinematic frequencies of the bearing [Hz]; None without a bearing."""
+        bearing = self.manifest.bearing
+        if bearing is None:
+            return None
+        return kinematic_frequencies(
+            bearing.balls,
+            self.parameter("bearing.ball_diameter"),
+            self.parameter("bearing.pitch_diameter"),
+            self.parameter(bearing.shaft_speed),
+        )
+
+    def ball_angles(self, t: float) -> Array:
+        """Angles of the balls at a time, (balls,) [rad]."""
+        bearing = self.manifest.bearing
+        assert bearing is not None  # figures of balls are drawn of scenes with a bearing only
+        return ball_angles(
+            t,
+            balls=bearing.balls,
+            cage_speed=self.parameter("bearing.cage_speed"),
+            ball_angle=self.parameter("bearing.ball_angle"),
+        )
+
+    def ball_force(self) -> tuple[str, Array]:
+        """Name and values of the ball force to show: total where asked for, else elastic, (n, balls) [N]."""
+        bearing = self.manifest.bearing
+        if self.has("ball.force"):
+            damped = bearing is not None and bearing.damping_law != "none"
+            return "elastic and damping force" if damped else "elastic force", self.solution["ball.force"]
+        return "elastic force", self.solution["ball.elastic_force"]
+
+    def ring_load(self) -> Array | None:
+        """Load on the inner ring, (n, 2) [N]: the output, else its share of the reaction; None without both."""
+        if self.has("load.x", "load.y"):
+            return np.column_stack((self.solution["load.x"], self.solution["load.y"]))
+        mechanism, bearing = self.manifest.mechanism, self.manifest.bearing
+        if mechanism is None or bearing is None:
+            return None
+        names = [f"reaction.{bearing.joint}.{axis}" for axis in "xy"]
+        if not self.has(*names):
+            return None
+        first = next(item[2] for item in mechanism.joints if item[0] == bearing.joint)
+        # Eq. (2): the force on the frame presses the ring; the reaction is that of the second body on the first
+        share = self.parameter("bearing.share") * (1.0 if first == FRAME else -1.0)
+        return share * np.column_stack([self.solution[name] for name in names])
+
+    def applied_forces(self, t: float) -> tuple[tuple[str, tuple[str, str], Array], ...]:
+        """Applied forces that act at a time: name, (body, point), components (2,) [N]."""
+        mechanism = self.manifest.mechanism
+        assert mechanism is not None  # drawn of scenes with a mechanism only
+        parameters = self.solution.parameters
+        inputs = dict(
+            zip((i.name for i in self.manifest.inputs), self.model.inputs_at(t, parameters), strict=True),
+        )
+        acting = []
+        for name, body, point, gate in mechanism.forces:
+            if gate and inputs[gate] == 0.0:
+                continue
+            cartesian, (magnitude, direction) = force_components(name)
+            if cartesian[0] in parameters:
+                force = np.array([parameters[component] for component in cartesian])
+            else:
+                angle = parameters[direction]
+                force = parameters[magnitude] * np.array([np.cos(angle), np.sin(angle)])
+            acting.append((name, (body, point), force))
+        return tuple(acting)
+
+    def points(self, t: float) -> dict[tuple[str, str], Array]:
+        """Coordinates of the mechanism's points at a time: (body, point) -> (2,) [m]."""
+        mechanism = self.manifest.mechanism
+        assert mechanism is not None  # drawn of scenes with a mechanism only
+        given = {
+            "t": 0.0,  # time since the reference time of the inputs' phases, which is t itself
+            "u": self.model.inputs_at(t, self.solution.parameters),
+            "p": np.array([self.solution.parameters[info.name] for info in self.manifest.parameters]),
+            "c": np.array([self.solution.constants[info.name] for info in self.manifest.constants]),
+        }
+        signature = self.manifest.function("geometry").inputs
+        flat = self.model.function("geometry")(*(given[name] for name, _ in signature))
+        pairs = np.array(flat, dtype=float).reshape(-1, 2)
+        return {(info.body, info.point): pairs[k] for k, info in enumerate(mechanism.points)}
+
+    def settings(self) -> str:
+        """What a caption says of the run: transient cycles dropped, method, clearance, damping law."""
+        statistics = self.solution.statistics
+        dropped = self.solution.transient_cycles
+        parts = [f"{dropped:g} transient cycle{'' if dropped == 1 else 's'} dropped"]
+        if self.solution.states:  # a linkage alone needs no integration
+            parts.append(f"method {statistics.method}")
+        if self.manifest.bearing is not None:
+            # a no-break space keeps number and unit on one line
+            parts.append(f"diametral clearance {self.parameter('bearing.clearance') * 1e6:g}\u00a0µm")
+            parts.append(f"damping law {self.manifest.bearing.damping_law}")
+        return ", ".join(parts)
+
+
+def gather(model: Model, solution: Solution) -> Record:
+    """The steady part of `solution`, with its turns."""
+    steady = solution.steady()
+    length = steady.cycle_length
+    return Record(
+        model=model,
+        solution=steady,
+        cycle_length=length,
+        turns=() if length is None else turns(steady.t, length),
+    )

@@ -1,0 +1,149 @@
+"""Figures of a sweep: a quantity over one varied parameter as a line, over two as a map.
+
+In: values on a grid of parameters.  Out: a figure.  The colours of a map grow in luminance with the value, and contours
+carry numbers, so that it survives a greyscale print.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+
+from ballpass.runtime.app.figures.canvas import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.contract.errors import RequestError
+
+#: From dark to light, with equal steps of luminance: places are those of the palette's own luminances.
+LUMINANCE = LinearSegmentedColormap.from_list("luminance", [(0.0, INK), (0.43, SIGNAL), (0.82, SAND), (1.0, PALE)])
+
+#: Contours of a map, at most.
+CONTOURS = 7
+
+#: Smallest change that is drawn as one, relative to the largest value [1].
+FLAT = 1e-12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VariedAxis:
+    """A varied parameter as it is drawn.
+
+    Attributes
+    ----------
+    path : of the parameter
+    unit : of the values
+    values : increasing or decreasing, shape (points,) [`unit`]
+    logarithmic : whether they are spaced so; they are above zero then
+    """
+
+    path: str
+    unit: str
+    values: np.ndarray
+    logarithmic: bool
+
+    @property
+    def label(self) -> str:
+        return f"{self.path} [{self.unit}]"
+
+
+@styled
+def draw_sweep(
+    title: str, axes: Sequence[VariedAxis], quantity: str, unit: str, values: np.ndarray, text: str
+) -> Figure:
+    """Figure of one quantity.
+
+    Parameters
+    ----------
+    title : of the scene
+    axes : one or two varied parameters
+    values : of the quantity, shape (points,) or (points of the first, points of the second), NaN where there is none
+        [`unit`]
+    text : what else holds for all points
+
+    Raises
+    ------
+    RequestError
+        There are more than two varied parameters, or no value at all.
+    """
+    if len(axes) not in (1, 2):
+        raise RequestError(f"A figure shows one or two varied parameters, not {len(axes)}. Vary fewer.")
+    if not np.any(np.isfinite(values)):
+        raise RequestError(f"{quantity}: no member has a value: there is nothing to draw.")
+    figure = new_figure(4.4 if len(axes) == 1 else 5.0)
+    panel = figure.add_subplot()
+    if len(axes) == 1:
+        _line(panel, axes[0], values)
+        panel.set_ylabel(f"{quantity} [{unit}]")
+    else:
+        mesh = _map(panel, axes[0], axes[1], values)
+        figure.colorbar(mesh, ax=panel, label=f"{quantity} [{unit}]", format=FuncFormatter(_plain))
+    missing = int(np.count_nonzero(~np.isfinite(values)))
+    lost = f" Crosses mark {missing} of {values.size} without a result." if missing else ""
+    caption(figure, f"{title}: {quantity}", f"{values.size} parameter sets. {text}{lost}")
+    return figure
+
+
+def _line(panel: Axes, varied: VariedAxis, values: np.ndarray) -> None:
+    panel.plot(varied.values, values, color=INK, marker="o", markersize=4, linewidth=1.4)
+    missing = ~np.isfinite(values)
+    panel.plot(
+        varied.values[missing],
+        np.full(np.count_nonzero(missing), 0.02),
+        transform=panel.get_xaxis_transform(),
+        linestyle="none",
+        marker="x",
+        color=SIGNAL,
+    )
+    _scale(panel, "x", varied)
+
+
+def _map(panel: Axes, first: VariedAxis, second: VariedAxis, values: np.ndarray) -> Any:
+    """The first parameter along x, the second along y."""
+    shown = np.ma.masked_invalid(values.T)
+    mesh = panel.pcolormesh(_edges(first), _edges(second), shown, cmap=LUMINANCE, rasterized=True)
+    low, high = float(shown.min()), float(shown.max())
+    if high - low > FLAT * max(abs(low), abs(high)) and min(shown.shape) > 1:
+        levels = [level for level in MaxNLocator(CONTOURS).tick_values(low, high) if low < level < high]
+        halo: list[AbstractPathEffect] = [withStroke(linewidth=2.4, foreground=PALE)]
+        lines = panel.contour(first.values, second.values, shown, levels=levels, colors="black", linewidths=0.8)
+        lines.set_path_effects(halo)
+        for label in panel.clabel(lines, fmt=_plain, fontsize=8):
+            label.set_path_effects(halo)
+    across, up = np.meshgrid(first.values, second.values)
+    missing = np.ma.getmaskarray(shown)
+    panel.plot(across[missing], up[missing], linestyle="none", marker="x", color=GREY)
+    panel.grid(visible=False)
+    _scale(panel, "x", first)
+    _scale(panel, "y", second)
+    return mesh
+
+
+def _edges(varied: VariedAxis) -> np.ndarray:
+    """Borders of the cells around the values, shape (points + 1,)."""
+    centres = np.log(varied.values) if varied.logarithmic else varied.values
+    middle = 0.5 * (centres[1:] + centres[:-1])
+    edges = np.concatenate([[2.0 * centres[0] - middle[0]], middle, [2.0 * centres[-1] - middle[-1]]])
+    return np.exp(edges) if varied.logarithmic else edges
+
+
+def _scale(panel: Axes, axis: str, varied: VariedAxis) -> None:
+    panel.set(**{f"{axis}label": varied.label})
+    if not varied.logarithmic:
+        return
+    panel.set(**{f"{axis}scale": "log"})
+    ruler = panel.xaxis if axis == "x" else panel.yaxis
+    ruler.set_major_formatter(FuncFormatter(_plain))
+    # within a decade there is hardly a power of ten to read
+    decades = math.log10(float(np.max(varied.values) / np.min(varied.values)))
+    ruler.set_minor_formatter(FuncFormatter(_plain) if decades < 1.2 else NullFormatter())
+
+
+def _plain(value: float, _: object = None) -> str:
+    return f"{value:g}"

@@ -1,0 +1,111 @@
+"""Tornado chart: which parameters move a quantity most.
+
+In: a `SensitivityReport`.  Out: a figure.  Bars are dimensionless derivatives (p/Q) dQ/dp, the largest on top: how many
+per cent the quantity changes when the parameter grows by one.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from ballpass.runtime.app.figures.canvas import GREY, INK, PALE, SAND, caption, new_figure, save, styled
+from ballpass.runtime.certify.certificate import Verdict
+from ballpass.runtime.certify.grazing import merge_grazing
+from ballpass.runtime.certify.sensitivity_report import Sensitivity, SensitivityReport
+from ballpass.runtime.contract.errors import RequestError
+
+#: Bars of a chart.
+BARS = 15
+
+#: Below this share of the longest bar a bar cannot be seen.
+VISIBLE = 2e-3
+
+#: Hatches tell the verdicts without colour.
+_LOOKS: dict[Verdict, tuple[str, str, str]] = {
+    Verdict.VERIFIED: (INK, "", "verified by the second route"),
+    Verdict.NOT_CHECKED: (SAND, "//", "not checked"),
+    Verdict.DISAGREES: (PALE, "xx", "the two routes disagree"),
+}
+
+
+@styled
+def tornado(report: SensitivityReport, quantity: str) -> Figure:
+    """Chart of one quantity.
+
+    Raises
+    ------
+    RequestError
+        The report does not have it, or no parameter moves it.
+    """
+    names = [item.name for item in report.quantities]
+    if quantity not in names:
+        raise RequestError(f"tornado: {quantity!r} is not in this report. It has: {', '.join(names)}.")
+    found = report.quantities[names.index(quantity)]
+    pairs = _bars(report, quantity)
+    if not pairs:
+        raise RequestError(f"tornado: no parameter of this report moves {quantity}: there is nothing to draw.")
+    figure = new_figure(1.6 + 0.3 * len(pairs))
+    axes = figure.add_subplot()
+    longest = max(abs(pair.dimensionless) for pair in pairs)
+    for row, pair in enumerate(pairs):
+        colour, hatch, _ = _LOOKS[pair.check.verdict]
+        axes.barh(row, pair.dimensionless, height=0.66, color=colour, hatch=hatch, edgecolor="#212529", linewidth=0.6)
+        beyond = math.copysign(0.012 * longest, pair.dimensionless)
+        axes.text(
+            pair.dimensionless + beyond,
+            row,
+            f"{pair.dimensionless:+.3g}".replace("-", "−"),
+            ha="left" if pair.dimensionless > 0.0 else "right",
+            va="center",
+            fontsize=8.5,
+        )
+    axes.set_yticks(range(len(pairs)), [pair.parameter for pair in pairs], fontsize=8.5)
+    axes.set_ylim(len(pairs) - 0.4, -0.6)
+    left = min(0.0, *(pair.dimensionless for pair in pairs))
+    right = max(0.0, *(pair.dimensionless for pair in pairs))
+    room = 0.14 * (right - left)
+    axes.set_xlim(left - (room if left < 0.0 else 0.02 * right), right + (room if right > 0.0 else -0.02 * left))
+    axes.axvline(0.0, color=GREY, linewidth=1.0)
+    axes.grid(visible=False, axis="y")
+    axes.set_xlabel("change of the quantity per change of the parameter, (p/Q) dQ/dp  [% per %]")
+    present = dict.fromkeys(pair.check.verdict for pair in pairs)
+    handles = [
+        Patch(facecolor=_LOOKS[verdict][0], hatch=_LOOKS[verdict][1], edgecolor="#212529", label=_LOOKS[verdict][2])
+        for verdict in Verdict
+        if verdict in present
+    ]
+    axes.legend(handles=handles, loc="lower right" if right >= -left else "lower left")
+    zero = sum(not math.isfinite(pair.dimensionless) for pair in report.of(quantity))
+    hidden = len(report.parameters) - len(pairs) - zero
+    words = f"{report.scene}: {quantity} = {found.value:.5g} {found.unit}."
+    if hidden:
+        words += f" Left out: {hidden} with smaller or no effect."
+    if zero:
+        words += f" Parameters of value 0, which have no % per %: {zero}; see the table for them."
+    words += " Sensitivities are local: they hold for small changes."
+    if report.grazing:
+        count = len(merge_grazing(report.grazing))
+        words += f" The motion grazes a kink at {count} place{'s' if count > 1 else ''}, where derivatives are fragile."
+    caption(figure, f"What moves {quantity}", words)
+    return figure
+
+
+def draw_tornados(report: SensitivityReport, folder: Path) -> list[Path]:
+    """Write a chart for each quantity that has bars; their paths."""
+    written = []
+    for item in report.quantities:
+        if _bars(report, item.name):
+            plain = "".join(letter if letter.isalnum() else "_" for letter in item.name).strip("_")
+            written.append(save(tornado(report, item.name), folder / f"tornado_{plain}.png"))
+    return written
+
+
+def _bars(report: SensitivityReport, quantity: str) -> list[Sensitivity]:
+    """Pairs that are drawn, largest first."""
+    pairs = [pair for pair in report.of(quantity) if math.isfinite(pair.dimensionless)]
+    longest = max((abs(pair.dimensionless) for pair in pairs), default=0.0)
+    return [pair for pair in pairs if longest > 0.0 and abs(pair.dimensionless) > VISIBLE * longest][:BARS]

@@ -1,0 +1,125 @@
+"""The figure of a trade: error against time, both logarithmic, and the front that no configuration beats."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from ballpass.runtime.app.figures.canvas import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
+from ballpass.runtime.certify.trade import FAST_MATH, FULL, KINKS_LOCATED, Measured, Trade
+
+#: Marker, colour and edge of each method; shapes tell them apart in grey as well.
+_METHODS: dict[str, tuple[str, str]] = {
+    "stepper": ("o", INK),
+    "stepper-rodas4": ("s", SIGNAL),
+    "stepper-rodas5p": ("D", SIGNAL),
+    "stepper-dp54": ("p", INK),
+    "stepper-dop853": ("^", INK),
+    QUASI_STATIC: ("*", SAND),
+    "rosenbrock": ("x", GREY),
+    "erk": ("+", GREY),
+    "cvodes": ("v", GREY),
+}
+
+#: Markers and faces of simpler models (filled) and of switches (open): the same in every figure.
+_OTHERS: dict[str, tuple[str, str]] = {
+    "the outer ring fixed": ("P", SAND),
+    "4 harmonics of the load": ("X", SAND),
+    "16 harmonics of the load": ("<", SAND),
+    FAST_MATH: ("o", "white"),
+    KINKS_LOCATED: ("s", "white"),
+}
+
+#: Markers of models that have none above, in the order they were measured.
+_SPARE = (">", "h", "8", "d")
+
+#: Decades the axis is lengthened at most to show where the reference is uncertain.
+_DECADES = 4.0
+
+
+@styled
+def draw_trade(trade: Trade, quantity: str | None = None) -> Figure:
+    """Error (95 % point over the members) against time a cycle; `quantity` None takes the worst of all."""
+    figure = new_figure(5.4)
+    axes = figure.add_subplot()
+    groups: dict[str, list[Measured]] = {}
+    for one in trade.measured:
+        if math.isfinite(one.time) and math.isfinite(trade.error(one, quantity)) and trade.error(one, quantity) > 0.0:
+            groups.setdefault(_group(one), []).append(one)
+    spare = iter(_SPARE)
+    for name, ones in groups.items():
+        ones.sort(key=lambda m: -m.configuration.rtol)
+        if name in _METHODS:
+            marker, colour = _METHODS[name]
+            looks: dict[str, Any] = {"markersize": 10 if name == QUASI_STATIC else 6}
+        else:
+            marker, colour = _OTHERS[name] if name in _OTHERS else (next(spare, "."), SAND)
+            looks = {"markersize": 7}
+        axes.plot(
+            [1e3 * m.time for m in ones],
+            [100.0 * trade.error(m, quantity) for m in ones],
+            marker=marker,
+            color=colour,
+            markeredgecolor=colour if marker in "x+" else INK,
+            markeredgewidth=1.2 if marker in "x+" else 0.6,
+            linestyle=":" if name in _METHODS else "none",
+            linewidth=0.7,
+            label=name,
+            zorder=3,
+            **looks,
+        )
+    front = trade.front(quantity)
+    axes.plot(
+        [1e3 * m.time for m in front],
+        [100.0 * trade.error(m, quantity) for m in front],
+        color=INK,
+        linewidth=5.0,
+        alpha=0.18,
+        solid_capstyle="round",
+        zorder=2,
+        label="best of all",
+    )
+    floor = 100.0 * (max(trade.uncertainty.values()) if quantity is None else trade.uncertainty[quantity])
+    shaded = _axes(axes, floor)
+    name = "the worst of all quantities" if quantity is None else quantity
+    caption(
+        figure,
+        f"{trade.title}: what accuracy costs",
+        f"Relative error of {name}, 95 % point over {trade.members} parameter sets within {100 * trade.spread:g} % of "
+        f"the scene's, against the time of the integration, {trade.cycles:g} cycles a run. A line joins the tolerances "
+        f"of a method. {'Hatched: below what is known, for the' if shaded else 'The'} reference is uncertain by "
+        f"{floor:.1g} %.",
+    )
+    return figure
+
+
+def _axes(axes: Axes, floor: float) -> bool:
+    """Scales, ticks and legend; whether the part below the reference's uncertainty [%] is shown."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("time a cycle [ms]")
+    axes.set_ylabel("relative error [%]")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(10.0, numticks=20))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
+    low, high = axes.get_ylim()
+    shown = bool(floor > low * 10.0**-_DECADES)
+    if shown:
+        low = min(low, floor / 10.0)
+        axes.axhspan(low, floor, facecolor=PALE, edgecolor=GREY, hatch="///", linewidth=0.0, zorder=0)
+    axes.set_ylim(low, min(high, 1e3))
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return shown
+
+
+def _group(one: Measured) -> str:
+    c = one.configuration
+    if c.switch:
+        return c.switch
+    return c.method if c.model == FULL else c.model

@@ -1,0 +1,301 @@
+"""The numbers people read first, as one JSON-ready mapping and as a table for the terminal.
+
+In: a `Model` and its `Solution`.  Out: a dict; every number stands in an object with its ``unit``.
+
+Only steady cycles count, transient ones are dropped.  Extremes of forces and torques are looked for between the samples
+as well; those of motions are of samples.  ``rms`` is the plain root mean square; ``std`` that of the deviation from the
+mean.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich import box
+from rich.table import Table
+
+from ballpass.runtime.ask.observables import drive_work, kinematic_frequencies, statistics, turns
+from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks
+from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.point.conditioning import conditioning, has_reactions
+from ballpass.runtime.run.inputs import breakpoints
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+    from ballpass.runtime.run.solution import Solution
+
+#: Packages whose version may change a number.
+_TOOLS = ("ballpass", "casadi", "numpy", "scipy")
+
+#: Outputs of which mean, rms and std are told besides the extremes.
+_MOTIONS = ("inner.x", "inner.y", "inner.vx", "inner.vy", "outer.x", "outer.y", "outer.vx", "outer.vy")
+
+#: The ball forces whose peaks are told, by the key they stand under.
+_BALL_FORCES = {"elastic": "ball.elastic_force", "total": "ball.force"}
+
+#: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
+_COLUMNS = ("value", "min", "max", "mean", "rms", "std")
+
+
+def summarize(model: Model, sol: Solution) -> dict[str, Any]:
+    """Key numbers of a run.
+
+    Returns
+    -------
+    mapping with, as far as the scene has them and their outputs were asked for:
+
+    ``scene``, ``title``, ``status``, ``method``, ``compiled``, ``damping_law``, ``versions``
+        words
+    ``steps``, ``located_kinks`` (where they were located), ``wall_time``, ``rtol``, ``transient_cycles_dropped``,
+    ``steady_cycles``, ``samples``, ``cycle_length``
+        ``{"value": , "unit": }``
+    ``reaction.<joint>.x`` and other reactions, ``drive_torque``, ``load.x``, ``load.y``
+        ``{"min": , "max": , "unit": }``; beside them ``unsearched`` as below, where it is not zero
+    ``drive_work``
+        work of the drive in a turn, mean over the steady turns: ``{"value": , "unit": "J"}``
+    ``reaction_condition``
+        largest condition number of the matrix of Eq. (1) in a turn (see `ballpass.runtime.point.conditioning`):
+        ``{"unscaled": , "scaled": , "unit": "1"}``; beside them ``crank_angle`` with the same two keys and a unit
+    ``peak_ball_force``
+        highest force of any ball, also between samples: ``{"elastic": , "total": , "unit": "N"}``; beside them, with
+        the same two keys and a unit each, ``time`` and ``ball`` of the peak (balls are counted from 1), ``sampled``,
+        what the samples alone show, and ``unsearched``, the intervals between samples that promised more and were not
+        looked at; and ``searched``, where was looked, in words (see `ballpass.runtime.ask.peaks.Peak`)
+    ``inner.x`` and other motions of the rings
+        ``{"min": , "max": , "mean": , "rms": , "std": , "unit": }``
+    ``k_b`` and other derived constants
+        ``{"value": , "unit": }``
+    ``frequencies``
+        ``{"shaft": , "cage": , "ball_pass_outer": , "ball_pass_inner": , "ball_spin": , "unit": "Hz"}``
+
+    Raises
+    ------
+    RequestError
+        The run lies within its transient cycles.
+    SimulationError
+        An output holds values that are not finite.
+    """
+    steady = sol.steady()
+    manifest, statistic = model.manifest, sol.statistics
+    summary: dict[str, Any] = {
+        "scene": manifest.scene,
+        "title": manifest.title,
+        "status": sol.status.name.lower(),
+        "method": statistic.method,
+        "compiled": statistic.compiled,
+        "rtol": _value(statistic.rtol, "1", "rtol"),
+        # null where the integrator does not tell: erk and rosenbrock in compiled code
+        "steps": {"value": statistic.steps, "unit": "1"},
+        **({"located_kinks": {"value": statistic.located, "unit": "1"}} if statistic.located is not None else {}),
+        "wall_time": _value(statistic.wall_time, "s", "wall_time"),
+        "transient_cycles_dropped": _value(sol.transient_cycles, "1", "transient cycles"),
+        "samples": {"value": len(steady.t), "unit": "1"},
+    }
+    if steady.cycle_length is not None:
+        summary["cycle_length"] = _value(steady.cycle_length, "s", "cycle_length")
+        summary["steady_cycles"] = _value((steady.t[-1] - steady.t[0]) / steady.cycle_length, "1", "steady_cycles")
+    peaks = _peaks(model, steady)
+    summary |= _forces(steady, peaks)
+    summary |= _conditioning(model, steady)
+    summary |= _balls(peaks)
+    summary |= _motions(steady)
+    summary |= _constants(steady)
+    summary["versions"] = _versions(steady)
+    return summary
+
+
+def _peaks(model: Model, sol: Solution) -> dict[tuple[str, Kind], Peak]:
+    """Peaks of forces and torques: samples miss what a load's step and a contact's spike do between them."""
+    wanted: list[tuple[str, Kind]] = [(name, "max") for name in _BALL_FORCES.values() if name in sol.outputs]
+    for info in sol.manifest.outputs:
+        if info.name in sol.outputs and (info.name.startswith(("reaction.", "load.")) or info.name == "drive_torque"):
+            wanted += [(info.name, "min"), (info.name, "max")]
+    if not wanted:
+        return {}
+    return dict(zip(wanted, refine_peaks(model, model.numbers(sol.parameters), sol, wanted), strict=True))
+
+
+def _forces(sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
+    """Extremes of reactions, load and drive torque; the work of the drive."""
+    found: dict[str, Any] = {}
+    for info in sol.manifest.outputs:
+        if (info.name, "max") in peaks and info.name not in _BALL_FORCES.values():
+            low, high = peaks[info.name, "min"], peaks[info.name, "max"]
+            found[info.name] = {
+                "min": _finite(low.value, info.name),
+                "max": _finite(high.value, info.name),
+                "unit": info.unit,
+            }
+            if low.unsearched or high.unsearched:
+                found[info.name]["unsearched"] = {"min": low.unsearched, "max": high.unsearched, "unit": "1"}
+    mechanism = sol.manifest.mechanism
+    length = sol.cycle_length
+    if mechanism is not None and "drive_torque" in found and length is not None and turns(sol.t, length):
+        values = {**sol.parameters, **sol.constants}
+        work = drive_work(
+            sol.t,
+            sol["drive_torque"],
+            speed=sol.parameters[mechanism.speed],
+            cycle_length=length,
+            steps=breakpoints(sol.manifest.inputs, values, float(sol.t[0]), float(sol.t[-1])),
+        )
+        found["drive_work"] = _value(np.mean(work), "J", "drive_torque")
+    return found
+
+
+def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:
+    """Condition numbers of Eq. (1) over a turn; warns where they pass a bound."""
+    if not has_reactions(model):
+        return {}
+    found = conditioning(model, model.numbers(sol.parameters))
+    angles = {"unscaled": found.unscaled_angle, "scaled": found.scaled_angle, "unit": "rad"}
+    conditions = {"unscaled": found.unscaled, "scaled": found.scaled, "unit": "1", "crank_angle": angles}
+    return {"reaction_condition": conditions}
+
+
+def _balls(found_peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
+    """The highest force of any ball, and how it was looked for."""
+    peaks = {key: found_peaks[name, "max"] for key, name in _BALL_FORCES.items() if (name, "max") in found_peaks}
+    if not peaks:
+        return {}
+    found: dict[str, Any] = {key: _finite(peak.value, "ball.force") for key, peak in peaks.items()}
+    found["unit"] = "N"
+    found["time"] = {**{key: peak.time for key, peak in peaks.items()}, "unit": "s"}
+    found["ball"] = {**{key: peak.ball for key, peak in peaks.items()}, "unit": "1"}
+    found["sampled"] = {**{key: peak.sampled for key, peak in peaks.items()}, "unit": "N"}
+    found["searched"] = {key: peak.searched for key, peak in peaks.items()}
+    found["unsearched"] = {**{key: peak.unsearched for key, peak in peaks.items()}, "unit": "1"}
+    return {"peak_ball_force": found}
+
+
+def _motions(sol: Solution) -> dict[str, Any]:
+    units = {info.name: info.unit for info in (*sol.manifest.states, *sol.manifest.outputs)}
+    found: dict[str, Any] = {}
+    for name in _MOTIONS:
+        if name in sol:
+            values = statistics(sol.t, sol[name])
+            found[name] = {
+                "min": _finite(values.minimum, name),
+                "max": _finite(values.maximum, name),
+                "mean": _finite(values.mean, name),
+                "rms": _finite(values.rms, name),
+                "std": _finite(values.std, name),
+                "unit": units[name],
+            }
+    return found
+
+
+def _constants(sol: Solution) -> dict[str, Any]:
+    """Derived constants by the last part of their name, and the kinematic frequencies."""
+    bearing = sol.manifest.bearing
+    if bearing is None:
+        return {}
+    units = {info.name: info.unit for info in sol.manifest.constants}
+    found: dict[str, Any] = {}
+    for key in ("k_i", "k_o", "k_b", "c_b", "m_ei", "cage_ratio"):
+        name = f"bearing.{key}"
+        if name in units:
+            found[key] = _value(sol.constants[name], units[name], name)
+    frequencies = kinematic_frequencies(
+        bearing.balls,
+        sol.parameters["bearing.ball_diameter"],
+        sol.parameters["bearing.pitch_diameter"],
+        sol.parameters[bearing.shaft_speed],
+    )
+    found["frequencies"] = {
+        "shaft": frequencies.shaft,
+        "cage": frequencies.cage,
+        "ball_pass_outer": frequencies.ball_pass_outer,
+        "ball_pass_inner": frequencies.ball_pass_inner,
+        "ball_spin": frequencies.ball_spin,
+        "unit": "Hz",
+    }
+    found["damping_law"] = bearing.damping_law
+    return found
+
+
+def _versions(sol: Solution) -> dict[str, Any]:
+    """Versions of the tools that generated the model, and of those that ran it."""
+    running = {"python": platform.python_version()} | {name: version(name) for name in _TOOLS}
+    return {"generated_with": dict(sol.manifest.versions), "run_with": running}
+
+
+def _value(value: float | np.floating[Any], unit: str, name: str) -> dict[str, Any]:
+    return {"value": _finite(value, name), "unit": unit}
+
+
+def _finite(value: float | np.floating[Any], name: str) -> float:
+    number = float(value)
+    if not isfinite(number):
+        raise SimulationError(
+            f"{name} holds {number}; allowed: finite values; the run diverged or a parameter is out of range: "
+            "check the scene"
+        )
+    return number
+
+
+#: Unit of a number in the file -> factor and unit in the table, so that six digits of a displacement are six digits.
+TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
+
+#: What the table's caption tells of the run, and with which words.
+_RUN = {
+    "rtol": "rtol {}",
+    "steps": "{} steps",
+    "located_kinks": "{} kinks located",
+    "wall_time": "integrated in {} s",
+    "cycle_length": "cycle {} s",
+    "transient_cycles_dropped": "{} transient cycles dropped",
+    "steady_cycles": "{} steady ones",
+    "samples": "{} steady samples",
+}
+
+
+def render_summary(summary: Mapping[str, Any]) -> Table:
+    """The summary as a table for a terminal of 80 columns; mean and standard deviation are in the file only.
+
+    Parameters
+    ----------
+    summary : what `summarize` gave
+    """
+    columns = ("value", "min", "max", "rms")
+    table = Table(
+        title=f"{summary['title']}: {summary['method']}",
+        caption=_caption(summary),
+        title_justify="left",
+        caption_justify="left",
+        header_style="bold",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+    )
+    table.add_column("quantity", no_wrap=True)
+    for key in columns:
+        table.add_column(key, justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    for name, item in summary.items():
+        if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
+            continue
+        factor, unit = TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
+        cells = [f"{factor * item[key]:.4g}" if key in item else "" for key in columns]
+        if any(cells):
+            table.add_row(name, *cells, unit)
+        for key, value in item.items():
+            if key not in _COLUMNS and key != "unit" and not isinstance(value, Mapping):
+                # a named part of a quantity, as the peak's elastic one; what is said of it is in the file
+                table.add_row(f"{name}.{key}", f"{factor * value:.4g}", "", "", "", unit)
+    return table
+
+
+def _caption(summary: Mapping[str, Any]) -> str:
+    run = [
+        words.format(f"{summary[key]['value']:.4g}")
+        for key, words in _RUN.items()
+        if key in summary and summary[key]["value"] is not None
+    ]
+    law = [f"damping law {summary['damping_law']}"] if "damping_law" in summary else []
+    tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
+    return f"{', '.join(run + law)}.\n{', '.join(tools)}."

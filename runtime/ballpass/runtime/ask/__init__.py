@@ -1,0 +1,1 @@
+"""Quantities of interest of a run: names, values, derivatives."""

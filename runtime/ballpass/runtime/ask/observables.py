@@ -1,0 +1,306 @@
+"""What people ask of a run: frequencies, turns, statistics, stroboscopic points, orbit, work of the drive.
+
+In: plain numpy arrays in SI.  Out: numbers, arrays and small frozen records in SI.  Spectra are in `spectrum`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from ballpass.runtime.contract.errors import RequestError
+
+Array = NDArray[np.float64]
+
+#: Part of a turn by which the ends of a record may miss a turn's ends: rounding of times, far below a sample.
+_TURN_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KinematicFrequencies:
+    """Frequencies of a ball bearing whose inner ring turns, from kinematics alone [Hz].
+
+    Attributes
+    ----------
+    shaft : turns of the inner ring
+    cage : turns of the cage (FTF)
+    ball_pass_outer : balls over a point of the outer ring (BPFO)
+    ball_pass_inner : balls over a point of the inner ring (BPFI)
+    ball_spin : turns of a ball about itself, seen from the cage (BSF); a spot on it meets a ring at twice this
+    """
+
+    shaft: float
+    cage: float
+    ball_pass_outer: float
+    ball_pass_inner: float
+    ball_spin: float
+
+
+def kinematic_frequencies(
+    balls: int, ball_diameter: float, pitch_diameter: float, speed: float
+) -> KinematicFrequencies:
+    """Frequencies of a deep groove ball bearing: rolling without slip, contact angle zero, outer ring at rest.
+
+    Parameters
+    ----------
+    balls : number of balls [1]
+    ball_diameter, pitch_diameter : [m]
+    speed : angular speed of the inner ring, either sense [rad/s]
+
+    Raises
+    ------
+    RequestError
+        The ball count or a diameter is not that of a bearing.
+
+    References
+    ----------
+    Harris & Kotzalas, Essential Concepts of Bearing Technology, 5th ed., 2006, ch. 10 with alpha = 0.
+    """
+    if balls < 1 or not 0.0 < ball_diameter < pitch_diameter or not np.isfinite(speed):
+        raise RequestError(
+            f"balls {balls!r}, ball_diameter {ball_diameter!r} m, pitch_diameter {pitch_diameter!r} m, "
+            f"speed {speed!r} rad/s; "
+            "allowed: balls >= 1, 0 < ball_diameter < pitch_diameter, finite speed"
+        )
+    shaft = abs(speed) / (2.0 * np.pi)
+    ratio = ball_diameter / pitch_diameter
+    cage = shaft * (1.0 - ratio) / 2.0
+    return KinematicFrequencies(
+        shaft=shaft,
+        cage=cage,
+        ball_pass_outer=balls * cage,
+        ball_pass_inner=balls * (shaft - cage),
+        ball_spin=shaft * (1.0 - ratio**2) / (2.0 * ratio),
+    )
+
+
+def ball_angles(t: ArrayLike, *, balls: int, cage_speed: float, ball_angle: float) -> Array:
+    """Angles theta_j of the balls from +x, Eq. (7), not wrapped [rad].
+
+    Parameters
+    ----------
+    t : (n,) times [s]
+    balls : number of balls [1]
+    cage_speed : [rad/s]
+    ball_angle : theta_0, angle of ball 1 at t = 0 [rad]
+
+    Returns
+    -------
+    (n, balls) [rad]
+    """
+    time = np.asarray(t, dtype=float)
+    spacing = 2.0 * np.pi * np.arange(balls) / balls
+    return np.asarray(ball_angle + cage_speed * time[..., None] + spacing)
+
+
+def turns(t: ArrayLike, cycle_length: float) -> tuple[slice, ...]:
+    """Whole turns of a record, the last one ending at the record's end.
+
+    Each slice holds both end samples of its turn, so that neighbours share one; where a turn is not a whole number of
+    steps, its ends are the samples next to it.
+
+    Parameters
+    ----------
+    t : (n,) increasing times [s]
+    cycle_length : length of a turn [s]
+
+    Returns
+    -------
+    slices of t, oldest first; empty for a record shorter than a turn
+    """
+    time = _increasing(t)
+    _positive(cycle_length, "cycle_length", "s")
+    count = int(np.floor((time[-1] - time[0]) / cycle_length + _TURN_TOLERANCE))
+    ends = time[-1] - cycle_length * np.arange(count, -1, -1)
+    index = [int(np.argmin(np.abs(time - end))) for end in ends]
+    return tuple(slice(first, last + 1) for first, last in pairwise(index))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Statistics:
+    """Extremes of the samples, and means over time, of one signal [unit of the signal].
+
+    Attributes
+    ----------
+    minimum, maximum : of the samples; a spike between two samples is missed
+    mean : over time
+    rms : plain root mean square, with the mean in it
+    std : root mean square of the deviation from the mean
+    """
+
+    minimum: float
+    maximum: float
+    mean: float
+    rms: float
+    std: float
+
+
+def statistics(t: ArrayLike, signal: ArrayLike) -> Statistics:
+    """Statistics of a signal, means by the trapezoidal rule.
+
+    On a whole number of cycles the rule counts the end that repeats the start once.
+
+    Parameters
+    ----------
+    t : (n,) increasing times [s]
+    signal : (n,) samples [any unit]
+
+    Raises
+    ------
+    RequestError
+        Shapes differ, or times do not increase.
+    """
+    time = _increasing(t)
+    values = _like(time, signal, "signal")
+    length = time[-1] - time[0]
+    mean = float(np.trapezoid(values, time) / length)
+    return Statistics(
+        minimum=float(np.min(values)),
+        maximum=float(np.max(values)),
+        mean=mean,
+        rms=float(np.sqrt(np.trapezoid(values**2, time) / length)),
+        std=float(np.sqrt(np.trapezoid((values - mean) ** 2, time) / length)),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StroboscopicPoints:
+    """State seen once per turn: times [s], positions [m] and velocities [m/s], each (k,)."""
+
+    time: Array
+    position: Array
+    velocity: Array
+
+
+def stroboscopic_points(
+    t: ArrayLike, position: ArrayLike, velocity: ArrayLike, *, cycle_length: float, offset: float = 0.0
+) -> StroboscopicPoints:
+    """Stroboscopic (Poincaré) points: the state at the times ``offset + k * cycle_length`` inside the record.
+
+    Between samples the position is the cubic with the given positions and velocities at both ends (Hermite), and the
+    velocity is its derivative; at a sample both are the sample.
+
+    Parameters
+    ----------
+    t : (n,) increasing times [s]
+    position, velocity : (n,) samples [m], [m/s]
+    cycle_length : time between two points [s]
+    offset : shift of the first point against t = 0 [s]
+
+    Raises
+    ------
+    RequestError
+        Shapes differ, times do not increase, or the cycle length is not positive.
+    """
+    time = _increasing(t)
+    x, v = _like(time, position, "position"), _like(time, velocity, "velocity")
+    _positive(cycle_length, "cycle_length", "s")
+    first = int(np.ceil((time[0] - offset) / cycle_length - _TURN_TOLERANCE))
+    last = int(np.floor((time[-1] - offset) / cycle_length + _TURN_TOLERANCE))
+    at = np.clip(offset + cycle_length * np.arange(first, last + 1), time[0], time[-1])
+    curve = CubicHermiteSpline(time, x, v)
+    return StroboscopicPoints(
+        time=at,
+        position=np.asarray(curve(at), dtype=float),
+        velocity=np.asarray(curve(at, 1), dtype=float),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Orbit:
+    """Path of a ring centre in one turn.
+
+    Attributes
+    ----------
+    time, x, y : (n,) [s], [m], [m]
+    gap : distance between its two ends [m]; zero for a motion that repeats each turn
+    """
+
+    time: Array
+    x: Array
+    y: Array
+    gap: float
+
+
+def orbits(t: ArrayLike, x: ArrayLike, y: ArrayLike, *, cycle_length: float) -> tuple[Orbit, ...]:
+    """Path of a ring centre, turn by turn, oldest first.
+
+    Parameters
+    ----------
+    t : (n,) increasing times [s]
+    x, y : (n,) coordinates of the centre [m]
+    cycle_length : length of a turn [s]
+    """
+    time = _increasing(t)
+    across, up = _like(time, x, "x"), _like(time, y, "y")
+    return tuple(
+        Orbit(
+            time=time[turn],
+            x=across[turn],
+            y=up[turn],
+            gap=float(np.hypot(across[turn][-1] - across[turn][0], up[turn][-1] - up[turn][0])),
+        )
+        for turn in turns(time, cycle_length)
+    )
+
+
+def drive_work(t: ArrayLike, torque: ArrayLike, *, speed: float, cycle_length: float, steps: ArrayLike = ()) -> Array:
+    """Work of the drive in each whole turn, the integral of M_d d(theta) [J].
+
+    Trapezoidal rule.  Where the torque steps, it is continued in a straight line from both sides up to the step: second
+    order with loads that act within windows as well.  A step not named in `steps` costs up to half of it times the
+    angle of a sampling step.
+
+    Parameters
+    ----------
+    t : (n,) increasing times [s]
+    torque : (n,) torque of the drive on the driven body, counter-clockwise [N*m]
+    speed : angular speed of the driven body, counter-clockwise [rad/s]
+    cycle_length : length of a turn [s]
+    steps : (k,) times at which the torque steps; a sample at such a time holds the value behind the step [s]
+
+    Returns
+    -------
+    (turns,) oldest first [J]
+    """
+    time = _increasing(t)
+    moment = _like(time, torque, "torque")
+    parts = np.diff(time) * (moment[1:] + moment[:-1]) / 2.0
+    for step in np.asarray(steps, dtype=float):
+        k = int(np.searchsorted(time, step, side="left")) - 1  # time[k] < step <= time[k + 1]
+        if 1 <= k < time.size - 2:
+            parts[k] = _continued(time, moment, k, k - 1, step) - _continued(time, moment, k + 1, k + 2, step)
+    return np.array([speed * np.sum(parts[turn.start : turn.stop - 1]) for turn in turns(time, cycle_length)])
+
+
+def _continued(time: Array, values: Array, near: int, far: int, end: float) -> float:
+    """Integral from sample `near` to the time `end` of the straight line through the samples `far` and `near`."""
+    slope = (values[near] - values[far]) / (time[near] - time[far])
+    span = end - time[near]
+    return float(span * (values[near] + slope * span / 2.0))
+
+
+def _increasing(t: ArrayLike) -> Array:
+    time = np.asarray(t, dtype=float)
+    if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0.0):
+        raise RequestError(f"t has shape {time.shape}; allowed: (n,) strictly increasing times with n >= 2")
+    return time
+
+
+def _like(time: Array, signal: ArrayLike, name: str) -> Array:
+    values = np.asarray(signal, dtype=float)
+    if values.shape != time.shape:
+        raise RequestError(
+            f"{name} has shape {values.shape}, t {time.shape}; allowed: equal; "
+            "take one column of an output that has one per ball"
+        )
+    return values
+
+
+def _positive(value: float, name: str, unit: str) -> None:
+    if not (np.isfinite(value) and value > 0.0):
+        raise RequestError(f"{name} is {value!r} {unit}; allowed: positive and finite")

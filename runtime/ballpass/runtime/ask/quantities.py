@@ -1,0 +1,135 @@
+"""Names of quantities of interest: numbers that a run is asked for, each with its derivative.
+
+In: a name, `parse_quantity`.  Out: a `Quantity`, which `ballpass.runtime.ask.study` evaluates along a run.
+
+A name is ``kind:output``, with ``[ball]`` for one ball and ``@place`` where a kind wants one::
+
+    max:ball.force          rms:inner.y        value:inner.y@240deg      amplitude:inner.y@bpfo
+    max:ball.force[3]       range:inner.x      value:inner.y@0.41s       amplitude:inner.y@2x
+
+Without ``[ball]`` an output of the balls is that of the most loaded ball at each moment.  The names of observables of
+ensembles (`integrate/reductions.py`) mean the same numbers here, ``peak_ball_force`` and ``rms_inner_y`` included.
+What each kind does with a run stands in `ballpass.runtime.ask.kinds`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from ballpass.runtime.ask.kinds import KINDS, Kind
+from ballpass.runtime.ask.quantity_location import check_first_turns, is_frequency, is_instant
+from ballpass.runtime.ask.quantity_records import Quantity
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.run.request import no_output
+
+#: Kinds of the ensembles' observables that are no differentiable quantities.
+_COUNTED = ("peak_time", "peak_ball", "min_time")
+
+#: Words people use for kinds.
+_SYNONYMS = {"peak": "max"}
+
+_FORM = re.compile(r"(?P<kind>[a-z_]+):(?P<channel>[^\[\]@\s]+)(?:\[(?P<ball>\d+)\])?(?:@(?P<place>\S+))?")
+
+
+def channels_of(manifest: Manifest) -> dict[str, tuple[int, str]]:
+    """States and outputs of a model: columns and unit of each."""
+    return {info.name: (info.size, info.unit) for info in (*manifest.states, *manifest.outputs)}
+
+
+def parse_quantity(manifest: Manifest, text: str) -> Quantity:
+    """Read the name of a quantity.
+
+    Raises
+    ------
+    RequestError
+        No such kind, output, ball or place; the nearest known names are told.
+    """
+    channels = channels_of(manifest)
+    aliases = _aliases(channels)
+    form = _FORM.fullmatch(aliases.get(text, text))
+    bare, _, instant = text.partition("@")
+    kind = KINDS.get(bare)
+    if kind is not None and kind.static:
+        if manifest.bearing is None:
+            raise RequestError(f"{text}: this scene has no bearing. Ask for another quantity.")
+        if instant:
+            _check_place(manifest, text, kind, bare, instant)
+        asked = Quantity(name=text, kind=bare, channel="", ball=None, place=instant, unit=kind.unit)
+        check_first_turns(asked)
+        return asked
+    if kind is not None and kind.channel and not instant:
+        if kind.channel not in channels:
+            raise RequestError(f"{text}: {no_output(manifest, kind.channel, list(channels))}")
+        return Quantity(name=text, kind=bare, channel=kind.channel, ball=None, place="", unit=kind.unit)
+    if form is None:
+        known = _usable(manifest, channels)
+        raise RequestError(f"{unknown_name('quantity', text, known)} Its form is kind:output, as in max:ball.force.")
+    name = _SYNONYMS.get(form["kind"], form["kind"])
+    if name in _COUNTED:
+        raise RequestError(f"{text}: {name} is found in ensembles, and has no derivative here. Ask for max: instead.")
+    if name not in KINDS or KINDS[name].unit:
+        raise RequestError(f"{text}: {unknown_name('kind of quantity', form['kind'], [*KINDS, *_SYNONYMS])}")
+    if form["channel"] not in channels:
+        raise RequestError(f"{text}: {no_output(manifest, form['channel'], list(channels))}")
+    columns, unit = channels[form["channel"]]
+    ball = None if form["ball"] is None else int(form["ball"])
+    if ball is not None and not (columns > 1 and 1 <= ball <= columns):
+        allowed = f"1 to {columns}" if columns > 1 else "none, for it has no balls"
+        raise RequestError(f"{text}: ball {ball} was given; {form['channel']} allows {allowed}.")
+    place = form["place"] or ""
+    _check_place(manifest, text, KINDS[name], name, place)
+    return Quantity(name=text, kind=name, channel=form["channel"], ball=ball, place=place, unit=unit)
+
+
+def default_quantities(manifest: Manifest) -> tuple[str, ...]:
+    """What is asked for when nothing is named: ball forces and motion of the rings, else loads of the mechanism."""
+    channels = channels_of(manifest)
+    wanted = [
+        *(("peak_ball_force", "ball.force"), ("rms:inner.x", "inner.x"), ("rms:inner.y", "inner.y")),
+        *(("range:inner.y", "inner.y"), ("rms:outer.y", "outer.y")),
+    ]
+    found = [name for name, channel in wanted if channel in channels]
+    if not found:
+        found = [f"max:{name}" for name in channels if name.startswith("reaction.")]
+        found += ["max:drive_torque"] if "drive_torque" in channels else []
+    return tuple(found)
+
+
+def _check_place(manifest: Manifest, text: str, kind: Kind, name: str, place: str) -> None:
+    if not kind.place:
+        if place:
+            raise RequestError(f"{text}: {name} takes nothing behind @. Leave @{place} away.")
+        return
+    fine = is_frequency(manifest, place) if name == "amplitude" else is_instant(manifest, place)
+    if not fine:
+        example = "amplitude:inner.y@2x" if name == "amplitude" else "value:inner.y@240deg"
+        raise RequestError(f"{text}: behind @ {kind.place} is expected, not {place!r}. Example: {example}.")
+
+
+def _aliases(channels: Mapping[str, tuple[int, str]]) -> dict[str, str]:
+    """Names for people: ``peak_ball_force``, ``rms_inner_y``."""
+    kinds = [name for name, kind in KINDS.items() if not kind.place and not kind.unit]
+    return {
+        f"{kind}_{channel.replace('.', '_')}": f"{kind}:{channel}"
+        for channel in channels
+        for kind in (*kinds, *_SYNONYMS, *_COUNTED)
+    }
+
+
+def _usable(manifest: Manifest, channels: Mapping[str, tuple[int, str]]) -> list[str]:
+    """Names that can be asked for as they stand, for suggestions."""
+    open_ = [name for name, kind in KINDS.items() if not kind.place and not kind.unit]
+    counted = tuple(f"{name}:" for name in _COUNTED)
+    alone = {name: kind for name, kind in KINDS.items() if kind.unit}
+    return [
+        *(alias for alias, meant in _aliases(channels).items() if not meant.startswith(counted)),
+        *(f"{name}:{channel}" for name in open_ for channel in channels),
+        *(
+            name
+            for name, kind in alone.items()
+            if (manifest.bearing is not None if kind.static else kind.channel in channels)
+        ),
+    ]

@@ -1,0 +1,167 @@
+"""What stands behind ``@`` in the name of a quantity: an angle, a time, a frequency, and how it moves with parameters.
+
+In: a `Quantity` and the numbers of a run.  Out: a time [s] or a frequency [Hz], each with its derivative.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ballpass.runtime.ask.nodes import Window
+from ballpass.runtime.ask.observables import KinematicFrequencies, kinematic_frequencies
+from ballpass.runtime.ask.quantity_records import Array, Quantity, View
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
+from ballpass.runtime.run import inputs as clock
+
+_PLACE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|s|Hz|x)")
+
+#: Names of kinematic frequencies in quantities, and in `KinematicFrequencies`.
+_FREQUENCIES = {
+    "shaft": "shaft",
+    "cage": "cage",
+    "ftf": "cage",
+    "bpfo": "ball_pass_outer",
+    "bpfi": "ball_pass_inner",
+    "bsf": "ball_spin",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Of what kind a place is: "angle" [rad], "time" [s] or "end"."""
+
+    kind: str
+    number: float
+
+
+def named_place(quantity: Quantity) -> Place:
+    """The place written behind ``@``: an angle or a time."""
+    form = _PLACE.fullmatch(quantity.place)
+    assert form is not None  # checked when read
+    number = float(form["number"])
+    if form["unit"] == "s":
+        return Place(kind="time", number=number)
+    return Place(kind="angle", number=math.radians(number) if form["unit"] == "deg" else number)
+
+
+def place_of(manifest: Manifest, numbers: Numbers, window: Window, quantity: Quantity) -> tuple[float, Place]:
+    """Time at which a quantity with a place is taken, in the last turn [s], and the place.
+
+    Raises
+    ------
+    RequestError
+        The run does not reach it, or nothing turns.
+    """
+    if quantity.kind == "end":
+        return window.duration, Place(kind="end", number=0.0)
+    asked = named_place(quantity)
+    if asked.kind == "time":
+        number = asked.number
+        if not 0.0 <= number <= window.duration:
+            raise RequestError(f"{quantity.name}: the run ends at {window.duration:g} s. Run longer, or ask earlier.")
+        return number, asked
+    angle = asked.number
+    speed = clock.shaft_speed(manifest, numbers.values)
+    if speed == 0.0:
+        raise RequestError(f"{quantity.name}: nothing turns (its speed is zero). Name a time instead, as in @0.41s.")
+    start = numbers.values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
+    turns = (start + speed * window.duration - angle) / clock.TURN
+    # the last turn before the end, an angle at the very end included; 1e-9 of a turn is rounding
+    whole = math.floor(turns + 1e-9) if speed > 0.0 else math.ceil(turns - 1e-9)
+    time = (angle + clock.TURN * whole - start) / speed
+    if time < 0.0:
+        raise RequestError(f"{quantity.name}: the run is over before that angle is passed. Run longer.")
+    return min(time, window.duration), asked
+
+
+def place_slope(
+    manifest: Manifest, numbers: Numbers, place: Place, time: float, end: Array, slopes: Callable[[str], Array]
+) -> Array:
+    """Derivative of the time of a place along the directions, shape (directions,) [s/unit].
+
+    Parameters
+    ----------
+    time : of the place [s]
+    end : derivative of the time at which the run ends, shape (directions,) [s/unit]
+    slopes : that of a parameter or constant by its name, shape (directions,)
+    """
+    if place.kind == "end":
+        return end
+    if place.kind == "time":
+        return np.zeros_like(end)
+    speed = clock.shaft_speed(manifest, numbers.values)
+    name = clock.speed_name(manifest)
+    assert name is not None  # something turns
+    moved = time * slopes(name)
+    if manifest.mechanism is not None:
+        moved = slopes(manifest.mechanism.start_angle) + moved
+    return -moved / speed
+
+
+def frequency(view: View, place: str) -> tuple[float, Array]:
+    """The frequency written behind ``@`` [Hz], and its derivative along the directions, shape (directions,)."""
+    manifest, values = view.manifest, view.numbers.values
+    form = _PLACE.fullmatch(place)
+    if form is not None and form["unit"] == "Hz":
+        return float(form["number"]), np.zeros(view.directions)
+    speed = clock.shaft_speed(manifest, values)
+    name = clock.speed_name(manifest)
+    assert name is not None  # something turns
+    faster = view.slopes(name)
+    if form is not None:
+        order = float(form["number"])
+        return order * abs(speed) / clock.TURN, order * math.copysign(1.0, speed) * faster / clock.TURN
+    bearing = manifest.bearing
+    assert bearing is not None
+    ball, pitch = values["bearing.ball_diameter"], values["bearing.pitch_diameter"]
+
+    def of(ratio: complex, shaft: complex) -> complex:
+        """The same closed forms for complex numbers: their derivative is exact to rounding (complex step)."""
+        cage = shaft * (1.0 - ratio) / 2.0
+        spin = shaft * (1.0 - ratio**2) / (2.0 * ratio)
+        passing = {"ball_pass_outer": bearing.balls * cage, "ball_pass_inner": bearing.balls * (shaft - cage)}
+        return {"shaft": shaft, "cage": cage, "ball_spin": spin, **passing}[_FREQUENCIES[place]]
+
+    known: KinematicFrequencies = kinematic_frequencies(bearing.balls, ball, pitch, speed)
+    ratio, shaft, tiny = ball / pitch, abs(speed) / clock.TURN, 1e-30
+    by_ratio = of(complex(ratio, tiny), shaft).imag / tiny
+    by_shaft = of(ratio, complex(shaft, tiny)).imag / tiny
+    ratio_slope = (view.slopes("bearing.ball_diameter") - ratio * view.slopes("bearing.pitch_diameter")) / pitch
+    shaft_slope = math.copysign(1.0, speed) * faster / clock.TURN
+    return float(getattr(known, _FREQUENCIES[place])), by_ratio * ratio_slope + by_shaft * shaft_slope
+
+
+def is_frequency(manifest: Manifest, place: str) -> bool:
+    """Whether what stands behind ``@`` is a frequency of this model."""
+    form = _PLACE.fullmatch(place)
+    if form is not None:
+        return form["unit"] in ("Hz", "x")
+    return place in _FREQUENCIES and manifest.bearing is not None and manifest.bearing.balls >= 1
+
+
+def is_instant(manifest: Manifest, place: str) -> bool:
+    """Whether what stands behind ``@`` is a time, or an angle of something that turns."""
+    form = _PLACE.fullmatch(place)
+    turning = manifest.mechanism is not None or manifest.bearing is not None
+    return form is not None and (form["unit"] == "s" or (form["unit"] in ("deg", "rad") and turning))
+
+
+def check_first_turns(quantity: Quantity) -> None:
+    """Raise `RequestError`, in the unit that was given, where the angle of a quantity at rest is beyond two turns."""
+    if not quantity.place:
+        return
+    asked = named_place(quantity)
+    if asked.kind == "angle" and abs(asked.number) > LARGEST_ANGLE:
+        allowed = "-720deg to 720deg" if quantity.place.endswith("deg") else "-4 pi to 4 pi rad"
+        raise RequestError(
+            f"{quantity.name}: {quantity.place} is more than two turns, while the angle is one of the first turn. "
+            f"Allowed: {allowed}. Or name a time instead, as in @0.41s."
+        )

@@ -1,0 +1,55 @@
+"""Quantities of the rings at rest: nothing is run for them.
+
+In: a model, numbers, a `Quantity` of a static kind.  Out: its `Estimate`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ballpass.runtime.ask.quantity_location import named_place, place_slope
+from ballpass.runtime.ask.quantity_records import Estimate, Quantity
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.point.equilibrium import instant, static_equilibrium
+from ballpass.runtime.run.sensitivity import Chain
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+
+def at_rest(model: Model, numbers: Numbers, quantity: Quantity, chain: Chain | None) -> Estimate:
+    """A static quantity; its derivative follows from the implicit function of the equilibrium.
+
+    Parameters
+    ----------
+    chain : directions of the derivative; None for none
+
+    Raises
+    ------
+    RequestError
+        No bearing, an unloaded ring in a clearance, or an angle where nothing turns.
+    SimulationError
+        Nothing holds the rings.
+    """
+    time, moved = 0.0, np.zeros(0 if chain is None else len(chain.names))
+    if quantity.place:
+        # an angle is that of the first turn, as in `Model.static_equilibrium`: the balls stand where they do there
+        kind = named_place(quantity)
+        by_angle = kind.kind == "angle"
+        time = instant(model, numbers, None if by_angle else kind.number, kind.number if by_angle else None)
+        if chain is not None:
+            moved = place_slope(model.manifest, numbers, kind, time, moved, chain.derivative)
+    rest = static_equilibrium(model, numbers, t=time)
+    names = [] if chain is None else [*chain.names, "time"]
+    if quantity.kind == "static_deflection":
+        place = np.array([rest["inner.x"], rest["inner.y"]])
+        value, ball = float(np.hypot(*place)), None
+        rows = rest.derivative("positions", names)[:2] if names else np.zeros((2, 1))
+        slope = place @ rows / value if value else np.zeros(rows.shape[1])
+    else:
+        best = int(np.argmax(rest.ball_force))
+        value, ball = float(rest.ball_force[best]), best + 1
+        slope = rest.derivative("ball.elastic_force", names)[best] if names else np.zeros(1)
+    return Estimate(value=value, slope=slope[:-1] + slope[-1] * moved, time=time, ball=ball)

@@ -1,0 +1,348 @@
+"""Follow a run along nodes: states and outputs there, with their derivatives along parameters.
+
+In: a model, numbers, edges and nodes.  Out: a `Track`, and `Signal` for each channel asked for.
+
+Derivatives are taken along the moving nodes: with x' at fixed time and the node's own t', that of the state is
+``x' + f t'``.  Across an edge where a load switches x' jumps by ``(f_before - f_behind) t_edge'``, and the sum does
+not: it is one number for both sides of the edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.ask.nodes import Edges, Nodes
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.kernel import Loop
+from ballpass.runtime.native.stepper import End, Family
+from ballpass.runtime.point.jacobian import rows_of
+from ballpass.runtime.run.reductions import RunFailed
+from ballpass.runtime.run.request import no_output
+from ballpass.runtime.run.segments import make_segments
+from ballpass.runtime.run.sensitivity import Directions
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+    from ballpass.runtime.run.sensitivity import Chain
+
+Array = NDArray[np.float64]
+
+#: Nodes whose derivatives are held in memory at once.
+BLOCK = 4096
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stepping:
+    """How to step.
+
+    Attributes
+    ----------
+    family : method of the driver
+    rtol, magnitude : error allowed in a step: relative, and the states' magnitudes, shape (states,)
+    sensitivity_rtol : tolerance of the derivatives in the choice of step sizes [1]
+    largest_step : bound of the step size [s]
+    """
+
+    family: Family
+    rtol: float
+    magnitude: Array
+    sensitivity_rtol: float | None = None
+    largest_step: float = np.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Track:
+    """States along nodes.
+
+    Attributes
+    ----------
+    nodes, edges : where
+    x : states, shape (nodes, states)
+    slope : their derivatives along the moving nodes, shape (nodes, states, directions)
+    fixed, rate : derivatives at fixed time, and rate of change in time, of which `slope` is made; shapes (nodes,
+        states, directions), (nodes, states); empty in a run without derivatives
+    local : time since the segment's start, shape (nodes,) [s]
+    u : inputs, shape (nodes, inputs)
+    steps : accepted steps
+    """
+
+    nodes: Nodes
+    edges: Edges
+    x: Array
+    slope: Array
+    fixed: Array
+    rate: Array
+    local: Array
+    u: Array
+    steps: int
+
+    def along(self, nodes: Nodes, edges: Edges) -> Track:
+        """The same run along the same nodes when they move otherwise."""
+        slope = self.fixed + self.rate[:, :, None] * nodes.slope[:, None, :]
+        return replace(self, nodes=nodes, edges=edges, slope=slope)
+
+    def part(self, rows: NDArray[np.int_]) -> Track:
+        """The track at some of its nodes."""
+        nodes = self.nodes
+        kept = Nodes(
+            t=nodes.t[rows],
+            weight=nodes.weight[rows],
+            segment=nodes.segment[rows],
+            slope=nodes.slope[rows],
+            weight_slope=nodes.weight_slope[rows],
+        )
+        names = ("x", "slope", "fixed", "rate", "local", "u")
+        return replace(self, nodes=kept, **{name: getattr(self, name)[rows] for name in names})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Signal:
+    """A channel along nodes.
+
+    Attributes
+    ----------
+    value : shape (nodes, columns); a column for each ball
+    slope : derivative along the moving nodes, shape (nodes, columns, directions)
+    """
+
+    value: Array
+    slope: Array
+
+
+def follow(
+    model: Model,
+    numbers: Numbers,
+    edges: Edges,
+    nodes: Nodes,
+    stepping: Stepping,
+    chain: Chain | None = None,
+) -> Track:
+    """States at the nodes; with derivatives along the directions of `chain`.
+
+    Raises
+    ------
+    RunFailed
+        The driver could not reach the end.
+    """
+    inputs, count = model.manifest.inputs, len(model.states)
+    directions = 0 if chain is None else len(chain.names)
+    segments = make_segments(inputs, numbers, edges.times)
+    u = segments.inputs
+    local, held = nodes.t - edges.times[nodes.segment], u[nodes.segment]
+    if not count:
+        empty = np.zeros((len(nodes), 0))
+        slope = np.zeros((len(nodes), 0, directions))
+        return Track(
+            nodes=nodes, edges=edges, x=empty, slope=slope, fixed=slope, rate=empty, local=local, u=held, steps=0
+        )
+    times, back = np.unique(nodes.t, return_inverse=True)
+    states = np.empty((len(times), count))
+    start = np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
+    made = None if chain is None else Directions(model, numbers, chain.names, len(times))
+    if made is not None and stepping.sensitivity_rtol is not None:
+        made.control(stepping.sensitivity_rtol, stepping.magnitude)
+    stepper = model.stepper if made is None else model.differentiating_stepper
+    outcome = stepper.run(
+        family=stepping.family,
+        tolerance=stepping.rtol * stepping.magnitude,
+        p=numbers.p,
+        c=numbers.c,
+        x=start,
+        segments=segments,
+        output_times=times,
+        output_states=states,
+        tangents=None if made is None else made.tangents(segments, 0, len(times)),
+        largest_step=stepping.largest_step,
+    )
+    if outcome.end is not End.DONE:
+        raise RunFailed(outcome.end, outcome.time, outcome.step)
+    slope = fixed = np.zeros((len(nodes), count, directions))
+    rates = np.zeros((len(nodes), count))
+    if made is not None:
+        # the driver gives an edge's derivative as it is before the edge
+        before = np.clip(np.searchsorted(edges.times, times, side="left") - 1, 0, None)
+        given = {"t": times - edges.times[before], "x": states, "u": u[before], "p": numbers.p, "c": numbers.c}
+        rate = next(iter(model.loop("rhs", ("t", "x", "u"))(len(times), given).values()))
+        fixed, rates = made.states(len(times))[back], rate[back]
+        slope = fixed + rates[:, :, None] * nodes.slope[:, None, :]
+    return Track(
+        nodes=nodes,
+        edges=edges,
+        x=states[back],
+        slope=slope,
+        fixed=fixed,
+        rate=rates,
+        local=local,
+        u=held,
+        steps=outcome.steps,
+    )
+
+
+class Outlook:
+    """Channels of a model along tracks: states by themselves, outputs through the generated function.
+
+    Parameters
+    ----------
+    model : the model
+    channels : states, outputs, and quantities that the scene's outputs do not name
+
+    Raises
+    ------
+    RequestError
+        An unknown channel.
+    """
+
+    def __init__(self, model: Model, channels: Sequence[str]) -> None:
+        self._model = model
+        known = list(dict.fromkeys((*model.states, *model.outputs, *(q.name for q in model.manifest.quantities))))
+        for name in channels:
+            if name not in known:
+                raise RequestError(no_output(model.manifest, name, known))
+        self.channels = tuple(dict.fromkeys(channels))
+        self._outputs = [info for info in model.manifest.outputs if info.name in self.channels]
+        self._outputs = [info for info in self._outputs if info.name not in model.states]
+        own = {*model.states, *model.outputs}
+        self._more = [rows for name in self.channels if name not in own for rows in rows_of(model, name)]
+        self._columns = [(info.name, info.size) for info in self._outputs]
+        self._columns += [(name.partition("[")[0], len(rows.labels)) for rows in self._more for name in rows.labels[:1]]
+        self._values_of_more: Loop | None = None
+        self._derivatives: Loop | None = None
+
+    def look(self, track: Track, numbers: Numbers, chain: Chain | None = None) -> Mapping[str, Signal]:
+        """Every channel along a track."""
+        states = self._model.states
+        found: dict[str, Signal] = {}
+        for name in self.channels:
+            if name in states:
+                k = states.index(name)
+                found[name] = Signal(value=track.x[:, [k]], slope=track.slope[:, [k]])
+        if self._columns:
+            found |= self._values(track, numbers) if chain is None else self._differentiated(track, numbers, chain)
+        return found
+
+    def by_states(self, track: Track, numbers: Numbers) -> Mapping[str, Array]:
+        """Derivative of every channel by the states, shape (nodes, columns, states)."""
+        states, count = self._model.states, len(track.nodes)
+        found = {}
+        for name in self.channels:
+            if name in states:
+                found[name] = np.tile(np.eye(len(states))[states.index(name)], (count, 1, 1))
+        if self._columns:
+            if self._derivatives is None:
+                self._derivatives = self._loop()
+            results = self._derivatives(count, self._given(track, numbers))
+            rows = results["g"].shape[1]
+            every = results["g_x"].reshape(count, -1, rows).transpose(0, 2, 1)
+            column = 0
+            for name, size in self._columns:
+                found[name] = every[:, column : column + size]
+                column += size
+        return found
+
+    def _given(self, track: Track, numbers: Numbers) -> dict[str, Array]:
+        return {"t": track.local, "x": track.x, "u": track.u, "p": numbers.p, "c": numbers.c}
+
+    def _values(self, track: Track, numbers: Numbers) -> dict[str, Signal]:
+        found: dict[str, Signal] = {}
+        if self._more:
+            if self._values_of_more is None:
+                self._values_of_more = Loop(self._function(self._more_rows), ("t", "x", "u"))
+            every = self._values_of_more(len(track.nodes), self._given(track, numbers))["g"]
+            column = 0
+            for name, size in self._columns[len(self._outputs) :]:
+                found[name] = Signal(value=every[:, column : column + size], slope=np.zeros((len(every), size, 0)))
+                column += size
+        if not self._outputs:
+            return found
+        infos = self._model.manifest.outputs
+        loop = self._model.loop("outputs", ("t", "x", "u"))
+        results = loop(len(track.nodes), self._given(track, numbers))
+        columns = dict(zip((info.name for info in infos), results.values(), strict=True))
+        return found | {
+            info.name: Signal(value=columns[info.name], slope=np.zeros((*columns[info.name].shape, 0)))
+            for info in self._outputs
+        }
+
+    def _differentiated(self, track: Track, numbers: Numbers, chain: Chain) -> dict[str, Signal]:
+        if self._derivatives is None:
+            self._derivatives = self._loop()
+        directions = len(chain.names)
+        moved = np.array([chain.inputs(float(time)) for time in track.edges.times[:-1]])
+        moved = moved.reshape(len(track.edges.times) - 1, track.u.shape[1], directions)
+        values, slopes = [], []
+        for first in range(0, len(track.nodes), BLOCK):
+            part = slice(first, first + BLOCK)
+            value, slope = self._block(track, numbers, chain, moved[track.nodes.segment[part]], part)
+            values.append(value)
+            slopes.append(slope)
+        value, slope = np.concatenate(values), np.concatenate(slopes)
+        found, column = {}, 0
+        for name, size in self._columns:
+            columns = slice(column, column + size)
+            found[name] = Signal(value=value[:, columns], slope=slope[:, columns])
+            column += size
+        return found
+
+    def _block(self, track: Track, numbers: Numbers, chain: Chain, moved: Array, part: slice) -> tuple[Array, Array]:
+        """Outputs at some nodes and their derivatives; `moved` are those of the inputs."""
+        assert self._derivatives is not None
+        given = {"t": track.local[part], "x": track.x[part], "u": track.u[part], "p": numbers.p, "c": numbers.c}
+        count = len(given["t"])
+        results = self._derivatives(count, given)
+        values = results["g"]
+
+        def by(name: str) -> Array:
+            """Derivative of all outputs by one argument, shape (nodes, rows, entries)."""
+            return results[f"g_{name}"].reshape(count, -1, values.shape[1]).transpose(0, 2, 1)
+
+        slope = by("t") * track.nodes.slope[part][:, None, :]
+        slope = slope + by("x") @ track.slope[part] + by("u") @ moved
+        return values, slope + by("p") @ chain.p + by("c") @ chain.c
+
+    def _loop(self) -> Loop:
+        """The channels asked for and their derivatives by each argument, made from the expression graph."""
+        return Loop(self._function(self._all_rows, derivatives=True), ("t", "x", "u"))
+
+    def _function(
+        self, rows: Callable[[Mapping[str, casadi.SX]], list[casadi.SX]], *, derivatives: bool = False
+    ) -> casadi.Function:
+        """Rows as a function of all five arguments; with their derivatives by each."""
+        manifest = self._model.manifest
+        sizes = {
+            "t": 1,
+            "x": len(self._model.states),
+            "u": len(manifest.inputs),
+            "p": len(manifest.parameters),
+            "c": len(manifest.constants),
+        }
+        inputs = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
+        wanted = casadi.vertcat(*rows(inputs))
+        results, names = [casadi.densify(wanted)], ["g"]
+        if derivatives:
+            results += [casadi.vec(casadi.densify(casadi.jacobian(wanted, symbol))) for symbol in inputs.values()]
+            names += [f"g_{name}" for name in inputs]
+        return casadi.Function("outlook", list(inputs.values()), results, list(inputs), names)
+
+    def _all_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
+        found = []
+        if self._outputs:
+            outputs = self._model.symbolic("outputs")
+            results = outputs.call([inputs[name] for name in outputs.name_in()])
+            order = [info.name for info in self._model.manifest.outputs]
+            found = [results[order.index(info.name)] for info in self._outputs]
+        return found + self._more_rows(inputs)
+
+    def _more_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
+        found = []
+        for rows in self._more:
+            group = self._model.symbolic(rows.function)
+            (every,) = group.call([inputs[name] for name in group.name_in()])
+            found.append(every[rows.indices.tolist()])
+        return found

@@ -1,0 +1,237 @@
+"""The second opinion on a derivative: another route to the same number, and what their comparison says.
+
+In: two numbers with their uncertainties.  Out: a `Check` with a verdict.
+
+verified      both agree within the tolerance, and the second is known well enough to say so.  Where they agree only
+              because a derivative below the quantum counts as nothing, the check says that too: `Check.bounded`
+disagrees     they differ by more than the tolerance and by more than their uncertainties explain
+not checked   the user turned the check off, or the uncertainties are too large for either answer (the reason is told):
+              in chaos, and where a contact grazes, no route gives a derivative that means anything
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.certify.differences import richardson
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+
+Array = NDArray[np.float64]
+
+#: Relative disagreement that is allowed [1].
+AGREEMENT = 1e-3
+
+#: Disagreement of the dimensionless derivative (p/Q) dQ/dp that is allowed besides: below it nothing is told apart [1].
+FLOOR = 1e-5
+
+#: Uncertainties, estimated from neighbouring approximations, may be too small by this factor.
+CAUTION = 4.0
+
+#: Largest step of the first triangle of difference quotients, relative to the parameter's scale; the next is larger
+#: where noise is what limits an entry, and smaller where it is curvature.
+FIRST_STEP, LARGER, SMALLER = 1e-3, 10.0, 0.1
+
+#: Most triangles of a parameter, and steps of each.
+TRIANGLES, HALVINGS = 3, 5
+
+#: Relative change of parameters that shows the noise of a run: what step sizes that are chosen anew do to its values.
+JITTER = 1e-7
+
+
+class Verdict(Enum):
+    """What a check says; values are for people."""
+
+    VERIFIED = "verified"
+    DISAGREES = "disagrees"
+    NOT_CHECKED = "not checked"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """A derivative by a second route, and the comparison.
+
+    Attributes
+    ----------
+    route : of the second number
+    value : second number, in the derivative's unit; None where there is none
+    uncertainty : of the second number, same unit
+    disagreement : distance of both, same unit
+    verdict : see above
+    reason : why nothing is said, else ""
+    quantum : derivative that counts as nothing, same unit; None where nothing was compared
+    bounded : verified, but only to within the quantum: relative to their size the numbers differ by more than is
+        allowed, or the second is not known that well
+    """
+
+    route: str
+    value: float | None
+    uncertainty: float | None
+    disagreement: float | None
+    verdict: Verdict
+    reason: str = ""
+    quantum: float | None = None
+    bounded: bool = False
+
+    def is_nothing(self, derivative: float) -> bool:
+        """Whether all that is verified is that `derivative` and the second number lie below the quantum."""
+        if not self.bounded or self.value is None or self.quantum is None:
+            return False
+        return max(abs(derivative), abs(self.value)) <= self.quantum
+
+
+#: The check that was turned off.
+UNCHECKED = Check(
+    route="none",
+    value=None,
+    uncertainty=None,
+    disagreement=None,
+    verdict=Verdict.NOT_CHECKED,
+    reason="the check was turned off",
+)
+
+
+def compare(
+    derivative: float,
+    own_uncertainty: float,
+    second: float,
+    uncertainty: float,
+    *,
+    route: str,
+    quantum: float,
+    agreement: float = AGREEMENT,
+) -> Check:
+    """Compare a derivative with that of a second route.
+
+    Parameters
+    ----------
+    derivative, second : both numbers
+    own_uncertainty, uncertainty : theirs, same unit
+    quantum : derivative that counts as nothing, same unit
+    agreement : relative disagreement that is allowed [1]
+    """
+    if not (np.isfinite(derivative) and np.isfinite(second) and np.isfinite(uncertainty)):
+        fine = np.isfinite(second) and np.isfinite(uncertainty)
+        why = "the derivative is no finite number" if fine else "the second route gives no finite number"
+        return Check(
+            route=route,
+            value=None,
+            uncertainty=None,
+            disagreement=None,
+            verdict=Verdict.DISAGREES if fine else Verdict.NOT_CHECKED,
+            reason=why,
+        )
+    apart = abs(derivative - second)
+    relative = agreement * max(abs(derivative), abs(second))
+    allowed = relative + quantum
+    verdict, reason = Verdict.VERIFIED, ""
+    if apart > allowed:
+        explained = CAUTION * (own_uncertainty + uncertainty)
+        verdict = Verdict.DISAGREES if apart > explained else Verdict.NOT_CHECKED
+        if verdict is Verdict.NOT_CHECKED:
+            reason = _blame(own_uncertainty, uncertainty, allowed)
+    elif uncertainty > allowed:
+        verdict, reason = Verdict.NOT_CHECKED, _blame(own_uncertainty, uncertainty, allowed)
+    return Check(
+        route=route,
+        value=second,
+        uncertainty=uncertainty,
+        disagreement=apart,
+        verdict=verdict,
+        reason=reason,
+        quantum=quantum,
+        bounded=verdict is Verdict.VERIFIED and max(apart, uncertainty) > relative,
+    )
+
+
+def _blame(own: float, second: float, allowed: float) -> str:
+    """Which number is not known well enough, and what may help."""
+    if own > second:
+        return (
+            f"the derivative itself is uncertain by {own:.1e}, more than the {allowed:.1e} that is allowed: take a "
+            "tighter sensitivity_rtol or fewer turns, or see whether the motion is chaotic"
+        )
+    return (
+        f"the second route is uncertain by {second:.1e}, more than the {allowed:.1e} that is allowed: grazing contact, "
+        "a chaotic motion, or a tolerance that is too loose"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Second:
+    """Derivatives by a second route: shapes (quantities, parameters)."""
+
+    route: str
+    value: Array
+    uncertainty: Array
+
+
+def noise_of(measure: Callable[[Mapping[str, float]], Array], at: Mapping[str, float], scales: Array) -> Array:
+    """Noise of values that a run gives, shape (quantities,): half the largest second difference over tiny changes.
+
+    Parameters
+    ----------
+    measure : values of all quantities for parameters that differ from the run's
+    at : values of the parameters to change
+    scales : change of each that is a large one, shape (parameters,)
+    """
+    rows = [
+        measure({name: value + k * JITTER * scale for (name, value), scale in zip(at.items(), scales, strict=True)})
+        for k in range(-2, 3)
+    ]
+    return np.asarray(np.max(np.abs(np.diff(rows, n=2, axis=0)), axis=0) / 2.0)
+
+
+def by_differences(
+    measure: Callable[[Mapping[str, float]], Array],
+    at: Mapping[str, float],
+    scales: Array,
+    *,
+    quantum: Array,
+    agreement: float = AGREEMENT,
+    progress: Callable[[float], None] | None = None,
+) -> Second:
+    """Derivatives of quantities by Richardson-extrapolated central differences, with step control.
+
+    Parameters
+    ----------
+    measure : values of all quantities for parameters that differ from the run's, shape (quantities,)
+    at : values of the parameters to differentiate by
+    scales : change of each that is a large one, shape (parameters,)
+    quantum : derivatives that count as nothing, shape (quantities, parameters)
+    agreement : relative disagreement that will be allowed [1]
+    progress : called with the finished fraction
+    """
+    noise = noise_of(measure, at, scales)
+    count = len(noise)
+    value, error = np.full((count, len(at)), np.nan), np.full((count, len(at)), np.inf)
+    for k, (name, number) in enumerate(at.items()):
+
+        def shifted(moved: float, name: str = name) -> Array:
+            try:
+                return measure({name: moved})
+            except (RequestError, SimulationError):
+                # beyond what can be simulated: this difference does not count
+                return np.full(count, np.nan)
+
+        step, tried = FIRST_STEP, 0
+        while tried < TRIANGLES:
+            found = richardson(shifted, number, step * scales[k], steps=HALVINGS, resolution=noise)
+            tried += 1
+            better = found.error < error[:, k]
+            value[:, k] = np.where(better, found.value, value[:, k])
+            error[:, k] = np.where(better, found.error, error[:, k])
+            poor = error[:, k] > 0.3 * (agreement * np.abs(value[:, k]) + quantum[:, k])
+            if not np.any(poor):
+                break
+            # noise over the width of the smallest difference, twice as `richardson` counts it
+            share = 2.0 * noise[poor] / (2.0 * step * scales[k] * 0.5 ** (HALVINGS - 1))
+            noisy = bool(np.any(share > 0.2 * error[poor, k]))
+            step = FIRST_STEP * (LARGER if noisy and tried == 1 else SMALLER ** (tried if not noisy else tried - 1))
+        if progress is not None:
+            progress((k + 1) / len(at))
+    return Second(route="differences", value=value, uncertainty=error)

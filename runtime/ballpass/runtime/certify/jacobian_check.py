@@ -1,0 +1,220 @@
+"""A Jacobian with a second opinion: generated derivatives beside extrapolated differences of the function itself.
+
+In: a model, numbers, what by what, an instant and a state.  Out: a `CheckedJacobian` with a verdict for each entry.
+
+The second route shares nothing with the first but the values of the function: parameters are moved and everything is
+computed anew, the derived constants, phases and tables included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.certify.certificate import UNCHECKED, Check, Verdict, compare
+from ballpass.runtime.certify.differences import richardson
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.point.evaluate import neighbour, point
+from ballpass.runtime.point.jacobian import (
+    CRANK_ANGLE,
+    TIME,
+    Rows,
+    contract,
+    directions_of,
+    rows_of,
+    turning_speed,
+    values_of_rows,
+)
+from ballpass.runtime.point.linearize import kink_notes
+from ballpass.runtime.run import inputs as clock
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+Array = NDArray[np.float64]
+
+#: Relative disagreement that is allowed [1]: both routes are exact but for rounding.
+AGREEMENT = 1e-6
+
+#: Derivatives that count as nothing, relative to the largest of the row times its step [1].
+NOTHING = 1e-9
+
+#: Largest step, relative to what is moved.
+STEP = 1e-3
+
+#: The same for what is zero, by unit.
+STEP_FROM_ZERO = {"m": 1e-7, "m/s": 1e-4, "rad": 1e-3, "s": 1e-6, "N": 1.0}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CheckedJacobian:
+    """Derivatives and, for each, what a second route says.
+
+    Attributes
+    ----------
+    rows, columns : labels
+    row_units, column_units : SI units
+    value : derivatives, shape (rows, columns) [row's unit / column's unit]
+    at : values of the rows, shape (rows,)
+    checks : one for each entry, row by row; all `UNCHECKED` where the check was turned off
+    notes : where the laws have no derivative at this state, in words
+    time, x : instant [s] and state
+    """
+
+    rows: tuple[str, ...]
+    columns: tuple[str, ...]
+    row_units: tuple[str, ...]
+    column_units: tuple[str, ...]
+    value: Array
+    at: Array
+    checks: tuple[tuple[Check, ...], ...]
+    notes: tuple[str, ...]
+    time: float
+    x: Array
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of all entries together: one that disagrees decides, then one that is not checked."""
+        all_of_them = [check.verdict for row in self.checks for check in row]
+        for verdict in (Verdict.DISAGREES, Verdict.NOT_CHECKED):
+            if verdict in all_of_them:
+                return verdict
+        return Verdict.VERIFIED
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists for JSON."""
+        entries = []
+        for i, row in enumerate(self.rows):
+            for j, column in enumerate(self.columns):
+                check = self.checks[i][j]
+                entries.append(
+                    {
+                        "of": row,
+                        "wrt": column,
+                        "value": _number(self.value[i, j]),
+                        "unit": _quotient(self.row_units[i], self.column_units[j]),
+                        "second": check.value,
+                        "second_uncertainty": check.uncertainty,
+                        "verdict": check.verdict.value,
+                        "reason": check.reason,
+                    }
+                )
+        return {
+            "time": {"value": self.time, "unit": "s"},
+            "state": self.x.tolist(),
+            "values": {
+                row: {"value": _number(value), "unit": unit}
+                for row, value, unit in zip(self.rows, self.at, self.row_units, strict=True)
+            },
+            "jacobian": entries,
+            "verdict": self.verdict.value,
+            "notes": list(self.notes),
+        }
+
+
+def checked_jacobian(
+    model: Model,
+    numbers: Numbers,
+    of: str | Sequence[str],
+    wrt: str | Sequence[str],
+    *,
+    t: float,
+    x: Sequence[float] | np.ndarray | None,
+    check: bool = True,
+) -> CheckedJacobian:
+    """Derivatives at one time and state with a verdict for each; arguments as for `Model.jacobian`.
+
+    Raises
+    ------
+    RequestError
+        Unknown names.
+    """
+    parts = rows_of(model, of)
+    directions = directions_of(model, numbers, wrt, t)
+    there = point(model, numbers, t, x)
+    state = np.asarray(there["x"], dtype=float)
+    value = np.concatenate([contract(model, part, directions, there) for part in parts])
+    at = values_of_rows(model, parts, there)
+    columns = []
+    for j, (label, unit) in enumerate(zip(directions.labels, directions.units, strict=True)):
+        if not check:
+            columns.append([UNCHECKED] * len(at))
+            continue
+        base, step, moved = _motion(model, numbers, parts, label, unit, t, state)
+        found = richardson(moved, base, step)
+        quantum = NOTHING * np.maximum(np.abs(at), 1e-3 * float(np.max(np.abs(at), initial=0.0))) / step
+        columns.append(
+            [
+                compare(
+                    float(value[i, j]),
+                    0.0,
+                    float(found.value[i]),
+                    float(found.error[i]),
+                    route="differences",
+                    quantum=float(quantum[i]),
+                    agreement=AGREEMENT,
+                )
+                for i in range(len(at))
+            ]
+        )
+    return CheckedJacobian(
+        rows=tuple(label for part in parts for label in part.labels),
+        columns=directions.labels,
+        row_units=tuple(unit for part in parts for unit in part.units),
+        column_units=directions.units,
+        value=value,
+        at=at,
+        checks=tuple(tuple(column[i] for column in columns) for i in range(len(at))),
+        notes=kink_notes(model, numbers, t, state) if model.states else (),
+        time=t,
+        x=state,
+    )
+
+
+def _motion(
+    model: Model, numbers: Numbers, parts: Sequence[Rows], name: str, unit: str, t: float, x: Array
+) -> tuple[float, float, Callable[[float], Array]]:
+    """Where a name stands, the largest step for it, and the rows as a function of its value."""
+    there = point(model, numbers, t, x)
+    if name in (TIME, CRANK_ANGLE):
+        rate = 1.0 if name == TIME else turning_speed(model, numbers)
+        speed = abs(clock.shaft_speed(model.manifest, numbers.values))
+        step = STEP / speed if speed else STEP_FROM_ZERO["s"]
+        # with the inputs of this instant, as between breakpoints: a gate's jump is no derivative
+        return 0.0, step * abs(rate), lambda v: values_of_rows(model, parts, {**there, "t": v / rate})
+    if name in model.states:
+        k = model.states.index(name)
+        size = max(float(np.max(np.abs(x[_same_kind(model, k)]))), STEP_FROM_ZERO[unit])
+
+        def with_state(v: float) -> Array:
+            moved = x.copy()
+            moved[k] = v
+            return values_of_rows(model, parts, {**there, "x": moved})
+
+        return float(x[k]), 0.1 * size, with_state
+    base = numbers.parameters[name]
+
+    def with_parameter(v: float) -> Array:
+        return values_of_rows(model, parts, point(model, neighbour(model, numbers, {name: v}), t, x))
+
+    return base, STEP * abs(base) or STEP_FROM_ZERO.get(unit, STEP), with_parameter
+
+
+def _same_kind(model: Model, k: int) -> slice:
+    half = len(model.states) // 2
+    return slice(0, half) if k < half else slice(half, 2 * half)
+
+
+def _number(value: float) -> float | None:
+    """A number for JSON, which knows no infinity."""
+    return float(value) if np.isfinite(value) else None
+
+
+def _quotient(above: str, below: str) -> str:
+    if below == "1":
+        return above
+    return f"{above}/({below})" if any(sign in below for sign in "*/") else f"{above}/{below}"

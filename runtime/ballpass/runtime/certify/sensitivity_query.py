@@ -1,0 +1,422 @@
+"""Sensitivities of quantities of interest, each with its certificate.
+
+In: a model, names of quantities and parameters.  Out: a `SensitivityReport`.
+
+Derivatives are those of the stepper's own steps, with their error in the choice of step sizes; a looser run beside it
+says how well they are known.  The certificate compares each with a second route (`certificate.py`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.ask.kinks import DEFLECTION
+from ballpass.runtime.ask.nodes import Window
+from ballpass.runtime.ask.quantities import default_quantities, parse_quantity
+from ballpass.runtime.ask.study import Course, Span, Study
+from ballpass.runtime.ask.track import Outlook, Stepping
+from ballpass.runtime.certify.certificate import AGREEMENT, FLOOR, UNCHECKED, Second, by_differences, compare
+from ballpass.runtime.certify.grazing import TOLERANCE, Grazing, find_grazing
+from ballpass.runtime.certify.sensitivity_report import QuantityValue, Sensitivity, SensitivityReport, ratio_unit
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.parameters import Numbers, real, unknown_name
+from ballpass.runtime.native.stepper import METHODS, Family
+from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.point.evaluate import neighbour
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.direction_scales import ANGLE
+from ballpass.runtime.run.magnitudes import model_scales
+from ballpass.runtime.run.request import TOLERANCES, asked_length
+from ballpass.runtime.run.scales import Scales
+from ballpass.runtime.run.simulate import STIFF_RATIO
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+Array = NDArray[np.float64]
+
+#: Tolerance of the states in a run with derivatives, and that of the derivatives themselves.
+RTOL, SENSITIVITY_RTOL = 1e-11, 1e-10
+
+#: The derivatives' tolerance is loosened tenfold, down to this, where steps would fall below the resolution of time:
+#: under laws whose slope is infinite at contact onset derivatives have singular rates there.
+LOOSEST = 1e-6
+
+#: Tolerance of the states in runs for difference quotients.
+DIFFERENCE_RTOL = 1e-13
+
+#: Nodes in a turn per sample of an ordinary run: where a law has a kink, derivatives of outputs jump, and their
+#: quadrature is of first order there.
+FINER = 4
+
+#: Nodes for each radian of the fastest vibration, and the most of them, in `FINER` runs' samples.
+NODES_A_RADIAN, MOST = 3, 4
+
+#: A change of the start by this share of the motion is a large one: it stays near, so that its effect is linear.
+START_SHARE = 1e-2
+
+#: Ways to check.
+CHECKS = ("differences", "erk", "adjoint")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Query:
+    """What is asked for; None takes the scene's run settings, or this module's defaults.
+
+    Attributes
+    ----------
+    of, wrt : names, in `wrt` shell-style patterns too; None for the sensible ones, and for all parameters
+    span : how long to run
+    method : of the derivatives: ``auto``, one of the stepper's, ``erk``
+    direction : of ``erk``: "forward" or "adjoint"
+    check : True (differences), False, or one of `CHECKS`
+    rtol, sensitivity_rtol : tolerances of states and derivatives
+    samples_per_cycle : nodes of quadratures in a turn
+    agreement : relative disagreement that is allowed [1]
+    progress : called with words and a finished fraction
+    """
+
+    of: Sequence[str] | None
+    wrt: Sequence[str] | None
+    span: Span
+    method: str = "auto"
+    direction: Literal["forward", "adjoint"] = "forward"
+    check: bool | str = True
+    rtol: float = RTOL
+    sensitivity_rtol: float = SENSITIVITY_RTOL
+    samples_per_cycle: int | None = None
+    agreement: float = AGREEMENT
+    progress: Callable[[str, float], None] | None = None
+
+
+def make_span(manifest: Manifest, cycles: float | None, duration: float | None, transient: float | None) -> Span:
+    """How long to run: as given, else as the scene's run settings say.
+
+    Raises
+    ------
+    RequestError
+        Both cycles and duration, or numbers that are none.
+    """
+    turns, time = asked_length(manifest.run, cycles, duration)
+    dropped = manifest.run.transient_cycles if transient is None else real(transient)
+    if not 0.0 <= dropped < math.inf:
+        raise RequestError(f"transient: a number of cycles from 0 on is expected, not {transient!r}.")
+    return Span(cycles=turns, duration=time, transient=dropped)
+
+
+def make_query(
+    manifest: Manifest,
+    *,
+    of: str | Sequence[str] | None,
+    wrt: str | Sequence[str] | None,
+    cycles: float | None,
+    duration: float | None,
+    transient: float | None,
+    method: str,
+    direction: Literal["forward", "adjoint"],
+    check: bool | str,
+    rtol: float | None,
+    sensitivity_rtol: float | None,
+    samples_per_cycle: int | None,
+    agreement: float | None,
+    progress: Callable[[str, float], None] | None,
+) -> Query:
+    """A query from what `Model.sensitivity` is given.
+
+    Raises
+    ------
+    RequestError
+        A wrong request.
+    """
+    for name, given in (("rtol", rtol), ("sensitivity_rtol", sensitivity_rtol)):
+        if given is not None and not TOLERANCES[0] <= given <= TOLERANCES[1]:
+            raise RequestError(
+                f"{name}: a number from {TOLERANCES[0]:g} to {TOLERANCES[1]:g} is expected, not {given!r}."
+            )
+    if samples_per_cycle is not None and not (int(samples_per_cycle) == samples_per_cycle >= 8):
+        raise RequestError(f"samples_per_cycle: a whole number from 8 on is expected, not {samples_per_cycle!r}.")
+    if agreement is not None and not 0.0 < agreement < 1.0:
+        raise RequestError(f"agreement: a number between 0 and 1 is expected, not {agreement!r}.")
+    if direction not in ("forward", "adjoint"):
+        raise RequestError(f"direction: forward or adjoint is expected, not {direction!r}.")
+    return Query(
+        of=[of] if isinstance(of, str) else of,
+        wrt=[wrt] if isinstance(wrt, str) else wrt,
+        span=make_span(manifest, cycles, duration, transient),
+        method=method,
+        direction=direction,
+        check=check,
+        rtol=RTOL if rtol is None else rtol,
+        sensitivity_rtol=SENSITIVITY_RTOL if sensitivity_rtol is None else sensitivity_rtol,
+        samples_per_cycle=samples_per_cycle,
+        agreement=AGREEMENT if agreement is None else agreement,
+        progress=progress,
+    )
+
+
+def answer(model: Model, numbers: Numbers, query: Query) -> SensitivityReport:
+    """Run a model and differentiate quantities by parameters, with certificates.
+
+    Raises
+    ------
+    RequestError
+        Unknown names, a law whose force jumps, a run without steady turns.
+    SimulationError
+        The computation failed.
+    """
+    manifest = model.manifest
+    _refuse_jumps(manifest)
+    check_assembly(model, numbers)
+    quantities = [parse_quantity(manifest, name) for name in _listed("of", query.of, default_quantities(manifest))]
+    names = _chosen(_listed("wrt", query.wrt, tuple(numbers.parameters)), numbers.parameters)
+    route = _check_route(query)
+    study = Study(model, quantities, query.span, 4)
+    window = study.window(numbers)
+    magnitude, family, fine = np.zeros(0), Family.AUTO, Family.AUTO
+    scales = Scales(magnitude=magnitude, frequency=0.0, decay=0.0)
+    if model.states:
+        start = np.array([numbers.values[name] for name in manifest.initial])
+        scales = model_scales(model, numbers, start, window.duration, window.turn)
+        magnitude = scales.magnitude
+        family, fine = _families(query.method, scales)
+    study.per_turn = query.samples_per_cycle or _nodes_a_turn(manifest, window, scales)
+    tell = query.progress or (lambda _words, _fraction: None)
+    stepping = Stepping(family=family, rtol=query.rtol, magnitude=magnitude, sensitivity_rtol=query.sensitivity_rtol)
+
+    if query.method == "erk":
+        from ballpass.runtime.certify.erk_route import by_erk
+
+        found = by_erk(study, numbers, names, scales, direction=query.direction, progress=lambda f: tell("erk", f))
+        course = study.measure(numbers, stepping)
+        values = np.array([item.value for item in course.estimates])
+        slopes, own = found.value, found.uncertainty
+        tolerance: float | None = None
+    else:
+        tell("differentiating", 0.0)
+        course, tolerance = _differentiate(study, numbers, names, stepping)
+        values = np.array([item.value for item in course.estimates])
+        slopes = np.array([item.slope for item in course.estimates])
+        own = np.zeros_like(slopes)
+        if route is not None and model.states:
+            tell("differentiating", 0.5)
+            looser = replace(stepping, rtol=min(10.0 * query.rtol, 1e-3), sensitivity_rtol=10.0 * tolerance)
+            own = np.abs(
+                slopes - np.array([e.slope for e in _differentiate(study, numbers, names, looser)[0].estimates])
+            )
+    difference_scales = _difference_scales(manifest, numbers, names, magnitude)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        quantum = FLOOR * np.abs(values)[:, None] / difference_scales[None, :]
+    second = None
+    if route is not None:
+        plain = Stepping(family=fine, rtol=DIFFERENCE_RTOL, magnitude=magnitude)
+        second = _second(study, model, numbers, names, route, plain, scales, difference_scales, quantum, query, tell)
+    pairs = []
+    units = {info.name: info.unit for info in manifest.parameters}
+    for row, (quantity, estimate) in enumerate(zip(quantities, course.estimates, strict=True)):
+        for column, name in enumerate(names):
+            derivative, at = float(slopes[row, column]), numbers.parameters[name]
+            check = UNCHECKED
+            if second is not None:
+                check = compare(
+                    derivative,
+                    float(own[row, column]),
+                    float(second.value[row, column]),
+                    float(second.uncertainty[row, column]),
+                    route=second.route,
+                    quantum=float(quantum[row, column]),
+                    agreement=query.agreement,
+                )
+            pairs.append(
+                Sensitivity(
+                    quantity=quantity.name,
+                    parameter=name,
+                    value=estimate.value,
+                    parameter_value=at,
+                    derivative=derivative,
+                    unit=ratio_unit(quantity.unit, units[name]),
+                    dimensionless=at * derivative / estimate.value if at * estimate.value != 0.0 else math.nan,
+                    scale=float(difference_scales[column]),
+                    uncertainty=float(own[row, column]) if route is not None else None,
+                    check=check,
+                )
+            )
+    return SensitivityReport(
+        scene=manifest.scene,
+        quantities=tuple(
+            QuantityValue(
+                name=item.name, value=found.value, unit=item.unit, time=found.time, ball=found.ball, notes=found.notes
+            )
+            for item, found in zip(quantities, course.estimates, strict=True)
+        ),
+        parameters=tuple(names),
+        pairs=tuple(pairs),
+        grazing=_grazing(model, numbers, course),
+        settings={
+            "cycles": query.span.cycles,
+            "duration": window.duration,
+            "transient_cycles": query.span.transient,
+            "method": query.method,
+            "rtol": query.rtol,
+            "sensitivity_rtol": tolerance,
+            "agreement": query.agreement,
+            "steps": 0 if course.track is None else course.track.steps,
+            "parameters": {name: numbers.parameters[name] for name in names},
+        },
+    )
+
+
+def _refuse_jumps(manifest: Manifest) -> None:
+    jumping = [law for law, smoothness in manifest.smoothness if smoothness == "discontinuous"]
+    if jumping:
+        raise RequestError(
+            f"sensitivity: the {' and '.join(jumping)} law of this scene is discontinuous (its force jumps at "
+            "contact), so the derivative of the steps is not that of the motion. Allowed: a continuous law, "
+            '[bearing.damping] law = "tangent" or "one-sided", or a smoothed contact, [bearing.contact] smoothing.'
+        )
+
+
+def _nodes_a_turn(manifest: Manifest, window: Window, scales: Scales) -> int:
+    """Nodes that quadratures need: more than a run's samples, and some in each period of the fastest vibration."""
+    ordinary = FINER * manifest.run.samples_per_cycle
+    span = window.turn if math.isfinite(window.turn) else window.duration
+    return max(ordinary, min(math.ceil(NODES_A_RADIAN * scales.frequency * span), MOST * ordinary))
+
+
+def _listed(option: str, given: Sequence[str] | None, default: Sequence[str]) -> list[str]:
+    names = list(dict.fromkeys(default if given is None else given))
+    if not names:
+        raise RequestError(f"sensitivity: {option} names nothing. Name at least one.")
+    return names
+
+
+def _chosen(patterns: Sequence[str], known: Mapping[str, float]) -> list[str]:
+    """Parameters by name or shell-style pattern, each once; those of a pattern in the scene's order."""
+    found: list[str] = []
+    for pattern in patterns:
+        matches = [pattern] if pattern in known else [name for name in known if fnmatchcase(name, pattern)]
+        if not matches:
+            raise RequestError(unknown_name("parameter", pattern, known))
+        found += matches
+    return list(dict.fromkeys(found))
+
+
+def _check_route(query: Query) -> str | None:
+    if query.check is False:
+        return None
+    route = "differences" if query.check is True else str(query.check)
+    if route not in CHECKS:
+        raise RequestError(f"check: {unknown_name('route', route, CHECKS)} Or True, or False for none.")
+    if query.method == "erk" and route in ("erk", "adjoint"):
+        raise RequestError(
+            "check: the derivatives come from erk themselves, so that erk is no second route. Take differences."
+        )
+    return route
+
+
+def _families(method: str, scales: Scales) -> tuple[Family, Family]:
+    """Family for derivatives, and family for the tight runs of difference quotients."""
+    if method not in ("auto", "erk", *METHODS):
+        raise RequestError(
+            f"sensitivity: the method {method!r} was given; allowed are auto, {', '.join(METHODS)} and erk, which "
+            "differentiate their own steps."
+        )
+    stiff = scales.stiffness > STIFF_RATIO
+    family = METHODS.get(method, Family.AUTO)
+    if family is Family.AUTO:
+        family = Family.RODAS5P if stiff else Family.DP54
+    return family, Family.RODAS5P if stiff else Family.DOP853
+
+
+def _differentiate(study: Study, numbers: Numbers, names: Sequence[str], stepping: Stepping) -> tuple[Course, float]:
+    """Derivatives at the tightest tolerance that the resolution of time allows; that tolerance."""
+    tolerance = stepping.sensitivity_rtol
+    assert tolerance is not None
+    while True:
+        try:
+            return study.differentiate(numbers, names, replace(stepping, sensitivity_rtol=tolerance)), tolerance
+        except SimulationError:
+            if tolerance * 10.0 > max(LOOSEST, stepping.sensitivity_rtol or 0.0):
+                raise
+            tolerance *= 10.0
+
+
+def _difference_scales(manifest: Manifest, numbers: Numbers, names: Sequence[str], magnitude: Array) -> Array:
+    """Change of each parameter that is a large one: its value; a radian; what its state or length is measured in."""
+    units = {info.name: info.unit for info in manifest.parameters}
+    at_start = dict(zip(manifest.initial, magnitude.tolist(), strict=True))
+    position = float(np.max(magnitude[: len(magnitude) // 2])) if len(magnitude) else 1e-3
+    scales = []
+    for name in names:
+        value = abs(numbers.parameters[name])
+        if name in at_start:
+            value = max(value, START_SHARE * at_start[name])
+        elif units[name] == ANGLE:
+            value = 1.0
+        elif value == 0.0:
+            alike = [abs(numbers.parameters[other]) for other, unit in units.items() if unit == units[name]]
+            value = position if units[name] == "m" else max(alike, default=0.0)
+        scales.append(value or 1.0)
+    return np.array(scales)
+
+
+def _second(
+    study: Study,
+    model: Model,
+    numbers: Numbers,
+    names: Sequence[str],
+    route: str,
+    plain: Stepping,
+    scales_of_states: Scales,
+    scales: Array,
+    quantum: Array,
+    query: Query,
+    tell: Callable[[str, float], None],
+) -> Second:
+    """Derivatives by the second route."""
+    if route != "differences":
+        from ballpass.runtime.certify.erk_route import by_erk
+
+        direction: Literal["forward", "adjoint"] = "adjoint" if route == "adjoint" else "forward"
+        return by_erk(
+            study, numbers, names, scales_of_states, direction=direction, progress=lambda f: tell("checking", f)
+        )
+
+    def measure(change: Mapping[str, float]) -> Array:
+        course = study.measure(neighbour(model, numbers, change), plain)
+        return np.array([item.value for item in course.estimates])
+
+    return by_differences(
+        measure,
+        {name: numbers.parameters[name] for name in names},
+        scales,
+        quantum=quantum,
+        agreement=query.agreement,
+        progress=lambda fraction: tell("checking", fraction),
+    )
+
+
+def _grazing(model: Model, numbers: Numbers, course: Course, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:
+    """Where the run grazes a kink, whether or not the scene's outputs name the balls' deflections."""
+    manifest, track = model.manifest, course.track
+    if track is None or manifest.bearing is None:
+        return ()
+    deflection = Outlook(model, [DEFLECTION]).look(track, numbers)[DEFLECTION].value
+    order = np.lexsort((track.nodes.t, track.nodes.segment))
+    times = track.nodes.t[order]
+    angles = np.array([clock.crank_angle(manifest, numbers.values, float(time)) for time in times])
+    return find_grazing(
+        times,
+        track.nodes.segment[order],
+        deflection[order],
+        angles,
+        one_sided=manifest.bearing.damping_law == "one-sided",
+        tolerance=tolerance,
+    )

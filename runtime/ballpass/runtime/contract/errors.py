@@ -1,0 +1,23 @@
+"""The errors this package raises on purpose."""
+
+from __future__ import annotations
+
+
+class BallpassError(Exception):
+    """Base of every error raised on purpose: what, what was given, what is allowed, what to do."""
+
+
+class RequestError(BallpassError, ValueError):
+    """The request was wrong (exit code 2): an unknown name, a value out of range, a bad artefact folder."""
+
+
+class ArtefactError(RequestError):
+    """The generated folder is missing, of another schema, or its files differ from the manifest's digests."""
+
+
+class CompileError(BallpassError, RuntimeError):
+    """The C compiler failed; the message carries command and its output."""
+
+
+class SimulationError(BallpassError, RuntimeError):
+    """The computation failed (exit code 1): cause, time, crank angle, remedy."""

@@ -1,0 +1,162 @@
+"""A generated folder and its manifest: reading, writing, and whether the files are those the manifest describes."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import importlib.metadata
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.folders import read_settled
+from ballpass.runtime.contract.manifest import FILE_NAME, Manifest
+
+
+def read_artefact(folder: str | Path, *, verify: bool = True) -> Manifest:
+    """Manifest of a generated folder whose files are those it describes.
+
+    Parameters
+    ----------
+    verify : False takes edited files as they are: the manifest then has the digests of what is there
+
+    Raises
+    ------
+    ArtefactError
+        See `read_manifest` and `check_files`; or the folder was written with another version of CasADi.
+    """
+    place = Path(folder)
+    if not verify:
+        manifest = read_manifest(folder, verify=False)
+        return replace(manifest, files=tuple(_present(place, [name for name, _ in manifest.files])))
+
+    def consistent() -> Manifest:
+        manifest = read_manifest(folder)
+        check_files(folder, manifest)
+        return manifest
+
+    manifest = read_settled(place, consistent, ArtefactError)
+    _check_version(folder, manifest)
+    return manifest
+
+
+def _present(place: Path, names: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Names and digests of the files that are there."""
+    for name in names:
+        with contextlib.suppress(FileNotFoundError):
+            yield name, file_digest(place / name)
+
+
+def _check_version(folder: str | Path, manifest: Manifest) -> None:
+    written, here = dict(manifest.versions).get("casadi", "none"), importlib.metadata.version("casadi")
+    if written.split(".")[:2] != here.split(".")[:2]:
+        raise ArtefactError(
+            f"{folder}: written with CasADi {written}, while {here} is installed: its functions may mean something "
+            "else there. Write the folder again with `ballpass derive`, or load it with verify=False to try."
+        )
+
+
+def read_manifest(folder: str | Path, *, verify: bool = True) -> Manifest:
+    """Read ``manifest.json`` of a generated folder.
+
+    Parameters
+    ----------
+    verify : refuse a manifest that was edited after it was written
+
+    Raises
+    ------
+    ArtefactError
+        There is no such folder or file, or its content is wrong (see `Manifest.from_json`).
+    """
+    path = Path(folder) / FILE_NAME
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (FileNotFoundError, NotADirectoryError) as fault:
+        what = "the folder has no" if Path(folder).is_dir() else "there is no folder with a"
+        raise ArtefactError(
+            f"{folder}: {what} {FILE_NAME}. A generated folder is expected; `ballpass derive SCENE` writes one."
+        ) from fault
+    except (OSError, ValueError) as fault:  # no text in UTF-8, no path
+        raise ArtefactError(
+            f"{path}: cannot be read ({fault}). A folder that `ballpass derive` wrote, and that you may read, "
+            "is expected."
+        ) from fault
+    return Manifest.from_json(text, source=str(path), verify=verify)
+
+
+def write(folder: str | Path, manifest: Manifest) -> Path:
+    """Write ``manifest.json`` into `folder`: the old file or the new one, never half of it."""
+    target = Path(folder) / FILE_NAME
+    descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=".manifest-")
+    try:
+        with os.fdopen(descriptor, "w", encoding="utf-8", newline="\n") as stream:
+            stream.write(manifest.to_json())
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(temporary, 0o666 & ~mask)  # mkstemp's 0600 would shut out colleagues
+        os.replace(temporary, target)
+    except BaseException:
+        os.unlink(temporary)
+        raise
+    return target
+
+
+def check_files(folder: str | Path, manifest: Manifest) -> None:
+    """Compare the digests of the files a manifest lists with those on disk.
+
+    Raises
+    ------
+    ArtefactError
+        A file is missing or was changed after it was generated; all such files are named.
+    """
+    faults = []
+    for name, digest in manifest.files:
+        try:
+            found = file_digest(Path(folder) / name)
+        except FileNotFoundError:
+            faults.append(f"{name}: missing")
+            continue
+        except OSError as fault:
+            faults.append(f"{name}: cannot be read ({fault.strerror})")
+            continue
+        if found != digest:
+            faults.append(f"{name}: sha256 {found[:12]}... found, {digest[:12]}... expected: edited or cut short")
+    if faults:
+        raise ArtefactError(
+            f"{folder}: the files are not those the manifest describes:\n"
+            + "\n".join(f"  - {fault}" for fault in faults)
+            + "\nWrite the folder again with `ballpass derive`, or load it with verify=False if the edit is meant."
+        )
+
+
+def check_unchanged(path: Path, digest: str, content: bytes | None = None) -> None:
+    """Refuse a file that is not the one its manifest describes, though it was when the model was loaded.
+
+    Parameters
+    ----------
+    path : a file of a generated folder
+    digest : sha256 that the manifest gives it
+    content : its bytes, where they were read
+
+    Raises
+    ------
+    ArtefactError
+        The folder was written anew, or edited, meanwhile.
+    """
+    try:
+        found = file_digest(path) if content is None else hashlib.sha256(content).hexdigest()
+    except OSError as fault:
+        raise ArtefactError(f"{path}: cannot be read ({fault.strerror}). Write the folder again.") from fault
+    if found != digest:
+        raise ArtefactError(
+            f"{path}: the file is not the one that its manifest described when the model was loaded: it was written "
+            "anew or edited since. Load the folder again."
+        )
+
+
+def file_digest(path: str | Path) -> str:
+    """sha256 of a file's bytes, hexadecimal."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()

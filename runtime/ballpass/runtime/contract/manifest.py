@@ -1,0 +1,254 @@
+"""Records of the contract: what a model consists of, with the names, units and sizes of everything in it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Literal
+
+from ballpass.runtime.contract.consistency import contradictions
+from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.json_text import DIGEST, kind_of, read_record, text_digest, text_of
+
+SCHEMA = 2
+FILE_NAME = "manifest.json"
+
+#: Where a generated function lives: ``<library>.c`` and, serialised, ``<library>.casadi``.
+MODEL, JACOBIANS = "model", "jacobians"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterInfo:
+    """A run-time number: name (its path in the scene file), SI unit, description, LaTeX symbol, default.
+
+    A value must be > `above`, >= `least`, <= `most` and < `below`; None bounds nothing.
+    """
+
+    name: str
+    unit: str
+    description: str
+    latex: str
+    default: float
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+    below: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VariableInfo:
+    """A derived constant, state or output: name, SI unit, description; `size` > 1 for one value per ball.
+
+    `latex` is empty where no symbol exists.
+    """
+
+    name: str
+    unit: str
+    description: str
+    latex: str = ""
+    size: int = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuantityInfo:
+    """Something the model can report and differentiate, whether a run reports it or not.
+
+    `group` is the function of ``jacobians.c`` that computes it; the quantities of a group stand one below the other,
+    in the order of `Manifest.quantities`, each with `size` rows.
+    """
+
+    name: str
+    unit: str
+    description: str
+    size: int
+    group: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputInfo:
+    """A quantity the driver holds constant between breakpoints.
+
+    kind ``phase``: the angle ``offset + rate * t_ref`` [rad] at the reference time; `offset` names a parameter, `rate`
+    a parameter or derived constant [rad/s].
+    kind ``gate``: 1 while ``offset + rate * t`` modulo a turn lies in one of `windows` (pairs of parameter names),
+    else 0.
+    kind ``table``: value at the reference time of the piecewise linear table with the knots `times` and `values`
+    (names of parameters); kind ``table_rate``: its slope there.
+    """
+
+    name: str
+    kind: Literal["phase", "gate", "table", "table_rate"]
+    offset: str = ""
+    rate: str = ""
+    windows: tuple[tuple[str, str], ...] = ()
+    times: tuple[str, ...] = ()
+    values: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FunctionInfo:
+    """Signature and cost of a generated function: names with sizes (rows), and the number of SX operations.
+
+    `library` is the generated file that holds it: `MODEL`, or `JACOBIANS`, compiled when first asked for.
+    """
+
+    name: str
+    inputs: tuple[tuple[str, int], ...]
+    outputs: tuple[tuple[str, int], ...]
+    operations: int
+    description: str
+    library: str = MODEL
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarginInfo:
+    """Row of ``assembly``: positive while the dyad at `joint` can be assembled [1]."""
+
+    joint: str
+    description: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointInfo:
+    """Point (or centre of mass) of a body, pair of rows ``2k, 2k + 1`` of ``geometry`` [m]."""
+
+    body: str
+    point: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunInfo:
+    """Run settings of the scene file; exactly one of `cycles` and `duration` [s] is given."""
+
+    cycles: float | None
+    duration: float | None
+    transient_cycles: float
+    samples_per_cycle: int
+    method: str
+    rtol: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BearingInfo:
+    """What observables need of the bearing: balls, and the names of its kinematic parameters and constants."""
+
+    balls: int
+    joint: str
+    shaft_speed: str
+    outer_ring: bool
+    damping_law: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MechanismInfo:
+    """What observables need of the linkage: driver joint, names of its parameters, joints, points for drawing.
+
+    The components of an applied force are the parameters ``mechanism.forces.<name>.force.x`` and ``.y``, or
+    ``.magnitude`` and ``.direction`` (see `consistency.force_components`).
+    """
+
+    driver_joint: str
+    speed: str
+    start_angle: str
+    joints: tuple[tuple[str, str, str, str, str, str], ...]  # name, kind, body, point, body, point
+    points: tuple[PointInfo, ...]
+    margins: tuple[MarginInfo, ...]
+    forces: tuple[tuple[str, str, str, str], ...] = ()  # name, body, point, input that gates it or "": acts always
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Manifest:
+    """Everything `runtime` knows of a model."""
+
+    schema: int = SCHEMA
+    scene: str
+    title: str
+    signature: str
+    versions: tuple[tuple[str, str], ...]
+    parameters: tuple[ParameterInfo, ...]
+    constants: tuple[VariableInfo, ...]
+    states: tuple[VariableInfo, ...]
+    initial: tuple[str, ...]  # names of the parameters that hold the initial states
+    inputs: tuple[InputInfo, ...]
+    outputs: tuple[VariableInfo, ...]
+    functions: tuple[FunctionInfo, ...]
+    smoothness: tuple[tuple[str, str], ...]  # law -> smooth, kinked, discontinuous
+    mechanism: MechanismInfo | None
+    bearing: BearingInfo | None
+    run: RunInfo
+    quantities: tuple[QuantityInfo, ...] = ()
+    relations: tuple[tuple[str, float, str], ...] = ()  # (name, factor, other): value > factor * value of the other
+    files: tuple[tuple[str, str], ...] = field(default=())  # file name -> sha256
+
+    def function(self, name: str) -> FunctionInfo:
+        """Signature of a generated function; KeyError where there is none of that name."""
+        for info in self.functions:
+            if info.name == name:
+                return info
+        raise KeyError(name)
+
+    def to_json(self) -> str:
+        """Deterministic text: the fields in the order of the records, one per line, ending in a newline.
+
+        The last key is the digest of the text without it: who edits a number there by hand is told.
+        """
+        document = asdict(self)
+        return text_of({**document, DIGEST: text_digest(document)})
+
+    @classmethod
+    def from_json(cls, text: str, *, source: str = FILE_NAME, verify: bool = True) -> Manifest:
+        """Manifest from its JSON text; all faults are raised together.
+
+        Parameters
+        ----------
+        text : what `to_json` wrote
+        source : name of the text in messages
+        verify : refuse a text that was edited after it was written
+
+        Raises
+        ------
+        ArtefactError
+            Not JSON, another schema, edited, or unknown or missing keys or values of a wrong type, each with its place.
+        """
+        try:
+            document = json.loads(text)
+        except (ValueError, RecursionError) as fault:  # no JSON, integers of thousands of digits, deep nesting
+            raise ArtefactError(
+                f"{source}: not JSON ({str(fault) or type(fault).__name__}). Write the folder again with "
+                "`ballpass derive`."
+            ) from None
+        if not isinstance(document, Mapping):
+            raise ArtefactError(f"{source}: a JSON object is expected, not {kind_of(document)}.")
+        schema = document.get("schema")
+        if schema != SCHEMA or isinstance(schema, bool):
+            raise ArtefactError(
+                f"{source}: schema {schema!r} was given, this version of ballpass reads schema {SCHEMA}. "
+                "Write the folder again with this version's `ballpass derive`."
+            )
+        document = dict(document)
+        digest = document.pop(DIGEST, None)
+        faults: list[str] = []
+        manifest = read_record(cls, document, "", faults)
+        if not faults:
+            faults = contradictions(manifest)
+        if faults:
+            raise ArtefactError(
+                f"{source}: {len(faults)} fault(s):\n"
+                + "\n".join(f"  - {fault}" for fault in faults)
+                + "\nThe file is generated: write the folder again with `ballpass derive` instead of editing it."
+            )
+        assert isinstance(manifest, cls)
+        if verify and digest != text_digest(document):
+            raise ArtefactError(
+                f"{source}: the digest in it, {_shortened(digest)}, is not that of its content: edited or cut short. "
+                "Write the folder again with `ballpass derive`, or load it with verify=False if the edit is meant."
+            )
+        return manifest
+
+
+def _shortened(digest: object) -> str:
+    """A digest for a message: its first digits, or what else stands there, or nothing."""
+    if not isinstance(digest, str):
+        return repr(digest)[:40]
+    return repr(digest if len(digest) <= 16 else f"{digest[:16]}...")

@@ -1,0 +1,185 @@
+"""The numbers of a model: names, defaults, and overrides checked before anything runs."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Real
+
+import numpy as np
+
+from ballpass.runtime.contract import Manifest, ParameterInfo
+from ballpass.runtime.contract.bounds import violations
+from ballpass.runtime.contract.errors import RequestError
+
+#: Most characters of an unknown name that a message shows.
+LONGEST_NAME = 100
+
+
+class Parameters(Mapping[str, float]):
+    """Run-time parameters: name to value in SI; printed as a table with units and descriptions."""
+
+    __slots__ = ("_infos", "_values")
+
+    def __init__(self, infos: Sequence[ParameterInfo], values: Mapping[str, float]) -> None:
+        self._infos = {info.name: info for info in infos}
+        self._values = {info.name: float(values[info.name]) for info in infos}
+
+    def __getitem__(self, name: str) -> float:
+        try:
+            return self._values[name]
+        except KeyError:
+            raise KeyError(unknown_name("parameter", name, self._values)) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def info(self, name: str) -> ParameterInfo:
+        """Unit, description, symbol and default of a parameter."""
+        self[name]
+        return self._infos[name]
+
+    def __repr__(self) -> str:
+        rows = [("name", "value", "unit", "description")]
+        rows += [
+            (name, f"{value:.8g}", self._infos[name].unit, self._infos[name].description)
+            for name, value in self._values.items()
+        ]
+        widths = [max(len(row[k]) for row in rows) for k in range(3)]
+        lines = [
+            f"{name:<{widths[0]}}  {value:>{widths[1]}}  {unit:<{widths[2]}}  {text}".rstrip()
+            for name, value, unit, text in rows
+        ]
+        return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Numbers:
+    """The numbers of one run: parameters and constants, as vectors and by name."""
+
+    parameters: Parameters
+    p: np.ndarray
+    c: np.ndarray
+    values: dict[str, float]
+
+
+def resolve_parameters(manifest: Manifest, overrides: Mapping[str, float] | None) -> Parameters:
+    """Defaults with `overrides` put in.
+
+    Raises
+    ------
+    RequestError
+        Unknown names (with the nearest known ones), values that are no finite real numbers, or that no scene file
+        could have (see `bounds`); all faults at once.
+    """
+    values = {info.name: info.default for info in manifest.parameters}
+    if overrides is None:
+        return Parameters(manifest.parameters, values)
+    if not isinstance(overrides, Mapping):
+        raise RequestError(
+            f"parameters: a mapping from name to value in SI is expected, not {type(overrides).__name__}. "
+            'Example: parameters={"bearing.clearance": 8e-6}.'
+        )
+    units = {info.name: info.unit for info in manifest.parameters}
+    faults = []
+    for name, value in overrides.items():
+        if name not in values:
+            faults.append(unknown_name("parameter", name, values))
+            continue
+        number = scalar(value)
+        if number is None:
+            what = f"{value!r:.200} ({type(value).__name__})"
+            faults.append(f"{name}: one number in {units[name]} is expected, not {what}")
+        elif not math.isfinite(number):
+            faults.append(f"{name}: a finite number in {units[name]} is expected, not {number!r}")
+        else:
+            values[name] = number
+    if not faults:
+        for _, rule in violations(manifest, values):
+            name = rule.partition(":")[0]
+            faults.append(f"{rule}, not {values[name]:.9g}.")
+    if faults:
+        raise RequestError("\n".join(faults))
+    return Parameters(manifest.parameters, values)
+
+
+def numbers_of(
+    manifest: Manifest, overrides: Mapping[str, float] | None, constants: Callable[[np.ndarray], np.ndarray]
+) -> Numbers:
+    """Parameters with overrides, checked, and the derived constants that follow.
+
+    Parameters
+    ----------
+    constants : derived constants, shape (constants,), of parameters, shape (parameters,); not called where there are
+        none
+
+    Raises
+    ------
+    RequestError
+        As `resolve_parameters`; or constants that are not finite.
+    """
+    numbers = unchecked_numbers(manifest, resolve_parameters(manifest, overrides), constants)
+    bad = [info.name for info in manifest.constants if not math.isfinite(numbers.values[info.name])]
+    if bad:
+        raise RequestError(
+            f"With these parameters the derived constants {', '.join(bad)} are not finite numbers. "
+            "Check the values that were changed: geometry and elastic constants must be physical."
+        )
+    return numbers
+
+
+def unchecked_numbers(
+    manifest: Manifest, parameters: Parameters, constants: Callable[[np.ndarray], np.ndarray]
+) -> Numbers:
+    """Numbers with the derived constants that follow, finite or not; see `numbers_of`."""
+    p = np.array(list(parameters.values()), dtype=float)
+    c = constants(p) if manifest.constants else np.zeros(0)
+    derived = {info.name: float(value) for info, value in zip(manifest.constants, c, strict=True)}
+    return Numbers(parameters=parameters, p=p, c=c, values={**parameters, **derived})
+
+
+def scalar(value: object) -> float | None:
+    """`value` as float when it is one real number (NumPy's scalars and arrays of no dimension included), else None."""
+    if getattr(value, "shape", None) == () and hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, Real) and not isinstance(value, bool):
+        try:
+            return float(value)
+        except OverflowError:  # an integer of more than 308 digits
+            return math.inf if abs(value) == value else -math.inf
+    return None
+
+
+def real(value: object) -> float:
+    """`value` as float when it is one real number, else NaN, which lies within no bounds."""
+    number = scalar(value)
+    return math.nan if number is None else number
+
+
+def vector(value: object) -> np.ndarray:
+    """`value` as an array of numbers, of its own shape; where it is none, one NaN, shape (1,)."""
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        return np.array([math.nan])
+
+
+def unknown_name(what: str, name: object, known: Iterable[str]) -> str:
+    """One line: the name is unknown, the nearest ones, or all where they are few."""
+    names = list(known)
+    name = name if not isinstance(name, str) or len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
+    near = difflib.get_close_matches(str(name), names, n=4, cutoff=0.5)
+    if not near:
+        # a remembered last part of the path is the commonest near miss that the ratio of difflib does not see
+        tail = str(name).rsplit(".", 1)[-1]
+        near = [candidate for candidate in names if tail and tail in candidate][:4]
+    if near:
+        return f"There is no {what} {name!r}. Did you mean {' or '.join(map(repr, near))}?"
+    if len(names) <= 12:
+        return f"There is no {what} {name!r}. There are: {', '.join(names) or 'none'}."
+    return f"There is no {what} {name!r}. There are {len(names)}; the first: {', '.join(names[:8])}, ..."

@@ -1,0 +1,221 @@
+/* Kinks of the law, located: which side of each every ball is on, where a step changes it, and when to leave one alone.
+
+   switches.h is generated with the scene from the conditions of its laws: switching functions g of a ball's deflection and rate, zero at
+   the kinks, and the law with its sides held.  A step is tried with the sides that its start has; where the law can be continued, it is
+   smooth within the step whatever the step does.  The step is looked at in BP_LOOKS places: a side changes where g is beyond zero by more
+   than a band, which is a part BP_BAND of the error allowed in a step.  Below that a kink does not matter, and a ring that rests on one
+   does not count as crossing it by rounding; between looks the parabola through three of them tells who has been on the other side.  The
+   step is then repeated so that it ends where g is zero on its dense output, and the sides are turned there.
+
+   Work is bounded.  A step is repeated BP_REPEATS times at most for one kink.  A ball may turn its side back at the very place where it
+   turned; the BP_TURNS-th time it is let go.  A crossing that follows the last one of the same ball by less than BP_BRIEF times the step
+   tried is brief: such steps do not resolve what crosses (an explicit method at the limit of its stability zigzags about rest), and
+   BP_CHATTER brief ones in a row let go as well.  A ball let go obeys the law as it is, stepped over, for BP_REST steps. */
+#ifndef BALLPASS_KINKS_H
+#define BALLPASS_KINKS_H
+
+#include <string.h>
+
+#include "ensemble_kernels.h"
+#include "model.h"
+
+enum { BP_LOOKS = 4, BP_REPEATS = 4, BP_TURNS = 2, BP_CHATTER = 4, BP_REST = 64, BP_ROOT_ITERATIONS = 60 };
+
+/* A root on the dense output is good enough where g is within the part BP_CLOSE of the band. */
+static const double BP_BAND = 0.01, BP_BRIEF = 1.5, BP_CLOSE = 0.1;
+
+/* Steps have the clock of pace.h where they are longer than BP_FAR times the time since an onset.  A slope at a step's end is divided by
+   the pace there unless it is below BP_LEAST_PACE.  The end of a contact is foreseen no nearer than BP_NEAREST times the step that error
+   control proposes, and looked for up to BP_ASTRAY times as far as it was foreseen; a step that leaves less than the part BP_ARRIVED of
+   the way there has arrived. */
+static const double BP_FAR = 2.0, BP_LEAST_PACE = 0.25, BP_NEAREST = 0.1, BP_ASTRAY = 1.5, BP_ARRIVED = 1e-6;
+
+typedef struct {
+    double border[BP_NB][BP_NSWITCHES]; /* in place of the zero of g in the held law: -infinity, infinity, or 0 for a ball let go */
+    double side[BP_NSWITCHES][BP_NB];   /* 1 where g > 0, else -1; 0 for a ball let go */
+    double seen[BP_LOOKS + 1][BP_NSWITCHES][BP_NB]; /* g at the start of the step and at its looks */
+    double place[BP_LOOKS + 1];         /* where these are, as parts of the step's time */
+    double slope[2][BP_NB];             /* rate of deflection at the start of the step and at its end */
+    double last[BP_NSWITCHES][BP_NB];   /* time of the last crossing [s] */
+    double band[BP_NSWITCHES];
+    unsigned char turn[BP_NSWITCHES][BP_NB]; /* sides to turn behind the step */
+    unsigned char brief[BP_NSWITCHES][BP_NB], still[BP_NSWITCHES][BP_NB]; /* brief crossings in a row, those without a step between */
+    unsigned char rest[BP_NSWITCHES][BP_NB]; /* steps for which a ball is let go */
+    int resting; /* balls let go */
+} bp_sides;
+
+/* Switching functions of all balls at a state and time, and their rates of deflection.  One ball a lane. */
+static inline void bp_switch_values(const bp_numbers *n, double t, const double *restrict x, double g[BP_NSWITCHES][BP_NB],
+                                    double slope[BP_NB])
+{
+    double w[BP_NW], r[5], k[BP_NK];
+    bp_cage(t, n->u, n->p, n->c, w);
+    bp_relative(x, n->u, n->p, n->c, w, r);
+    bp_law_numbers(n->p, n->c, k);
+    const double cage_cos = w[0], cage_sin = w[1];
+#pragma omp simd
+    for (int j = 0; j < BP_NB; j++) {
+        const double co = bp_cos[j] * cage_cos - bp_sin[j] * cage_sin;
+        const double si = bp_sin[j] * cage_cos + bp_cos[j] * cage_sin;
+        double at[BP_NSWITCHES];
+        slope[j] = r[3] * co + r[4] * si;
+        bp_ball_switches(r[0] + r[1] * co + r[2] * si, slope[j], k, at);
+        for (int i = 0; i < BP_NSWITCHES; i++) g[i][j] = at[i];
+    }
+}
+
+static inline void bp_set_side(bp_sides *s, int i, int j, double side)
+{
+    s->side[i][j] = side;
+    s->border[j][i] = side > 0.0 ? -INFINITY : side < 0.0 ? INFINITY : 0.0;
+}
+
+/* Sides at the start of a run; `weight` is 1 over the error allowed in a step. */
+static inline void bp_sides_start(bp_sides *restrict s, const bp_numbers *n, double t, const double *restrict x, const double *restrict weight)
+{
+    memset(s, 0, sizeof *s);
+    for (int i = 0; i < BP_NSWITCHES; i++) {
+        double least = INFINITY; /* weight: of the coarsest state */
+        for (int k = 0; k < BP_NQ; k++) {
+            const double of = weight[bp_switch_of_rate[i] > 0.0 ? BP_NQ + k : k];
+            least = of < least ? of : least;
+        }
+        s->band[i] = BP_BAND / least;
+    }
+    bp_switch_values(n, t, x, s->seen[0], s->slope[0]);
+    for (int i = 0; i < BP_NSWITCHES; i++)
+        for (int j = 0; j < BP_NB; j++) {
+            bp_set_side(s, i, j, s->seen[0][i][j] > 0.0 ? 1.0 : -1.0);
+            s->last[i][j] = -INFINITY;
+        }
+}
+
+/* Whether the law on a side of a switch ends there at a branch point. */
+static inline int bp_ends(int i, double side) { return (side > 0.0 && bp_ends_above[i] > 0.0) || (side < 0.0 && bp_ends_below[i] > 0.0); }
+
+/* Whether slopes of a switching function come with its values: of a deflection, where rates are computed. */
+static inline int bp_has_slope(int i) { return BP_RATES && !(bp_switch_of_rate[i] > 0.0); }
+
+static inline int bp_has_slopes(void)
+{
+    int all = 1;
+    for (int i = 0; i < BP_NSWITCHES; i++) all &= bp_has_slope(i);
+    return all;
+}
+
+/* Whether a ball has been on its other side between three looks in a row, on its own at all of them, as far as the parabola through them
+   tells. */
+static inline int bp_is_dip(double before, double here, double behind, double band)
+{
+    const double bend = before - 2.0 * here + behind, difference = behind - before;
+    return (bend > 0.0) & (fabs(difference) <= 2.0 * bend) & (8.0 * (here - band) * bend < difference * difference);
+}
+
+/* Whether a step has to be looked at in earnest: the cubics through the values of the switching functions at its ends and their slopes
+   tell, at these theta of its looks.  `pace`: paces at the ends, times the step's size. */
+static inline int bp_glance(const bp_sides *restrict s, const double theta[BP_LOOKS + 1], const double pace[2])
+{
+    int found = 0;
+    for (int i = 0; i < BP_NSWITCHES; i++) {
+        const double band = -s->band[i];
+        int any = 0;
+#pragma omp simd reduction(| : any)
+        for (int j = 0; j < BP_NB; j++) {
+            const double side = s->side[i][j], from = side * s->seen[0][i][j], to = side * s->seen[BP_LOOKS][i][j], change = to - from;
+            const double first = side * pace[0] * s->slope[0][j], last = side * pace[1] * s->slope[1][j];
+            const double level = first - change, tilt = 2.0 * change - (first + last);
+            double at[BP_LOOKS + 1];
+            at[0] = from;
+            at[BP_LOOKS] = to;
+#pragma GCC unroll 8
+            for (int k = 1; k < BP_LOOKS; k++) at[k] = from + theta[k] * (change + (1.0 - theta[k]) * (level + theta[k] * tilt));
+            any |= to < band;
+#pragma GCC unroll 8
+            for (int k = 1; k < BP_LOOKS; k++) any |= (at[k] < band) | bp_is_dip(at[k - 1], at[k], at[k + 1], band);
+        }
+        found |= any;
+    }
+    return found;
+}
+
+/* Time of the last onset that has a branch point, of the balls that have not left it since. */
+static inline double bp_onset(const bp_sides *restrict s)
+{
+    double onset = -INFINITY;
+    for (int i = 0; i < BP_NSWITCHES; i++)
+        for (int j = 0; j < BP_NB; j++)
+            if (bp_ends(i, s->side[i][j]) && s->last[i][j] > onset) onset = s->last[i][j];
+    return onset;
+}
+
+/* Where a ball that all looks find on its side has been on the other between them: the place of the vertex, to be looked at, and the look
+   that it replaces; 0 where there is none. */
+static inline int bp_dip(const bp_sides *restrict s, double *place)
+{
+    for (int k = 1; k < BP_LOOKS; k++)
+        for (int i = 0; i < BP_NSWITCHES; i++)
+            for (int j = 0; j < BP_NB; j++) {
+                const double side = s->side[i][j], here = side * s->seen[k][i][j];
+                const double before = side * s->seen[k - 1][i][j], behind = side * s->seen[k + 1][i][j];
+                if (!bp_is_dip(before, here, behind, -s->band[i])) continue;
+                *place = (k - 0.5 * (behind - before) / (behind - 2.0 * here + before)) / BP_LOOKS;
+                return k;
+            }
+    return 0;
+}
+
+/* Whether any ball is on its other side at a look. */
+static inline int bp_changed(const bp_sides *restrict s, int look)
+{
+    int changed = 0;
+    for (int i = 0; i < BP_NSWITCHES; i++) {
+        const double band = -s->band[i];
+        int any = 0;
+#pragma omp simd reduction(| : any)
+        for (int j = 0; j < BP_NB; j++) any |= s->side[i][j] * s->seen[look][i][j] < band;
+        changed |= any;
+    }
+    return changed;
+}
+
+/* A ball that leaves its side alone for some time. */
+static inline void bp_let_go(bp_sides *s, int i, int j)
+{
+    if (s->side[i][j] != 0.0) s->resting++;
+    bp_set_side(s, i, j, 0.0);
+    s->rest[i][j] = BP_REST;
+    s->brief[i][j] = 0;
+}
+
+/* Turn the sides marked, at a time; `step` is the step tried. */
+static inline void bp_turn_sides(bp_sides *s, double time, double step)
+{
+    for (int i = 0; i < BP_NSWITCHES; i++)
+        for (int j = 0; j < BP_NB; j++) {
+            if (!s->turn[i][j]) continue;
+            s->turn[i][j] = 0;
+            const double since = time - s->last[i][j];
+            s->brief[i][j] = (unsigned char)(since < BP_BRIEF * step ? s->brief[i][j] + 1 : 0);
+            s->still[i][j] = (unsigned char)(since > 0.0 ? 0 : s->still[i][j] + 1);
+            s->last[i][j] = time;
+            if (s->brief[i][j] >= BP_CHATTER || s->still[i][j] >= BP_TURNS) bp_let_go(s, i, j);
+            else bp_set_side(s, i, j, -s->side[i][j]);
+        }
+}
+
+/* Behind an accepted step: its end is the next start, and balls let go come back in time. */
+static inline void bp_sides_move_on(bp_sides *s)
+{
+    memcpy(s->seen[0], s->seen[BP_LOOKS], sizeof s->seen[0]);
+    memcpy(s->slope[0], s->slope[1], sizeof s->slope[0]);
+    if (!s->resting) return;
+    for (int i = 0; i < BP_NSWITCHES; i++)
+        for (int j = 0; j < BP_NB; j++) {
+            if (s->side[i][j] != 0.0 || --s->rest[i][j] > 0) continue;
+            /* the side that the law takes by itself: nothing jumps */
+            bp_set_side(s, i, j, s->seen[0][i][j] > 0.0 ? 1.0 : -1.0);
+            s->resting--;
+        }
+}
+
+#endif

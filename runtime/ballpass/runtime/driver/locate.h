@@ -1,0 +1,296 @@
+/* Steps that end on kinks of the law, and steps about contacts, which have a clock of their own: what kinks.h and pace.h describe, done in a
+   run.  Without BALLPASS_LOCATED nothing of it is there. */
+#ifndef BALLPASS_LOCATE_H
+#define BALLPASS_LOCATE_H
+
+#include "run.h"
+
+enum { NO_KINK = 0, CUT = 1, AT_ONCE = 2 }; /* what a step met: nothing; it was cut to end on a kink; there is one at its start */
+
+#ifdef BALLPASS_LOCATED
+/* The step tried, at a part of its time: the cubic through its ends and their slopes where these are known, else its dense output. */
+static void glance_at(const bp_run *run, double part, double *y)
+{
+    if (is_explicit(run->method)) {
+        const double theta = place_of(run, part);
+        const bp_state inner = BP_STATE(run->dense[0]) + theta * BP_STATE(run->dense[1]);
+        *(bp_state *)y = BP_STATE(run->x) + theta * (BP_STATE(run->next) - BP_STATE(run->x) + (1.0 - theta) * inner);
+    } else {
+        state_at(run, part, y);
+    }
+}
+
+static void prepare_glance(bp_run *run, double t, double h)
+{
+    if (is_explicit(run->method)) {
+        const int end = run->method == BALLPASS_DP54 ? BP_DP54_STAGES : BP_DOP853_STAGES;
+        const bp_state delta = BP_STATE(run->next) - BP_STATE(run->x), first = h * BP_STATE(run->plain.k[0]);
+        *(bp_state *)run->dense[0] = first - delta;
+        *(bp_state *)run->dense[1] = 2.0 * delta - (first + h * BP_STATE(run->plain.k[end]));
+    } else {
+        prepare_dense(run, t, h);
+    }
+}
+
+typedef void bp_view(const bp_run *, double, double *);
+
+/* Look at the step tried, before its end by `at`; whether a side changes. */
+static int look(bp_run *run, double t, double h, bp_view *at)
+{
+    bp_sides *s = &run->sides;
+    double unused[BP_NB], y[BP_NX], place;
+    int changed = 0;
+    for (int k = 1; k <= BP_LOOKS; k++) {
+        s->place[k] = (double)k / BP_LOOKS;
+        if (k < BP_LOOKS) at(run, s->place[k], y);
+        bp_switch_values(&run->numbers, t + s->place[k] * h, k < BP_LOOKS ? y : run->next, s->seen[k], k < BP_LOOKS ? unused : s->slope[1]);
+        changed |= bp_changed(s, k);
+    }
+    const int dip = changed ? 0 : bp_dip(s, &place);
+    if (dip > 0) {
+        s->place[dip] = place;
+        at(run, place, y);
+        bp_switch_values(&run->numbers, t + place * h, y, s->seen[dip], unused);
+        changed = bp_changed(s, dip);
+    }
+    return changed;
+}
+
+/* Whether the step tried has to be looked at in earnest. */
+static int glance(bp_run *run, double t, double h)
+{
+    bp_sides *s = &run->sides;
+    if (!bp_has_slopes()) {
+        prepare_glance(run, t, h);
+        return look(run, t, h, glance_at);
+    }
+    const double pace[2] = {h * bp_pace(run->lead, 0.0), h * bp_pace(run->lead, 1.0)};
+    double theta[BP_LOOKS + 1];
+    for (int k = 0; k <= BP_LOOKS; k++) theta[k] = place_of(run, (double)k / BP_LOOKS);
+    bp_switch_values(&run->numbers, t + h, run->next, s->seen[BP_LOOKS], s->slope[1]);
+    return bp_glance(s, theta, pace);
+}
+
+/* A switching function of a ball within the step tried. */
+static double switch_at(const bp_run *run, double t, double h, double part, bp_view *at, int i, int j)
+{
+    double y[BP_NX], g[BP_NSWITCHES][BP_NB], unused[BP_NB];
+    if (part < 1.0) at(run, part, y);
+    bp_switch_values(&run->numbers, t + part * h, part < 1.0 ? y : run->next, g, unused);
+    return g[i][j];
+}
+
+/* Where a ball changes its side that is found changed at a look: the first root in front of it, by regula falsi (Illinois). */
+static double root_before(const bp_run *run, double t, double h, bp_view *at, int before, int i, int j)
+{
+    const bp_sides *s = &run->sides;
+    const double side = s->side[i][j];
+    int behind = before;
+    while (before > 0 && !(side * s->seen[before - 1][i][j] > 0.0)) behind = --before;
+    if (before == 0) return 0.0;
+    before--;
+    double a = s->place[before], b = s->place[behind], fa = side * s->seen[before][i][j], fb = side * s->seen[behind][i][j];
+    double root = b;
+    int kept = 0; /* end that the last iteration kept: -1 the first, 1 the last */
+    for (int k = 0; k < BP_ROOT_ITERATIONS && fb < 0.0; k++) {
+        const double next = k % 8 == 7 ? 0.5 * (a + b) : b - fb * (b - a) / (fb - fa), moved = fabs(next - root);
+        if (!(next > a && next < b)) break;
+        root = next;
+        if (!(moved > DBL_EPSILON * root)) break;
+        const double f = side * switch_at(run, t, h, root, at, i, j);
+        if (fabs(f) <= BP_CLOSE * s->band[i]) break;
+        if (f > 0.0) {
+            fb *= kept > 0 ? 0.5 : 1.0;
+            a = root, fa = f, kept = 1;
+        } else {
+            fa *= kept < 0 ? 0.5 : 1.0;
+            b = root, fb = f, kept = -1;
+        }
+    }
+    return root;
+}
+
+/* The first change of a side in the step looked at: its part of the step's time, above 1 where there is none; all that change. */
+static double first_change(const bp_run *run, double t, double h, bp_view *at, int *which, int *ball,
+                           unsigned char changed[BP_NSWITCHES][BP_NB])
+{
+    const bp_sides *s = &run->sides;
+    double first = 2.0;
+    for (int i = 0; i < BP_NSWITCHES; i++)
+        for (int j = 0; j < BP_NB; j++)
+            for (int k = 1; k <= BP_LOOKS && !changed[i][j]; k++) {
+                if (!(s->side[i][j] * s->seen[k][i][j] < -s->band[i])) continue;
+                changed[i][j] = 1;
+                const double root = root_before(run, t, h, at, k, i, j);
+                if (root < first) first = root, *which = i, *ball = j;
+            }
+    return first;
+}
+
+/* Pace of a step of size h from t: over the root of the time to a branch point of the law that is near. */
+static void set_pace(bp_run *run, double start, double t, double h)
+{
+    run->lead = 1.0;
+    if (!is_explicit(run->method)) return;
+    if (run->release.time > t) {
+        const double from = run->release.time - t, to = from - h;
+        run->lead = bp_lead(from, to > 0.0 ? to : 0.0);
+    } else {
+        const double from = (start + t) - run->onset;
+        if (h > BP_FAR * from) run->lead = bp_lead(from, from + h);
+    }
+    for (int k = 0; k < BP_NX; k++) run->plain.k[0][k] = run->lead * run->rate[k];
+}
+
+/* Size of a step by `factor` longer than the one of size h from t, over its clock: the next, or the same again. */
+static double stretched(const bp_run *run, double start, double t, double h, double factor, int next)
+{
+    if (!is_paced(run)) return h * factor;
+    const int ahead = run->release.time > t;
+    const double from = ahead ? run->release.time - t : (start + t) - run->onset, to = ahead ? from - h : from + h;
+    /* it was made to end where the contact was foreseen to, and the contact goes on: what is left there is rounding */
+    if (next && !(to > BP_ARRIVED * from)) return h * factor;
+    const double first = sqrt(from), last = sqrt(to > 0.0 ? to : 0.0), reach = factor * fabs(last - first), base = next ? last : first;
+    if (!ahead) return reach * (2.0 * base + reach);
+    return reach < base ? reach * (2.0 * base - reach) : base * base;
+}
+
+/* Where a step of size h that was refused runs over the end of a contact, the next is paced for it, and `next` is the way there.
+   Much shorter than what error control makes of the step it is not taken: what was refused is not to be trusted so far, and a ball that has
+   just landed is on its kink. */
+static void foresee(bp_run *run, double t, double h, double *next)
+{
+    if (!is_explicit(run->method) || run->release.time > t) return;
+    unsigned char changed[BP_NSWITCHES][BP_NB] = {{0}};
+    int which = 0, ball = 0;
+    prepare_glance(run, t, h);
+    if (!look(run, t, h, glance_at)) return;
+    const double part = first_change(run, t, h, glance_at, &which, &ball, changed);
+    if (!(part * h > BP_NEAREST * *next && part < 1.0 && bp_ends(which, run->sides.side[which][ball]))) return;
+    *next = part * h;
+    run->release = (bp_release){t + *next, which, ball};
+}
+
+/* Whether the step tried changes a side.  Then it is repeated with a length that ends on the first kink, and `h` is that length; the sides
+   to turn there are marked.  `aimed`: it was made to end where a contact does, and may become longer for it, up to `longest`. */
+static int locate(bp_run *run, double start, double t, double *h, double *error, double resolution, int aimed, double longest)
+{
+    bp_sides *s = &run->sides;
+    ballpass_result *result = run->result;
+    const double tried = *h;
+    unsigned char changed[BP_NSWITCHES][BP_NB] = {{0}};
+    const double farthest = aimed && BP_ASTRAY * tried < longest ? BP_ASTRAY * tried : aimed ? longest : tried;
+    double reach = tried;
+    int which = run->release.which, ball = run->release.ball, met;
+    met = glance(run, t, tried);
+    if (met) {
+        prepare_dense(run, t, tried);
+        met = look(run, t, tried, state_at);
+    }
+    if (!met && !aimed) return NO_KINK;
+    if (met) reach = first_change(run, t, tried, state_at, &which, &ball, changed) * tried;
+    const int ends = is_explicit(run->method) && bp_ends(which, s->side[which][ball]);
+    double scale = 0.0;
+    for (int j = 0; j < BP_NB; j++) scale = fabs(s->seen[0][which][j]) > scale ? fabs(s->seen[0][which][j]) : scale;
+    const double band = s->band[which], least = 1e-6 * band, rounding = 4.0 * DBL_EPSILON * scale;
+    /* behind a branch point of the law its slope is unbounded: a linearly implicit step stays on the other side */
+    const double clear = is_explicit(run->method) ? 0.0 : bp_ends(which, 1.0) ? -1.0 : bp_ends(which, -1.0) ? 1.0 : 0.0;
+    const double goal = clear * (least > rounding ? least : rounding);
+    double length = tried; /* of the step at hand */
+    for (int k = 0; k < BP_REPEATS; k++) {
+        if (!(reach > resolution)) {
+            s->turn[which][ball] = 1;
+            result->rejected++;
+            return AT_ONCE;
+        }
+        if (reach != length) {
+            length = reach;
+            result->rejected++;
+            if (ends) run->release = (bp_release){t + reach, which, ball};
+            set_pace(run, start, t, reach);
+            const double again = try_step(run, t, reach);
+            *h = reach;
+            *error = again;
+            if (!(again >= 0.0 && again <= 1.0 && within_reach(run))) return NO_KINK;
+        }
+        bp_switch_values(&run->numbers, t + reach, run->next, s->seen[BP_LOOKS], s->slope[1]);
+        const double left = s->seen[BP_LOOKS][which][ball];
+        if (fabs(left) <= band && !(clear * left < 0.0)) break;
+        double slope = s->slope[1][ball];
+        if (!bp_has_slope(which)) {
+            const double back = 1.0 / 64.0;
+            prepare_dense(run, t, reach);
+            slope = (left - switch_at(run, t, reach, 1.0 - back, state_at, which, ball)) / (back * reach);
+        }
+        const double moved = reach - (left - goal) / slope;
+        if (aimed && !met && !(s->side[which][ball] * slope < 0.0 && moved <= farthest)) return NO_KINK; /* contact goes on */
+        if (!(moved > 0.0 && moved <= farthest)) break;
+        if (k + 1 < BP_REPEATS) reach = moved;
+    }
+    for (int i = 0; i < BP_NSWITCHES; i++)
+        for (int j = 0; j < BP_NB; j++)
+            s->turn[i][j] = changed[i][j] && s->side[i][j] * s->seen[BP_LOOKS][i][j] <= s->band[i];
+    s->turn[which][ball] = 1;
+    return CUT;
+}
+
+/* Turn the sides marked: the slopes at (t, x) are new. */
+static void turn_sides(bp_run *run, double time, double step)
+{
+    bp_turn_sides(&run->sides, time, step);
+    run->onset = bp_onset(&run->sides);
+    if (run->onset == time && run->step > run->touch) run->step = run->touch;
+    run->release.time = NAN;
+    run->result->kinks++;
+}
+
+/* The numbers point into the run itself. */
+static void sides_here(bp_run *run) { run->numbers.border = (const double(*)[BP_NSWITCHES])run->sides.border; }
+
+static void sides_start(bp_run *run, double t)
+{
+    bp_sides_start(&run->sides, &run->numbers, t, run->x, run->weight);
+    sides_here(run);
+    run->onset = -INFINITY;
+    run->touch = INFINITY;
+}
+
+static void sides_move_on(bp_run *run) { bp_sides_move_on(&run->sides); }
+
+/* Behind the first step from an onset: how long it might have been. */
+static void remember_touch(bp_run *run, double h, double factor)
+{
+    if (run->lead == 0.0) run->touch = h * factor * factor;
+}
+
+/* The coming times are those of another segment. */
+static void forget_release(bp_run *run) { run->release = (bp_release){NAN, 0, 0}; }
+
+/* Whether a step is to end where a contact is foreseen to, no farther than `longest`; `h` is the way there then. */
+static int aim(bp_run *run, double t, double longest, double resolution, double *h)
+{
+    const double ahead = run->release.time - t;
+    if (!(ahead > 0.0)) return 0;
+    if (!(ahead > resolution)) {
+        run->release.time = NAN;
+        return 0;
+    }
+    if (!(ahead <= *h * 1.0001 && ahead <= longest)) return 0;
+    *h = ahead;
+    return 1;
+}
+#else
+#define locate(run, start, t, h, error, resolution, aimed, longest) ((void)(aimed), NO_KINK)
+#define turn_sides(run, time, step) ((void)(time), (void)(step))
+#define sides_start(run, t) ((void)0)
+#define sides_here(run) ((void)0)
+#define sides_move_on(run) ((void)0)
+#define remember_touch(run, h, factor) ((void)0)
+#define forget_release(run) ((void)0)
+#define aim(run, t, longest, resolution, h) ((void)(longest), 0)
+#define set_pace(run, start, t, h) ((void)0)
+#define stretched(run, start, t, h, factor, next) ((h) * (factor))
+#define foresee(run, t, h, next) ((void)0)
+#endif
+
+#endif

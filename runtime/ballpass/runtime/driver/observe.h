@@ -1,0 +1,80 @@
+/* What a run gives while it goes on: states at output times, and reductions (reductions.h). */
+#ifndef BALLPASS_OBSERVE_H
+#define BALLPASS_OBSERVE_H
+
+#include "differentiate.h"
+#include "run.h"
+
+/* Outputs up to `end`, that of the accepted step from (t, x) to (t + h, next); t counts from the segment's start.  The caller gives the
+   end, for start + (t + h) may fall short of the segment's by rounding, and its output would then be lost. */
+static void write_outputs(bp_run *run, double start, double t, double h, double end)
+{
+    ballpass_result *result = run->result;
+    if (result->written >= run->outputs) return;
+    if (run->output_times[result->written] > end) return;
+    int prepared = 0, tangents_prepared = 0;
+    while (result->written < run->outputs && run->output_times[result->written] <= end) {
+        const double theta = ((run->output_times[result->written] - start) - t) / h;
+        double at[BP_NX], *y = run->output_states ? run->output_states + result->written * BP_NX : at;
+        if (theta >= 1.0) {
+            memcpy(y, run->next, sizeof run->next);
+        } else {
+            if (!prepared) prepare_dense(run, t, h);
+            prepared = 1;
+            state_at(run, theta > 0.0 ? theta : 0.0, y);
+        }
+        /* behind the state: the derivatives use its slopes */
+        tangent_output(run, t, h, theta > 0.0 ? theta : 0.0, tangents_prepared);
+        tangents_prepared = tangents_prepared || theta < 1.0;
+        result->written++;
+    }
+}
+
+#ifdef BALLPASS_REDUCTIONS
+/* An accepted step, for the reductions: its dense output is ready.  They look at its part from `from` over `span` of it. */
+typedef struct {
+    const bp_run *run;
+    double t, h, from, span;
+} bp_step_taken;
+
+static double channel_at(const void *source, int channel, double theta, int *ball)
+{
+    const bp_step_taken *step = source;
+    double y[BP_NX];
+    const double place = step->from + step->span * theta;
+    state_at(step->run, place, y);
+    return bp_channel(&step->run->numbers, step->t + place * step->h, y, channel, ball);
+}
+
+static void reduce_start(bp_run *run, double start)
+{
+    run->reduction = run->options->reduction;
+    if (run->reduction == NULL || start < run->reduction[BP_FROM]) run->reduction = NULL;
+    else bp_channels(&run->numbers, 0.0, run->x, bp_balls_wanted(run->reduction), run->sampled[0]);
+}
+
+static void reduce_step(bp_run *run, double start, double t, double h)
+{
+    if (run->reduction == NULL) return;
+    prepare_dense(run, t, h);
+    /* the output of DOP853 is of degree seven, more than five points tell: its steps are taken in halves */
+    const int parts = run->method == BALLPASS_DOP853 ? 2 : 1;
+    for (int part = 0; part < parts; part++) {
+        const bp_step_taken step = {run, t, h, (double)part / parts, 1.0 / parts};
+        for (int i = 1; i < BP_POINTS; i++) {
+            const double theta = step.from + step.span * i / (BP_POINTS - 1);
+            double y[BP_NX];
+            if (theta < 1.0) state_at(run, theta, y);
+            else memcpy(y, run->next, sizeof y);
+            bp_channels(&run->numbers, t + theta * h, y, bp_balls_wanted(run->reduction), run->sampled[i]);
+        }
+        bp_reduce(run->reduction, (const double(*)[BP_CHANNELS])run->sampled, start + t + step.from * h, step.span * h, channel_at, &step);
+        memcpy(run->sampled[0], run->sampled[BP_POINTS - 1], sizeof run->sampled[0]);
+    }
+}
+#else
+#define reduce_start(run, start) ((void)(start))
+#define reduce_step(run, start, t, h) ((void)0)
+#endif
+
+#endif

@@ -1,0 +1,305 @@
+/* On-line reductions: extremes with their times, mean and mean square of channels, from the dense output of every accepted step.
+
+   Channels are the states, then four quantities of the balls, each with its value of the most loaded ball at the moment: total force,
+   elastic force, damping force, deflection.  Every step is looked at in its quarters, theta = 0, 1/4, 1/2, 3/4, 1; those of DOP853, whose
+   output is of degree seven and not four, as two steps of half the size.
+
+   Integrals are taken by Boole's rule; squares of states over the polynomial of degree four through the five values, which is exact for
+   all methods but DOP853; squares of the balls' quantities by Boole's rule as well, for where these jump a polynomial swings.
+
+   Extremes: that polynomial is looked at for tops, all of them, wherever it may reach beyond the extreme known so far; the channel is
+   evaluated there from the dense output, and refined where it is not what the polynomial promised.  For states and all methods but
+   DOP853 the polynomial is the dense output itself, and no extreme is missed.  An extreme is always a value that the solution takes, never
+   an extrapolation across a kink.  At a kink it is met to a part of a quarter step: the smallest value of the most loaded ball is such a
+   place, for there two balls change rank.
+
+   A reduction is a row of BP_REDUCTION numbers, which a run adds to: it can go on in another call. */
+#ifndef BALLPASS_REDUCTIONS_H
+#define BALLPASS_REDUCTIONS_H
+
+#include "ensemble_kernels.h"
+#include "model.h"
+
+enum { BP_POINTS = 5, BP_BALL_CHANNELS = 4, BP_CHANNELS = BP_NX + BP_BALL_CHANNELS };
+
+/* Places in a reduction: the head, then BP_CHANNELS entries of each kind. */
+enum {
+    BP_FROM = 0,     /* nothing is reduced in segments that start before this time [s]; given by the caller */
+    BP_WANTED = 1,   /* sum of 2^k over the channels k that are wanted; given by the caller */
+    BP_DURATION = 2, /* time reduced so far [s] */
+    BP_HEAD = 3,
+    BP_MAX = BP_HEAD,
+    BP_MAX_TIME = BP_MAX + BP_CHANNELS,
+    BP_MAX_BALL = BP_MAX_TIME + BP_CHANNELS, /* counted from 1; 0 for a state */
+    BP_MIN = BP_MAX_BALL + BP_CHANNELS,
+    BP_MIN_TIME = BP_MIN + BP_CHANNELS,
+    BP_MIN_BALL = BP_MIN_TIME + BP_CHANNELS,
+    BP_INTEGRAL = BP_MIN_BALL + BP_CHANNELS, /* of the channel over time */
+    BP_SQUARE = BP_INTEGRAL + BP_CHANNELS,   /* of its square */
+    BP_REDUCTION = BP_SQUARE + BP_CHANNELS
+};
+
+enum {
+    BP_REFINEMENTS = 12, /* evaluations spent on a top at most, besides the first; that of a state takes no more */
+    BP_CELLS = 16        /* parts of a step in which the slope of a channel may change its sign */
+};
+
+/* Channels wanted, a bit each; whether those of the balls are among them. */
+static inline unsigned long bp_wanted(const double *reduction) { return (unsigned long)reduction[BP_WANTED]; }
+static inline int bp_balls_wanted(const double *reduction) { return bp_wanted(reduction) >> BP_NX != 0; }
+
+/* Weights of Boole's rule. */
+static const double bp_boole[BP_POINTS] = {7.0 / 90.0, 32.0 / 90.0, 12.0 / 90.0, 32.0 / 90.0, 7.0 / 90.0};
+
+/* Value of a channel within a step, and the ball that has it. */
+typedef double (*bp_channel_at)(const void *source, int channel, double theta, int *ball);
+
+/* Quantities of all balls at a state and time.  One ball a lane. */
+static inline void bp_ball_quantities(const bp_numbers *n, double t, const double *restrict x, double q[BP_BALL_CHANNELS][BP_NB])
+{
+    double w[BP_NW], r[5], k[BP_NCONTACT];
+    bp_cage(t, n->u, n->p, n->c, w);
+    bp_relative(x, n->u, n->p, n->c, w, r);
+    bp_contact_numbers(n->p, n->c, k);
+    const double cage_cos = w[0], cage_sin = w[1];
+#pragma omp simd
+    for (int j = 0; j < BP_NB; j++) {
+        const double co = bp_cos[j] * cage_cos - bp_sin[j] * cage_sin;
+        const double si = bp_sin[j] * cage_cos + bp_cos[j] * cage_sin;
+        const double delta = r[0] + r[1] * co + r[2] * si;
+        double elastic, damping;
+        bp_ball_contact(delta, r[3] * co + r[4] * si, k, &elastic, &damping);
+        q[0][j] = elastic + damping;
+        q[1][j] = elastic;
+        q[2][j] = damping;
+        q[3][j] = delta;
+    }
+}
+
+/* All channels at a state and time; those of the balls are zero where not wanted. */
+static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, int balls, double *restrict value)
+{
+    for (int k = 0; k < BP_NX; k++) value[k] = x[k];
+    for (int k = BP_NX; k < BP_CHANNELS; k++) value[k] = 0.0;
+    if (!balls) return;
+    double q[BP_BALL_CHANNELS][BP_NB];
+    bp_ball_quantities(n, t, x, q);
+    for (int k = 0; k < BP_BALL_CHANNELS; k++) {
+        double most = -INFINITY;
+#pragma omp simd reduction(max : most)
+        for (int j = 0; j < BP_NB; j++) most = q[k][j] > most ? q[k][j] : most;
+        value[BP_NX + k] = most;
+    }
+}
+
+/* One channel at a state and time, and its ball counted from 1. */
+static inline double bp_channel(const bp_numbers *n, double t, const double *restrict x, int channel, int *ball)
+{
+    *ball = 0;
+    if (channel < BP_NX) return x[channel];
+    double q[BP_BALL_CHANNELS][BP_NB];
+    bp_ball_quantities(n, t, x, q);
+    const double *of = q[channel - BP_NX];
+    int best = 0;
+    for (int j = 1; j < BP_NB; j++)
+        if (of[j] > of[best]) best = j;
+    *ball = best + 1;
+    return of[best];
+}
+
+/* Top of the parabola through three points with the middle one the highest; the middle where they lie on a line. */
+static inline double bp_top(double a, double va, double b, double vb, double c, double vc)
+{
+    const double left = (b - a) * (vb - vc), right = (b - c) * (vb - va), below = left - right;
+    if (below == 0.0) return b;
+    const double top = b - 0.5 * ((b - a) * left - (b - c) * right) / below;
+    return top > a && top < c ? top : b;
+}
+
+/* The polynomial of degree four through the values at the quarters, in powers of s = 4 theta - 2. */
+static inline void bp_quartic(double v0, double v1, double v2, double v3, double v4, double *restrict q)
+{
+    q[0] = v2;
+    q[1] = (8.0 * (v3 - v1) - (v4 - v0)) * (1.0 / 12.0);
+    q[2] = (16.0 * (v1 + v3) - (v0 + v4) - 30.0 * v2) * (1.0 / 24.0);
+    q[3] = ((v4 - v0) - 2.0 * (v3 - v1)) * (1.0 / 12.0);
+    q[4] = ((v0 + v4) - 4.0 * (v1 + v3) + 6.0 * v2) * (1.0 / 24.0);
+}
+
+/* Mean of its square over the step. */
+static inline double bp_mean_square(const double *restrict q)
+{
+    return q[0] * q[0] + 4.0 / 3.0 * (2.0 * q[0] * q[2] + q[1] * q[1]) + 16.0 / 5.0 * (2.0 * (q[0] * q[4] + q[1] * q[3]) + q[2] * q[2])
+           + 64.0 / 7.0 * (2.0 * q[2] * q[4] + q[3] * q[3]) + 256.0 / 9.0 * (q[4] * q[4]);
+}
+
+/* Bounds of that polynomial between its ends: its inner Bezier ordinates (it lies within their hull and that of its end values). */
+static inline void bp_hull(const double *restrict q, double *restrict hull)
+{
+    const double even = q[0] - 16.0 * q[4], odd = q[1] - 4.0 * q[3];
+    hull[0] = even - odd;
+    hull[1] = q[0] - 4.0 / 3.0 * q[2] + 16.0 * q[4];
+    hull[2] = even + odd;
+}
+
+/* Bounds of what a step may bring, from the values at its quarters and that polynomial: no extreme is looked for that lies within those
+   known.  A parabola through three of the points rises above them by no more than an eighth of their range. */
+static inline void bp_survey(double v0, double v1, double v2, double v3, double v4, const double *restrict q, double *restrict bottom,
+                             double *restrict top)
+{
+    double hull[3];
+    bp_hull(q, hull);
+    const double a = v0 > v1 ? v0 : v1, c = v0 > v1 ? v1 : v0, d = v2 > v3 ? v2 : v3, e = v2 > v3 ? v3 : v2;
+    double high = a > d ? a : d, low = c < e ? c : e;
+    high = v4 > high ? v4 : high;
+    low = v4 < low ? v4 : low;
+    const double reach = 0.1250001 * (high - low), up = hull[0] > hull[1] ? hull[0] : hull[1], down = hull[0] > hull[1] ? hull[1] : hull[0];
+    high = up > high + reach ? up : high + reach;
+    low = down < low - reach ? down : low - reach;
+    *top = hull[2] > high ? hull[2] : high;
+    *bottom = hull[2] < low ? hull[2] : low;
+}
+
+/* What the search for one extreme of a channel within a step knows. */
+typedef struct {
+    double *best; /* in the reduction; its time and ball follow */
+    double sign;  /* 1 for a maximum, -1 for a minimum */
+    double time, h;
+    bp_channel_at at;
+    const void *source;
+    int channel;
+} bp_search;
+
+/* The channel within the step, with the sign of a maximum; the extreme is brought up to date. */
+static inline double bp_probe(const bp_search *search, double theta)
+{
+    int ball;
+    const double value = search->at(search->source, search->channel, theta, &ball), found = search->sign * value;
+    if (found > search->sign * *search->best) {
+        search->best[0] = value;
+        search->best[BP_CHANNELS] = search->time + theta * search->h;
+        search->best[2 * BP_CHANNELS] = ball;
+    }
+    return found;
+}
+
+/* The top that is near theta, where `promised` was expected; u holds the channel at the quarters, with the sign of a maximum. */
+static inline void bp_climb(const bp_search *search, const double *u, double theta, double promised)
+{
+    const int part = theta < 1.0 ? (int)((BP_POINTS - 1) * theta) : BP_POINTS - 2;
+    double b = theta, vb = bp_probe(search, b);
+    /* the polynomial is the channel: there is its top */
+    if (fabs(vb - promised) <= 1e-12 * (fabs(vb) + fabs(promised))) return;
+    double a = (double)part / (BP_POINTS - 1), c = (double)(part + 1) / (BP_POINTS - 1), va = u[part], vc = u[part + 1];
+    if (vc > vb && vc >= va) {
+        /* not between the quarters around it: uphill is the next one */
+        if (part + 2 >= BP_POINTS) return;
+        a = b, va = vb, b = c, vb = vc;
+        c = (double)(part + 2) / (BP_POINTS - 1), vc = u[part + 2];
+    } else if (va > vb) {
+        if (part == 0) return;
+        c = b, vc = vb, b = a, vb = va;
+        a = (double)(part - 1) / (BP_POINTS - 1), va = u[part - 1];
+    }
+    for (int i = 0; i < BP_REFINEMENTS && vb >= va && vb >= vc; i++) {
+        /* what the next parabola promises on top; beside a jump of the force parabolas creep, and every other place is the middle of the
+           larger part instead */
+        const double range = va < vc ? vb - va : vb - vc, next = bp_top(a, va, b, vb, c, vc), move = (next - b) / (next < b ? b - a : c - b);
+        if (!(range * move * move > 1e-9 * fabs(vb))) return;
+        const double place = i % 2 == 0 ? next : b - a > c - b ? 0.5 * (a + b) : 0.5 * (b + c), found = bp_probe(search, place);
+        if (place < b) {
+            if (found > vb) c = b, vc = vb, b = place, vb = found;
+            else a = place, va = found;
+        } else {
+            if (found > vb) a = b, va = vb, b = place, vb = found;
+            else c = place, vc = found;
+        }
+    }
+}
+
+/* Bring one extreme of a channel up to date with a step.
+
+   reduction   the row
+   value       place of the extreme in the row; its time and ball follow
+   sign        1 for a maximum, -1 for a minimum
+   v           the channel at the quarters, `stride` apart
+   time        start of the step [s] */
+static inline void bp_extreme(double *reduction, int value, int channel, double sign, const double *v, int stride, double time, double h,
+                              bp_channel_at at, const void *source)
+{
+    const bp_search search = {reduction + value + channel, sign, time, h, at, source, channel};
+    double *best = search.best, u[BP_POINTS], q[5], hull[3], slope[BP_CELLS + 1];
+    const int first = !(reduction[BP_DURATION] > 0.0);
+    int top = 0, ball;
+    for (int i = 0; i < BP_POINTS; i++) {
+        u[i] = sign * v[i * stride];
+        if (u[i] > u[top]) top = i;
+    }
+    if (first || u[top] > sign * *best) {
+        const double theta = (double)top / (BP_POINTS - 1);
+        at(source, channel, theta, &ball);
+        best[0] = v[top * stride];
+        best[BP_CHANNELS] = time + theta * h;
+        best[2 * BP_CHANNELS] = ball;
+    }
+    /* is there anything above it?  The parabola is for balls that change rank within the step, where no polynomial is the channel. */
+    bp_quartic(u[0], u[1], u[2], u[3], u[4], q);
+    bp_hull(q, hull);
+    const int middle = top == 0 ? 1 : top == BP_POINTS - 1 ? BP_POINTS - 2 : top;
+    const double bend = u[middle - 1] - 2.0 * u[middle] + u[middle + 1], rise = 0.5 * (u[middle + 1] - u[middle - 1]);
+    const double shift = bend < 0.0 ? -rise / bend : 0.0, place = (middle + shift) / (BP_POINTS - 1);
+    const double above = u[middle] + 0.5 * rise * shift, known = sign * *best;
+    if (!(hull[0] > known || hull[1] > known || hull[2] > known || above > known)) return;
+    /* every top of the polynomial: where its slope changes sign */
+    for (int i = 0; i <= BP_CELLS; i++) {
+        const double s = 4.0 * i / BP_CELLS - 2.0;
+        slope[i] = q[1] + s * (2.0 * q[2] + s * (3.0 * q[3] + s * (4.0 * q[4])));
+    }
+    for (int i = 0; i < BP_CELLS; i++) {
+        if (!(slope[i] > 0.0 && slope[i + 1] <= 0.0)) continue;
+        const double low = 4.0 * i / BP_CELLS - 2.0, high = 4.0 * (i + 1) / BP_CELLS - 2.0;
+        double s = low + (high - low) * slope[i] / (slope[i] - slope[i + 1]);
+        for (int k = 0; k < 4; k++) {
+            const double there = q[1] + s * (2.0 * q[2] + s * (3.0 * q[3] + s * (4.0 * q[4])));
+            const double curve = 2.0 * q[2] + s * (6.0 * q[3] + s * (12.0 * q[4])), moved = curve < 0.0 ? s - there / curve : s;
+            s = moved < low ? low : moved > high ? high : moved;
+        }
+        const double promised = q[0] + s * (q[1] + s * (q[2] + s * (q[3] + s * q[4])));
+        if (promised > sign * *best) bp_climb(&search, u, 0.25 * (s + 2.0), promised);
+    }
+    if (channel >= BP_NX && above > sign * *best && place > 0.0 && place < 1.0) bp_climb(&search, u, place, above);
+}
+
+/* Add an accepted step whose channels at the quarters are v. */
+static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHANNELS], double time, double h, bp_channel_at at,
+                             const void *source)
+{
+    const unsigned long wanted = bp_wanted(reduction);
+    const int first = !(reduction[BP_DURATION] > 0.0);
+    double sum[BP_CHANNELS], square[BP_CHANNELS], top[BP_CHANNELS], bottom[BP_CHANNELS];
+#pragma omp simd
+    for (int k = 0; k < BP_CHANNELS; k++) {
+        const double v0 = v[0][k], v1 = v[1][k], v2 = v[2][k], v3 = v[3][k], v4 = v[4][k];
+        double q[5], low, high;
+        bp_quartic(v0, v1, v2, v3, v4, q);
+        bp_survey(v0, v1, v2, v3, v4, q, &low, &high);
+        top[k] = high;
+        bottom[k] = low;
+        sum[k] = bp_boole[0] * (v0 + v4) + bp_boole[1] * (v1 + v3) + bp_boole[2] * v2;
+        const double boole = bp_boole[0] * (v0 * v0 + v4 * v4) + bp_boole[1] * (v1 * v1 + v3 * v3) + bp_boole[2] * (v2 * v2);
+        const double exact = bp_mean_square(q);
+        square[k] = k < BP_NX ? exact : boole;
+    }
+    for (int k = 0; k < BP_CHANNELS; k++) {
+        if (!(wanted >> k & 1)) continue;
+        reduction[BP_INTEGRAL + k] += h * sum[k];
+        reduction[BP_SQUARE + k] += h * square[k];
+        if (first || top[k] > reduction[BP_MAX + k])
+            bp_extreme(reduction, BP_MAX, k, 1.0, v[0] + k, BP_CHANNELS, time, h, at, source);
+        if (first || bottom[k] < reduction[BP_MIN + k])
+            bp_extreme(reduction, BP_MIN, k, -1.0, v[0] + k, BP_CHANNELS, time, h, at, source);
+    }
+    reduction[BP_DURATION] += h;
+}
+
+#endif

@@ -1,0 +1,229 @@
+/* A run: what is carried from step to step, and one step of whichever method it has.
+
+   The files locate.h, differentiate.h and observe.h add what a run may do besides; stepper.c is the loop around all.  They are parts of
+   one translation unit. */
+#ifndef BALLPASS_RUN_H
+#define BALLPASS_RUN_H
+
+#include <float.h>
+#include <string.h>
+
+#include "control.h"
+#include "explicit.h"
+#include "family.h"
+#include "rosenbrock.h"
+#include "stepper.h"
+#ifdef BALLPASS_LOCATED
+#include "kinks.h"
+#endif
+#ifdef BALLPASS_SENSITIVITIES
+#include "sensitivity.h"
+#endif
+#ifdef BALLPASS_REDUCTIONS
+#include "reductions.h"
+#endif
+
+#ifdef BALLPASS_LOCATED
+/* End of a contact ahead, as foreseen: time within the segment, not a number where there is none, and what ends. */
+typedef struct {
+    double time;
+    int which, ball;
+} bp_release;
+#endif
+
+typedef struct {
+    const ballpass_options *options;
+    ballpass_result *result;
+    bp_numbers numbers;
+    double weight[BP_NX]; /* 1 / tolerance */
+    double *x;
+    double next[BP_NX];
+    double step;           /* proposal for the next step; 0 where it has to be estimated */
+    bp_seen seen;
+    double last_error;     /* logarithm of that of the last accepted step, for the PI controller */
+    int method;
+    /* within the segment, of a run that goes on in another call */
+    double elapsed; /* [s] */
+    int rejected_last;
+    bp_family family;
+    long outputs;
+    const double *output_times;
+    double *output_states;
+    /* work of the methods */
+    bp_rosenbrock linear;
+    bp_matrix matrix;
+    bp_explicit plain;
+    double dense[BP_DENSE_ROWS][BP_NX];
+#ifdef BALLPASS_SENSITIVITIES
+    const ballpass_tangents *tangents; /* or NULL */
+    bp_tangent_block *blocks;
+    double rate_before[BP_NX]; /* at the end of the segment before */
+#endif
+#ifdef BALLPASS_REDUCTIONS
+    double *reduction; /* or NULL where nothing is reduced in the present segment */
+    double sampled[BP_POINTS][BP_CHANNELS];
+#endif
+#ifdef BALLPASS_LOCATED
+    bp_sides sides;
+    double rate[BP_NX]; /* dx/dt where the step starts: its first slope where its pace is even */
+    double lead;        /* of the step tried, 1 where its pace is even (pace.h) */
+    double touch;
+    double onset;       /* time of the branch point behind, minus infinity where there is none [s] */
+    bp_release release; /* branch point ahead */
+#endif
+} bp_run;
+
+#ifdef BALLPASS_LOCATED
+static int is_paced(const bp_run *run) { return run->lead != 1.0; }
+static const double *lead_of(const bp_run *run) { return &run->lead; }
+static double place_of(const bp_run *run, double part) { return is_paced(run) ? bp_theta(run->lead, part) : part; }
+#else
+#define is_paced(run) 0
+#define lead_of(run) NULL
+#define place_of(run, part) (part)
+#endif
+
+static int is_explicit(int method) { return method == BALLPASS_DP54 || method == BALLPASS_DOP853; }
+
+static int is_finite(const double *x)
+{
+    for (int k = 0; k < BP_NX; k++)
+        if (!(fabs(x[k]) <= DBL_MAX)) return 0;
+    return 1;
+}
+
+/* Whether the tolerance is above the rounding of the states reached.  A motion that grows without bound ends where it is not: error
+   control would follow it with ever smaller steps for hours. */
+static int within_reach(const bp_run *run)
+{
+    for (int k = 0; k < BP_NX; k++)
+        if (!(fabs(run->next[k]) * run->weight[k] <= 1.0 / DBL_EPSILON)) return 0;
+    return 1;
+}
+
+static double error_exponent(int method)
+{
+    switch (method) {
+    case BALLPASS_RODAS4: return bp_rodas4.error_exponent;
+    case BALLPASS_RODAS5P: return bp_rodas5p.error_exponent;
+    case BALLPASS_DP54: return bp_dp54.error_exponent;
+    default: return bp_dop853.error_exponent;
+    }
+}
+
+/* Prepare the dense output of the step from (t, x) to (t + h, next). */
+static void prepare_dense(bp_run *run, double t, double h)
+{
+    const bp_numbers *n = &run->numbers;
+    switch (run->method) {
+    case BALLPASS_DP54:
+        if (is_paced(run)) bp_explicit_dense(&bp_dp54, &run->plain, n, t, run->x, h, lead_of(run), run->next, run->dense);
+        else bp_explicit_dense(&bp_dp54, &run->plain, n, t, run->x, h, NULL, run->next, run->dense);
+        break;
+    case BALLPASS_DOP853:
+        if (is_paced(run)) bp_explicit_dense(&bp_dop853, &run->plain, n, t, run->x, h, lead_of(run), run->next, run->dense);
+        else bp_explicit_dense(&bp_dop853, &run->plain, n, t, run->x, h, NULL, run->next, run->dense);
+        break;
+    case BALLPASS_RODAS4: bp_rosenbrock_dense(&bp_rodas4, &run->linear, run->dense); break;
+    default: bp_rosenbrock_dense(&bp_rodas5p, &run->linear, run->dense);
+    }
+}
+
+/* The state of that step where a part of its time has passed. */
+static void state_at(const bp_run *run, double part, double *y)
+{
+    const double(*dense)[BP_NX] = (const double(*)[BP_NX])run->dense;
+    const double theta = place_of(run, part);
+    switch (run->method) {
+    case BALLPASS_DP54: bp_explicit_at(&bp_dp54, dense, run->x, run->next, theta, y); break;
+    case BALLPASS_DOP853: bp_explicit_at(&bp_dop853, dense, run->x, run->next, theta, y); break;
+    case BALLPASS_RODAS4: bp_rosenbrock_at(&bp_rodas4, dense, run->x, run->next, theta, y); break;
+    default: bp_rosenbrock_at(&bp_rodas5p, dense, run->x, run->next, theta, y);
+    }
+}
+
+/* Try one step; returns its scaled error. */
+static double try_step(bp_run *run, double t, double h)
+{
+    ballpass_result *result = run->result;
+    switch (run->method) {
+    case BALLPASS_DP54:
+        result->evaluations += bp_dp54.stages;
+        if (is_paced(run))
+            return bp_explicit_step(&bp_dp54, BP_DP54_STAGES, &run->plain, &run->numbers, t, run->x, h, lead_of(run), run->weight, run->next);
+        return bp_explicit_step(&bp_dp54, BP_DP54_STAGES, &run->plain, &run->numbers, t, run->x, h, NULL, run->weight, run->next);
+    case BALLPASS_DOP853:
+        result->evaluations += bp_dop853.stages;
+        if (is_paced(run))
+            return bp_explicit_step(&bp_dop853, BP_DOP853_STAGES, &run->plain, &run->numbers, t, run->x, h, lead_of(run), run->weight,
+                                    run->next);
+        return bp_explicit_step(&bp_dop853, BP_DOP853_STAGES, &run->plain, &run->numbers, t, run->x, h, NULL, run->weight, run->next);
+    case BALLPASS_RODAS4: {
+        result->evaluations += bp_rodas4.stages - 1;
+        const double error = bp_rosenbrock_step(&bp_rodas4, BP_RODAS4_STAGES, &run->linear, &run->matrix, &run->numbers, t, run->x, h,
+                                                run->weight, run->next);
+        result->factorizations++;
+        result->pivoted += run->matrix.pivoted;
+        return error;
+    }
+    default: {
+        result->evaluations += bp_rodas5p.stages - 1;
+        const double error = bp_rosenbrock_step(&bp_rodas5p, BP_RODAS5P_STAGES, &run->linear, &run->matrix, &run->numbers, t, run->x, h,
+                                                run->weight, run->next);
+        result->factorizations++;
+        result->pivoted += run->matrix.pivoted;
+        return error;
+    }
+    }
+}
+
+/* The state whose scaled value is worst, or the first that is none. */
+static int worst_state(const bp_run *run)
+{
+    int worst = 0;
+    double largest = -1.0;
+    for (int k = 0; k < BP_NX; k++) {
+        if (!(fabs(run->next[k]) <= DBL_MAX)) return k;
+        const double change = fabs(run->next[k] - run->x[k]) * run->weight[k];
+        if (change > largest) {
+            largest = change;
+            worst = k;
+        }
+    }
+    return worst;
+}
+
+static void first_slope(bp_run *run, double t)
+{
+    bp_explicit_rate(&run->numbers, t, run->x, run->plain.k[0]);
+    run->result->evaluations++;
+#ifdef BALLPASS_LOCATED
+    memcpy(run->rate, run->plain.k[0], sizeof run->rate);
+#endif
+}
+
+/* That behind an accepted step which ended at (t, x): most end with the slope of the next. */
+static void next_slope(bp_run *run, double t)
+{
+    const int end = run->method == BALLPASS_DP54 ? BP_DP54_STAGES : BP_DOP853_STAGES;
+#ifdef BALLPASS_LOCATED
+    const double pace = bp_pace(run->lead, 1.0);
+    if (pace < BP_LEAST_PACE) {
+        first_slope(run, t);
+        return;
+    }
+    for (int k = 0; k < BP_NX; k++) run->rate[k] = run->plain.k[end][k] / pace;
+    memcpy(run->plain.k[0], run->rate, sizeof run->rate);
+#else
+    (void)t;
+    memcpy(run->plain.k[0], run->plain.k[end], sizeof run->plain.k[0]);
+#endif
+}
+
+static void linearize(bp_run *run, double t, int fresh)
+{
+    bp_rosenbrock_start(&run->linear, &run->numbers, t, run->x, fresh);
+    run->result->evaluations++;
+}
+
+#endif

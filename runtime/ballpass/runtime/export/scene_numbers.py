@@ -1,0 +1,275 @@
+"""The C that a scene brings to its stand-alone program: its numbers, derived constants, margins of its linkage.
+
+In: a manifest, or a model whose functions CasADi can write.  Out: texts of ``scene.h``, ``scene.c``, ``constants.c``
+and ``margins.c``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import casadi
+
+from ballpass.runtime.contract import InputInfo, Manifest, MarginInfo
+from ballpass.runtime.model import Model
+from ballpass.runtime.native.stepper import METHODS as STEPPERS
+from ballpass.runtime.run.locating import has_kinks, tight_below
+
+#: First line of every file that is written.
+NOTE = "/* Written by ballpass export. */"
+
+_KINDS = {
+    "phase": "SCHEDULE_PHASE",
+    "gate": "SCHEDULE_GATE",
+    "table": "SCHEDULE_TABLE",
+    "table_rate": "SCHEDULE_TABLE_RATE",
+}
+
+
+def margins_of(manifest: Manifest) -> tuple[MarginInfo, ...]:
+    """Of the dyads of the linkage; none where there is no linkage."""
+    return manifest.mechanism.margins if manifest.mechanism is not None else ()
+
+
+def scene_header(manifest: Manifest) -> str:
+    """Text of ``scene.h``: what the other files know of the scene."""
+    sizes = {
+        "SCENE_STATES": len(manifest.states),
+        "SCENE_INPUTS": len(manifest.inputs),
+        "SCENE_PARAMETERS": len(manifest.parameters),
+        "SCENE_CONSTANTS": len(manifest.constants),
+        "SCENE_RELATIONS": len(manifest.relations),
+        "SCENE_MARGINS": len(margins_of(manifest)),
+    }
+    listed = ", ".join(f"{name} = {value}" for name, value in sizes.items())
+    kinks = (
+        "\n/* The laws have kinks, which located.c ends steps on. */\n#define SCENE_KINKS\n"
+        if has_kinks(manifest)
+        else ""
+    )
+    linkage = (
+        """
+/* There is a linkage, whose dyads may fail to meet. */
+#define SCENE_LINKAGE
+
+/* A number that is above zero while the dyad at a joint can be assembled. */
+typedef struct {
+    const char *joint, *description;
+} scene_margin;
+
+extern const scene_margin scene_margin_infos[];
+extern const int scene_start_angle; /* of the driver [rad], its place among parameters */
+
+/* The margins, at a time counted from the one that the inputs u belong to. */
+void scene_margins(double t, const double *u, const double *p, const double *c, double *margins);
+"""
+        if margins_of(manifest)
+        else ""
+    )
+    return f"""{NOTE}
+#ifndef SCENE_H
+#define SCENE_H
+
+#include "schedule.h"
+
+enum {{ {listed} }};
+{kinks}
+/* Tolerance at which kinks are located unless something else is asked for. */
+#define SCENE_TIGHT {tight_below(manifest)!r}
+
+/* A parameter in SI; a value must be above `above`, at least `least`, at most `most` and below `below`. */
+typedef struct {{
+    const char *name, *unit, *description;
+    double value, above, least, most, below;
+}} scene_parameter;
+
+/* A parameter that must be above `factor` times another one; places among the parameters. */
+typedef struct {{
+    int parameter, other;
+    double factor;
+}} scene_relation;
+
+extern const char *const scene_title;
+extern const scene_parameter scene_parameters[];
+extern const scene_relation scene_relations[];
+extern const char *const scene_constant_names[];
+extern const char *const scene_states[];
+
+/* Places among parameters and, behind these, derived constants. */
+extern const int scene_initial[];
+extern const int scene_speed; /* of driver or shaft [rad/s]; -1 where there is none */
+extern const schedule_input scene_inputs[];
+
+/* Run settings: of cycles and duration [s] one is above zero. */
+extern const double scene_cycles, scene_duration, scene_rtol;
+extern const long scene_samples;
+extern const char *const scene_method;
+
+/* Derived constants of the parameters. */
+void scene_constants(const double *p, double *c);
+{linkage}
+#endif
+"""
+
+
+def scene_source(manifest: Manifest) -> str:
+    """Text of ``scene.c``: the scene's numbers."""
+    names = [*(info.name for info in manifest.parameters), *(info.name for info in manifest.constants)]
+    place = {name: k for k, name in enumerate(names)}
+    speed = -1
+    if manifest.mechanism is not None:
+        speed = place[manifest.mechanism.speed]
+    elif manifest.bearing is not None:
+        speed = place[manifest.bearing.shaft_speed]
+    run = manifest.run
+    method = run.method.removeprefix("stepper-") if run.method in STEPPERS and run.method != "stepper" else "auto"
+    parameters = [
+        f"    {{{_string(p.name)}, {_string(p.unit)}, {_string(p.description)}, {p.default!r}, "
+        f"{_bound(p.above, '-INFINITY')}, {_bound(p.least, '-INFINITY')}, {_bound(p.most, 'INFINITY')}, "
+        f"{_bound(p.below, 'INFINITY')}}},"
+        for p in manifest.parameters
+    ]
+    relations = [f"    {{{place[name]}, {place[other]}, {factor!r}}}," for name, factor, other in manifest.relations]
+    indices, inputs = _inputs(manifest.inputs, place)
+    return "\n".join(
+        [
+            NOTE,
+            "/* The scene's numbers. */",
+            '#include "scene.h"',
+            "",
+            "#include <math.h>",
+            "#include <stddef.h>",
+            "",
+            f"const char *const scene_title = {_string(manifest.title)};",
+            "",
+            "const scene_parameter scene_parameters[] = {",
+            *parameters,
+            "};",
+            "",
+            "const scene_relation scene_relations[] = {",
+            *(relations or ["    {0, 0, 0.0}, /* none */"]),  # C has no arrays of length zero
+            "};",
+            "",
+            f"const char *const scene_constant_names[] = {{{_listed(_string(c.name) for c in manifest.constants)}}};",
+            "",
+            f"const char *const scene_states[] = {{{_listed(_string(s.name) for s in manifest.states)}}};",
+            f"const int scene_initial[] = {{{_listed(str(place[name]) for name in manifest.initial)}}};",
+            f"const int scene_speed = {speed};",
+            "",
+            *_linkage(manifest, place),
+            *indices,
+            f"const schedule_input scene_inputs[] = {{\n{inputs}\n}};",
+            "",
+            f"const double scene_cycles = {float(run.cycles or 0.0)!r};",
+            f"const double scene_duration = {float(run.duration or 0.0)!r};",
+            f"const double scene_rtol = {run.rtol!r};",
+            f"const long scene_samples = {run.samples_per_cycle};",
+            f"const char *const scene_method = {_string(method)};",
+            "",
+        ]
+    )
+
+
+def _linkage(manifest: Manifest, place: dict[str, int]) -> list[str]:
+    """Definitions that only a scene with a linkage has."""
+    margins = margins_of(manifest)
+    if manifest.mechanism is None or not margins:
+        return []
+    rows = [f"    {{{_string(margin.joint)}, {_string(margin.description)}}}," for margin in margins]
+    start = place[manifest.mechanism.start_angle]
+    return [f"const int scene_start_angle = {start};", "const scene_margin scene_margin_infos[] = {", *rows, "};", ""]
+
+
+def _inputs(inputs: Sequence[InputInfo], place: dict[str, int]) -> tuple[list[str], str]:
+    """Arrays of places, and the entries of the table of inputs that name them."""
+    arrays: list[str] = []
+
+    def array(name: str, names: Sequence[str]) -> str:
+        if not names:
+            return "NULL"
+        arrays.append(f"static const int {name}[] = {{{_listed(str(place[n]) for n in names)}}};")
+        return name
+
+    entries = []
+    for k, item in enumerate(inputs):
+        edges = array(f"edges_{k}", [edge for window in item.windows for edge in window])
+        times = array(f"times_{k}", item.times)
+        heights = array(f"heights_{k}", item.values)
+        offset = place[item.offset] if item.offset else -1
+        rate = place[item.rate] if item.rate else -1
+        entries.append(
+            f"    {{{_KINDS[item.kind]}, {offset}, {rate}, {len(item.windows)}, {edges}, {len(item.times)}, {times}, "
+            f"{heights}}}, /* {item.name} */"
+        )
+    # C has no arrays of length zero
+    return arrays, "\n".join(entries) or "    {SCHEDULE_PHASE, -1, -1, 0, NULL, 0, NULL, NULL}, /* none */"
+
+
+def constants_source(model: Model) -> str:
+    """C of ``constants``; of nothing where there are none."""
+    if not model.manifest.constants:
+        body = "{\n    (void)p;\n    (void)c;\n}"
+        return f'{NOTE}\n#include "scene.h"\n\nvoid scene_constants(const double *p, double *c)\n{body}\n'
+    given = (("const double *p", "p"),)
+    return _behind("The derived constants", model.symbolic("constants"), "scene_constants", given, "c")
+
+
+def margins_source(model: Model) -> str:
+    """C of ``assembly``, in the same way."""
+    given = (("double t", "&t"), ("const double *u", "u"), ("const double *p", "p"), ("const double *c", "c"))
+    return _behind("The linkage's margins", model.symbolic("assembly"), "scene_margins", given, "margins")
+
+
+def _behind(what: str, function: casadi.Function, name: str, given: Sequence[tuple[str, str]], result: str) -> str:
+    """C of a function as CasADi writes it, behind a function `name` with the project's signature.
+
+    Parameters
+    ----------
+    given : declarations of what the function is given, and their addresses
+    result : name of the array for what it returns
+    """
+    generator = casadi.CodeGenerator(f"{function.name()}.c", {"with_header": False, "with_export": False})
+    generator.add(function)
+    # C has no arrays of length zero
+    sizes = [max(size, 1) for size in (function.sz_arg(), function.sz_res(), function.sz_iw(), function.sz_w())]
+    arguments = "\n".join(f"    arguments[{k}] = {address};" for k, (_, address) in enumerate(given))
+    return f"""{NOTE}
+/* {what}, as CasADi writes them, and {name} at the end, which calls them. */
+#include "scene.h"
+
+#if defined(__GNUC__)
+/* CasADi's calling convention has arguments that this function does not need */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+
+{generator.dump().strip()}
+
+void {name}({", ".join(declaration for declaration, _ in given)}, double *{result})
+{{
+    const casadi_real *arguments[{sizes[0]}];
+    casadi_real *results[{sizes[1]}];
+    casadi_int iw[{sizes[2]}];
+    casadi_real w[{sizes[3]}];
+{arguments}
+    results[0] = {result};
+    {function.name()}(arguments, results, iw, w, 0);
+}}
+"""
+
+
+def _string(text: str) -> str:
+    """C string literal; all but plain ASCII as octal escapes."""
+    out = []
+    for byte in text.encode():
+        character = chr(byte)
+        plain = 32 <= byte < 127 and character not in '"\\?'
+        out.append(character if plain else f"\\{byte:03o}")
+    return '"' + "".join(out) + '"'
+
+
+def _bound(bound: float | None, none: str) -> str:
+    return none if bound is None else repr(float(bound))
+
+
+def _listed(items: Iterable[str]) -> str:
+    return ", ".join(items) or "0"

@@ -1,0 +1,263 @@
+"""An ensemble under way: chunks of members in threads, each a stretch of its runs after the other.
+
+In: `Work`.  Out: its rows of reductions and states at the end, filled; who has no results, and why.
+
+A stretch is some turns of all members of a chunk, so that memory does not grow with the runs.  What members carry from
+one stretch to the next is in the driver's `Carried`: steps and bits are those of runs in one go.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ballpass.runtime.many.member_segments import moments, stretches
+from ballpass.runtime.many.members import Members, Span
+from ballpass.runtime.native.ensemble_driver import STOPPED, EnsembleDriver, MemberNumbers
+from ballpass.runtime.native.stepper import End, Family
+from ballpass.runtime.run.limits import brief_limit
+from ballpass.runtime.run.reductions import Begun, RunFailed, integrate_reduced
+from ballpass.runtime.run.stepping import STATUS_OF_END
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+#: Most members of a chunk: enough that lanes which run out of members at its end do not count.
+CHUNK = 128
+
+#: Chunks that an ensemble is cut into at least, as far as its members fill lanes: what threads share.
+CHUNKS = 16
+
+#: Longest that an interrupt waits to be heard, and that progress is not told [s].
+PATIENCE = 0.2
+
+#: What is counted over all members.
+COUNTS = ("steps", "rejected", "evaluations", "switches", "pivoted")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MemberFailure:
+    """A member without results.
+
+    Attributes
+    ----------
+    member : its place in the table
+    status : a name of `ballpass.runtime.contract.status.Status`, ``REFUSED`` where its numbers cannot be simulated, or
+        ``INTERRUPTED``
+    time : how far it came [s]
+    message : cause and remedy
+    """
+
+    member: int
+    status: str
+    time: float
+    message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Work:
+    """What chunks read, and the rows they fill.
+
+    Attributes
+    ----------
+    lanes : whether members advance in lanes, or one by one
+    end : states of all members, at the start and then at the end, shape (members, states)
+    rows : reductions of all members, shape (members, .)
+    reducing : whether any channel is reduced
+    results : members without results
+    counts : of `COUNTS`, over all members
+    stop : asks the threads to end soon when it becomes nonzero
+    """
+
+    model: Model
+    driver: EnsembleDriver
+    members: Members
+    span: Span
+    family: Family
+    rtol: float
+    lanes: bool
+    reducing: bool
+    end: np.ndarray
+    rows: np.ndarray
+    results: dict[int, MemberFailure]
+    counts: dict[str, int]
+    stop: ctypes.c_int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Chunk:
+    """Some members, their places in the table, and how far they have come [s]; each of shape (members,)."""
+
+    members: np.ndarray
+    reached: np.ndarray
+
+
+def chunk_size(members: int, lanes: int) -> int:
+    """Members of a chunk: a multiple of the lanes, from the number of members alone."""
+    wanted = -(-members // CHUNKS)
+    return min(CHUNK, max(1, -(-wanted // lanes)) * lanes)
+
+
+def run_chunks(
+    work: Work, able: np.ndarray, size: int, threads: int, progress: Callable[[float], None] | None = None
+) -> bool:
+    """Let threads work through the chunks.
+
+    Parameters
+    ----------
+    able : members to run, in order
+    size : members of a chunk
+    progress : told the finished part of all runs, whenever a chunk ends and at least every `PATIENCE`
+
+    Returns
+    -------
+    whether the user interrupted
+    """
+    durations, reached = work.span.durations[able], np.zeros(len(able))
+    chunks = [_Chunk(members=able[k : k + size], reached=reached[k : k + size]) for k in range(0, len(able), size)]
+    interrupted = False
+    pending: dict[Future[dict[str, int]], _Chunk] = {}
+    with ThreadPoolExecutor(max_workers=threads, thread_name_prefix="ballpass") as pool:
+        try:
+            for chunk in chunks:
+                pending[pool.submit(_in_lanes if work.lanes else _one_by_one, work, chunk)] = chunk
+            while pending:
+                # with a limit: waiting without one, the main thread would not hear an interrupt on every system
+                finished, _ = wait(pending, timeout=PATIENCE, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    _add(work.counts, future.result())
+                    chunk = pending.pop(future)
+                    chunk.reached[:] = work.span.durations[chunk.members]
+                if progress is not None:
+                    progress(float(np.sum(np.minimum(reached / durations, 1.0))) / len(able))
+        except BaseException as fault:
+            work.stop.value = 1
+            for future, chunk in pending.items():
+                if future.cancel():
+                    _note(work, chunk.members, "INTERRUPTED", "Interrupted before it began.")
+            if not isinstance(fault, KeyboardInterrupt):
+                raise
+            interrupted = True
+            for future in pending:
+                if not future.cancelled():
+                    _add(work.counts, future.result())
+    return interrupted
+
+
+def _add(counts: dict[str, int], more: Mapping[str, int]) -> None:
+    for name, count in more.items():
+        counts[name] += count
+
+
+def _note(work: Work, members: np.ndarray, status: str, message: str) -> None:
+    for member in members.tolist():
+        work.results[member] = MemberFailure(member=member, status=status, time=0.0, message=message)
+
+
+def _tolerance(work: Work, which: np.ndarray) -> np.ndarray:
+    """Error allowed in a step of some members, relative to their own magnitudes, shape (members, states)."""
+    numbers = MemberNumbers(p=work.members.p[which], c=work.members.c[which])
+    first, inputs, horizons = moments(work.model, work.members, work.span, which)
+    return work.rtol * work.driver.magnitudes(numbers, work.members.initial[which], first, inputs, horizons)
+
+
+def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
+    """Integrate a chunk's members, several together; one that takes too many steps for that goes on alone."""
+    which = chunk.members
+    tolerance = _tolerance(work, which)
+    x = work.members.initial[which]
+    rows = work.rows[which] if work.reducing else None
+    durations = work.span.durations[which]
+    limits = np.array(list(map(brief_limit, durations.tolist(), work.span.turns[which].tolist())))
+    carried = work.driver.carry(len(which))
+    results = carried.results
+    for arrays in stretches(work.model, work.members, work.span, which):
+        if work.stop.value:
+            break
+        work.driver.run(
+            work.family,
+            arrays,
+            x,
+            tolerance,
+            rows,
+            work.stop,
+            max_steps=limits,
+            carried=carried,
+            reached=chunk.reached,
+        )
+        going = (results["status"] == End.DONE) & (results["time"] < durations)
+        if not np.any(going):
+            break
+    work.end[which] = x
+    if rows is not None:
+        work.rows[which] = rows
+    counts = {name: int(results[name].sum()) for name in COUNTS}
+    for place in np.flatnonzero(results["status"] == End.TOO_MANY_STEPS).tolist():
+        told = results[place]
+        begun = Begun(time=float(told["time"]), steps=int(told["steps"] + told["rejected"]))
+        _alone(work, chunk, place, tolerance[place], counts, begun)
+    others = results["status"] != End.TOO_MANY_STEPS
+    failed = others & ((results["status"] != End.DONE) | (results["time"] < durations))
+    for place in np.flatnonzero(failed).tolist():
+        member, told = int(which[place]), results[place]
+        if told["status"] in (STOPPED, End.DONE):
+            status, message = "INTERRUPTED", "Interrupted on its way."
+        else:
+            ending = STATUS_OF_END[End(int(told["status"]))]
+            state = f", worst state {work.model.states[told['state']]}" if told["state"] >= 0 else ""
+            status, message = ending.name, f"{ending.value} Step size {told['step']:.3g} s{state}."
+        work.results[member] = MemberFailure(member=member, status=status, time=float(told["time"]), message=message)
+    return counts
+
+
+def _one_by_one(work: Work, chunk: _Chunk) -> dict[str, int]:
+    """Integrate a chunk's members by the driver of single runs."""
+    tolerance = _tolerance(work, chunk.members)
+    counts = dict.fromkeys(COUNTS, 0)
+    for place in range(len(chunk.members)):
+        if work.stop.value:
+            _note(work, chunk.members[place:], "INTERRUPTED", "Interrupted before it began.")
+            break
+        _alone(work, chunk, place, tolerance[place], counts, Begun())
+    return counts
+
+
+def _alone(work: Work, chunk: _Chunk, place: int, tolerance: np.ndarray, counts: dict[str, int], begun: Begun) -> None:
+    """Integrate one member of a chunk by the driver of single runs, from where it is; adds its steps to `counts`."""
+    member = int(chunk.members[place])
+    duration, turn, start = (float(of[member]) for of in (work.span.durations, work.span.turns, work.span.starts))
+
+    def tell(fraction: float) -> None:
+        chunk.reached[place] = fraction * duration
+
+    try:
+        steps, rejected = integrate_reduced(
+            work.model,
+            work.driver,
+            work.members.numbers(work.model, member),
+            work.family,
+            tolerance,
+            work.end[member],
+            work.rows[member],
+            (duration, turn, start),
+            progress=tell,
+            stop=work.stop,
+            begun=begun,
+        )
+    except RunFailed as fault:
+        work.results[member] = MemberFailure(
+            member=member, status=fault.status.name, time=fault.time, message=str(fault)
+        )
+        return
+    counts["steps"] += steps
+    counts["rejected"] += rejected
+    reached = float(chunk.reached[place])
+    if reached < duration:
+        work.results[member] = MemberFailure(
+            member=member, status="INTERRUPTED", time=reached, message="Interrupted on its way."
+        )

@@ -1,0 +1,325 @@
+"""Ensembles: many parameter sets of one model, only the observables asked for kept.
+
+In: a model, a table of parameters, names of observables.  Out: an `EnsembleResult`.
+
+Members are cut into chunks whose size follows from their number alone; threads take chunks, and within a chunk several
+members advance together in SIMD lanes.  A member's arithmetic depends neither on its neighbours nor on the chunk, so
+the results are the same bits for any number of threads.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+import time as clocks
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ballpass.runtime.app.printed import printed
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import real, unknown_name
+from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, run_chunks
+from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
+from ballpass.runtime.native.ensemble_driver import LANE_FAMILIES
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
+from ballpass.runtime.run.reductions import (
+    channel_names,
+    check_rtol,
+    check_span,
+    choose_family,
+    observable_aliases,
+    observe,
+)
+from ballpass.runtime.run.request import check_memory
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ballpass.runtime.model import Model
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnsembleStatistics:
+    """What an ensemble took.
+
+    Attributes
+    ----------
+    steps, rejected, evaluations : over all members; evaluations only of members in lanes
+    switches : changes of family, over all members
+    pivoted : systems of the linearly implicit method solved with pivoting
+    chunk : members of a chunk
+    lanes : members that advance together in a thread
+    kinks : what steps did at the kinks of the laws, ``stepped-over`` or ``located``
+    threads : at work
+    rtol : relative tolerance [1]
+    wall_time : [s]
+    """
+
+    steps: int
+    rejected: int
+    evaluations: int
+    switches: int
+    pivoted: int
+    chunk: int
+    lanes: int
+    kinks: Kinks
+    threads: int
+    rtol: float
+    wall_time: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnsembleResult(Mapping[str, np.ndarray]):
+    """Observables by the name they were asked for, each of shape (members,); NaN for a member without results.
+
+    Attributes
+    ----------
+    observables : the values
+    parameters : the varied parameters, each of shape (members,)
+    failures : members without results, in order
+    interrupted : whether the run was stopped by the user; members finished by then are there
+    statistics : what it took
+    manifest : of the model
+    """
+
+    observables: Mapping[str, np.ndarray]
+    parameters: Mapping[str, np.ndarray]
+    failures: tuple[MemberFailure, ...]
+    interrupted: bool
+    statistics: EnsembleStatistics
+    manifest: Manifest = field(repr=False)
+
+    def __repr__(self) -> str:
+        count = len(next(iter(self.parameters.values())))
+        return (
+            f"EnsembleResult({self.manifest.scene}: {count} members, {len(self.failures)} without results"
+            f"{', interrupted' if self.interrupted else ''}; varied: {', '.join(self.parameters)}; "
+            f"observables: {', '.join(self.observables)})"
+        )
+
+    def __str__(self) -> str:
+        return printed(_render(self))
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        try:
+            return self.observables[name]
+        except KeyError:
+            raise KeyError(unknown_name("observable", name, self.observables)) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.observables)
+
+    def __len__(self) -> int:
+        return len(self.observables)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Dataset with the dimension ``member``; the varied parameters are coordinates along it, with units."""
+        import xarray
+
+        infos = {info.name: info for info in self.manifest.parameters}
+        count = len(next(iter(self.parameters.values())))
+        coordinates: dict[str, Any] = {"member": np.arange(count)}
+        for name, values in self.parameters.items():
+            facts = {"units": infos[name].unit, "long_name": infos[name].description}
+            coordinates[name] = ("member", values, facts)
+        aliases = observable_aliases(channel_names(self.manifest))
+        variables = {}
+        for name, values in self.observables.items():
+            kind, channel = aliases[name]
+            facts = {"units": _unit(self.manifest, kind, channel), "long_name": f"{kind} of {channel}"}
+            variables[name] = ("member", values, facts)
+        return xarray.Dataset(variables, coords=coordinates, attrs={"title": self.manifest.title})
+
+
+def simulate_many(
+    model: Model,
+    table: Table,
+    observables: str | Sequence[str],
+    *,
+    cycles: float | None,
+    duration: float | None,
+    transient: float | None,
+    rtol: float | None,
+    method: str | None,
+    kinks: str | None,
+    threads: int | None,
+    lanes: bool,
+    progress: Callable[[float], None] | None,
+) -> EnsembleResult:
+    """Run an ensemble; see `ballpass.runtime.Model.simulate_many`."""
+    started = clocks.perf_counter()
+    manifest = model.manifest
+    aliases = observable_aliases(channel_names(manifest))
+    chosen = _observables(observables, aliases)
+    asked = method or manifest.run.method
+    family = choose_family(asked)
+    tolerance = check_rtol(manifest.run.rtol if rtol is None else rtol)
+    at_kinks = choose_kinks(kinks, "stepper" if asked == "auto" else asked, manifest, tolerance)
+    workers = _threads(threads)
+    # the table first: a wrong one is told before the driver is compiled
+    columns = read_table(manifest, table)
+    count = max((len(values) for values in columns.values()), default=0)
+    # parameters, constants and what belongs to them, as arrays and for the driver: measured, with room to spare
+    check_memory(
+        f"{count} members of",
+        count,
+        3 * (len(manifest.parameters) + len(manifest.constants)) + 10,
+        "Run the table in parts of some millions of members: they do not depend on each other.",
+    )
+    driver = model.ensemble_driver
+    if at_kinks == LOCATED and has_kinks(manifest):
+        driver = driver.with_stepper(model.locating_stepper)
+    members = make_members(model, columns)
+    skipped = manifest.run.transient_cycles if transient is None else real(transient)
+    span = _span(model, members, cycles, duration, skipped)
+    in_lanes = lanes and at_kinks != LOCATED and family in LANE_FAMILIES
+    reduced = {channel for kind, channel in chosen.values() if kind != "end"}
+    work = Work(
+        model=model,
+        driver=driver,
+        members=members,
+        span=span,
+        family=family,
+        rtol=tolerance,
+        lanes=in_lanes,
+        reducing=bool(reduced),
+        end=members.initial.copy(),
+        rows=driver.reductions(len(members), span.starts, reduced),
+        results={
+            member: MemberFailure(member=member, status="REFUSED", time=0.0, message=message)
+            for member, message in members.refused.items()
+        },
+        counts=dict.fromkeys(COUNTS, 0),
+        stop=ctypes.c_int(0),
+    )
+    able = np.array([m for m in range(len(members)) if m not in members.refused], dtype=np.int_)
+    size = chunk_size(len(able), driver.lanes)
+    interrupted = run_chunks(work, able, size, workers, progress)
+
+    failed = sorted(work.results)
+    found = {}
+    for name, (kind, channel) in chosen.items():
+        values = observe(driver, kind, channel, work.rows, work.end)
+        values[failed] = np.nan
+        found[name] = values
+    return EnsembleResult(
+        observables=found,
+        parameters=members.varied,
+        failures=tuple(work.results[member] for member in failed),
+        interrupted=interrupted,
+        statistics=EnsembleStatistics(
+            **work.counts,
+            chunk=size,
+            lanes=driver.lanes if in_lanes else 1,
+            kinks=at_kinks,
+            threads=workers,
+            rtol=tolerance,
+            wall_time=clocks.perf_counter() - started,
+        ),
+        manifest=manifest,
+    )
+
+
+def _observables(names: str | Sequence[str], aliases: Mapping[str, tuple[str, str]]) -> dict[str, tuple[str, str]]:
+    names = [names] if isinstance(names, str) else list(names)
+    if not names:
+        raise RequestError(
+            "observables: one name or more is expected, none was given. Example: ['max:ball.force', 'rms:inner.y']."
+        )
+    faults = [unknown_name("observable", name, aliases) for name in names if name not in aliases]
+    if faults:
+        raise RequestError("\n".join(faults))
+    return {name: aliases[name] for name in names}
+
+
+def _threads(given: int | None) -> int:
+    if given is None:
+        # processors that this process may use, where the system tells
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if not (1.0 <= real(given) < math.inf and int(given) == given):
+        raise RequestError(f"threads: a whole number from 1 on is expected, not {given!r}.")
+    return int(given)
+
+
+def _span(model: Model, members: Members, cycles: float | None, duration: float | None, transient: float) -> Span:
+    """Lengths of the members' runs; members for which there is none are refused."""
+    run = model.manifest.run
+    if cycles is not None and duration is not None:
+        raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
+    if cycles is None and duration is None:
+        cycles, duration = run.cycles, run.duration
+    for name, value in (("cycles", cycles), ("duration", duration)):
+        if value is not None and not 0.0 < value < np.inf:
+            raise RequestError(f"{name}: a number above 0 is expected, not {value!r}.")
+    count = len(members)
+    durations, turns, starts = np.zeros(count), np.full(count, np.inf), np.zeros(count)
+    mechanism, bearing = model.manifest.mechanism, model.manifest.bearing
+    speed = mechanism.speed if mechanism is not None else bearing.shaft_speed if bearing is not None else None
+    speeds = np.abs(members.columns[speed]) if speed is not None else np.zeros(count)
+    np.divide(clock.TURN, speeds, out=turns, where=speeds > 0.0)
+    # where there is a run for everybody, in one go; the rules of `check_span`
+    if 0.0 <= transient < math.inf and (duration is not None or np.all(np.isfinite(turns))):
+        durations = np.full(count, float(duration)) if duration is not None else float(cycles or 0.0) * turns
+        starts = transient * turns if transient > 0.0 else starts
+        if np.all(starts < durations * (1.0 - 1e-9)):
+            return Span(durations=durations, turns=turns, starts=starts)
+    durations, starts = np.zeros(count), np.zeros(count)
+    for turn in np.unique(turns):
+        which = np.flatnonzero(turns == turn)
+        try:
+            if duration is None and not np.isfinite(turn):
+                raise RequestError("cycles: nothing turns in this model (its speed is zero). Give duration in seconds.")
+            assert cycles is not None or duration is not None  # the manifest has one of the two
+            length = float(duration) if duration is not None else float(cycles or 0.0) * float(turn)
+            durations[which] = length
+            starts[which] = check_span(length, float(turn), transient)
+        except RequestError as fault:
+            if len(which) == count:
+                raise
+            members.refused.update((int(member), str(fault)) for member in which)
+    return Span(durations=durations, turns=turns, starts=starts)
+
+
+def _render(result: EnsembleResult) -> Any:
+    """Smallest, middle and largest value of each varied parameter and observable over the members."""
+    from rich import box
+    from rich.table import Table as Printed
+
+    count = len(next(iter(result.parameters.values())))
+    statistic = result.statistics
+    table = Printed(
+        title=f"{result.manifest.title}: {count} members",
+        caption=f"{len(result.failures)} without results; {statistic.threads} threads, rtol {statistic.rtol:g}, "
+        f"{statistic.wall_time:.3g} s",
+        title_justify="left",
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+    )
+    table.add_column("parameter or observable", no_wrap=True)
+    for head in ("min", "median", "max"):
+        table.add_column(head, justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    units = {info.name: info.unit for info in result.manifest.parameters}
+    aliases = observable_aliases(channel_names(result.manifest))
+    units |= {name: _unit(result.manifest, *aliases[name]) for name in result.observables}
+    for name, values in (*result.parameters.items(), *result.observables.items()):
+        known = values[np.isfinite(values)]
+        cells = [f"{f(known):.6g}" for f in (np.min, np.median, np.max)] if len(known) else ["", "", ""]
+        table.add_row(name, *cells, units[name])
+    return table
+
+
+def _unit(manifest: Manifest, kind: str, channel: str) -> str:
+    if kind in ("peak_time", "min_time"):
+        return "s"
+    if kind == "peak_ball":
+        return "1"
+    units = {state.name: state.unit for state in manifest.states}
+    return units.get(channel, "m" if channel == "ball.deflection" else "N")

@@ -1,0 +1,255 @@
+"""Members of an ensemble: a table of parameters read, checked, and completed by derived constants.
+
+In: a table of parameters.  Out: `Members`, the `Span` of their runs, and the edges of one run's segments.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain, pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.bounds import violations
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers, Parameters, scalar, unknown_name
+from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.segments import segment_edges
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+#: Turns whose edges are sought at a time: the search compares all with all.
+TURNS_A_SEARCH = 64
+
+Table = Mapping[str, object] | Sequence[Mapping[str, float]] | np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Members:
+    """Numbers of all members.
+
+    Attributes
+    ----------
+    varied : parameters of the table, each of shape (members,)
+    columns : every parameter and constant by name, each of shape (members,)
+    p, c : parameters and constants, shape (members, .)
+    initial : states at the start, shape (members, states)
+    refused : members whose numbers cannot be simulated, and why
+    """
+
+    varied: dict[str, np.ndarray]
+    columns: dict[str, np.ndarray]
+    p: np.ndarray
+    c: np.ndarray
+    initial: np.ndarray
+    refused: dict[int, str]
+
+    def __len__(self) -> int:
+        return len(self.p)
+
+    def numbers(self, model: Model, member: int) -> Numbers:
+        """The numbers of one member, by name as well."""
+        values = {name: float(column[member]) for name, column in self.columns.items()}
+        parameters = Parameters(model.manifest.parameters, values)
+        return Numbers(parameters=parameters, p=self.p[member], c=self.c[member], values=values)
+
+    def timing(self, model: Model, names: Sequence[str], member: int) -> Numbers:
+        """The same with only these of its values by name: all that edges of segments need."""
+        values = {name: float(self.columns[name][member]) for name in names}
+        parameters = Parameters((), {})
+        return Numbers(parameters=parameters, p=self.p[member], c=self.c[member], values=values)
+
+
+def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
+    """Columns of a table of parameters, each of shape (members,).
+
+    Parameters
+    ----------
+    table : mapping from name to one number for each member; or one mapping for each member, where what a member does
+        not name keeps its default; or a structured array
+
+    Raises
+    ------
+    RequestError
+        Unknown names, columns of unequal length, values that are no finite numbers; all faults at once.
+    """
+    defaults = {info.name: info.default for info in manifest.parameters}
+    raw: dict[str, object] = {}
+    if isinstance(table, np.ndarray):
+        if table.dtype.names is None or table.ndim != 1:
+            raise RequestError(
+                "parameters: an array must have one dimension and named fields (a structured array). "
+                'Otherwise give a mapping: {"bearing.clearance": values}.'
+            )
+        raw = {name: table[name] for name in table.dtype.names}
+    elif isinstance(table, Mapping):
+        raw = dict(table)
+    elif isinstance(table, Sequence) and table and all(isinstance(row, Mapping) for row in table):
+        names = list(dict.fromkeys(name for row in table for name in row))
+        raw = {name: [row.get(name, defaults.get(name, math.nan)) for row in table] for name in names}
+    else:
+        raise RequestError(
+            "parameters: a mapping from name to values, a list of mappings, or a structured array is expected, "
+            f"not {type(table).__name__}{' without entries' if isinstance(table, Sequence) else ''}."
+        )
+    if not raw:
+        raise RequestError("parameters: no parameter is named, so the number of members is unknown. Name one.")
+    faults: list[str] = []
+    columns: dict[str, np.ndarray] = {}
+    for name, given in raw.items():
+        if name not in defaults:
+            faults.append(unknown_name("parameter", name, defaults))
+            continue
+        try:
+            column = np.array(given, dtype=float)
+            # NumPy takes truth values and texts for numbers
+            plain = _plain(given)
+        except (TypeError, ValueError, OverflowError):
+            plain = False
+        if not plain:
+            faults.append(f"{name}: numbers are expected, not {given!r:.80}")
+            continue
+        if column.ndim != 1:
+            faults.append(f"{name}: one number for each member is expected, not an array of shape {column.shape}")
+            continue
+        bad = np.flatnonzero(~np.isfinite(column))
+        if len(bad):
+            more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
+            faults.append(f"{name}: member {bad[0]}{more} has {column[bad[0]]}; a finite number is expected")
+        columns[name] = column
+    lengths = {name: len(column) for name, column in columns.items()}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        faults.append(f"The columns must be of one length, a value for each member: {told}")
+    if not faults and not next(iter(lengths.values())):
+        faults.append("There are no members: the columns are empty. Give at least one value.")
+    if faults:
+        raise RequestError("\n".join(faults))
+    return columns
+
+
+def _plain(given: object) -> bool:
+    """Whether these are numbers: NumPy takes truth values and texts for some."""
+    if isinstance(given, list | tuple):
+        kinds = dict.fromkeys(map(type, given))
+        if all(issubclass(kind, float | int | np.floating | np.integer) and kind is not bool for kind in kinds):
+            return True
+        return all(scalar(item) is not None or isinstance(item, list | tuple | np.ndarray) for item in given)
+    return np.asarray(given).dtype.kind in "iufO"
+
+
+def make_members(model: Model, table: Table) -> Members:
+    """Members with their derived constants; those that cannot be simulated are noted, not raised."""
+    manifest = model.manifest
+    varied = read_table(manifest, table)
+    count = len(next(iter(varied.values())))
+    columns = {info.name: varied.get(info.name, np.full(count, info.default)) for info in manifest.parameters}
+    p = np.ascontiguousarray(np.column_stack(list(columns.values())))
+    c = np.zeros((count, 0))
+    refused: dict[int, str] = {}
+    for mask, rule in violations(manifest, columns):
+        name = rule.partition(":")[0]
+        for member in np.flatnonzero(mask):
+            refused.setdefault(int(member), f"{rule}, not {columns[name][member]:.9g}.")
+    if manifest.constants:
+        c = np.ascontiguousarray(model.loop("constants", ("p",))(count, {"p": p})["c"])
+        for member in np.flatnonzero(~np.all(np.isfinite(c), axis=1)):
+            bad = [info.name for info, fine in zip(manifest.constants, np.isfinite(c[member]), strict=True) if not fine]
+            refused.setdefault(
+                int(member),
+                f"The derived constants {', '.join(bad)} are not finite numbers. "
+                "Geometry and elastic constants must be physical.",
+            )
+        columns |= {info.name: c[:, k] for k, info in enumerate(manifest.constants)}
+    _check_knots(manifest, columns, refused)
+    initial = np.ascontiguousarray(np.column_stack([columns[name] for name in manifest.initial]))
+    members = Members(varied=varied, columns=columns, p=p, c=c, initial=initial, refused=refused)
+    _check_assembly(model, members)
+    return members
+
+
+def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused: dict[int, str]) -> None:
+    """Note members whose tables have times that do not increase."""
+    for item in manifest.inputs:
+        if item.kind != "table":
+            continue
+        wrong = np.any(np.diff([columns[name] for name in item.times], axis=0) <= 0.0, axis=0)
+        for member in np.flatnonzero(wrong).tolist():
+            values = {name: float(columns[name][member]) for name in (*item.times, *item.values)}
+            try:
+                clock.breakpoints((item,), values, 0.0, 1.0)
+            except RequestError as fault:
+                refused[member] = str(fault)
+
+
+def _check_assembly(model: Model, members: Members) -> None:
+    """Note members whose linkage cannot be assembled; each distinct geometry is looked at once."""
+    manifest = model.manifest
+    mechanism = manifest.mechanism
+    if mechanism is None or not mechanism.margins:
+        return
+    function = model.symbolic("assembly")
+    # a turn shows every angle, whatever speed and start: only whether it turns at all matters of them
+    timing = [k for k, info in enumerate(manifest.parameters) if info.name in (mechanism.speed, mechanism.start_angle)]
+    parts = [members.columns[mechanism.speed][:, None] == 0.0]
+    for name, rows in (("p", members.p), ("c", members.c)):
+        if name in function.name_in() and rows.shape[1]:
+            used = set(function.jac_sparsity(0, function.name_in().index(name)).get_col())
+            parts.append(rows[:, sorted(used.difference(timing) if name == "p" else used)])
+    for group in groups(np.column_stack(parts)):
+        member = int(group[0])
+        if member in members.refused:
+            continue
+        try:
+            check_assembly(model, members.numbers(model, member))
+        except RequestError as fault:
+            members.refused.update((int(other), str(fault)) for other in group)
+
+
+def groups(rows: np.ndarray) -> list[np.ndarray]:
+    """Places of equal rows, each group in order."""
+    if not rows.shape[1]:
+        return [np.arange(len(rows))]
+    _, inverse = np.unique(rows, axis=0, return_inverse=True)
+    order = np.argsort(inverse.ravel(), kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(inverse.ravel()[order])) + 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Span:
+    """How long each member runs.
+
+    Attributes
+    ----------
+    durations : shape (members,) [s]
+    turns : time of a turn, infinite when nothing turns, shape (members,) [s]
+    starts : from which time on is reduced, shape (members,) [s]
+    """
+
+    durations: np.ndarray
+    turns: np.ndarray
+    starts: np.ndarray
+
+
+def edge_windows(model: Model, numbers: Numbers, duration: float, turn: float, start: float) -> Iterator[np.ndarray]:
+    """Begin, breakpoints, whole turns, `start` and end of a run, some turns at a time, increasing [s].
+
+    Memory does not grow with the run; each window begins with the last edge of the one before.
+    """
+    near = 1e-9 * min(turn, duration)
+    wholes = range(TURNS_A_SEARCH, math.ceil(duration / turn), TURNS_A_SEARCH) if math.isfinite(turn) else ()
+    stops = (k * turn for k in wholes if k * turn < duration - near)
+    for left, right in pairwise(chain((0.0,), stops, (duration,))):
+        if left + near < start < right - near:
+            # not a window of its own: a window's first step size is estimated anew
+            before, behind = (segment_edges(model, numbers, a, b, turn) for a, b in ((left, start), (start, right)))
+            yield np.concatenate([before, behind[1:]])
+        else:
+            edges = segment_edges(model, numbers, left, right, turn)
+            yield np.where(np.abs(edges - start) <= near, start, edges)

@@ -1,0 +1,715 @@
+"""A generated model at work: load, look, evaluate, simulate, differentiate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import casadi
+import numpy as np
+
+from ballpass.runtime.ask.peaks import Peak, refine_peak
+from ballpass.runtime.certify.named_error import Models, simulate_to_error
+from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
+from ballpass.runtime.certify.quasi_static import QuasiStatic
+from ballpass.runtime.contract import Manifest, read_artefact
+from ballpass.runtime.contract.errors import ArtefactError, RequestError
+from ballpass.runtime.contract.folders import LOOKS
+from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters, vector
+from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
+from ballpass.runtime.many.members import Table
+from ballpass.runtime.native.compile import CompiledLibrary, compile_model
+from ballpass.runtime.native.drivers import Drivers
+from ballpass.runtime.native.ensemble_driver import EnsembleDriver
+from ballpass.runtime.native.functions import Functions
+from ballpass.runtime.native.kernel import Array, Kernel
+from ballpass.runtime.native.loops import PointLoop
+from ballpass.runtime.native.stepper import METHODS as STEPPERS
+from ballpass.runtime.native.stepper import Stepper
+from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.point.evaluate import checked_time, evaluate_point
+from ballpass.runtime.point.explain import Explanation, explain
+from ballpass.runtime.point.jacobian import jacobian
+from ballpass.runtime.point.jacobian_function import JacobianFunction
+from ballpass.runtime.point.second_derivatives import hessian
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.casadi_integrators import available_methods
+from ballpass.runtime.run.locating import Kinks, refuse_with_error
+from ballpass.runtime.run.reductions import Reductions, reduce_run
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.sensitivity import Sensitivities, refuse_located, sensitivities
+from ballpass.runtime.run.simulate import simulate
+
+if TYPE_CHECKING:
+    from ballpass.runtime.certify.sensitivity_report import SensitivityReport
+    from ballpass.runtime.certify.trade import Trade
+    from ballpass.runtime.point.equilibrium import StaticEquilibrium
+    from ballpass.runtime.point.linearize import Linearization
+    from ballpass.runtime.run.solution import Solution
+
+
+def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True) -> Model:
+    """Load a generated folder; compile its C when no cached library fits.
+
+    Parameters
+    ----------
+    folder : what `ballpass derive` wrote
+    compiler : command of a C compiler.  Default: $CC, cc, gcc, clang, ziglang, whichever is there first
+    verify : refuse files that differ from the manifest's digests
+
+    Warns
+    -----
+    NoCompilerWarning
+        There is no compiler: the functions run in CasADi's virtual machine.
+
+    Raises
+    ------
+    ArtefactError
+        No such folder, a manifest that is wrong or of another schema, edited files.
+    CompileError
+        The compiler failed.
+    """
+    # absolute: functions may be read after the process has moved elsewhere
+    place = Path(folder).absolute()
+    for look in range(LOOKS):
+        manifest = read_artefact(folder, verify=verify)
+        try:
+            library = compile_model(place, manifest, compiler)
+            break
+        except ArtefactError:
+            # another process has put a new folder in place since the manifest was read
+            if look == LOOKS - 1:
+                raise
+    return Model(place, manifest, library, compiler=compiler)
+
+
+class Model:
+    """Functions of one scene with their names, units and defaults.  All numbers are SI.
+
+    For any number of threads at once, with the bits of calls one after the other.  What `kernel` and `loop` give
+    belongs to the thread that asked for it, and so does what `jacobian_function` gives.
+
+    Attributes
+    ----------
+    manifest : what the model consists of
+    library : the compiled library, None when CasADi's virtual machine runs the functions
+    """
+
+    def __init__(
+        self, folder: Path, manifest: Manifest, library: CompiledLibrary | None, *, compiler: str | None = None
+    ) -> None:
+        self.manifest = manifest
+        self.library = library
+        self._functions = Functions(folder, manifest, library, compiler)
+        self._drivers = Drivers(folder, manifest, compiler, compiled=library is not None)
+        self._assembled = b""  # parameters whose linkage was looked at last
+
+    def __repr__(self) -> str:
+        how = "compiled" if self.compiled else "in CasADi's virtual machine"
+        return (
+            f"Model({self.manifest.scene}: {len(self.states)} states, {len(self.manifest.parameters)} parameters, "
+            f"{len(self.outputs)} outputs, {how})"
+        )
+
+    @property
+    def compiled(self) -> bool:
+        """Whether generated C runs."""
+        return self.library is not None
+
+    @property
+    def parameters(self) -> Parameters:
+        """Names and defaults; prints as a table with units and descriptions."""
+        return resolve_parameters(self.manifest, None)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states: positions, then velocities."""
+        return tuple(state.name for state in self.manifest.states)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return tuple(output.name for output in self.manifest.outputs)
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Integration methods of this model, besides ``auto``."""
+        return (*((*STEPPERS, QUASI_STATIC) if self.has_stepper else ()), *available_methods(self))
+
+    @property
+    def has_stepper(self) -> bool:
+        """Whether the folder brings the kernels of the project's own stepper, and a compiler made code of the rest."""
+        return self._drivers.available
+
+    @property
+    def stepper(self) -> Stepper:
+        """The project's own stepper, compiled when first asked for.
+
+        Raises
+        ------
+        RequestError
+            There is no compiler, or the folder brings no kernels.
+        CompileError
+            The compiler failed.
+        """
+        return self._drivers.stepper
+
+    @property
+    def differentiating_stepper(self) -> Stepper:
+        """The stepper with the derivatives of its steps, compiled when first asked for; errors as for `stepper`."""
+        return self._drivers.differentiating_stepper
+
+    @property
+    def locating_stepper(self) -> Stepper:
+        """The stepper whose steps end on kinks of the laws, compiled when first asked for; errors as for `stepper`."""
+        return self._drivers.locating_stepper
+
+    @property
+    def ensemble_driver(self) -> EnsembleDriver:
+        """The driver of ensembles and reductions, compiled when first asked for; errors as for `stepper`."""
+        return self._drivers.ensemble
+
+    @property
+    def quasi_static(self) -> QuasiStatic:
+        """The driver of the quasi-static model, compiled when first asked for; errors as for `stepper`."""
+        return self._drivers.quasi_static
+
+    def has(self, name: str) -> bool:
+        """Whether the model has a function of that name."""
+        return self._functions.has(name)
+
+    def function(self, name: str) -> casadi.Function:
+        """CasADi function by name, compiled if possible.
+
+        Raises
+        ------
+        RequestError
+            The model has no such function.
+        """
+        return self._functions.function(name)
+
+    def kernel(self, name: str) -> Kernel:
+        """Function by name on memory of its own: ``kernel({"t": 0.0, "x": x, ...})`` costs microseconds."""
+        return self._functions.kernel(name)
+
+    def loop(self, name: str, varying: tuple[str, ...]) -> PointLoop:
+        """Function by name for many points at once; `varying` names the inputs that change between them."""
+        return self._functions.loop(name, varying)
+
+    def sample_outputs(
+        self, count: int, values: Mapping[str, Any], names: Sequence[str], *, lean: bool
+    ) -> dict[str, Array]:
+        """Outputs at many points (see `ballpass.runtime.native.functions`)."""
+        return self._functions.sample_outputs(count, values, names, lean=lean)
+
+    def symbolic(self, name: str) -> casadi.Function:
+        """CasADi function by name as an expression graph, which can be differentiated further."""
+        return self._functions.symbolic(name)
+
+    def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function:
+        """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `integrators`)."""
+        return self._functions.virtual_integrator(plugin, intervals)
+
+    def numbers(self, parameters: Mapping[str, float] | None = None) -> Numbers:
+        """Parameters with overrides, checked, and the derived constants that follow."""
+        return numbers_of(self.manifest, parameters, lambda p: self.kernel("constants")({"p": p}))
+
+    def _runnable(self, parameters: Mapping[str, float] | None) -> Numbers:
+        """Numbers of a run whose linkage can be assembled; what was looked at last is not looked at again."""
+        numbers = self.numbers(parameters)
+        looked_at = numbers.p.tobytes()
+        if looked_at != self._assembled:
+            check_assembly(self, numbers)
+            self._assembled = looked_at
+        return numbers
+
+    def constants(self, parameters: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Derived constants (stiffness, cage ratio, ...) by name, for the defaults with `parameters` put in."""
+        values = self.numbers(parameters).values
+        return {info.name: values[info.name] for info in self.manifest.constants}
+
+    def period(self, parameters: Mapping[str, float] | None = None) -> float:
+        """Time of one turn of driver or shaft [s]; infinite when nothing turns."""
+        return clock.period(self.manifest, self.numbers(parameters).values)
+
+    def breakpoints(self, t0: float, t1: float, parameters: Mapping[str, float] | None = None) -> np.ndarray:
+        """Times in the open interval (t0, t1) at which a load switches or a table has a knot, increasing [s]."""
+        if not (math.isfinite(t0) and math.isfinite(t1) and t0 < t1):
+            raise RequestError(f"breakpoints: finite times t0 < t1 are expected, not {t0!r} and {t1!r}.")
+        return clock.breakpoints(self.manifest.inputs, self.numbers(parameters).values, float(t0), float(t1))
+
+    def inputs_at(self, t: float, parameters: Mapping[str, float] | None = None) -> np.ndarray:
+        """Inputs ``u`` at time `t`, for functions that are then called with ``t = 0``; shape (inputs,)."""
+        return clock.inputs_at(self.manifest.inputs, self.numbers(parameters).values, checked_time(t))
+
+    def initial(self, parameters: Mapping[str, float] | None = None) -> np.ndarray:
+        """State at the start, shape (states,)."""
+        values = self.numbers(parameters).values
+        return np.array([values[name] for name in self.manifest.initial], dtype=float)
+
+    def evaluate(
+        self,
+        t: float,
+        x: Sequence[float] | np.ndarray | None = None,
+        outputs: Sequence[str] | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> dict[str, float | np.ndarray]:
+        """Outputs at one time and state.
+
+        Parameters
+        ----------
+        t : time [s]
+        x : state, shape (states,).  Default: the initial one
+        outputs : names.  Default: all
+        parameters : overrides, SI
+
+        Returns
+        -------
+        dict from name to number, or to array of shape (balls,)
+        """
+        return evaluate_point(self, self.numbers(parameters), t, x, outputs)
+
+    def simulate(
+        self,
+        cycles: float | None = None,
+        *,
+        duration: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        method: str | None = None,
+        rtol: float | None = None,
+        samples_per_cycle: int | None = None,
+        times: Sequence[float] | np.ndarray | None = None,
+        outputs: Sequence[str] | None = None,
+        initial: Sequence[float] | np.ndarray | None = None,
+        transient: float | None = None,
+        kinks: Kinks | None = None,
+        progress: Callable[[float], None] | None = None,
+        error: float | None = None,
+        of: str | Sequence[str] | None = None,
+        trade: Trade | None = None,
+        models: Models = "any",
+    ) -> Solution:
+        """Simulate from t = 0.  What is not given is taken from the scene's run settings.
+
+        Parameters
+        ----------
+        cycles, duration : turns of driver or shaft, or time [s]; one of them
+        parameters : overrides of parameters, SI
+        method : ``auto`` or one of `methods`.  ``auto`` takes ``stepper`` where there is a compiler, else
+            ``rosenbrock`` for a stiff model and ``erk`` for others
+        rtol : error allowed per step, relative to the magnitudes of the states (`ballpass.runtime.run.scales`)
+        samples_per_cycle : samples in a turn; in the whole run where nothing turns
+        times : times of the samples instead, increasing, within the run; where neither cycles nor duration is given,
+            the run ends at the last one.  The stepper takes the same steps however a run of one length is sampled; the
+            other methods go from sample to sample [s]
+        outputs : names of the outputs to evaluate, none of them for ``[]``; the others cost nothing.  Default: all of
+            the scene.  A new choice is compiled when first asked for, in a fraction of a second
+        initial : state at the start, shape (states,)
+        transient : turns at the start that `Solution.steady` leaves out
+        kinks : ``stepped-over`` leaves kinks of the laws to error control; with ``located`` steps of the project's own
+            stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 3e-7
+            (1e-6 where a law jumps), else stepped over
+        progress : called with the finished fraction
+        error : relative error wanted instead of `method` and `rtol`: the tool chooses them, estimates the error of
+            this run and tightens until the estimate is within it; ``Solution.accuracy`` tells (see
+            `ballpass.runtime.certify.error_target`)
+        of : quantities that `error` is about.  Default: peak ball force, rms and range of the inner ring's motion
+        trade : a measurement of this scene (`ballpass trade`), from which `error` begins its search
+        models : which models `error` may take: ``"any"``, simpler ones that were kept with the trade as well, or
+            ``"full"``
+
+        Raises
+        ------
+        RequestError
+            A wrong request, or a linkage that cannot be assembled.
+        IntegrationError
+            The computation failed; ``.partial`` holds what was computed.
+        TargetMissed
+            No way keeps the error that was asked for.
+        """
+        numbers = self._runnable(parameters)
+        request = Request(
+            cycles=cycles,
+            duration=duration,
+            method=method,
+            rtol=rtol,
+            samples_per_cycle=samples_per_cycle,
+            times=times,
+            outputs=outputs,
+            initial=None if initial is None else vector(initial),
+            transient_cycles=transient,
+            kinks=kinks,
+            progress=progress,
+        )
+        refuse_with_error(kinks, error)
+        if error is None:
+            return simulate(self, numbers, request)
+        return simulate_to_error(self, numbers, request, error, of, trade, models)
+
+    def sensitivities(
+        self,
+        wrt: str | Sequence[str],
+        cycles: float | None = None,
+        *,
+        duration: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        method: str | None = None,
+        rtol: float | None = None,
+        sensitivity_rtol: float | None = None,
+        samples_per_cycle: int | None = None,
+        kinks: Literal["stepped-over"] | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Sensitivities:
+        """Simulate from t = 0 with the derivatives of the states by parameters, exact for the discrete solution.
+
+        Parameters
+        ----------
+        wrt : names of parameters; any number in one pass
+        sensitivity_rtol : error allowed per step in the derivatives, which then take part in the choice of step sizes,
+            relative to the states' magnitudes over the parameters' scales (`derivatives/direction_scales.py`) or to
+            the derivative itself where it is larger; None: the states alone choose the steps
+        kinks : ``stepped-over`` at any tolerance: what is differentiated are steps that go over the kinks of the laws
+        others : as for `simulate`
+
+        Raises
+        ------
+        RequestError
+            A wrong request, an unknown parameter, or a damping law whose force jumps.
+        IntegrationError
+            The computation failed.
+        """
+        numbers = self._runnable(parameters)
+        request = Request(
+            cycles=cycles,
+            duration=duration,
+            method=method,
+            rtol=rtol,
+            sensitivity_rtol=sensitivity_rtol,
+            samples_per_cycle=samples_per_cycle,
+            kinks=kinks,
+            progress=progress,
+        )
+        return sensitivities(self, numbers, request, [wrt] if isinstance(wrt, str) else list(wrt))
+
+    def sensitivity(
+        self,
+        of: str | Sequence[str] | None = None,
+        wrt: str | Sequence[str] | None = None,
+        cycles: float | None = None,
+        *,
+        duration: float | None = None,
+        transient: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        method: str = "auto",
+        direction: Literal["forward", "adjoint"] = "forward",
+        check: bool | Literal["differences", "erk", "adjoint"] = True,
+        rtol: float | None = None,
+        sensitivity_rtol: float | None = None,
+        samples_per_cycle: int | None = None,
+        kinks: Literal["stepped-over"] | None = None,
+        agreement: float | None = None,
+        progress: Callable[[str, float], None] | None = None,
+    ) -> SensitivityReport:
+        """Derivatives of quantities of interest by parameters, each with a certificate (see `certificate`).
+
+        Parameters
+        ----------
+        of : quantities (see `ballpass.runtime.ask.quantities`).  Default: peak ball force and motion of the rings
+        wrt : parameters.  Default: all
+        cycles, duration, transient, parameters : as for `simulate`
+        method : of the derivatives: ``auto``, one of the stepper's, or ``erk``
+        direction : of ``erk``
+        check : the second route: True (differences), "erk", "adjoint", or False for none
+        rtol, sensitivity_rtol : tolerances of states and derivatives; tight ones by default
+        samples_per_cycle : nodes of quadratures in a turn
+        kinks : ``stepped-over`` at any tolerance, as for `sensitivities`
+        agreement : relative disagreement of both routes that is allowed
+        progress : called with words and a finished fraction
+
+        Raises
+        ------
+        RequestError
+            A wrong request, unknown names, or a law whose force jumps.
+        SimulationError
+            The computation failed.
+        """
+        from ballpass.runtime.certify.sensitivity_query import (  # SciPy takes longer to read than a run
+            answer,
+            make_query,
+        )
+
+        refuse_located(kinks)
+        query = make_query(
+            self.manifest,
+            of=of,
+            wrt=wrt,
+            cycles=cycles,
+            duration=duration,
+            transient=transient,
+            method=method,
+            direction=direction,
+            check=check,
+            rtol=rtol,
+            sensitivity_rtol=sensitivity_rtol,
+            samples_per_cycle=samples_per_cycle,
+            agreement=agreement,
+            progress=progress,
+        )
+        return answer(self, self._runnable(parameters), query)
+
+    def reduce(
+        self,
+        cycles: float | None = None,
+        *,
+        duration: float | None = None,
+        transient: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        method: str | None = None,
+        rtol: float | None = None,
+        initial: Sequence[float] | np.ndarray | None = None,
+        kinks: Kinks | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Reductions:
+        """Extremes with their times, mean and rms of a run behind its transient, without a stored trajectory.
+
+        Parameters are those of `simulate`; the transient's turns do not count.  The memory does not grow with the run.
+        However long it takes, `progress` is told and an interrupt (Ctrl-C) heard every so many steps, a fraction of a
+        second; that changes no bit of the results.  It is given up where `simulate` gives up.
+
+        Raises
+        ------
+        RequestError
+            A wrong request, or a linkage that cannot be assembled.
+        SimulationError
+            The computation failed.
+        """
+        request = Request(
+            cycles=cycles,
+            duration=duration,
+            method=method,
+            rtol=rtol,
+            initial=None if initial is None else vector(initial),
+            transient_cycles=transient,
+            kinks=kinks,
+            progress=progress,
+        )
+        return reduce_run(self, self._runnable(parameters), request)
+
+    def simulate_many(
+        self,
+        parameters: Table,
+        observables: str | Sequence[str],
+        *,
+        cycles: float | None = None,
+        duration: float | None = None,
+        transient: float | None = None,
+        rtol: float | None = None,
+        method: str | None = None,
+        kinks: Kinks | None = None,
+        threads: int | None = None,
+        lanes: bool = True,
+        progress: Callable[[float], None] | None = None,
+    ) -> EnsembleResult:
+        """Simulate many parameter sets, keeping only observables.
+
+        The results of a member are those of a single run within the tolerance, and the same bits for any number of
+        threads.  A member that fails is reported in ``failures`` and has NaN in its place.  An interrupt (Ctrl-C) ends
+        the ensemble within a fraction of a second, and the members finished by then are kept.
+
+        Parameters
+        ----------
+        parameters : overrides, SI: name to one value for each member, or a mapping for each member, or a structured
+            array
+        observables : ``max:``, ``min:``, ``mean:``, ``rms:``, ``range:``, ``peak_time:``, ``peak_ball:``, ``min_time:``
+            or ``end:``, and a state or one of ball.force, ball.elastic_force, ball.damping_force, ball.deflection (of
+            the most loaded ball); also written ``peak_ball_force``, ``rms_inner_y``
+        cycles, duration : turns of driver or shaft, or time [s]; one of them
+        transient : turns at the start that do not count
+        rtol : error allowed per step, relative to each member's own magnitudes
+        method : ``auto``, or one of the project's own stepper
+        kinks : as in `simulate`: with ``located``, the default at tight tolerances of ``auto`` and ``stepper``, steps
+            end on the kinks of the laws and members run one at a time, for lanes cannot; with ``stepped-over`` lanes
+            serve at any tolerance, but what a step loses at a kink is above a tight one, and members agree with single
+            runs no closer than that.  ``statistics.kinks`` says which it was
+        threads : default: as many as processors
+        lanes : False advances one member at a time
+        progress : called with the finished fraction
+
+        Raises
+        ------
+        RequestError
+            A wrong request: unknown names, columns of unequal length, values that are no finite numbers.
+        """
+        return simulate_many(
+            self,
+            parameters,
+            observables,
+            cycles=cycles,
+            duration=duration,
+            transient=transient,
+            rtol=rtol,
+            method=method,
+            kinks=kinks,
+            threads=threads,
+            lanes=lanes,
+            progress=progress,
+        )
+
+    def refine_peak(
+        self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max", candidates: int = 6
+    ) -> Peak:
+        """Peak of an output of a run of this model, between its samples too (see `ballpass.runtime.ask.peaks`).
+
+        It is looked for within every step where the project's own stepper ran, between all samples as far as these tell
+        where another method did; the result's ``searched`` says which.
+
+        Parameters
+        ----------
+        solution : the run, or its steady part
+        name : an output
+        kind : which extreme
+        candidates : so many places are looked at closely at a time
+
+        Raises
+        ------
+        RequestError
+            No such output, fewer than three samples, or another `kind`.
+        """
+        numbers = self.numbers(solution.parameters)
+        return refine_peak(self, numbers, solution, name, kind=kind, candidates=candidates)
+
+    def check_assembly(self, parameters: Mapping[str, float] | None = None) -> None:
+        """Raise `RequestError`, naming joint and crank angle, when the linkage locks somewhere in a turn."""
+        check_assembly(self, self.numbers(parameters))
+
+    def jacobian(
+        self,
+        of: str | Sequence[str],
+        wrt: str | Sequence[str] = "states",
+        *,
+        t: float = 0.0,
+        x: Sequence[float] | np.ndarray | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> np.ndarray:
+        """Derivative of the right-hand side or of quantities at one time and state, from generated code.
+
+        Parameters
+        ----------
+        of : "rhs", or names or patterns of quantities ("ball.force", "reaction.A.*"), whether a run reports them or
+            not; `manifest.quantities` lists them
+        wrt : "states", "time", "crank_angle" (time over speed: everything moves on but the rings), names of states or
+            parameters, or several of these.  Derivatives along parameters are total: through the derived constants,
+            the phases and the tables as well, at fixed state.  Gates are flat (they jump at edges).
+        t : time [s]
+        x : state.  Default: the initial one
+        parameters : overrides, SI
+
+        Returns
+        -------
+        array, shape (rows, columns); a single number as `of` has no rows, a single name as `wrt` no columns
+
+        Raises
+        ------
+        RequestError
+            Unknown names, with the nearest ones.
+        """
+        return jacobian(self, self.numbers(parameters), of, wrt, t=t, x=x)
+
+    def jacobian_function(
+        self,
+        of: str | Sequence[str],
+        wrt: str | Sequence[str] = "states",
+        *,
+        t: float = 0.0,
+        parameters: Mapping[str, float] | None = None,
+    ) -> JacobianFunction:
+        """The same, sparse and prepared for many states: ``J = model.jacobian_function("ball.force"); J(x)``."""
+        return JacobianFunction(self, self.numbers(parameters), of, wrt, t=t)
+
+    def hessian(
+        self,
+        of: str | Sequence[str],
+        wrt: tuple[str, str],
+        *,
+        t: float = 0.0,
+        x: Sequence[float] | np.ndarray | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> np.ndarray:
+        """Second derivatives by a pair of names at one time and state, shape (rows,), as for `jacobian`.
+
+        Raises
+        ------
+        RequestError
+            Unknown names, or laws without a bounded second derivative: Hertz's at contact onset.
+        """
+        return hessian(self, self.numbers(parameters), of, wrt, t=t, x=x)
+
+    def explain(self, parameters: Mapping[str, float] | None = None) -> Explanation:
+        """Breakpoints, smoothness and time scales, and the method they speak for."""
+        return explain(self, parameters)
+
+    def static_equilibrium(
+        self,
+        t: float | None = None,
+        *,
+        crank_angle: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        load: tuple[float, float] | None = None,
+    ) -> StaticEquilibrium:
+        """Positions at which the rings rest under the load of one instant, everything at rest, no damping force.
+
+        Parameters
+        ----------
+        t, crank_angle : the instant: time [s], default 0, or angle of crank or shaft in the first turn in radians,
+            at most two turns
+        parameters : overrides, SI
+        load : on the inner ring, x and y [N], instead of the scene's
+
+        Warns
+        -----
+        FreeRingWarning
+            The rings can move without force along some direction: the place is one of many.
+
+        Raises
+        ------
+        RequestError
+            No bearing, or an unloaded ring in a clearance.
+        SimulationError
+            Nothing holds the rings.
+        """
+        from ballpass.runtime.point.equilibrium import instant, static_equilibrium  # with SciPy
+
+        numbers = self.numbers(parameters)
+        return static_equilibrium(self, numbers, t=instant(self, numbers, t, crank_angle), load=load)
+
+    def linearize(
+        self,
+        t: float | None = None,
+        *,
+        crank_angle: float | None = None,
+        x: Sequence[float] | np.ndarray | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> Linearization:
+        """Mass, damping and stiffness matrices, natural frequencies and modes about a state.
+
+        Parameters
+        ----------
+        t, crank_angle : the instant: time [s], default 0, or angle of crank or shaft in the first turn in radians,
+            at most two turns
+        x : state, shape (states,).  Default: static equilibrium under the load of that instant
+        parameters : overrides, SI
+
+        Warns
+        -----
+        KinkWarning
+            The damping law has no derivative at this state; the warning says which side is given.
+        """
+        from ballpass.runtime.point.equilibrium import instant, static_equilibrium
+        from ballpass.runtime.point.linearize import linearize  # with SciPy
+
+        numbers = self.numbers(parameters)
+        time = instant(self, numbers, t, crank_angle)
+        state = static_equilibrium(self, numbers, t=time).x if x is None else x
+        return linearize(self, numbers, t=time, x=state, at_equilibrium=x is None)

@@ -1,0 +1,1 @@
+"""Compiled code: compilers, cache, and every ctypes binding."""

@@ -1,0 +1,193 @@
+"""C compilers: which one there is, what it can, and how it is run.
+
+In: a command, $CC, or what is installed.  Out: a `Compiler`; and of its runs an end without children left behind.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.metadata
+import importlib.util
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from ballpass.runtime.contract.errors import CompileError, RequestError
+from ballpass.runtime.native.interrupts import held
+
+#: -ffp-contract=off: the same bits with and without fused multiply-add, so that results do not depend on the processor.
+FLAGS = ("-O2", "-fPIC", "-shared", "-std=c99", "-ffp-contract=off")
+
+#: Longest a compiler may take [s]; a generated file takes about one second, ten with a cold ziglang.
+TIMEOUT = 300.0
+
+#: Longest a compiler may take to tell its version [s].
+ANSWER_TIMEOUT = 30.0
+
+#: Time a compiler has to end, and to delete its temporary files, once it is told to [s].
+GRACE = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Compiler:
+    """A C compiler: command, flags and what identifies it (path and version)."""
+
+    command: tuple[str, ...]
+    flags: tuple[str, ...]
+    identity: str
+
+
+def find_compiler(command: str | None = None) -> Compiler | None:
+    """The compiler to use, or None.
+
+    Parameters
+    ----------
+    command : a command, with arguments or without.  Default: $CC, else the first of cc, gcc, clang, ziglang
+
+    Raises
+    ------
+    RequestError
+        `command`, or $CC, names no program.
+    CompileError
+        The compiler does not answer when it is asked for its version.
+    """
+    origin = "compiler" if command else "the environment variable CC"
+    asked = command or os.environ.get("CC", "").strip()
+    if asked:
+        try:
+            words = shlex.split(asked)
+        except ValueError as fault:
+            raise RequestError(
+                f"{origin} names {asked!r}, which is no command ({str(fault).lower()}). Give the command of a C "
+                "compiler (gcc, clang), or leave it unset."
+            ) from None
+        if not words:
+            raise RequestError(
+                f"{origin} names {asked!r}, which is no command. Give the command of a C compiler (gcc, clang), or "
+                "leave it unset."
+            )
+        path = shutil.which(words[0])
+        if path is None:
+            raise RequestError(
+                f"{origin} names {asked!r}, but there is no program {words[0]!r}. Give the command of a C compiler "
+                "(gcc, clang), or leave it unset."
+            )
+        return _describe((path, *words[1:]))
+    for name in ("cc", "gcc", "clang"):
+        path = shutil.which(name)
+        if path is not None:
+            return _describe((path,))
+    if importlib.util.find_spec("ziglang") is not None:
+        # zig compiles for the processor at hand without being told
+        return Compiler(
+            command=(sys.executable, "-m", "ziglang", "cc"),
+            flags=FLAGS,
+            identity=f"ziglang {importlib.metadata.version('ziglang')}",
+        )
+    return None
+
+
+@lru_cache(maxsize=16)
+def _describe(command: tuple[str, ...]) -> Compiler:
+    """Ask a compiler for its version, and whether it can compile for the processor at hand."""
+    version = _ask((*command, "--version"))
+    identity = f"{command[0]} {version.stdout.strip() if version is not None else ''}"
+    native = _ask((*command, "-march=native", "-x", "c", "-E", os.devnull))
+    flags = (FLAGS[0], "-march=native", *FLAGS[1:]) if native is not None and native.returncode == 0 else FLAGS
+    return Compiler(command=command, flags=flags, identity=identity)
+
+
+def _ask(command: tuple[str, ...]) -> subprocess.CompletedProcess[str] | None:
+    """Answer of a short command, None where it cannot run: a broken compiler fails, loudly, when it compiles."""
+    try:
+        return _finish(command, None, ANSWER_TIMEOUT)
+    except OSError:
+        return None
+    except subprocess.TimeoutExpired as fault:
+        raise CompileError(
+            f"The C compiler did not answer within {ANSWER_TIMEOUT:g} s.\n  {shlex.join(command)}\n"
+            "Nothing was written. Try another compiler: set CC."
+        ) from fault
+
+
+def run_compiler(command: tuple[str, ...], folder: Path, shown: str) -> None:
+    """Run the compiler in `folder`.
+
+    Parameters
+    ----------
+    shown : the command as a user may repeat it
+
+    Raises
+    ------
+    CompileError
+        It failed, took too long or cannot be run; with command and output.
+    """
+    try:
+        done = _finish(command, folder, TIMEOUT)
+    except subprocess.TimeoutExpired as fault:
+        raise CompileError(
+            f"The C compiler did not finish within {TIMEOUT:g} s.\n  {shown}\nNothing was written. Try another "
+            "compiler: set CC."
+        ) from fault
+    except OSError as fault:
+        raise CompileError(
+            f"The C compiler cannot be run ({fault}).\n  {shown}\nNothing was written. Try another compiler: set CC."
+        ) from fault
+    if done.returncode != 0:
+        output = "\n".join(text for text in (done.stdout.strip(), done.stderr.strip()) if text) or "(no output)"
+        output = output.replace(f"{folder}{os.sep}", "")
+        raise CompileError(
+            f"The C compiler failed with exit code {done.returncode}.\n  {shown}\n{output}\n"
+            "Nothing was written. Check the compiler's installation, the free space of the cache and of the folder for "
+            "temporary files, or set CC to another one."
+        )
+
+
+def _finish(command: tuple[str, ...], folder: Path | None, timeout: float) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end; at a timeout or an interrupt it ends with all its children.
+
+    A compiler is a driver that starts the real one: ending the driver alone leaves a child that holds the pipes, and
+    reading them would wait for it.
+    """
+    process = None
+    try:
+        # an interrupt that arrives before the process has a name here would leave it running
+        with held():
+            process = subprocess.Popen(
+                command,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                errors="replace",
+                start_new_session=True,
+            )
+        stdout, stderr = process.communicate(timeout=timeout)
+    except BaseException:
+        if process is not None:
+            with held():
+                _end(process)
+        raise
+    return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a process and its children; politely first, so that they delete their temporary files."""
+    if os.name != "posix":
+        process.kill()
+        return
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        with contextlib.suppress(ProcessLookupError):  # all have ended
+            os.killpg(process.pid, number)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(GRACE)
+    for stream in (process.stdout, process.stderr):
+        if stream is not None:
+            stream.close()

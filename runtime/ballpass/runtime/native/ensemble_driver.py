@@ -1,0 +1,260 @@
+"""The driver of ensembles: C of `driver/ensemble.c` compiled with a model's kernels and called through ctypes.
+
+In: numbers and segments of many members.  Out: their states at the end, on-line reductions, and how each ended.  A long
+run is cut into several calls: `Carried` is what members carry from one to the next, and the bits are those of one call.
+The library also holds the driver of single runs, there with reductions; plain runs pay for neither.
+"""
+
+from __future__ import annotations
+
+import copy
+import ctypes
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.native.compile import CompiledLibrary
+from ballpass.runtime.native.compilers import Compiler
+from ballpass.runtime.native.driver_library import (
+    ENSEMBLE_HEADERS,
+    check_headers,
+    check_records,
+    compile_driver,
+    input_columns,
+    padded,
+    sizes_of,
+)
+from ballpass.runtime.native.stepper import MAX_STEPS, Family, Stepper
+
+#: Status of members that were under way when the caller asked to stop; the others are those of `stepper.End`.
+STOPPED = 5
+
+#: Head of a reduction, and what follows for every channel; the layout of driver/reductions.h.
+HEAD = ("from", "wanted", "duration")
+ROWS = ("max", "max_time", "max_ball", "min", "min_time", "min_ball", "integral", "square")
+
+#: Channels behind those of the states: values of the most loaded ball.
+BALL_CHANNELS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
+
+#: Families of methods that advance in lanes.
+LANE_FAMILIES = (Family.AUTO, Family.DP54, Family.RODAS5P)
+
+#: What is told of every member; the fields of ballpass_result in stepper.h.
+RESULT = np.dtype(
+    {
+        "names": [
+            *("status", "method", "state", "segment", "written", "steps", "rejected", "evaluations"),
+            *("factorizations", "pivoted", "switches", "kinks", "time", "step"),
+        ],
+        "formats": [ctypes.c_int] * 3 + [ctypes.c_long] * 9 + [ctypes.c_double] * 2,
+    },
+    align=True,
+)
+
+
+class _Options(ctypes.Structure):
+    _fields_ = (
+        ("method", ctypes.c_int),
+        ("resume", ctypes.c_int),
+        ("max_steps", ctypes.c_void_p),
+        ("stop", ctypes.POINTER(ctypes.c_int)),
+        ("reached", ctypes.c_void_p),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MemberNumbers:
+    """Parameters and constants of the members of one call, shape (members, .)."""
+
+    p: np.ndarray
+    c: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MemberArrays(MemberNumbers):
+    """The same with their segments, row after row.
+
+    Attributes
+    ----------
+    first : first segment of each member, shape (members + 1,)
+    times : ends of the segments, one more than segments for each member, shape (segments + members,) [s]
+    inputs : of each segment at its start, shape (segments, inputs)
+    restarts : where the load jumps at a segment's start, shape (segments,)
+    """
+
+    first: np.ndarray
+    times: np.ndarray
+    inputs: np.ndarray
+    restarts: np.ndarray
+
+
+@dataclass(slots=True, kw_only=True)
+class Carried:
+    """What members carry from one call to the next: step sizes, error of the last step, methods, rates seen, counts.
+
+    Attributes
+    ----------
+    results : how each ended so far, shape (members,) of `RESULT`; counts are those of all calls
+    work : records of the driver, which read as C wrote them
+    begun : whether there was a call
+    """
+
+    results: np.ndarray
+    work: np.ndarray
+    begun: bool = False
+
+
+def compile_ensemble(folder: Path, manifest: Manifest, compiler: Compiler) -> CompiledLibrary:
+    """Library with the drivers of ensembles and of single runs with reductions.
+
+    Raises
+    ------
+    ArtefactError
+        The folder was written before ensembles were.
+    CompileError
+        The compiler failed.
+    """
+    check_headers(folder, ENSEMBLE_HEADERS)
+    sources, flags = ("stepper.c", "ensemble.c"), ("-DBALLPASS_REDUCTIONS",)
+    return compile_driver(folder, manifest, compiler, sources, kind="ensemble", headers=ENSEMBLE_HEADERS, flags=flags)
+
+
+class EnsembleDriver:
+    """The compiled drivers of one model.
+
+    Attributes
+    ----------
+    stepper : driver of single runs, with reductions
+    channels : names of the channels that can be reduced: states, then `BALL_CHANNELS`
+    lanes : members that advance together
+
+    Raises
+    ------
+    ArtefactError
+        The library's sizes are not those of the manifest or of this module.
+    """
+
+    def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
+        self.stepper = Stepper(library, manifest)
+        self.channels = (*(state.name for state in manifest.states), *BALL_CHANNELS)
+        code = ctypes.CDLL(str(library.path))
+        self.row, channels, self.lanes, *records = sizes_of(code, "ballpass_ensemble_sizes")
+        check_records(library, records, (_Options,))
+        expected = len(HEAD) + len(ROWS) * len(self.channels)
+        if (self.row, channels) != (expected, len(self.channels)):
+            raise ArtefactError(
+                f"{library.path}: reductions of {self.row} numbers and {channels} channels, {expected} and "
+                f"{len(self.channels)} are expected. Write the folder again."
+            )
+        self._inputs = input_columns(manifest)
+        self._code = code
+        code.ballpass_ensemble_work.restype = ctypes.c_long
+        code.ballpass_ensemble.restype = ctypes.c_int
+
+    def with_stepper(self, stepper: Stepper) -> EnsembleDriver:
+        """The same with another driver of single runs, which must have reductions."""
+        found = copy.copy(self)
+        found.stepper = stepper
+        return found
+
+    def reductions(self, members: int, start: np.ndarray | float, channels: Collection[str]) -> np.ndarray:
+        """Empty rows of reductions of these channels that count from `start` on [s], shape (members, row)."""
+        rows = np.zeros((members, self.row))
+        rows[:, 0] = start
+        rows[:, 1] = sum(2**k for k, name in enumerate(self.channels) if name in channels)
+        return rows
+
+    def carry(self, members: int) -> Carried:
+        """What so many members carry, before their first call."""
+        size = self._code.ballpass_ensemble_work(ctypes.c_long(members))
+        return Carried(results=np.zeros(members, dtype=RESULT), work=np.empty(size // 8 + 1))
+
+    def run(
+        self,
+        family: Family,
+        members: MemberArrays,
+        x: np.ndarray,
+        tolerance: np.ndarray,
+        reductions: np.ndarray | None,
+        stop: ctypes.c_int,
+        *,
+        max_steps: np.ndarray | int = MAX_STEPS,
+        carried: Carried | None = None,
+        reached: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Advance members in lanes.
+
+        Parameters
+        ----------
+        family : one of `LANE_FAMILIES`
+        x : states at the start, shape (members, states); on return those reached
+        tolerance : error allowed in a step, shape (members, states)
+        reductions : rows to add to, or None
+        stop : the call ends soon after this becomes nonzero
+        max_steps : allowed to all members, or to each, shape (members,); accepted and rejected, in all calls
+        carried : from `carry`; a second call with it goes on where the first ended, with the same `x` and `reductions`
+        reached : how far each member has come, written while the call is under way, shape (members,) [s]
+
+        Returns
+        -------
+        array of `RESULT`, shape (members,)
+        """
+        if family not in LANE_FAMILIES:
+            raise ValueError(f"{family!r} does not advance in lanes: {', '.join(f.name for f in LANE_FAMILIES)} do.")
+        count = len(x)
+        carried = self.carry(count) if carried is None else carried
+        limits = np.full(count, max_steps, dtype=ctypes.c_long)
+        options = _Options(
+            method=int(family),
+            resume=int(carried.begun),
+            max_steps=_pointer(limits),
+            stop=ctypes.pointer(stop),
+            reached=None if reached is None else _pointer(reached),
+        )
+        carried.begun = True
+        inputs = padded(members.inputs, self._inputs)
+        arrays = (members.p, members.c, tolerance, x, members.first, members.times, inputs)
+        self._code.ballpass_ensemble(
+            ctypes.byref(options),
+            ctypes.c_long(count),
+            *(_pointer(array) for array in arrays),
+            _pointer(members.restarts),
+            None if reductions is None else _pointer(reductions),
+            _pointer(carried.work),
+            _pointer(carried.results),
+        )
+        return carried.results
+
+    def magnitudes(
+        self,
+        members: MemberNumbers,
+        initial: np.ndarray,
+        first: np.ndarray,
+        inputs: np.ndarray,
+        horizons: np.ndarray,
+    ) -> np.ndarray:
+        """Magnitudes of the states of each member (see `ballpass.runtime.run.scales`), shape (members, states).
+
+        Parameters
+        ----------
+        initial : states at the start, shape (members, states)
+        first : first moment of each member, shape (members + 1,)
+        inputs : inputs at the moments, shape (moments, inputs)
+        horizons : a turn, or the run, of each member [s]
+        """
+        found = np.empty_like(initial)
+        # named, for a pointer does not keep alive what it points to
+        arrays = (members.p, members.c, initial, first, padded(inputs, self._inputs), horizons, found)
+        pointers = [_pointer(array) for array in arrays]
+        self._code.ballpass_ensemble_magnitudes(ctypes.c_long(len(initial)), *pointers)
+        return found
+
+
+def _pointer(array: np.ndarray) -> ctypes.c_void_p:
+    if not array.flags.c_contiguous:
+        raise TypeError(f"a C-contiguous array is expected, not one with strides {array.strides}")
+    return ctypes.c_void_p(array.ctypes.data)

@@ -1,0 +1,271 @@
+"""The generated functions of a model: compiled where there is a library, as expression graphs for derivatives.
+
+In: a generated folder, its manifest, perhaps its compiled library.  Out: CasADi functions by name, and kernels and
+loops that call them cheaply, each made when first asked for and kept.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+import threading
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import casadi
+
+from ballpass.runtime.contract import MODEL, Manifest, check_unchanged
+from ballpass.runtime.contract.errors import ArtefactError, CompileError, RequestError
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.native.compile import CompiledLibrary, compile_sources, digests_of
+from ballpass.runtime.native.compilers import Compiler, find_compiler
+from ballpass.runtime.native.kernel import Array, Kernel, Loop
+from ballpass.runtime.native.loops import CompiledLoop, LoopDriver, PointLoop
+from ballpass.runtime.run.casadi_integrators import make_integrator
+
+#: Arguments of a function of outputs that change from sample to sample.
+_MOVING = ("t", "x", "u")
+
+
+#: Names of derivatives, and of integrators over a grid.
+_DERIVATIVE = re.compile(r"(?P<of>\w+?)_(?:jac_(?P<along>[a-z])|tangent)")
+_INTEGRATOR = re.compile(r"(?P<plugin>\w+)_(?P<intervals>\d+)")
+
+
+class _OwnMemory(threading.local):
+    """Kernels and loops of one thread: a call fills their memory and reads it, so no other thread may have them."""
+
+    def __init__(self) -> None:
+        self.kernels: dict[str, Kernel] = {}
+        self.loops: dict[tuple[str, tuple[str, ...]], PointLoop] = {}
+        self.lean: dict[tuple[str, ...], PointLoop] = {}
+
+
+class Functions:
+    """Functions of one generated folder by name.
+
+    For any number of threads at once: each has kernels and loops of its own, which it must not hand to another.
+
+    Attributes
+    ----------
+    folder : the generated folder, absolute
+    manifest : what the folder consists of
+    library : the compiled library of ``model.c``, None when CasADi's virtual machine runs the functions
+    """
+
+    def __init__(
+        self, folder: Path, manifest: Manifest, library: CompiledLibrary | None, compiler: str | None = None
+    ) -> None:
+        self.folder = folder
+        self.manifest = manifest
+        self.library = library
+        self._compiler = compiler
+        self._where = {info.name: info.library for info in manifest.functions}
+        self._libraries = {MODEL: library} if library is not None else {}
+        self._read: set[str] = set()
+        self._functions: dict[str, casadi.Function] = {}
+        self._own = _OwnMemory()
+        # what is shared is made once: re-entrant, for one function is made from another
+        self._making = threading.RLock()
+        self._loop_driver: LoopDriver | None = None
+        self._symbolic: dict[str, casadi.Function] = {}
+
+    def has(self, name: str) -> bool:
+        """Whether the manifest has a function of that name."""
+        return name in self._where
+
+    def function(self, name: str) -> casadi.Function:
+        """CasADi function by name, compiled if possible.
+
+        Raises
+        ------
+        RequestError
+            The model has no such function.
+        """
+        if name not in self._functions:
+            with self._making:
+                self._functions[name] = self.symbolic(name) if self.library is None else self._external(name)
+        return self._functions[name]
+
+    def kernel(self, name: str) -> Kernel:
+        """Function by name on memory of its own."""
+        if name not in self._own.kernels:
+            self._own.kernels[name] = Kernel(self.function(name))
+        return self._own.kernels[name]
+
+    def loop(self, name: str, varying: tuple[str, ...]) -> PointLoop:
+        """Function by name for many points at once; `varying` names the inputs that change between them."""
+        if (name, varying) not in self._own.loops:
+            function = self.function(name)
+            self._own.loops[name, varying] = self._looped(
+                function, None if self.library is None else self._library(name), varying
+            )
+        return self._own.loops[name, varying]
+
+    def sample_outputs(
+        self, count: int, values: Mapping[str, Any], names: Sequence[str], *, lean: bool
+    ) -> dict[str, Array]:
+        """Outputs by name at `count` points, each of shape (count, rows).
+
+        Parameters
+        ----------
+        values : t, x and u at the points, p and c
+        names : of outputs that are no states
+        lean : take a function of these outputs alone, made and compiled when they are first asked for; False: the one
+            of all outputs
+        """
+        states = {state.name for state in self.manifest.states}
+        known = [info.name for info in self.manifest.outputs]
+        chosen = tuple(name for name in known if name in names)
+        if not lean or len(chosen) == sum(name not in states for name in known):
+            loop = self.loop("outputs", _MOVING)
+            fields = dict(zip(known, loop.function.name_out(), strict=True))
+        else:
+            loop = self._lean_loop(chosen, [known.index(name) for name in chosen])
+            fields = dict(zip(chosen, loop.function.name_out(), strict=True))
+        results = loop(count, values, [fields[name] for name in chosen])
+        return {name: results[fields[name]] for name in chosen}
+
+    def _lean_loop(self, names: tuple[str, ...], places: Sequence[int]) -> PointLoop:
+        """Some of the outputs, at many points."""
+        if names not in self._own.lean:
+            graph = self.symbolic("outputs")
+            given = graph.sx_in()
+            results = graph.call(given)
+            fields = [graph.name_out(k) for k in places]
+            function = casadi.Function("some_outputs", given, [results[k] for k in places], graph.name_in(), fields)
+            library = None
+            if self.library is not None:
+                generator = casadi.CodeGenerator("some_outputs.c")
+                generator.add(function)
+                with tempfile.TemporaryDirectory() as folder:
+                    source = Path(folder) / "some_outputs.c"
+                    source.write_text(generator.dump(), encoding="utf-8")
+                    label = f"{self.manifest.scene}_outputs"
+                    library = compile_sources((source,), self._find_compiler("some_outputs.c"), label=label)
+            self._own.lean[names] = self._looped(function, library, _MOVING)
+        return self._own.lean[names]
+
+    def _looped(
+        self, function: casadi.Function, library: CompiledLibrary | None, varying: tuple[str, ...]
+    ) -> PointLoop:
+        if library is None:
+            return Loop(function, varying)
+        with self._making:
+            if self._loop_driver is None:
+                self._loop_driver = LoopDriver(self._find_compiler("loop.c"))
+        return CompiledLoop(self._loop_driver, library.path, function, varying)
+
+    def symbolic(self, name: str) -> casadi.Function:
+        """CasADi function by name as an expression graph, which can be differentiated further.
+
+        Raises
+        ------
+        RequestError
+            The model has no such function.
+        ArtefactError
+            The folder has none, or was written anew since its manifest was read.
+        """
+        self._require(name)
+        where = self._where[name]
+        path = self.folder / f"{where}.casadi"
+        with self._making:
+            if where not in self._read:
+                self._symbolic |= self._read_file(path)
+                self._read.add(where)
+            if name not in self._symbolic:
+                derivative, integrator = _DERIVATIVE.fullmatch(name), _INTEGRATOR.fullmatch(name)
+                # derivatives and integrators are generated to C only; here they are made from what they belong to
+                if derivative is not None and self.has(derivative["of"]):
+                    self._symbolic[name] = _differentiate(self.symbolic(derivative["of"]), name, derivative["along"])
+                elif integrator is not None:
+                    self._symbolic[name] = self.virtual_integrator(integrator["plugin"], int(integrator["intervals"]))
+                else:
+                    raise ArtefactError(f"{path}: has no function {name!r}. Write the folder again.")
+            return self._symbolic[name]
+
+    def _read_file(self, path: Path) -> dict[str, casadi.Function]:
+        # before, for CasADi does not survive every torn file; behind, for it reads by name
+        digest = dict(self.manifest.files)[path.name]
+        check_unchanged(path, digest)
+        functions = _read_functions(path)
+        check_unchanged(path, digest)
+        return functions
+
+    def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function:
+        """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `integrators`)."""
+        manifest = self.manifest
+        sizes = {"u": len(manifest.inputs), "p": len(manifest.parameters), "c": len(manifest.constants)}
+        return make_integrator(self.symbolic("rhs"), sizes, plugin, intervals)
+
+    def _require(self, name: str) -> None:
+        if not self.has(name):
+            raise RequestError(unknown_name("function", name, [info.name for info in self.manifest.functions]))
+
+    def _library(self, name: str) -> CompiledLibrary:
+        """Library that holds a function, compiled when first asked for."""
+        where = self._where[name]
+        with self._making:
+            if where not in self._libraries:
+                compiler = self._find_compiler(f"{where}.c")
+                source, label = self.folder / f"{where}.c", f"{self.manifest.scene}_{where}"
+                digests = digests_of(self.folder, self.manifest)
+                self._libraries[where] = compile_sources((source,), compiler, label=label, digests=digests)
+            return self._libraries[where]
+
+    def _find_compiler(self, source: str) -> Compiler:
+        compiler = find_compiler(self._compiler)
+        if compiler is None:
+            raise CompileError(
+                f"{source}: the compiler that made the model is gone. Load the folder again to run without one."
+            )
+        return compiler
+
+    def _external(self, name: str) -> casadi.Function:
+        self._require(name)
+        library = self._library(name)
+        try:
+            function = casadi.external(name, str(library.path))
+        except RuntimeError as fault:
+            raise CompileError(
+                f"{library.path}: function {name!r} cannot be loaded. "
+                f"Delete this file, and it is compiled anew.\n{fault}"
+            ) from fault
+        _check_signature(function, self.manifest)
+        return function
+
+
+def _read_functions(path: Path) -> dict[str, casadi.Function]:
+    try:
+        stored = casadi.FileDeserializer(str(path))
+        functions = [stored.unpack() for _ in range(int(stored.unpack()))]
+    except (RuntimeError, SystemError) as fault:
+        raise ArtefactError(f"{path}: no functions can be read from it. Write the folder again.\n{fault}") from fault
+    return {function.name(): function for function in functions}
+
+
+def _differentiate(graph: casadi.Function, name: str, along: str | None) -> casadi.Function:
+    """Sparse derivative by one argument, or along a direction of all (``dx`` for ``x``) where `along` is None."""
+    result = graph.name_out(0)
+    arguments = dict(zip(graph.name_in(), graph.sx_in(), strict=True))
+    value = graph(*arguments.values())
+    if along is not None:
+        block = casadi.cse(casadi.jacobian(value, arguments[along]))
+        return casadi.Function(name, [*arguments.values()], [block], [*arguments], [f"{result}_{along}"])
+    directions = {f"d{key}": casadi.SX.sym(f"d{key}", argument.numel()) for key, argument in arguments.items()}
+    moved = casadi.jtimes(value, casadi.vertcat(*arguments.values()), casadi.vertcat(*directions.values()))
+    both = {**arguments, **directions}
+    return casadi.Function(name, [*both.values()], [casadi.cse(casadi.densify(moved))], [*both], [f"d{result}"])
+
+
+def _check_signature(function: casadi.Function, manifest: Manifest) -> None:
+    """Refuse a function whose arguments are not those of the manifest."""
+    info = manifest.function(function.name())
+    names = function.name_in()
+    for name, rows in info.inputs:
+        if name not in names or function.size1_in(name) != rows:
+            raise ArtefactError(
+                f"{function.name()}: the manifest has the argument {name} with {rows} rows, the compiled code has "
+                f"{', '.join(f'{n} ({function.size1_in(n)})' for n in names)}. Write the folder again."
+            )

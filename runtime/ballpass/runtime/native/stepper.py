@@ -1,0 +1,383 @@
+"""The project's own stepper: generated kernels and the C driver, compiled together and called through ctypes.
+
+In: numbers and segments of a run.  Out: states at the requested times, and what the run cost.  One call integrates
+any number
+of segments; the interpreter is free meanwhile, and calls from several threads do not share anything.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+
+import numpy as np
+
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.native.compile import CompiledLibrary
+from ballpass.runtime.native.compilers import Compiler
+from ballpass.runtime.native.driver_library import (
+    ENSEMBLE_HEADERS,
+    HEADERS,
+    LOCATING_HEADERS,
+    address,
+    compile_driver,
+    input_columns,
+    open_driver,
+    padded,
+)
+
+#: Most steps of a call, accepted and rejected, unless the caller says otherwise: some seconds, during which the
+#: interpreter is deaf to an interrupt.
+MAX_STEPS = 20_000_000
+
+
+class Family(IntEnum):
+    """Methods of the driver; the numbers are those of stepper.h."""
+
+    AUTO = 0
+    RODAS4 = 1
+    RODAS5P = 2
+    DP54 = 3
+    DOP853 = 4
+
+
+#: Names users give, and the driver's methods.  Plain ``stepper`` lets the driver choose.
+METHODS: Mapping[str, Family] = {
+    "stepper": Family.AUTO,
+    "stepper-rodas4": Family.RODAS4,
+    "stepper-rodas5p": Family.RODAS5P,
+    "stepper-dp54": Family.DP54,
+    "stepper-dop853": Family.DOP853,
+}
+
+
+class End(IntEnum):
+    """How a run of the driver ended; the numbers are those of stepper.h."""
+
+    DONE = 0
+    TOO_MANY_STEPS = 1
+    STEP_TOO_SMALL = 2
+    NOT_FINITE = 3
+    BAD_ARGUMENT = 4
+
+
+class _Options(ctypes.Structure):
+    _fields_ = (
+        ("method", ctypes.c_int),
+        ("max_steps", ctypes.c_long),
+        ("first_step", ctypes.c_double),
+        ("smallest_step", ctypes.c_double),
+        ("largest_step", ctypes.c_double),
+        ("tolerance", ctypes.c_void_p),
+        ("reduction", ctypes.c_void_p),
+        ("work", ctypes.c_void_p),
+        ("resume", ctypes.c_int),
+    )
+
+
+class _Tangents(ctypes.Structure):
+    _fields_ = (
+        ("blocks", ctypes.c_long),
+        *((name, ctypes.c_void_p) for name in ("p", "c", "u", "shift", "x", "outputs", "work", "weight")),
+        ("rtol", ctypes.c_double),
+    )
+
+
+class _Result(ctypes.Structure):
+    _fields_ = (
+        ("status", ctypes.c_int),
+        ("method", ctypes.c_int),
+        ("state", ctypes.c_int),
+        ("segment", ctypes.c_long),
+        ("written", ctypes.c_long),
+        ("steps", ctypes.c_long),
+        ("rejected", ctypes.c_long),
+        ("evaluations", ctypes.c_long),
+        ("factorizations", ctypes.c_long),
+        ("pivoted", ctypes.c_long),
+        ("switches", ctypes.c_long),
+        ("kinks", ctypes.c_long),
+        ("time", ctypes.c_double),
+        ("step", ctypes.c_double),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segments:
+    """The run as the driver sees it.
+
+    Attributes
+    ----------
+    times : ends of the segments, shape (segments + 1,), increasing [s]
+    inputs : inputs of each segment at its start, shape (segments, inputs)
+    restarts : where the load jumps at a segment's start, shape (segments,)
+    """
+
+    times: np.ndarray
+    inputs: np.ndarray
+    restarts: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What a run of the driver tells.
+
+    Attributes
+    ----------
+    end : how it ended
+    family : method of the last segment
+    state : index of the state that ended it, -1 if none
+    written : output times reached
+    steps, rejected, evaluations, factorizations, pivoted, switches, kinks : counts
+    time : reached [s]
+    step : last step size tried [s]
+    """
+
+    end: End
+    family: Family
+    state: int
+    written: int
+    steps: int
+    rejected: int
+    evaluations: int
+    factorizations: int
+    pivoted: int
+    switches: int
+    kinks: int
+    time: float
+    step: float
+
+
+@dataclass(slots=True, kw_only=True)
+class Held:
+    """A run that is made in several calls, between two of them.
+
+    Attributes
+    ----------
+    work : records of the driver, which read as C wrote them
+    result : what the calls so far tell; its counts are those of all
+    begun : whether there was a call
+    """
+
+    work: np.ndarray
+    result: _Result
+    begun: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tangents:
+    """Directions along which a run is differentiated, in blocks of `Stepper.lanes`.
+
+    Attributes
+    ----------
+    p, c : derivatives of parameters and constants along the directions, shapes (blocks, parameters, lanes),
+        (blocks, constants, lanes)
+    u : of the inputs at each segment's start, shape (segments, blocks, inputs, lanes)
+    shift : of the time at which each segment starts, shape (segments, blocks, lanes) [s]
+    x : of the states at the start, on return at the end, shape (blocks, states, lanes)
+    outputs : filled with those at the output times, shape (outputs, blocks, states, lanes)
+    weight, rtol : where the derivatives take part in the choice of step sizes, 1 / error allowed in a step, shape
+        (blocks, states, lanes), zero for directions that do not count, and the relative tolerance that is in it; a
+        derivative that outgrows 1 / (rtol weight) is followed relative to its size
+    """
+
+    p: np.ndarray
+    c: np.ndarray
+    u: np.ndarray
+    shift: np.ndarray
+    x: np.ndarray
+    outputs: np.ndarray
+    weight: np.ndarray | None = None
+    rtol: float = 0.0
+
+
+def compile_stepper(
+    folder: Path, manifest: Manifest, compiler: Compiler, *, sensitivities: bool = False
+) -> CompiledLibrary:
+    """Library of driver and kernels of a generated folder: with reductions, or with the derivatives of its steps.
+
+    Reductions cost a run that does not ask for them nothing that can be measured, and the compiler a sixth more time.
+
+    Raises
+    ------
+    CompileError
+        The compiler failed.
+    """
+    headers: tuple[str, ...] = HEADERS if sensitivities else ENSEMBLE_HEADERS
+    flags = ("-DBALLPASS_SENSITIVITIES" if sensitivities else "-DBALLPASS_REDUCTIONS",)
+    return compile_driver(folder, manifest, compiler, ("stepper.c",), kind="stepper", headers=headers, flags=flags)
+
+
+def compile_locating_stepper(folder: Path, manifest: Manifest, compiler: Compiler) -> CompiledLibrary:
+    """Library of the driver whose steps end on the kinks of the laws, with reductions.
+
+    Raises
+    ------
+    CompileError
+        The compiler failed.
+    """
+    flags = ("-DBALLPASS_LOCATED", "-DBALLPASS_REDUCTIONS")
+    return compile_driver(
+        folder, manifest, compiler, ("stepper.c",), kind="locating", headers=LOCATING_HEADERS, flags=flags
+    )
+
+
+class Stepper:
+    """The compiled driver of one model.
+
+    Attributes
+    ----------
+    library : what was compiled
+    lanes : directions that the driver differentiates along at once
+
+    Raises
+    ------
+    ArtefactError
+        The library's sizes are not those of the manifest, or its records not those of this module.
+    """
+
+    def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
+        self.library = library
+        records = (_Options, _Result, _Tangents)
+        code, (_, self.lanes, self._work) = open_driver(library, manifest, "ballpass_sizes", records, others=3)
+        self._inputs = input_columns(manifest)
+        self._code = code
+        self._run = code.ballpass_run
+        self._run.restype = ctypes.c_int
+        # addresses as numbers: making typed pointers would take as long as a hundred steps
+        pointer, long = ctypes.c_void_p, ctypes.c_long
+        self._run.argtypes = (
+            *(ctypes.POINTER(_Options), pointer, pointer, pointer, long, pointer, pointer, pointer),
+            *(long, pointer, pointer, ctypes.POINTER(_Result)),
+        )
+
+    def hold(self) -> Held:
+        """What a run in several calls is kept in, before its first."""
+        return Held(work=np.empty(self._work // 8 + 1), result=_Result())
+
+    def run(
+        self,
+        *,
+        family: Family,
+        tolerance: np.ndarray,
+        p: np.ndarray,
+        c: np.ndarray,
+        x: np.ndarray,
+        segments: Segments,
+        output_times: np.ndarray,
+        output_states: np.ndarray | None,
+        tangents: Tangents | None = None,
+        reduction: np.ndarray | None = None,
+        max_steps: int = MAX_STEPS,
+        first_step: float = 0.0,
+        smallest_step: float = 0.0,
+        largest_step: float = np.inf,
+        held: Held | None = None,
+    ) -> Outcome:
+        """Integrate over all segments.
+
+        Parameters
+        ----------
+        tolerance : error allowed in a step, shape (states,)
+        p, c : parameters and derived constants
+        x : state at the start, shape (states,); on return that at the end
+        output_times : increasing, shape (n,) [s]
+        output_states : C-contiguous, shape (n, states), or None
+        tangents : directions to differentiate along; the library must have been compiled with sensitivities
+        reduction : row of on-line reductions to add to; the library must have been compiled with reductions
+        max_steps : accepted and rejected
+        held : from `hold`; where a call with it has taken all its steps, another goes on with the same arguments and
+            more `max_steps`, which then count those of all calls, as the counts told do.  The bits are those of one
+            call.  Not with `tangents`
+        """
+        inputs = padded(segments.inputs, self._inputs)
+        restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
+        reduced = None if reduction is None else address("reduction", reduction)
+        options = _Options(
+            *(family, max_steps, first_step, smallest_step, largest_step, address("tolerance", tolerance), reduced)
+        )
+        result = _Result()
+        if held is not None:
+            result, options.work, options.resume = held.result, address("work", held.work), int(held.begun)
+            held.begun = True
+        call = self._run if tangents is None else self._differentiated(tangents)
+        call(
+            ctypes.byref(options),
+            address("p", p),
+            address("c", c),
+            address("x", x),
+            len(restarts),
+            address("times", segments.times),
+            address("inputs", inputs),
+            restarts.ctypes.data,
+            len(output_times),
+            address("output_times", output_times),
+            None if output_states is None else address("output_states", output_states),
+            ctypes.byref(result),
+        )
+        return Outcome(
+            end=End(result.status),
+            family=Family(result.method),
+            state=result.state,
+            written=result.written,
+            steps=result.steps,
+            rejected=result.rejected,
+            evaluations=result.evaluations,
+            factorizations=result.factorizations,
+            pivoted=result.pivoted,
+            switches=result.switches,
+            kinks=result.kinks,
+            time=result.time,
+            step=result.step,
+        )
+
+    def magnitudes(
+        self, p: np.ndarray, c: np.ndarray, initial: np.ndarray, inputs: np.ndarray, horizon: float
+    ) -> np.ndarray:
+        """Magnitudes of the states of a run (see `ballpass.runtime.run.scales`), shape (states,).
+
+        The library that locates kinks has none: they are those of the plain one.
+
+        Parameters
+        ----------
+        initial : state at the start, shape (states,)
+        inputs : inputs at moments spread over the run, shape (moments, inputs)
+        horizon : a turn, or the run [s]
+        """
+        moments = padded(inputs, self._inputs)
+        found = np.empty_like(initial)
+        magnitudes, pointer = self._code.ballpass_magnitudes, ctypes.c_void_p
+        magnitudes.restype = None
+        magnitudes.argtypes = (pointer, pointer, pointer, ctypes.c_long, pointer, ctypes.c_double, pointer)
+        magnitudes(
+            *(address(name, array) for name, array in (("p", p), ("c", c), ("initial", initial))),
+            len(moments),
+            address("inputs", moments),
+            horizon,
+            address("found", found),
+        )
+        return found
+
+    def _differentiated(self, tangents: Tangents) -> Callable[..., int]:
+        """The driver's call with derivatives, the directions bound."""
+        fields = ("p", "c", "u", "shift", "x", "outputs")
+        pointers = {name: address(name, getattr(tangents, name)) for name in fields}
+        blocks = len(tangents.x)
+        self._code.ballpass_tangent_work.restype = ctypes.c_long
+        work = np.empty(self._code.ballpass_tangent_work(ctypes.c_long(blocks)) // 8 + 8)
+        weight = None if tangents.weight is None else address("weight", tangents.weight)
+        bound = _Tangents(blocks=blocks, work=work.ctypes.data, weight=weight, rtol=tangents.rtol, **pointers)
+        run = self._code.ballpass_run_tangents
+        run.restype = ctypes.c_int
+        run.argtypes = (*self._run.argtypes[:-1], ctypes.POINTER(_Tangents), self._run.argtypes[-1])
+
+        def call(*arguments: object) -> int:
+            *given, result = arguments
+            done: int = run(*given, ctypes.byref(bound), result)
+            assert work.size  # the driver's memory lives until here
+            return done
+
+        return call

@@ -1,0 +1,1 @@
+"""A model at one instant: derivatives, equilibrium, small vibrations, time scales."""

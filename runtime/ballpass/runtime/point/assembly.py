@@ -1,0 +1,68 @@
+"""Whether a linkage can be assembled at every angle of a turn."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.run import inputs as clock
+
+if TYPE_CHECKING:
+    from ballpass.runtime.contract.parameters import Numbers
+    from ballpass.runtime.model import Model
+
+#: Angles looked at in a turn; between them minima are refined.
+ANGLES = 720
+
+#: Sweeps around the smallest sample, each so many times finer than the one before.
+SWEEPS, FINE = 3, 128
+
+
+def check_assembly(model: Model, numbers: Numbers) -> None:
+    """Look at every margin of the linkage over a turn.
+
+    Raises
+    ------
+    RequestError
+        A dyad cannot be assembled; names its joint and the crank angle at which it is worst.
+    """
+    mechanism = model.manifest.mechanism
+    if mechanism is None or not mechanism.margins:
+        return
+    turn = clock.period(model.manifest, numbers.values)
+    times = turn * np.arange(ANGLES) / ANGLES if math.isfinite(turn) else np.zeros(1)
+    margins = _margins(model, numbers, times)
+    faults = []
+    for row, info in enumerate(mechanism.margins):
+        k = int(np.argmin(margins[:, row]))
+        time, worst = float(times[k]), float(margins[k, row])
+        if worst > 0.0 and len(times) > 1:
+            time, worst = _refine(model, numbers, row, time, turn / ANGLES)
+        if worst <= 0.0:
+            angle = math.degrees(clock.crank_angle(model.manifest, numbers.values, time))
+            faults.append(
+                f"The linkage cannot be assembled at joint {info.joint!r}, worst at crank angle {angle:.2f} deg "
+                f"({info.description}: margin {worst:.4g})."
+            )
+    if faults:
+        raise RequestError("\n".join(faults) + "\nChange the lengths of the bodies that meet at the joint.")
+
+
+def _margins(model: Model, numbers: Numbers, times: np.ndarray) -> np.ndarray:
+    """Margins at times counted from t = 0, shape (times, margins); no number is no assembly."""
+    fixed = {"u": clock.inputs_at(model.manifest.inputs, numbers.values, 0.0), "p": numbers.p, "c": numbers.c}
+    (found,) = model.loop("assembly", ("t",))(len(times), {"t": times, **fixed}).values()
+    return np.where(np.isnan(found), -np.inf, found)
+
+
+def _refine(model: Model, numbers: Numbers, row: int, time: float, reach: float) -> tuple[float, float]:
+    """Time and value of the minimum of a margin within `reach` of a sample."""
+    for _ in range(SWEEPS):
+        times = time + reach * np.linspace(-1.0, 1.0, 2 * FINE + 1)
+        heights = _margins(model, numbers, times)[:, row]
+        k = int(np.argmin(heights))
+        time, worst, reach = float(times[k]), float(heights[k]), reach / FINE
+    return time, worst

@@ -1,0 +1,123 @@
+"""How well Eq. (1), A r = b, can be solved over a turn: condition numbers of the reaction matrix A(q).
+
+In: a model with a mechanism and its numbers.  Out: `Conditioning`: the largest condition number in a turn, of the
+matrix as it stands (SI, with forces beside moments) and of the matrix with rows and columns scaled to like size, with
+the crank angles where they are met.  The second one tells how near the linkage is to a position where it locks: there
+reactions grow like the condition number, and so do errors of lengths and masses in them.
+
+Scaling: rows and columns are divided by the roots of their largest entries, in turns (D. Ruiz, A scaling algorithm to
+equilibrate both rows and columns norms in matrices, RAL-TR-2001-034).
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ballpass.runtime.run import inputs as clock
+
+if TYPE_CHECKING:
+    from ballpass.runtime.contract.parameters import Numbers
+    from ballpass.runtime.model import Model
+
+#: Name of the generated function with A.
+FUNCTION = "reaction_system"
+
+#: Angles looked at in a turn; around the largest value the maximum is refined.
+ANGLES = 360
+
+#: Scaled condition number above which reactions are warned about [1].
+BOUND = 1e4
+
+#: Passes of the scaling; each halves the logarithm of what is left to do.
+PASSES = 12
+
+
+class ConditioningWarning(UserWarning):
+    """The reactions of a linkage near a position where it locks."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditioning:
+    """Largest condition numbers of A(q) in a turn, in the 2-norm.
+
+    Attributes
+    ----------
+    unscaled, scaled : of the matrix in SI, and with rows and columns of like size [1]
+    unscaled_angle, scaled_angle : crank angles where they are met, in [0, 2 pi) [rad]
+    """
+
+    unscaled: float
+    scaled: float
+    unscaled_angle: float
+    scaled_angle: float
+
+
+def has_reactions(model: Model) -> bool:
+    """Whether the model has a mechanism, and so the matrix."""
+    return model.manifest.mechanism is not None and model.has(FUNCTION)
+
+
+def conditioning(model: Model, numbers: Numbers) -> Conditioning:
+    """Look at a turn; where nothing turns, at the position that stands.
+
+    Warns
+    -----
+    ConditioningWarning
+        The scaled condition number passes `BOUND`; names the crank angle.
+    """
+    turn = clock.period(model.manifest, numbers.values)
+    kernel = model.kernel(FUNCTION)
+    span = turn if math.isfinite(turn) else 0.0
+
+    def matrix(t: float) -> np.ndarray:
+        u = clock.inputs_at(model.manifest.inputs, numbers.values, t)
+        return np.asarray(kernel({"t": 0.0, "u": u, "p": numbers.p, "c": numbers.c}))
+
+    times = span * np.arange(ANGLES) / ANGLES if span else np.zeros(1)
+    matrices = np.array([matrix(float(t)) for t in times])
+    found = []
+    for condition in (_condition, lambda m: _condition(equilibrate(m))):
+        values = condition(matrices)
+        k = int(np.argmax(values))
+        time, largest = float(times[k]), float(values[k])
+        if span and math.isfinite(largest):
+            near = minimize_scalar(
+                lambda t, of=condition: -float(of(matrix(t))),
+                bounds=(time - span / ANGLES, time + span / ANGLES),
+                method="bounded",
+                options={"xatol": 1e-7 * span},
+            )
+            time, largest = max((largest, time), (-float(near.fun), float(near.x)))[::-1]
+        found.append((largest, clock.crank_angle(model.manifest, numbers.values, time)))
+    (whole, whole_angle), (equal, equal_angle) = found
+    if not equal <= BOUND:
+        warnings.warn(
+            f"The reactions are ill-conditioned at crank angle {math.degrees(equal_angle):.2f} deg: condition number "
+            f"{equal:.3g} of the scaled matrix of Eq. (1), above {BOUND:.0e}. The linkage nearly locks there, and "
+            "errors of lengths and masses grow that much in the forces. Change the lengths of the bodies, or keep the "
+            "driver away from this angle.",
+            ConditioningWarning,
+            stacklevel=2,
+        )
+    return Conditioning(unscaled=whole, scaled=equal, unscaled_angle=whole_angle, scaled_angle=equal_angle)
+
+
+def equilibrate(matrix: np.ndarray) -> np.ndarray:
+    """Matrices with rows and columns scaled so that the largest entry of each is one in size; shape (..., n, n)."""
+    scaled = matrix.copy()
+    for _ in range(PASSES):
+        for axis in (-2, -1):
+            largest = np.max(np.abs(scaled), axis=axis, keepdims=True)
+            scaled = scaled / np.sqrt(np.where(largest > 0.0, largest, 1.0))
+    return scaled
+
+
+def _condition(matrix: np.ndarray) -> np.ndarray:
+    finite = np.all(np.isfinite(matrix), axis=(-2, -1))
+    return np.where(finite, np.linalg.cond(np.where(finite[..., None, None], matrix, 0.0)), math.inf)

@@ -1,0 +1,373 @@
+"""Static equilibrium: where the rings stand under the load of one instant, and how that place moves with parameters.
+
+In: a model, numbers, an instant.  Out: a `StaticEquilibrium`.
+
+Everything is at rest: the balls stand where they are at that instant, and no damping force acts.  The deflection of
+each ball is linear in the positions, so the potential energy is convex, and Newton's method with a step that does not
+pass far beyond the minimum along its direction finds it from any start.  The start is the equilibrium along the load.
+
+Derivatives are those of the implicit function: 0 = f(q(p), p) gives dq/dp = K^-1 df/dp with the stiffness K = -df/dq.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from rich import box
+from rich.table import Table
+from scipy.optimize import brentq
+
+from ballpass.runtime.app.printed import printed
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.parameters import Numbers, real, vector
+from ballpass.runtime.point.evaluate import checked_time, point
+from ballpass.runtime.point.jacobian import RHS, Rows, contract, directions_of, rows_of
+from ballpass.runtime.run import inputs as clock
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+Array = NDArray[np.float64]
+
+#: Net force left over, relative to the forces at work.
+TOLERANCE = 1e-12
+
+#: Most Newton steps; a dozen are usual.
+ITERATIONS = 200
+
+#: Largest angle of crank or shaft that is taken for one in radians: who gives more means degrees [rad].
+LARGEST_ANGLE = 4.0 * math.pi
+
+#: Stiffness below this fraction of the largest counts as none.
+FREE = 1e-9
+
+
+class FreeRingWarning(UserWarning):
+    """The equilibrium is one of many: a ring can move without force along some direction."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StaticEquilibrium:
+    """Rings at rest under the load of one instant.
+
+    Attributes
+    ----------
+    coordinates : names of the positions
+    positions : shape (coordinates,) [m]
+    x : the state with these positions and no velocities, shape (states,)
+    time : the instant [s]
+    load : on the inner ring, x and y [N]
+    deflection : of each ball, shape (balls,) [m]
+    ball_force : elastic force of each ball, shape (balls,) [N]
+    stiffness : -d(force)/d(position), shape (coordinates, coordinates) [N/m]
+    free_directions : directions without stiffness, shape (number, coordinates); empty where the equilibrium is unique
+    iterations : Newton steps taken
+    residual : largest net force left [N]
+    """
+
+    coordinates: tuple[str, ...]
+    positions: Array
+    x: Array
+    time: float
+    load: tuple[float, float]
+    deflection: Array
+    ball_force: Array
+    stiffness: Array
+    free_directions: Array
+    iterations: int
+    residual: float
+    model: Model = field(repr=False)
+    numbers: Numbers = field(repr=False)
+    load_is_given: bool = field(repr=False)
+
+    def __repr__(self) -> str:
+        places = ", ".join(f"{name} {q:.4g} m" for name, q in zip(self.coordinates, self.positions, strict=True))
+        return (
+            f"StaticEquilibrium({self.model.manifest.scene} at t = {self.time:.6g} s: {places}; "
+            f"peak ball force {self.peak_ball_force:.6g} N)"
+        )
+
+    def __str__(self) -> str:
+        return printed(_render(self))
+
+    def __getitem__(self, name: str) -> float:
+        """Position by name [m]."""
+        if name not in self.coordinates:
+            raise RequestError(
+                f"There is no position {name!r} in this equilibrium. There are: {', '.join(self.coordinates)}."
+            )
+        return float(self.positions[self.coordinates.index(name)])
+
+    @property
+    def peak_ball_force(self) -> float:
+        """Largest elastic force of any ball [N]."""
+        return float(np.max(self.ball_force))
+
+    def derivative(self, of: str | Sequence[str], wrt: str | Sequence[str]) -> Array:
+        """Derivative of the equilibrium, or of quantities at it, by parameters: the rings move with them.
+
+        Parameters
+        ----------
+        of : "positions", or quantities as for `Model.jacobian`, ball.elastic_force
+        wrt : parameters, "time" or "crank_angle"; a given load does not move with them
+
+        Returns
+        -------
+        array, shape (rows, columns); no columns where `wrt` is a single name
+
+        Raises
+        ------
+        RequestError
+            Unknown names, a state in `wrt`, or a ring that is free to move.
+        """
+        names = [wrt] if isinstance(wrt, str) else list(wrt)
+        for name in names:
+            if name in (*self.model.states, "states"):
+                raise RequestError(f"static equilibrium: {name!r} is found, not given. Differentiate by parameters.")
+        if len(self.free_directions):
+            raise RequestError(
+                "static equilibrium: a ring is free to move along some direction, so that its place is not a function "
+                "of the parameters. Give a preload, or another instant or ball angle."
+            )
+        directions = directions_of(self.model, self.numbers, wrt, self.time)
+        there = point(self.model, self.numbers, self.time, self.x)
+        moved = contract(self.model, _force_rows(self.model), directions, there)
+        if self.load_is_given:
+            (load,) = rows_of(self.model, ["load.x", "load.y"])
+            moved[:2] -= contract(self.model, load, directions, there)
+        slopes = np.linalg.solve(self.stiffness, moved)
+        if of == "positions":
+            total = slopes
+        else:
+            if of == RHS:
+                raise RequestError("static equilibrium: rhs is no quantity of it. Name positions or quantities.")
+            parts = []
+            half = len(self.coordinates)
+            for rows in rows_of(self.model, of):
+                part = contract(self.model, rows, directions, there)
+                name = f"{rows.function}_jac_x"
+                if self.model.has(name):
+                    by_states = self.model.kernel(name)(there).reshape(-1, len(self.x))
+                    part += by_states[rows.indices, :half] @ slopes
+                parts.append(part)
+            total = np.concatenate(parts)
+        return np.asarray(total[:, 0] if isinstance(wrt, str) else total)
+
+
+def instant(model: Model, numbers: Numbers, t: float | None, crank_angle: float | None) -> float:
+    """Time of an instant given by itself [s] or by the crank's angle [rad], in the first turn; 0 by default.
+
+    Raises
+    ------
+    RequestError
+        Both are given, one is no finite number, the angle is beyond two turns, or nothing turns.
+    """
+    if t is not None and crank_angle is not None:
+        raise RequestError("Both t and crank_angle were given. Allowed: one of the two.")
+    if crank_angle is None:
+        return checked_time(0.0 if t is None else t)
+    angle = real(crank_angle)
+    if not math.isfinite(angle):
+        raise RequestError(f"crank_angle: a finite angle [rad] is expected, not {crank_angle!r}.")
+    if abs(angle) > LARGEST_ANGLE:
+        raise RequestError(
+            f"crank_angle: {crank_angle!r} rad is more than two turns. Were degrees meant? Allowed: radians from -4 pi "
+            f"to 4 pi; for degrees give math.radians({crank_angle!r})."
+        )
+    speed = clock.shaft_speed(model.manifest, numbers.values)
+    past = (angle - clock.crank_angle(model.manifest, numbers.values, 0.0)) * math.copysign(1.0, speed)
+    if speed == 0.0:
+        if abs(math.remainder(past, clock.TURN)) < clock.ANGLE_RESOLUTION:
+            return 0.0
+        raise RequestError("crank_angle: nothing turns in this scene. Give the start angle as a parameter instead.")
+    return (past % clock.TURN) / abs(speed)
+
+
+def static_equilibrium(
+    model: Model, numbers: Numbers, *, t: float = 0.0, load: tuple[float, float] | None = None
+) -> StaticEquilibrium:
+    """Positions at which the rings rest; see `ballpass.runtime.Model.static_equilibrium`.
+
+    Raises
+    ------
+    RequestError
+        No bearing; an unloaded inner ring inside a clearance, which may stand anywhere.
+    SimulationError
+        Nothing holds the rings.
+    """
+    if not model.has("static_forces"):
+        raise RequestError(
+            "static_equilibrium: this model has no bearing, or its folder was written by an older version. A scene "
+            "with [bearing] is expected; `ballpass derive SCENE` writes the folder again."
+        )
+    half = len(model.states) // 2
+    there = point(model, numbers, t, np.zeros(2 * half))
+    kernel, slopes = model.kernel("static_forces"), model.kernel("static_forces_jac_x")
+    (rows,) = rows_of(model, ["load.x", "load.y"])
+    own = model.kernel(rows.function)(there)[rows.indices]
+    applied = own if load is None else vector(load)
+    if applied.shape != (2,) or not np.all(np.isfinite(applied)):
+        raise RequestError(f"load: two finite numbers, x and y [N], are expected, not {load!r}.")
+    extra = np.concatenate([applied - own, np.zeros(half - 2)])
+
+    def force(q: Array) -> Array:
+        there["x"] = np.concatenate([q, np.zeros(half)])
+        return np.asarray(kernel(there) + extra)
+
+    def stiffness(q: Array) -> Array:
+        there["x"] = np.concatenate([q, np.zeros(half)])
+        matrix = -slopes(there).reshape(half, 2 * half)[:, :half]
+        return np.asarray(0.5 * (matrix + matrix.T))
+
+    start = _start(model, numbers, force, applied, half)
+    clearance = abs(numbers.values["bearing.clearance"])
+    q, iterations = _newton(force, stiffness, start, float(np.linalg.norm(applied)), clearance)
+    matrix = stiffness(q)
+    eigenvalues, vectors = np.linalg.eigh(matrix)
+    free = vectors[:, eigenvalues <= FREE * max(float(eigenvalues[-1]), 0.0)].T
+    held = np.concatenate([q, np.zeros(half)])
+    if len(free) and not np.any(applied) and float(np.max(_balls(model, numbers, t, held)[0])) < 0.0:
+        raise RequestError(
+            "static_equilibrium: the inner ring carries no load and no ball touches: it may stand anywhere in its "
+            "clearance. Give a load, or a negative clearance (preload)."
+        )
+    if len(free):
+        names = [model.states[int(np.argmax(np.abs(row)))] for row in free]
+        warnings.warn(
+            f"static_equilibrium: the rings can move without force along {len(free)} direction(s), mostly "
+            f"{', '.join(names)}: the place given is one of many (one loaded ball does not hold a ring sideways).",
+            FreeRingWarning,
+            stacklevel=3,
+        )
+    deflection, ball_force = _balls(model, numbers, t, held)
+    return StaticEquilibrium(
+        coordinates=model.states[:half],
+        positions=q,
+        x=held,
+        time=t,
+        load=(float(applied[0]), float(applied[1])),
+        deflection=deflection,
+        ball_force=ball_force,
+        stiffness=matrix,
+        free_directions=free,
+        iterations=iterations,
+        residual=float(np.max(np.abs(force(q)))),
+        model=model,
+        numbers=numbers,
+        load_is_given=load is not None,
+    )
+
+
+def _render(found: StaticEquilibrium) -> Table:
+    """Positions, load and balls as a table, a row for each."""
+    table = Table(
+        title=f"Static equilibrium at t = {found.time:.6g} s",
+        caption=f"load {found.load[0]:.6g} N, {found.load[1]:.6g} N; net force left {found.residual:.2g} N",
+        title_justify="left",
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+    )
+    table.add_column("position or ball", no_wrap=True)
+    for head in ("position or deflection, µm", "elastic force, N"):
+        table.add_column(head, justify="right", no_wrap=True)
+    for name, q in zip(found.coordinates, found.positions.tolist(), strict=True):
+        table.add_row(name, f"{1e6 * q:.6g}", "")
+    for k, (deflection, force) in enumerate(zip(found.deflection.tolist(), found.ball_force.tolist(), strict=True)):
+        table.add_row(f"ball {k + 1}", f"{1e6 * deflection:.6g}", f"{force:.6g}")
+    return table
+
+
+def _force_rows(model: Model) -> Rows:
+    half = len(model.states) // 2
+    return Rows(
+        function="static_forces", indices=np.arange(half), labels=tuple(model.states[:half]), units=("N",) * half
+    )
+
+
+def _balls(model: Model, numbers: Numbers, t: float, x: Array) -> tuple[Array, Array]:
+    """Deflection and elastic force of each ball."""
+    there = point(model, numbers, t, x)
+    found = []
+    for name in ("ball.deflection", "ball.elastic_force"):
+        (rows,) = rows_of(model, name)
+        found.append(model.kernel(rows.function)(there)[rows.indices])
+    return found[0], found[1]
+
+
+def _start(model: Model, numbers: Numbers, force: Callable[[Array], Array], applied: Array, half: int) -> Array:
+    """Equilibrium along the load alone, the housing carrying all of it; concentric rings where there is no load."""
+    size = float(np.linalg.norm(applied))
+    q = np.zeros(half)
+    if size == 0.0:
+        return q
+    direction = applied / size
+    if half > 2:
+        housing = numbers.values["bearing.outer_ring.stiffness"]
+        if housing == 0.0:
+            raise SimulationError(
+                "static_equilibrium: the housing has no stiffness, so nothing holds the outer ring against the load of "
+                f"{size:.6g} N. Give bearing.outer_ring.stiffness a value above 0."
+            )
+        q[2:] = applied / housing
+
+    def left(travel: float) -> float:
+        q[:2] = (q[2:] if half > 2 else 0.0) + travel * direction
+        return float(force(q)[:2] @ direction)
+
+    # three balls or more: one of them lies within 60 degrees of the load and takes it in the end
+    below, travel = 0.0, 1e-6
+    if left(0.0) <= 0.0:
+        return q
+    while left(travel) > 0.0:
+        below, travel = travel, 2.0 * travel
+        if travel > 1.0:
+            raise SimulationError(
+                f"static_equilibrium: the inner ring meets no ball within a metre along the load of {size:.6g} N. "
+                "Check clearance and contact stiffness."
+            )
+    left(float(brentq(left, below, travel, xtol=1e-15, rtol=1e-12)))
+    return q
+
+
+def _newton(
+    force: Callable[[Array], Array], stiffness: Callable[[Array], Array], q: Array, scale: float, length: float
+) -> tuple[Array, int]:
+    """Newton's method on a convex energy: steps are halved until they do not pass far beyond the minimum.
+
+    `scale` is the size of the load [N], `length` that of the clearance [m].
+    """
+    net = force(q)
+    for iteration in range(ITERATIONS):
+        matrix = stiffness(q)
+        eigenvalues, vectors = np.linalg.eigh(matrix)
+        largest = float(eigenvalues[-1])
+        # rounding of the forces themselves: stiffness times the last digit of what a deflection is computed from
+        rounding = 16.0 * np.finfo(float).eps * largest * (float(np.max(np.abs(q))) + length)
+        if float(np.max(np.abs(net))) <= TOLERANCE * scale + rounding or largest <= 0.0:
+            return q, iteration
+        held = np.maximum(eigenvalues, 0.1 * FREE * largest)
+        step = vectors @ ((vectors.T @ net) / held)
+        descent, share = float(net @ step), 1.0
+        while True:
+            trial = q + share * step
+            there = force(trial)
+            if np.all(np.isfinite(there)) and float(there @ step) >= -0.5 * descent:
+                break
+            share *= 0.5
+            if share < 1e-15:
+                raise SimulationError(
+                    f"static_equilibrium: no step lowers the energy after {iteration} iterations; a net force of "
+                    f"{float(np.max(np.abs(net))):.3g} N is left. Check the parameters: stiffnesses must be positive."
+                )
+        q, net = trial, there
+    raise SimulationError(
+        f"static_equilibrium: not found within {ITERATIONS} iterations; a net force of "
+        f"{float(np.max(np.abs(net))):.3g} N is left. Check clearance, stiffness and load."
+    )

@@ -1,0 +1,82 @@
+"""Functions at one time and state: the point they are called at, and the outputs there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers, Parameters, real, unchecked_numbers, vector
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.request import no_output
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+
+def evaluate_point(
+    model: Model,
+    numbers: Numbers,
+    t: float,
+    x: Sequence[float] | np.ndarray | None,
+    outputs: Sequence[str] | None,
+) -> dict[str, float | np.ndarray]:
+    """Outputs at one time and state; see `ballpass.runtime.Model.evaluate`.
+
+    Raises
+    ------
+    RequestError
+        No such output, a time that is not finite, or a state of another shape.
+    """
+    wanted = list(model.outputs) if outputs is None else list(outputs)
+    for name in wanted:
+        if name not in model.outputs:
+            raise RequestError(no_output(model.manifest, name, model.outputs))
+    if not wanted:
+        return {}
+    kernel = model.kernel("outputs")
+    kernel.run(point(model, numbers, checked_time(t), x))
+    results: dict[str, float | np.ndarray] = {}
+    for info, output in zip(model.manifest.outputs, kernel.function.name_out(), strict=True):
+        if info.name in wanted:
+            value = kernel.output(output)
+            results[info.name] = value if info.size > 1 else float(value[0])
+    return results
+
+
+def neighbour(model: Model, numbers: Numbers, change: Mapping[str, float]) -> Numbers:
+    """Numbers beside those of a run.  Bounds do not hold: a difference looks a hair beyond a value at its bound."""
+    manifest = model.manifest
+    parameters = Parameters(manifest.parameters, {**numbers.parameters, **change})
+    return unchecked_numbers(manifest, parameters, lambda p: model.kernel("constants")({"p": p}))
+
+
+def point(
+    model: Model, numbers: Numbers, t: float, x: Sequence[float] | np.ndarray | None
+) -> dict[str, float | np.ndarray]:
+    """Arguments of a generated function at time `t` and state `x` (None: the initial one): t, x, u, p, c by name.
+
+    Raises
+    ------
+    RequestError
+        `x` has another shape than (states,).
+    """
+    state = np.array([numbers.values[name] for name in model.manifest.initial]) if x is None else vector(x)
+    if state.shape != (len(model.states),) or not np.all(np.isfinite(state)):
+        raise RequestError(
+            f"x: shape ({len(model.states)},) is expected ({', '.join(model.states)}), not {state.shape}"
+            f"{'' if np.all(np.isfinite(state)) else ' with NaN or inf'}."
+        )
+    u = clock.inputs_at(model.manifest.inputs, numbers.values, t)
+    return {"t": 0.0, "x": state, "u": u, "p": numbers.p, "c": numbers.c}
+
+
+def checked_time(t: float) -> float:
+    """A finite time [s]; RequestError for anything else."""
+    value = real(t)
+    if not math.isfinite(value):
+        raise RequestError(f"t: a finite time [s] is expected, not {t!r}.")
+    return value

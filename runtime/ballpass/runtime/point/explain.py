@@ -1,0 +1,237 @@
+"""What a model's numbers mean for its integration: breakpoints, smoothness, time scales, and the method they speak for.
+
+In: a model and numbers.  Out: `Explanation`.  Time scales are eigenvalues of the derivative of the right-hand side by
+the states, at the equilibria that the ring would rest in under the lightest and the heaviest load of a turn, at rest
+and moving each way (a law that damps approach only shows its damping only then).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import BallpassError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.point.evaluate import point
+from ballpass.runtime.point.jacobian import rows_of
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.scales import Scales
+from ballpass.runtime.run.simulate import STIFF_RATIO, choose_method
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+#: Instants of a turn that are searched for the lightest and the heaviest load.
+INSTANTS = 360
+
+#: Fastest oscillations in a turn, above which vibrations die out within a small part of it, undamped ones apart.
+MANY_OSCILLATIONS = 5000.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Breakpoint:
+    """A time of the first turn at which a load switches or a table has a knot: time [s], driver angle [rad], cause."""
+
+    time: float
+    angle: float
+    cause: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeScale:
+    """Rates of small motions about one equilibrium.
+
+    Attributes
+    ----------
+    name : "lightest load" or "heaviest load"; "at rest under the load" where the load is the same all the time
+    time, angle : instant [s] and driver angle [rad]
+    acceleration : of the unsupported ring at that instant: its load over its mass [m/s^2]
+    decay : fastest decay, the largest -Re(eigenvalue) [1/s]
+    frequency : fastest natural frequency without damping [rad/s]
+    slowest : smallest magnitude of an eigenvalue [1/s]
+    """
+
+    name: str
+    time: float
+    angle: float
+    acceleration: float
+    decay: float
+    frequency: float
+    slowest: float
+
+    @property
+    def stiffness(self) -> float:
+        """Fastest decay over fastest natural frequency in rad/s [1]; above about 3 steps are bounded by decay.
+
+        For a single mode that oscillates this is its damping ratio; above 1 it is not.
+        """
+        return self.decay / self.frequency if self.frequency > 0.0 else math.inf if self.decay > 0.0 else 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Explanation:
+    """What a run of a model consists of.
+
+    Attributes
+    ----------
+    states, outputs : their names
+    turn : time of a turn [s]; infinite where nothing turns
+    breakpoints : of the first turn (of the run where nothing turns)
+    smoothness : pairs of law and the manifest's word, which `ballpass.runtime.contract.smoothness.WORDS` explains
+    scales : rates at the lightest and heaviest load, once under a load that does not change; empty for a model without
+        states
+    unsupported : instants without equilibrium, whose rates are not known
+    method, reason : what ``auto`` takes, and why
+    """
+
+    states: tuple[str, ...]
+    outputs: tuple[str, ...]
+    turn: float
+    breakpoints: tuple[Breakpoint, ...]
+    smoothness: tuple[tuple[str, str], ...]
+    scales: tuple[TimeScale, ...]
+    unsupported: tuple[str, ...]
+    method: str
+    reason: str
+
+
+def explain(model: Model, parameters: Mapping[str, float] | None = None) -> Explanation:
+    """Breakpoints, smoothness and time scales of a model.
+
+    Raises
+    ------
+    RequestError
+        Unknown parameters, or a linkage that cannot be assembled.
+    """
+    model.check_assembly(parameters)
+    values = model.numbers(parameters).values
+    manifest = model.manifest
+    turn = clock.period(manifest, values)
+    span = turn if math.isfinite(turn) else (manifest.run.duration or 1.0)
+    scales, unsupported = _time_scales(model, parameters, span) if model.states else ((), ())
+    method, reason = _method(model, scales, turn)
+    return Explanation(
+        states=model.states,
+        outputs=model.outputs,
+        turn=turn,
+        breakpoints=_breakpoints(model, values, span),
+        smoothness=manifest.smoothness,
+        scales=scales,
+        unsupported=unsupported,
+        method=method,
+        reason=reason,
+    )
+
+
+def _breakpoints(model: Model, values: Mapping[str, float], span: float) -> tuple[Breakpoint, ...]:
+    found = []
+    inputs = model.manifest.inputs
+    # a little over the turn's end, so that an edge at t = 0 counts once
+    for time in clock.breakpoints(inputs, values, -1e-9 * span, span * (1.0 - 1e-9)):
+        before = clock.inputs_at(inputs, values, time, time - 1e-7 * span)
+        behind = clock.inputs_at(inputs, values, time, time + 1e-7 * span)
+        causes = [
+            f"{item.name.removeprefix('gate.')} {'on' if b > a else 'off'}" if item.kind == "gate" else item.name
+            for item, a, b in zip(inputs, before, behind, strict=True)
+            if a != b and item.kind in ("gate", "table_rate")
+        ]
+        angle = clock.crank_angle(model.manifest, values, float(time))
+        found.append(Breakpoint(time=float(time), angle=angle, cause=", ".join(causes) or "a knot of a table"))
+    return tuple(found)
+
+
+def _time_scales(
+    model: Model, parameters: Mapping[str, float] | None, span: float
+) -> tuple[tuple[TimeScale, ...], tuple[str, ...]]:
+    numbers = model.numbers(parameters)
+    values = numbers.values
+    half = len(model.states) // 2
+    rest = np.array([values[name] for name in model.manifest.initial])
+    rest[half:] = 0.0
+    times = (np.arange(INSTANTS) + 0.5) / INSTANTS * span
+    # at the initial position, where the contacts press as they do at t = 0: what differs between instants is the load
+    point = {"t": 0.0, "x": rest, "p": numbers.p, "c": numbers.c}
+    pull = np.empty(INSTANTS)
+    for k, time in enumerate(times):
+        u = clock.inputs_at(model.manifest.inputs, values, float(time))
+        pull[k] = np.linalg.norm(model.kernel("rhs")({**point, "u": u})[half:])
+    scales, unsupported = [], []
+    instants: tuple[tuple[str, int], ...] = (
+        ("lightest load", int(np.argmin(pull))),
+        ("heaviest load", int(np.argmax(pull))),
+    )
+    if _is_constant(model, numbers, times):
+        instants = (("at rest under the load", 0),)
+    for name, k in instants:
+        time = float(times[k])
+        angle = clock.crank_angle(model.manifest, values, time)
+        try:
+            x = model.static_equilibrium(t=time, parameters=parameters).x
+        except BallpassError as fault:
+            unsupported.append(f"{name}, {math.degrees(angle):.4g} deg: {fault}")
+            continue
+        decay = frequency = 0.0
+        slowest = math.inf
+        speed = math.sqrt(pull[k] * max(float(np.max(np.abs(x[:half]))), 1e-12))
+        for kick in (np.zeros(half), *(sign * speed * unit for unit in np.eye(half) for sign in (1.0, -1.0))):
+            matrix = model.jacobian("rhs", "states", t=time, x=np.concatenate([x[:half], kick]), parameters=parameters)
+            eigenvalues = np.linalg.eigvals(matrix)
+            decay = max(decay, float(np.max(-eigenvalues.real)))
+            slowest = min(slowest, float(np.min(np.abs(eigenvalues))))
+            frequency = max(frequency, math.sqrt(float(np.max(np.abs(np.linalg.eigvals(matrix[half:, :half]))))))
+        scales.append(
+            TimeScale(
+                name=name,
+                time=time,
+                angle=angle,
+                acceleration=float(pull[k]),
+                decay=decay,
+                frequency=frequency,
+                slowest=slowest,
+            )
+        )
+    return tuple(scales), tuple(unsupported)
+
+
+def _is_constant(model: Model, numbers: Numbers, times: np.ndarray) -> bool:
+    """Whether the load is the same at all these times, to rounding."""
+    if not any(info.name == "load.x" for info in model.manifest.quantities):
+        return False
+    (rows,) = rows_of(model, ["load.x", "load.y"])
+    kernel = model.kernel(rows.function)
+    loads = np.array([kernel(point(model, numbers, float(time), None))[rows.indices] for time in times])
+    return bool(np.max(np.ptp(loads, axis=0)) <= 1e-12 * np.max(np.abs(loads)))
+
+
+def _method(model: Model, scales: tuple[TimeScale, ...], turn: float) -> tuple[str, str]:
+    """What ``auto`` takes for these rates and turns of `turn` [s], and why."""
+    if not model.states:
+        return "none", "the model has no states: its outputs follow from time alone"
+    decay = max((s.decay for s in scales), default=0.0)
+    frequency = max((s.frequency for s in scales), default=0.0)
+    name, reason = choose_method(model, "auto", Scales(magnitude=np.zeros(0), decay=decay, frequency=frequency))
+    if frequency > 0.0:
+        ratio = decay / frequency
+        if ratio > STIFF_RATIO:
+            reason += (
+                f"; decay is {ratio:.2g} times the fastest oscillation, so that an explicit method's steps would be "
+                "bounded by it: linearly implicit steps suit"
+            )
+        else:
+            reason += (
+                f"; decay is {ratio:.2g} times the fastest oscillation: explicit steps suit while the ring vibrates"
+            )
+            oscillations = frequency * turn / (2.0 * math.pi)
+            if math.isfinite(turn) and oscillations > MANY_OSCILLATIONS:
+                reason += (
+                    f", but {oscillations:.2g} oscillations fit into a turn: where they have died out, the stepper's "
+                    "are linearly implicit and as long as the tolerance allows; the explicit methods cannot do so"
+                )
+    jumping = [law for law, kind in model.manifest.smoothness if kind == "discontinuous"]
+    if jumping:
+        reason += f"; the {' and '.join(jumping)} law jumps, and steps across a jump are rejected and repeated"
+    return name, reason

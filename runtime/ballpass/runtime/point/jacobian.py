@@ -1,0 +1,330 @@
+"""Derivatives of generated functions at a point: of what, along what, and the chain between them.
+
+In: a model, numbers, a point.  Out: dense arrays.
+
+A generated function depends on (t, x, u, p, c).  A *direction* says how these move when one thing does: a state, the
+time, the crank's angle, or a parameter, which moves the derived constants (groove radius -> elliptic integrals ->
+stiffness), the phases and the tables as well.  Gates are flat: they jump at the edges of their windows, where no
+derivative exists.  Derivatives along parameters are taken at fixed states.
+
+`jacobian` evaluates the sparse blocks of ``jacobians.c`` and contracts them with the directions; `output_tangents` runs
+the generated derivative along a direction for many samples; `jacobian_function` prepares one query for many states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers, unknown_name
+from ballpass.runtime.point.evaluate import checked_time, point
+from ballpass.runtime.run import inputs as clock
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+Array = NDArray[np.float64]
+
+#: Arguments of a generated function, in the order they are differentiated.
+ARGUMENTS = ("t", "x", "u", "p", "c")
+
+#: What can be named besides quantities, states and parameters.
+RHS, STATES, TIME, CRANK_ANGLE = "rhs", "states", "time", "crank_angle"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rows:
+    """Rows of the result that one generated function gives.
+
+    Attributes
+    ----------
+    function : "rhs", or a group of quantities
+    indices : rows of that function's value, shape (rows,)
+    labels : name of each, "ball.force[3]" for ball 3
+    units : SI unit of each
+    """
+
+    function: str
+    indices: NDArray[np.int64]
+    labels: tuple[str, ...]
+    units: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Directions:
+    """How the arguments of a function move along each direction, shape (size of the argument, directions)."""
+
+    labels: tuple[str, ...]
+    units: tuple[str, ...]
+    t: Array
+    x: Array
+    u: Array
+    p: Array
+    c: Array
+
+    def of(self, argument: str) -> Array:
+        """The block of one argument, "t", "x", "u", "p" or "c": shape (size of the argument, directions)."""
+        return {"t": self.t, "x": self.x, "u": self.u, "p": self.p, "c": self.c}[argument]
+
+
+def rows_of(model: Model, of: str | Sequence[str]) -> list[Rows]:
+    """Rows of the right-hand side ("rhs") or of quantities by name or pattern, one record per generated function.
+
+    Raises
+    ------
+    RequestError
+        Unknown names, with the nearest ones; all at once.
+    """
+    names = [of] if isinstance(of, str) else list(of)
+    manifest = model.manifest
+    known = [*((RHS,) if model.has(RHS) else ()), *(item.name for item in manifest.quantities)]
+    faults = [
+        unknown_name("function to differentiate", name, known)
+        for name in names
+        if not any(fnmatchcase(candidate, name) for candidate in known)
+    ]
+    if not names:
+        faults.append("Nothing to differentiate was named. Give a name, as ball.force, or several.")
+    if faults:
+        raise RequestError("\n".join(faults))
+    chosen = [c for name in names for c in known if fnmatchcase(c, name) and (c != RHS or name == RHS)]
+    place: dict[str, tuple[str, int, int, str]] = {}
+    counts: dict[str, int] = {}
+    for item in manifest.quantities:
+        start = counts.get(item.group, 0)
+        place[item.name] = (item.group, start, item.size, item.unit)
+        counts[item.group] = start + item.size
+    found: list[Rows] = []
+    for name in dict.fromkeys(chosen):
+        if name == RHS:
+            labels = tuple(f"d({state.name})/dt" for state in manifest.states)
+            units = tuple(f"{state.unit}/s" for state in manifest.states)
+            found.append(Rows(function=RHS, indices=np.arange(len(labels)), labels=labels, units=units))
+            continue
+        group, start, size, unit = place[name]
+        labels = (name,) if size == 1 else tuple(f"{name}[{k + 1}]" for k in range(size))
+        found.append(Rows(function=group, indices=np.arange(start, start + size), labels=labels, units=(unit,) * size))
+    return _merged(found)
+
+
+def _merged(found: Sequence[Rows]) -> list[Rows]:
+    """Neighbours of one function taken together; the order of the rows stays."""
+    out: list[Rows] = []
+    for rows in found:
+        if out and out[-1].function == rows.function:
+            last = out.pop()
+            rows = Rows(
+                function=rows.function,
+                indices=np.concatenate([last.indices, rows.indices]),
+                labels=last.labels + rows.labels,
+                units=last.units + rows.units,
+            )
+        out.append(rows)
+    return out
+
+
+def directions_of(model: Model, numbers: Numbers, wrt: str | Sequence[str], t: float) -> Directions:
+    """Directions along states ("states": all), "time", "crank_angle" or parameters, at time `t` [s].
+
+    Raises
+    ------
+    RequestError
+        Unknown names, with the nearest ones; a crank angle where nothing turns.
+    """
+    manifest = model.manifest
+    names = [wrt] if isinstance(wrt, str) else list(wrt)
+    names = [item for name in names for item in (model.states if name == STATES else (name,))]
+    rows = {name: row for row, name in enumerate(numbers.parameters)}
+    units = {state.name: state.unit for state in manifest.states} | {TIME: "s", CRANK_ANGLE: "rad"}
+    units |= {info.name: info.unit for info in manifest.parameters}
+    faults = []
+    for name in names:
+        if name not in units:
+            words = f"'{STATES}', names of states, '{TIME}' and '{CRANK_ANGLE}'"
+            hint = unknown_name("parameter", name, (*rows, *model.states, STATES, TIME, CRANK_ANGLE))
+            faults.append(f"{hint} Besides parameters, wrt takes {words}.")
+    if not names and not model.states and wrt == STATES:
+        faults.append("wrt: this model has no states: a scene with [bearing] has. Give parameters, or 'crank_angle'.")
+    elif not names:
+        faults.append("wrt: nothing to differentiate by was named. Give a parameter, or 'states'.")
+    if faults:
+        raise RequestError("\n".join(faults))
+    count = len(names)
+    along_t, along_x = np.zeros((1, count)), np.zeros((len(model.states), count))
+    along_p = np.zeros((len(numbers.p), count))
+    for column, name in enumerate(names):
+        if name == TIME:
+            along_t[0, column] = 1.0
+        elif name == CRANK_ANGLE:
+            along_t[0, column] = 1.0 / turning_speed(model, numbers)
+        elif name in rows:
+            along_p[rows[name], column] = 1.0
+        else:
+            along_x[model.states.index(name), column] = 1.0
+    along_c = np.zeros((len(numbers.c), count))
+    if len(numbers.c) and np.any(along_p):
+        by_parameters = model.kernel("constants_jac")({"p": numbers.p}).reshape(len(numbers.c), len(numbers.p))
+        along_c = by_parameters @ along_p
+    along_u = np.zeros((len(manifest.inputs), count))
+    constants = {info.name: row for row, info in enumerate(manifest.constants)}
+    for row, name, slope in clock.input_derivatives(manifest.inputs, numbers.values, t):
+        along_u[row] += slope * (along_p[rows[name]] if name in rows else along_c[constants[name]])
+    return Directions(
+        labels=tuple(names),
+        units=tuple(units[name] for name in names),
+        t=along_t,
+        x=along_x,
+        u=along_u,
+        p=along_p,
+        c=along_c,
+    )
+
+
+def turning_speed(model: Model, numbers: Numbers) -> float:
+    """Speed of crank or shaft [rad/s].
+
+    Raises
+    ------
+    RequestError
+        Nothing turns.
+    """
+    speed = clock.shaft_speed(model.manifest, numbers.values)
+    if speed == 0.0:
+        raise RequestError(
+            "crank_angle: nothing turns in this scene, so time does not move the angle. Give a speed, or differentiate "
+            "by the driver's start angle, which turns the linkage alone and holds the balls."
+        )
+    return speed
+
+
+def jacobian(
+    model: Model,
+    numbers: Numbers,
+    of: str | Sequence[str],
+    wrt: str | Sequence[str],
+    *,
+    t: float,
+    x: Sequence[float] | np.ndarray | None,
+) -> Array:
+    """Derivatives at one time and state; see `ballpass.runtime.Model.jacobian`."""
+    time = checked_time(t)
+    rows = rows_of(model, of)
+    directions = directions_of(model, numbers, wrt, time)
+    there = point(model, numbers, time, x)
+    dense = np.concatenate([contract(model, part, directions, there) for part in rows])
+    if isinstance(of, str) and of != RHS and sum(len(part.labels) for part in rows) == 1:
+        dense = dense[0]
+    if isinstance(wrt, str) and wrt != STATES:
+        dense = dense[..., 0]
+    return np.asarray(dense, dtype=float)
+
+
+def contract(model: Model, rows: Rows, directions: Directions, there: Mapping[str, object]) -> Array:
+    """Sum over the arguments of block times direction, shape (rows, directions)."""
+    total = np.zeros((len(rows.indices), len(directions.labels)))
+    for argument in ARGUMENTS:
+        along = directions.of(argument)
+        name = f"{rows.function}_jac_{argument}"
+        # a block without entries is not generated
+        if np.any(along) and model.has(name):
+            kernel = model.kernel(name)
+            block = kernel(there).reshape(-1, along.shape[0])
+            total += block[rows.indices] @ along
+    return total
+
+
+def quantity_values(
+    model: Model, numbers: Numbers, of: str | Sequence[str], *, t: float, x: Sequence[float] | np.ndarray | None
+) -> Array:
+    """Values of what `jacobian` differentiates, all rows one below the other, shape (rows,)."""
+    return values_of_rows(model, rows_of(model, of), point(model, numbers, checked_time(t), x))
+
+
+def values_of_rows(model: Model, parts: Sequence[Rows], there: Mapping[str, object]) -> Array:
+    """Values of rows with the arguments `there`, shape (rows,)."""
+    return np.concatenate([model.kernel(part.function)(there)[part.indices] for part in parts])
+
+
+def output_tangents(
+    model: Model,
+    numbers: Numbers,
+    of: str | Sequence[str],
+    *,
+    t: Array,
+    x: Array,
+    u: Array,
+    dx: Array | None = None,
+    du: Array | None = None,
+    dp: Array | None = None,
+    dc: Array | None = None,
+    dt: Array | None = None,
+) -> Array:
+    """Derivatives of quantities along M directions at N samples, through generated C; no Python loop over samples.
+
+    Parameters
+    ----------
+    of : names or patterns of quantities, or "rhs", as for `jacobian`; the rows of the result stand in that order, an
+        entry per ball one below the other (`rows_of` gives their labels)
+    t : times since the reference time of `u`, shape (N,) [s]
+    x : states, shape (N, states)
+    u : inputs at the reference time, shape (N, inputs), or (inputs,) for all samples
+    dx : how the states move, shape (N, states, M); None: not at all, likewise the others
+    du : how the inputs move, shape (N, inputs, M) or (inputs, M)
+    dp, dc : how parameters and constants move, shape (parameters, M) and (constants, M); see `directions_of`
+    dt : how the time since the reference moves, shape (N, M) or (M,) [s]
+
+    Returns
+    -------
+    array, shape (N, rows, M)
+
+    Raises
+    ------
+    RequestError
+        Unknown names, no direction given, shapes that do not fit.
+    """
+    count, given = len(t), [d for d in (dx, du, dp, dc, dt) if d is not None]
+    if not given:
+        raise RequestError("output_tangents: no direction was given. Give one or more of dx, du, dp, dc, dt.")
+    moves = given[0].shape[-1]
+    sizes = {"dx": len(model.states), "du": len(model.manifest.inputs), "dp": len(numbers.p), "dc": len(numbers.c)}
+
+    def shaped(value: Array | None, shape: tuple[int, ...], name: str) -> Array:
+        if value is None:
+            return np.broadcast_to(0.0, shape)
+        try:
+            return np.broadcast_to(np.asarray(value, dtype=float), shape)
+        except ValueError as fault:
+            raise RequestError(f"output_tangents: {name} of shape {shape} is expected, not {value.shape}.") from fault
+
+    along_x = shaped(dx, (count, sizes["dx"], moves), "dx")
+    along_u = shaped(du, (count, sizes["du"], moves), "du")
+    along_p, along_c = shaped(dp, (sizes["dp"], moves), "dp"), shaped(dc, (sizes["dc"], moves), "dc")
+    along_t = shaped(dt, (count, moves), "dt")
+    fixed = {"p": numbers.p, "c": numbers.c}
+    varying = {
+        "t": shaped(t, (count,), "t"),
+        "x": shaped(x, (count, sizes["dx"]), "x"),
+        "u": shaped(u, (count, sizes["du"]), "u"),
+    }
+    parts = []
+    for rows in rows_of(model, of):
+        loop = model.loop(f"{rows.function}_tangent", ("t", "x", "u", "dt", "dx", "du"))
+        (result,) = loop.function.name_out()
+        part = np.empty((count, len(rows.indices), moves))
+        for m in range(moves):
+            moved = {
+                "dt": along_t[:, m],
+                "dx": along_x[:, :, m],
+                "du": along_u[:, :, m],
+                "dp": along_p[:, m],
+                "dc": along_c[:, m],
+            }
+            part[:, :, m] = loop(count, {**fixed, **varying, **moved})[result][:, rows.indices]
+        parts.append(part)
+    return np.concatenate(parts, axis=1)

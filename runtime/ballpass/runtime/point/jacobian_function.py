@@ -1,0 +1,172 @@
+"""A Jacobian prepared for many calls: one generated function on fixed memory, with its sparsity pattern.
+
+In: a model, numbers, what to differentiate by what.  Out: a `JacobianFunction`, called with a state in about a
+microsecond: the pattern is found once, and a call copies the state, runs compiled code and picks the entries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.point.evaluate import checked_time, point
+from ballpass.runtime.point.jacobian import ARGUMENTS, Directions, Rows, directions_of, rows_of
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+
+    from ballpass.runtime.model import Model
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sparsity:
+    """Compressed columns: entries of column j are ``rows[starts[j]:starts[j + 1]]``, increasing.
+
+    Attributes
+    ----------
+    shape : rows and columns of the matrix
+    starts : shape (columns + 1,)
+    rows : row of each entry, shape (entries,)
+    """
+
+    shape: tuple[int, int]
+    starts: Whole
+    rows: Whole
+
+    @property
+    def columns(self) -> Whole:
+        """Column of each entry, shape (entries,)."""
+        return np.repeat(np.arange(self.shape[1]), np.diff(self.starts))
+
+
+class JacobianFunction:
+    """Derivative of one generated function's rows along states or other directions, ready to be called.
+
+    Not for several threads at once: calls share memory.
+
+    Attributes
+    ----------
+    rows, columns : labels of the matrix
+    row_units, column_units : SI units
+    sparsity : where entries can differ from zero
+    values : entries of the last call, in the order of `sparsity`; overwritten by the next call
+    x : memory of the state, shape (states,)
+    evaluate : the compiled code alone, for whoever writes `x` and reads the memory himself
+    """
+
+    def __init__(
+        self, model: Model, numbers: Numbers, of: str | Sequence[str], wrt: str | Sequence[str], *, t: float
+    ) -> None:
+        self._model, self._wrt = model, wrt
+        chosen = rows_of(model, of)
+        if len(chosen) != 1:
+            groups = "; ".join(", ".join(part.labels) for part in chosen)
+            raise RequestError(
+                f"jacobian_function: the quantities come from {len(chosen)} generated functions ({groups}). Make one "
+                "for each, or take model.jacobian."
+            )
+        rows = chosen[0]
+        directions = directions_of(model, numbers, wrt, checked_time(t))
+        self.rows, self.row_units = rows.labels, rows.units
+        self.columns, self.column_units = directions.labels, directions.units
+        # states alone: a sparse block as it is generated; else the derivative along each direction
+        self._by_states = all(label in model.states for label in self.columns)
+        function, entries = self._prepare(rows, directions)
+        self._entries = entries
+        buffer: Any = function.buffer()
+        self._buffer, self.evaluate = buffer  # the first owns the memory the second works on
+        self._memory: dict[str, Array] = {}
+        for k, name in enumerate(function.name_in()):
+            memory = self._memory[name] = np.zeros(function.nnz_in(k))
+            if memory.size:
+                self._buffer.set_arg(k, memory.data)
+        result = np.zeros(max(function.nnz_out(0), 1))
+        self._buffer.set_res(0, result.data)
+        whole = len(entries) == len(result) and bool(np.all(entries == np.arange(len(entries))))
+        self._result = None if whole else result
+        self.values = result if whole else np.zeros(len(entries))
+        self.x = self._memory["x"]
+        self._place(numbers, t, directions)
+
+    def _prepare(self, rows: Rows, directions: Directions) -> tuple[casadi.Function, Whole]:
+        """The function to call and which of its results are entries; sets `sparsity`."""
+        model, shape = self._model, (len(rows.labels), len(directions.labels))
+        pattern = np.zeros(shape, dtype=bool)
+        for argument in ARGUMENTS:
+            name, along = f"{rows.function}_jac_{argument}", directions.of(argument) != 0.0
+            if model.has(name) and np.any(along):
+                block = _pattern(model.function(name))
+                pattern |= (block[rows.indices].astype(int) @ along.astype(int)) > 0
+        starts = np.concatenate([[0], np.cumsum(pattern.sum(axis=0))])
+        column, row = np.nonzero(pattern.T)
+        self.sparsity = Sparsity(shape=shape, starts=starts, rows=row)
+        name = f"{rows.function}_jac_x"
+        if self._by_states and model.has(name):
+            function = model.function(name)
+            # column-major position of each entry of the block among its nonzeros
+            block_rows, block_columns = (np.array(k, dtype=int) for k in function.sparsity_out(0).get_triplet())
+            order = {(int(r), int(c)): k for k, (r, c) in enumerate(zip(block_rows, block_columns, strict=True))}
+            state = np.argmax(directions.x, axis=0)
+            entries = [
+                order[int(rows.indices[r]), int(state[c])] for r, c in zip(row.tolist(), column.tolist(), strict=True)
+            ]
+            return function, np.array(entries, dtype=np.int64)
+        single = model.function(f"{rows.function}_tangent")
+        size, count = single.size1_out(0), shape[1]
+        if count > 1:
+            fixed = [k for k, name in enumerate(single.name_in()) if name in ARGUMENTS]
+            single = single.map(f"{single.name()}_{count}", "serial", count, fixed, [])
+        return single, np.asarray(column * size + rows.indices[row], dtype=np.int64)
+
+    def _place(self, numbers: Numbers, t: float, directions: Directions) -> None:
+        """Write everything but the state."""
+        values: dict[str, Any] = point(self._model, numbers, t, None)
+        for name, memory in self._memory.items():
+            if name == "x":
+                continue
+            memory[:] = values[name] if name in ARGUMENTS else directions.of(name[1:]).reshape(-1, order="F")
+
+    def move(self, t: float, parameters: dict[str, float] | None = None) -> None:
+        """Go to another time [s] and other parameters; the state stays."""
+        numbers = self._model.numbers(parameters)
+        self._place(numbers, checked_time(t), directions_of(self._model, numbers, self._wrt, t))
+
+    def __call__(self, x: Array | Sequence[float]) -> Array:
+        """Entries at a state, in the order of `sparsity`; the same memory each time: copy what is to be kept."""
+        self.x[:] = x
+        self.evaluate()  # straight-line code: it has no failure to report
+        if self._result is not None:
+            # mode: the indices are right, and checking them would need a buffer
+            self._result.take(self._entries, out=self.values, mode="clip")
+        return self.values
+
+    def to_dense(self) -> Array:
+        """Matrix of the last call, shape (rows, columns)."""
+        dense = np.zeros(self.sparsity.shape)
+        dense[self.sparsity.rows, self.sparsity.columns] = self.values
+        return dense
+
+    def to_scipy(self) -> csc_array:
+        """Matrix of the last call as ``scipy.sparse.csc_array``."""
+        from scipy.sparse import csc_array
+
+        pattern = self.sparsity
+        return csc_array((self.values.copy(), pattern.rows, pattern.starts), shape=pattern.shape)
+
+
+def _pattern(function: casadi.Function) -> NDArray[np.bool_]:
+    sparsity = function.sparsity_out(0)
+    dense = np.zeros(sparsity.shape, dtype=bool)
+    rows, columns = sparsity.get_triplet()
+    dense[rows, columns] = True
+    return dense

@@ -1,0 +1,319 @@
+"""Small vibrations about a state: mass, damping and stiffness matrices, natural frequencies, modes.
+
+In: a model, numbers, an instant, a state.  Out: a `Linearization` of M q'' = f(q, q', t):
+
+    M dq'' + C dq' + K dq = 0,    K = -df/dq,    C = -df/dq',
+
+with time frozen: the balls stand where they are at that instant, while their passing (the cage's speed) still enters
+the rates of deflection, as in the right-hand side itself.  Eigenvalues are those of the generalised problem of first
+order (F. Tisseur, K. Meerbergen, SIAM Review 43 (2001) 235, doi:10.1137/S0036144500381988).
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from rich import box
+from rich.console import Group
+from rich.table import Table
+
+from ballpass.runtime.app.printed import printed
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.point.evaluate import point
+from ballpass.runtime.point.jacobian import rows_of
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+Array = NDArray[np.float64]
+
+#: Eigenvalues below this fraction of the largest are zero but for rounding [1].
+RIGID = 1e-7
+
+#: A ball whose deflection or rate is below this fraction of the rings' motion stands on the kink.
+ON_THE_KINK = 1e-9
+
+
+class KinkWarning(UserWarning):
+    """The damping law has no derivative at this state; one of two one-sided ones is given."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Mode:
+    """A way to vibrate or to decay.
+
+    Attributes
+    ----------
+    eigenvalue : of the motion exp(eigenvalue t) [1/s]; of a conjugate pair the one with positive imaginary part
+    natural_frequency : absolute value of the eigenvalue over 2 pi [Hz]
+    damped_frequency : Im(eigenvalue) / (2 pi) [Hz]; 0 for a decay without vibration
+    damping_ratio : -Re(eigenvalue) over its absolute value [1]; NaN for a rigid mode
+    shape : complex displacement of each coordinate, the largest 1, shape (coordinates,)
+    """
+
+    eigenvalue: complex
+    natural_frequency: float
+    damped_frequency: float
+    damping_ratio: float
+    shape: NDArray[np.complex128]
+
+    @property
+    def rigid(self) -> bool:
+        """Whether nothing restrains this mode."""
+        return self.natural_frequency == 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Linearization:
+    """Matrices and modes of small vibrations.
+
+    Attributes
+    ----------
+    coordinates : names of the positions
+    mass : M, shape (coordinates, coordinates) [kg]
+    damping : C, same shape [N*s/m]
+    stiffness : K, same shape [N/m]
+    modes : by increasing natural frequency
+    x : the state, shape (states,)
+    time : the instant [s]
+    at_equilibrium : whether the state is the static equilibrium of that instant
+    unbalanced : accelerations left at the state, largest [m/s^2]
+    notes : what does not hold without reserve, for people
+    """
+
+    coordinates: tuple[str, ...]
+    mass: Array
+    damping: Array
+    stiffness: Array
+    modes: tuple[Mode, ...]
+    x: Array
+    time: float
+    at_equilibrium: bool
+    unbalanced: float
+    notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        frequencies = ", ".join(f"{m.natural_frequency:.6g}" for m in self.modes)
+        where = "equilibrium" if self.at_equilibrium else "given state"
+        return f"Linearization({where} at t = {self.time:.6g} s; natural frequencies {frequencies} Hz)"
+
+    def __str__(self) -> str:
+        return printed(Group(render_linearization(self), render_matrices(self)))
+
+    @property
+    def eigenvalues(self) -> NDArray[np.complex128]:
+        """All of them, pairs complete, shape (2 coordinates,) [1/s]."""
+        pairs = [m.eigenvalue for m in self.modes] + [m.eigenvalue.conjugate() for m in self.modes if m.eigenvalue.imag]
+        return np.array(sorted(pairs, key=lambda z: (abs(z), z.imag)))
+
+    @property
+    def natural_frequencies(self) -> Array:
+        """Of the modes, shape (modes,) [Hz]."""
+        return np.array([m.natural_frequency for m in self.modes])
+
+    @property
+    def damping_ratios(self) -> Array:
+        """Of the modes, shape (modes,) [1]."""
+        return np.array([m.damping_ratio for m in self.modes])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers and lists for JSON; complex numbers as pairs, what is not defined as null."""
+        return {
+            "time": {"value": self.time, "unit": "s"},
+            "at_equilibrium": self.at_equilibrium,
+            "coordinates": list(self.coordinates),
+            "state": self.x.tolist(),
+            "mass": {"value": self.mass.tolist(), "unit": "kg"},
+            "damping": {"value": self.damping.tolist(), "unit": "N*s/m"},
+            "stiffness": {"value": self.stiffness.tolist(), "unit": "N/m"},
+            "modes": [
+                {
+                    "eigenvalue": [m.eigenvalue.real, m.eigenvalue.imag],
+                    "natural_frequency": {"value": m.natural_frequency, "unit": "Hz"},
+                    "damped_frequency": {"value": m.damped_frequency, "unit": "Hz"},
+                    "damping_ratio": {"value": None if m.rigid else m.damping_ratio, "unit": "1"},
+                    "shape": [[z.real, z.imag] for z in m.shape.tolist()],
+                }
+                for m in self.modes
+            ],
+            "notes": list(self.notes),
+        }
+
+
+def linearize(
+    model: Model, numbers: Numbers, *, t: float, x: Sequence[float] | np.ndarray | None, at_equilibrium: bool
+) -> Linearization:
+    """Linearise about a state; see `ballpass.runtime.Model.linearize`.
+
+    Raises
+    ------
+    RequestError
+        No bearing.
+    SimulationError
+        The derivatives are not finite there.
+    """
+    if not model.has("rhs"):
+        raise RequestError("linearize: this model has no equations of motion. A scene with [bearing] is expected.")
+    there = point(model, numbers, t, x)
+    count = len(model.states)
+    half = count // 2
+    jacobian = model.kernel("rhs_jac_x")(there).reshape(count, count)
+    if not np.all(np.isfinite(jacobian)):
+        raise SimulationError("linearize: the derivatives at this state are not finite. Check state and parameters.")
+    mass = np.diag(masses(model, numbers))
+    stiffness, damping = -mass @ jacobian[half:, :half], -mass @ jacobian[half:, half:]
+    state = np.asarray(there["x"], dtype=float)
+    notes = kink_notes(model, numbers, t, state)
+    for note in notes:
+        warnings.warn(f"linearize: {note}", KinkWarning, stacklevel=3)
+    return Linearization(
+        coordinates=model.states[:half],
+        mass=mass,
+        damping=damping,
+        stiffness=stiffness,
+        modes=_modes(mass, damping, stiffness),
+        x=state,
+        time=t,
+        at_equilibrium=at_equilibrium,
+        unbalanced=float(np.max(np.abs(model.kernel("rhs")(there)[half:]))),
+        notes=notes,
+    )
+
+
+def masses(model: Model, numbers: Numbers) -> Array:
+    """Mass moved along each coordinate, shape (coordinates,) [kg]."""
+    names = {"inner": "bearing.m_ei", "outer": "bearing.outer_ring.mass"}
+    half = len(model.states) // 2
+    return np.array([numbers.values[names[state.partition(".")[0]]] for state in model.states[:half]])
+
+
+def _modes(mass: Array, damping: Array, stiffness: Array) -> tuple[Mode, ...]:
+    """Modes of A z = lambda B z with z = (q, q'), A = [[0, I], [-K, -C]], B = [[I, 0], [0, M]]."""
+    n = len(mass)
+    zero, one = np.zeros((n, n)), np.eye(n)
+    # one unit of time for all: positions and velocities of the same size, so that rounding spares the slow modes
+    unit = math.sqrt(max(float(np.max(np.abs(np.linalg.solve(mass, stiffness)))), 1e-300))
+    left = np.block([[zero, one], [-stiffness / unit**2, -damping / unit]])
+    right = np.block([[one, zero], [zero, mass]])
+    values, vectors = scipy.linalg.eig(left, right)
+    values = values * unit
+    largest = float(np.max(np.abs(values)))
+    modes = []
+    for value, vector in zip(values.tolist(), vectors.T, strict=True):
+        if value.imag < 0.0:
+            continue
+        shape = vector[:n]
+        shape = shape / shape[int(np.argmax(np.abs(shape)))]
+        if abs(value) <= RIGID * largest:
+            value = 0j
+        size = abs(value)
+        modes.append(
+            Mode(
+                eigenvalue=value,
+                natural_frequency=size / (2.0 * math.pi),
+                damped_frequency=value.imag / (2.0 * math.pi),
+                damping_ratio=-value.real / size if size else math.nan,
+                shape=shape,
+            )
+        )
+    return tuple(sorted(modes, key=lambda m: (m.natural_frequency, m.eigenvalue.imag)))
+
+
+def kink_notes(model: Model, numbers: Numbers, t: float, x: Array) -> tuple[str, ...]:
+    """Where the damping law has no derivative at this state, in words; empty where it has one."""
+    smoothness = dict(model.manifest.smoothness).get("damping")
+    if smoothness not in ("kinked", "discontinuous") or model.manifest.bearing is None:
+        return ()
+    law = model.manifest.bearing.damping_law
+    deflection, rate, speed = _deflections(model, numbers, t, x)
+    length = max(float(np.max(np.abs(deflection))), 1e-12)
+    at_onset = np.flatnonzero(np.abs(deflection) <= ON_THE_KINK * length).tolist()
+    at_rest = np.flatnonzero(np.abs(rate) <= ON_THE_KINK * max(speed, 1e-12)).tolist()
+    notes = []
+    if law.startswith("one-sided"):
+        resting = [k for k in at_rest if not law.endswith("gated") or deflection[k] > 0.0]
+        if resting:
+            notes.append(
+                f"the law {law} has a kink where the deflection's rate is zero, as at {_balls(resting)}: damping is "
+                "that of the parting side, without resistance; on the approaching side each of these balls adds "
+                f"{numbers.values['bearing.c_b']:.6g} N*s/m along its direction. Give bearing.damping.smoothing, and "
+                "there is one derivative."
+            )
+    if law.endswith("gated") or law == "tangent":
+        touching = [k for k in at_onset if abs(rate[k]) > 0.0 or law.endswith("gated")]
+        if touching:
+            notes.append(
+                f"the law {law} has no derivative at contact onset, where {_balls(touching)} stands: the derivative is "
+                "that of the free side. Give bearing.contact.smoothing, and there is one derivative."
+            )
+    return tuple(notes)
+
+
+def _balls(indices: Sequence[int]) -> str:
+    return "ball " + ", ".join(str(k + 1) for k in indices)
+
+
+def _deflections(model: Model, numbers: Numbers, t: float, x: Array) -> tuple[Array, Array, float]:
+    """Deflection of each ball, its rate, and the largest speed in it [m], [m/s]."""
+    there = point(model, numbers, t, x)
+    (rows,) = rows_of(model, "ball.deflection")
+    half = len(x) // 2
+    value = model.kernel(rows.function)(there)[rows.indices]
+    by_states = model.kernel(f"{rows.function}_jac_x")(there).reshape(-1, len(x))[rows.indices]
+    by_time = model.kernel(f"{rows.function}_jac_t")(there)[rows.indices]
+    rate = by_states[:, :half] @ x[half:] + by_time
+    return value, rate, max(float(np.max(np.abs(x[half:]))), float(np.max(np.abs(by_time))))
+
+
+def render_linearization(result: Linearization) -> Table:
+    """Modes as a table for a terminal of 80 columns."""
+    where = "static equilibrium" if result.at_equilibrium else "given state"
+    words = "f: natural frequency; ratio: damping over critical damping; shapes: size and phase, the largest 1"
+    table = Table(
+        title=f"Small vibrations about the {where} at t = {result.time:.6g} s",
+        caption="\n".join((words, *result.notes)),
+        title_justify="left",
+        caption_justify="left",
+        header_style="bold",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+    )
+    for head in ("f, Hz", "damped, Hz", "ratio", *result.coordinates):
+        table.add_column(head, justify="right", no_wrap=True)
+    for mode in result.modes:
+        ratio = "" if mode.rigid else f"{mode.damping_ratio:.4g}"
+        shape = [_polar(z) for z in mode.shape.tolist()]
+        table.add_row(f"{mode.natural_frequency:.6g}", f"{mode.damped_frequency:.6g}", ratio, *shape)
+    return table
+
+
+def _polar(z: complex) -> str:
+    """Size and phase [deg]; what rounds to nothing has no phase."""
+    size = f"{abs(z):.2f}"
+    phase = round(math.degrees(math.atan2(z.imag, z.real)))
+    return "0" if float(size) == 0.0 else f"{size}∠{180 if phase == -180 else phase}°"
+
+
+def render_matrices(result: Linearization) -> Table:
+    """Mass, damping and stiffness as one table, a row for each coordinate."""
+    table = Table(box=box.SIMPLE_HEAD, header_style="bold", padding=(0, 1, 0, 0))
+    table.add_column("matrix", no_wrap=True)
+    table.add_column("row", no_wrap=True)
+    for name in result.coordinates:
+        table.add_column(name, justify="right", no_wrap=True)
+    for words, matrix in (
+        ("M kg", result.mass),
+        ("C N·s/m", result.damping),
+        ("K N/m", result.stiffness),
+    ):
+        for k, (name, row) in enumerate(zip(result.coordinates, matrix.tolist(), strict=True)):
+            table.add_row(words if k == 0 else "", name, *(f"{value:.5g}" for value in row))
+    return table

@@ -1,0 +1,134 @@
+"""Second derivatives at a point, where the laws have them.
+
+In: a model, numbers, what to differentiate by which pair.  Out: a dense array.
+
+The graph of the function is put together with those of the derived constants and of the inputs, so that second
+derivatives along parameters are total, and differentiated twice by CasADi.  Hertz's law has no bounded second
+derivative at contact onset, d2F/d(delta)2 ~ delta^(-1/2): such a query is refused and the smoothed law offered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.contract import InputInfo
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.smoothness import WORDS
+from ballpass.runtime.point.evaluate import checked_time, point
+from ballpass.runtime.point.jacobian import CRANK_ANGLE, RHS, TIME, directions_of, rows_of, turning_speed
+from ballpass.runtime.run import inputs as clock
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+Array = NDArray[np.float64]
+
+#: Quantities that the contact and damping laws enter.
+_BY_LAW = ("ball.elastic_force", "ball.damping_force", "ball.force", "ring_force.")
+
+
+def hessian(
+    model: Model,
+    numbers: Numbers,
+    of: str | Sequence[str],
+    wrt: tuple[str, str],
+    *,
+    t: float,
+    x: Sequence[float] | np.ndarray | None,
+) -> Array:
+    """Second derivatives at one time and state, shape (rows,); see `ballpass.runtime.Model.hessian`.
+
+    Raises
+    ------
+    RequestError
+        `wrt` is no pair, unknown names, or a law without a bounded second derivative.
+    SimulationError
+        The derivatives are not finite there.
+    """
+    if isinstance(wrt, str) or len(wrt) != 2:
+        raise RequestError(f"hessian: wrt must be a pair of names, as ('inner.x', 'bearing.clearance'), not {wrt!r}.")
+    time = checked_time(t)
+    parts = rows_of(model, of)
+    directions_of(model, numbers, list(wrt), time)  # the names are refused as they are for first derivatives
+    for name in wrt:
+        if name == "states":
+            raise RequestError("hessian: wrt takes two names; 'states' stands for several. Name the states.")
+    _refuse_unbounded(model, [label for part in parts for label in part.labels], [part.function for part in parts])
+    there = point(model, numbers, time, x)
+    symbols = {
+        "moved": ca.SX.sym("moved"),
+        "turned": ca.SX.sym("turned"),
+        "x": ca.SX.sym("x", len(model.states)),
+        "p": ca.SX.sym("p", len(numbers.p)),
+    }
+    values = [0.0, 0.0, there["x"], numbers.p]
+    first, second = (_symbol(model, numbers, symbols, name) for name in wrt)
+    c = model.symbolic("constants")(symbols["p"]) if model.manifest.constants else ca.SX(0, 1)
+    known = {info.name: symbols["p"][k] for k, info in enumerate(model.manifest.parameters)}
+    known |= {info.name: c[k] for k, info in enumerate(model.manifest.constants)}
+    u = ca.vertcat(*(_input(item, known, numbers, time) for item in model.manifest.inputs))
+    local = symbols["moved"]
+    if CRANK_ANGLE in wrt:
+        turning_speed(model, numbers)
+        speed = clock.speed_name(model.manifest)
+        assert speed is not None  # something turns
+        local = local + symbols["turned"] / known[speed]
+    arguments = {"t": local, "x": symbols["x"], "u": ca.SX(u), "p": symbols["p"], "c": c}
+    found = []
+    for part in parts:
+        graph = model.symbolic(part.function)
+        value = graph(*(arguments[name] for name in graph.name_in()))[part.indices.tolist()]
+        twice = ca.jacobian(ca.jacobian(value, first), second)
+        function = ca.Function("twice", [*symbols.values()], [ca.densify(twice)])
+        found.append(function(*values).full().ravel())
+    result = np.concatenate(found)
+    if not np.all(np.isfinite(result)):
+        raise SimulationError("hessian: the second derivatives are not finite here. Check state and parameters.")
+    single = isinstance(of, str) and of != RHS and len(result) == 1
+    return np.asarray(result[0] if single else result, dtype=float)
+
+
+def _refuse_unbounded(model: Model, labels: Sequence[str], functions: Sequence[str]) -> None:
+    rough = [f"{law}: {WORDS[kind]}" for law, kind in model.manifest.smoothness if kind != "twice smooth"]
+    asked = [label for label in labels if label.startswith(_BY_LAW)] + ([RHS] if RHS in functions else [])
+    if rough and asked:
+        raise RequestError(
+            f"hessian: {asked[0]} depends on laws without a bounded second derivative ({', '.join(rough)}): that of "
+            "Hertz's law grows as deflection^(-1/2) at contact onset, so a number would tell nothing of its "
+            'surroundings. Take the smoothed law: smoothing = "0.05 um" in [bearing.contact], for a one-sided damping '
+            'law also smoothing = "1 mm/s" in [bearing.damping].'
+        )
+
+
+def _symbol(model: Model, numbers: Numbers, symbols: dict[str, ca.SX], name: str) -> ca.SX:
+    if name == TIME:
+        return symbols["moved"]
+    if name == CRANK_ANGLE:
+        return symbols["turned"]
+    if name in model.states:
+        return symbols["x"][model.states.index(name)]
+    return symbols["p"][list(numbers.parameters).index(name)]
+
+
+def _input(item: InputInfo, known: dict[str, ca.SX], numbers: Numbers, t: float) -> ca.SX:
+    """An input at the time `t` as a function of parameters: its value there, and what moves it."""
+    if item.kind == "phase":
+        now = float(clock.inputs_at([item], numbers.values, t)[0])
+        # the angle within the turn, for rounding; what is subtracted and added has the same value
+        whole = numbers.values[item.offset] + numbers.values[item.rate] * t
+        return known[item.offset] + known[item.rate] * t + (now - whole)
+    if item.kind == "gate":
+        return ca.SX(float(clock.inputs_at([item], numbers.values, t)[0]))
+    times = [numbers.values[name] for name in item.times]
+    k = int(np.searchsorted(times, t, side="right"))
+    if k in (0, len(times)):
+        return ca.SX(0.0) if item.kind == "table_rate" else known[item.values[0 if k == 0 else -1]]
+    (t0, t1), (y0, y1) = ([known[names[j]] for j in (k - 1, k)] for names in (item.times, item.values))
+    slope = (y1 - y0) / (t1 - t0)
+    return slope if item.kind == "table_rate" else y0 + slope * (t - t0)

@@ -1,0 +1,1 @@
+"""A run over time: request, segments, inputs, steps, samples, reductions."""

@@ -1,0 +1,249 @@
+"""The integration methods, behind one interface and a registry of names.
+
+Every method integrates the scaled states ``z = x / scale`` over the normalised time of a piece, with an absolute
+tolerance of one: ``scale = rtol * magnitude`` is the tolerance, chosen at run time, and changing it recompiles nothing.
+The local error of a step is kept below `rtol` times the magnitude of each state (see `scales`).
+
+erk         explicit Runge-Kutta 5(4), generated C
+rosenbrock  linearly implicit, L-stable, order 5(4), generated C
+cvodes      SUNDIALS' variable-order BDF in CasADi's virtual machine: slower, and independent of the others
+
+A further method is a class with `pieces` and `advance`, and a line in `METHODS`.
+"""
+
+from __future__ import annotations
+
+import io
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import FrameType
+from typing import Any, Protocol
+
+import casadi
+import numpy as np
+
+from ballpass.runtime.native.kernel import EvaluationError, Kernel
+
+#: Output intervals of the generated integrators with a fine grid.
+GRID = 64
+
+
+class ModelFunctions(Protocol):
+    """What a method needs of a model."""
+
+    @property
+    def compiled(self) -> bool: ...
+    def has(self, name: str) -> bool: ...
+    def function(self, name: str) -> casadi.Function: ...
+    def kernel(self, name: str) -> Kernel: ...
+    def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function: ...
+
+
+class Integrator(Protocol):
+    """One method at work on one model."""
+
+    #: Accepted and rejected steps so far; None where the method does not tell.
+    steps: int | None
+    rejected: int | None
+
+    def pieces(self, intervals: int) -> list[int]:
+        """Numbers of intervals, adding up to `intervals`, that single calls can take."""
+
+    def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
+        """States at ``start + step * k / intervals``, k = 1 ... intervals; shape (intervals, states).
+
+        Raises
+        ------
+        EvaluationError
+            The method could not go on.
+        """
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frozen:
+    """What stays constant during a piece: scale of the states, inputs, parameters, constants."""
+
+    scale: np.ndarray
+    u: np.ndarray
+    p: np.ndarray
+    c: np.ndarray
+
+    def pack(self, start: float, step: float) -> np.ndarray:
+        """The integrators' parameter vector: start, step, scale, u, p, c one behind the other, shape (n,)."""
+        return np.concatenate([(start, step), self.scale, self.u, self.p, self.c])
+
+
+class GeneratedIntegrator:
+    """``erk`` and ``rosenbrock``: integrators with a grid of 1 and of `GRID` intervals.
+
+    A piece of fewer intervals (a power of two) is integrated on the fine grid, of which every second, fourth ... point
+    is kept: outputs within a step cost next to nothing, calls do.
+    """
+
+    def __init__(self, model: ModelFunctions, name: str) -> None:
+        self._model = model
+        self._name = name
+        # the virtual machine counts steps, compiled code does not
+        self.steps: int | None = None if model.compiled else 0
+        self.rejected: int | None = None if model.compiled else 0
+
+    @staticmethod
+    def required(name: str) -> tuple[str, ...]:
+        """Functions that a model must have for a method of that name."""
+        return (f"{name}_1", f"{name}_{GRID}")
+
+    def pieces(self, intervals: int) -> list[int]:
+        """Powers of two, as many of `GRID` as there are."""
+        sizes = []
+        size = GRID
+        while intervals:
+            count, intervals = divmod(intervals, size)
+            sizes += [size] * count
+            size //= 2
+        return sizes
+
+    def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
+        """As `Integrator` says."""
+        grid = 1 if intervals == 1 else GRID
+        values = {"x0": state / frozen.scale, "p": frozen.pack(start, step)}
+        name = f"{self._name}_{grid}"
+        if self.steps is None or self.rejected is None:
+            samples = self._model.kernel(name)(values)
+        else:
+            function = self._model.function(name)
+            samples = _call(function, values)
+            statistics = function.stats()
+            self.steps += int(statistics["n_steps"])
+            self.rejected += int(statistics["n_reject"])
+        samples = samples.reshape(len(state), grid).T
+        return np.asarray(samples[grid // intervals - 1 :: grid // intervals] * frozen.scale)
+
+
+class CvodesIntegrator:
+    """CVODES on the serialised right-hand side; one integrator for each number of intervals, made when first needed."""
+
+    def __init__(self, model: ModelFunctions) -> None:
+        self._model = model
+        self._made: dict[int, casadi.Function] = {}
+        self.steps: int | None = 0
+        self.rejected: int | None = 0
+
+    @staticmethod
+    def required(name: str) -> tuple[str, ...]:
+        """Functions that a model must have for this method."""
+        return ("rhs",)
+
+    def pieces(self, intervals: int) -> list[int]:
+        """All at once."""
+        # a multistep method starts with tiny steps: as few starts as possible
+        return [intervals] if intervals else []
+
+    def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
+        """As `Integrator` says."""
+        if intervals not in self._made:
+            self._made[intervals] = self._model.virtual_integrator("cvodes", intervals)
+        function = self._made[intervals]
+        samples = _call(function, {"x0": state / frozen.scale, "p": frozen.pack(start, step)})
+        statistics = function.stats()
+        self.steps = (self.steps or 0) + int(statistics["nsteps"])
+        self.rejected = (self.rejected or 0) + int(statistics["netfails"])
+        return np.asarray(samples.reshape(len(state), intervals).T * frozen.scale)
+
+
+def make_integrator(rhs: casadi.Function, sizes: Mapping[str, int], plugin: str, intervals: int) -> casadi.Function:
+    """One of CasADi's integrators for the scaled states of `rhs` over a normalised step, in the virtual machine.
+
+    Parameters
+    ----------
+    rhs : right-hand side as an expression graph, with the arguments t, x, u, p, c or some of them
+    sizes : lengths of u, p and c
+    plugin : ``cvodes``, ``erk``, ``rosenbrock``
+    intervals : equal output intervals
+    """
+    names = rhs.name_in()
+    symbols = {name: casadi.SX.sym(name, sizes[name]) for name in ("u", "p", "c")}
+    count = rhs.size1_out(0)
+    time, start, step = (casadi.SX.sym(name) for name in ("s", "start", "step"))
+    scaled, scale = casadi.SX.sym("z", count), casadi.SX.sym("scale", count)
+    given = {"t": start + step * time, "x": scaled * scale, **symbols}
+    (rate,) = rhs.call([given[name] for name in names])
+    equations = {
+        "t": time,
+        "x": scaled,
+        "p": casadi.vertcat(start, step, scale, *symbols.values()),
+        "ode": step * rate / scale,
+    }
+    # the relative part is there only because some plugins want one
+    options: dict[str, Any] = {"abstol": 1.0, "reltol": 1e-14, "max_num_steps": 1_000_000, "show_eval_warnings": False}
+    if plugin != "cvodes" and intervals > 1:
+        options["control_group_size"] = [intervals]  # steps may cross output times
+    grid = [k / intervals for k in range(1, intervals + 1)]
+    return casadi.integrator(f"{plugin}_{intervals}", plugin, equations, 0.0, grid, options)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Method:
+    """An entry of the registry: how to make the integrator, and which functions it needs."""
+
+    make: Callable[[ModelFunctions], Integrator]
+    required: tuple[str, ...]
+
+
+#: Name of a method to how it is made; the order is that of messages.
+METHODS: Mapping[str, Method] = {
+    "erk": Method(make=lambda model: GeneratedIntegrator(model, "erk"), required=GeneratedIntegrator.required("erk")),
+    "rosenbrock": Method(
+        make=lambda model: GeneratedIntegrator(model, "rosenbrock"),
+        required=GeneratedIntegrator.required("rosenbrock"),
+    ),
+    "cvodes": Method(make=CvodesIntegrator, required=CvodesIntegrator.required("cvodes")),
+}
+
+
+def available_methods(model: ModelFunctions) -> tuple[str, ...]:
+    """Names of the methods whose functions the model has."""
+    return tuple(name for name, method in METHODS.items() if all(model.has(needed) for needed in method.required))
+
+
+def _call(function: casadi.Function, values: Mapping[str, Any]) -> np.ndarray:
+    try:
+        with _interrupts_kept():
+            return np.asarray(function(**values)["xf"].full())
+    except RuntimeError as fault:
+        lines = [line.strip() for line in str(fault).splitlines() if line.strip()]
+        raise EvaluationError(f"{function.name()}: {lines[-1] if lines else 'failed'}") from fault
+
+
+@contextmanager
+def _interrupts_kept() -> Iterator[None]:
+    """Let Ctrl-C be Ctrl-C: CasADi's integrators report it as a right-hand side that failed, and print that."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    noted = False
+    written, words = sys.stderr, io.StringIO()
+
+    def note(number: int, frame: FrameType | None) -> None:
+        nonlocal noted
+        noted = True
+        sys.stderr = words  # what CasADi writes from here on is of the interrupt
+        before(number, frame)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    except (RuntimeError, KeyboardInterrupt):
+        if not noted:
+            raise
+        words.truncate(0)
+        raise KeyboardInterrupt from None
+    finally:
+        signal.signal(signal.SIGINT, before)
+        sys.stderr = written
+        if words.getvalue():
+            written.write(words.getvalue())

@@ -1,0 +1,239 @@
+"""Which inputs hold at a time, and when they change: phases, gates, tables.
+
+In: the manifest's inputs and a look-up of values by name.  Out: numbers for ``u``, times of breakpoints.
+
+Angles are reduced modulo a turn here, so that the generated code sees small arguments in the thousandth turn as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ballpass.runtime.contract import InputInfo, Manifest
+from ballpass.runtime.contract.errors import RequestError
+
+TURN = 2.0 * math.pi
+
+#: Angles closer than this are one angle [rad]: an edge hit by rounding belongs to the window that starts there.
+ANGLE_RESOLUTION = 1e-11
+
+#: Times closer than this fraction of the interval under study are one time [1].
+TIME_RESOLUTION = 1e-12
+
+Values = Mapping[str, float]
+
+
+def period(manifest: Manifest, values: Values) -> float:
+    """Time of one turn of driver or shaft [s]; infinite when it stands or none exists."""
+    speed = shaft_speed(manifest, values)
+    return TURN / abs(speed) if speed != 0.0 else math.inf
+
+
+def shaft_speed(manifest: Manifest, values: Values) -> float:
+    """Speed of the driver, else of the shaft, counter-clockwise [rad/s]; 0 when the model has neither."""
+    name = speed_name(manifest)
+    return 0.0 if name is None else values[name]
+
+
+def speed_name(manifest: Manifest) -> str | None:
+    """Parameter or constant that holds this speed; None when the model has neither."""
+    if manifest.mechanism is not None:
+        return manifest.mechanism.speed
+    return None if manifest.bearing is None else manifest.bearing.shaft_speed
+
+
+def crank_angle(manifest: Manifest, values: Values, t: float) -> float:
+    """Angle of the driver (of the shaft: from its position at t = 0) in [0, 2 pi) [rad]."""
+    start = values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
+    return (start + shaft_speed(manifest, values) * t) % TURN
+
+
+def inputs_at(inputs: Sequence[InputInfo], values: Values, t: float, inside: float | None = None) -> np.ndarray:
+    """Inputs ``u`` with reference time `t`.
+
+    Parameters
+    ----------
+    inputs : the manifest's inputs
+    values : parameters and derived constants by name
+    t : reference time of phases and table values [s]
+    inside : a time within the open interval for which gates and slopes hold [s].  Default: `t`, where an edge belongs
+        to what follows in angle (gates) and in time (tables).
+
+    Returns
+    -------
+    array, shape (inputs,)
+    """
+    (found,) = inputs_over(inputs, values, np.array([t]), np.array([t if inside is None else inside]))
+    return np.asarray(found)
+
+
+def inputs_over(inputs: Sequence[InputInfo], values: Values, t: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """`inputs_at` for many reference times and times within the intervals they start, each of shape (n,) [s].
+
+    Returns
+    -------
+    array, shape (n, inputs)
+    """
+    found = np.empty((len(t), len(inputs)))
+    for k, item in enumerate(inputs):
+        if item.kind == "phase":
+            found[:, k] = (values[item.offset] + values[item.rate] * t) % TURN
+        elif item.kind == "gate":
+            angle = values[item.offset] + values[item.rate] * inside
+            covered = np.zeros(len(t), dtype=bool)
+            for start, width in _windows(item, values):
+                covered |= _covers(angle, start, width)
+            found[:, k] = covered
+        else:
+            found[:, k] = _table(item, values, t, inside)
+    return found
+
+
+def breakpoints(inputs: Sequence[InputInfo], values: Values, t0: float, t1: float) -> np.ndarray:
+    """Times in the open interval (t0, t1) at which a gate switches or a table has a knot.
+
+    A window of zero width and one of a turn or more never switch.
+
+    Returns
+    -------
+    array, shape (breakpoints,), increasing [s]
+    """
+    found: list[np.ndarray] = [np.zeros(0)]
+    for item in inputs:
+        if item.kind == "gate":
+            offset, rate = values[item.offset], values[item.rate]
+            if rate != 0.0:
+                for start, width in _windows(item, values):
+                    if 0.0 < width < TURN:
+                        found += [_passages(edge, offset, rate, t0, t1) for edge in (start, start + width)]
+        elif item.kind in ("table", "table_rate"):
+            found.append(_knots(item, values)[0])
+    near = TIME_RESOLUTION * max(abs(t0), abs(t1))
+    times = np.sort(np.concatenate(found))
+    times = times[(t0 + near < times) & (times < t1 - near)]
+    if np.all(np.diff(times) > near):
+        return times
+    apart: list[float] = []
+    for time in times.tolist():
+        if not apart or time - apart[-1] > near:
+            apart.append(time)
+    return np.array(apart)
+
+
+def input_derivatives(inputs: Sequence[InputInfo], values: Values, t: float) -> list[tuple[int, str, float]]:
+    """Nonzero partial derivatives of ``inputs_at(t)``: (row of u, name of parameter or constant, derivative).
+
+    A gate is flat between its edges; at an edge the derivative does not exist, and the flat one is given.
+    """
+    entries: list[tuple[int, str, float]] = []
+    for row, item in enumerate(inputs):
+        if item.kind == "phase":
+            entries += [(row, item.offset, 1.0), (row, item.rate, t)]
+        elif item.kind in ("table", "table_rate"):
+            times, heights = _knots(item, values)
+            k = int(np.searchsorted(times, t, side="right"))
+            if k in (0, len(times)):
+                if item.kind == "table":
+                    entries.append((row, item.values[0 if k == 0 else -1], 1.0))
+                continue
+            span = times[k] - times[k - 1]
+            slope = (heights[k] - heights[k - 1]) / span
+            share = (t - times[k - 1]) / span
+            weights = (1.0 - share, share) if item.kind == "table" else (-1.0 / span, 1.0 / span)
+            for weight, knot in zip(weights, (k - 1, k), strict=True):
+                entries += [(row, item.values[knot], weight), (row, item.times[knot], -slope * weight)]
+    return entries
+
+
+def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float) -> list[tuple[str, float]]:
+    """Derivative of the time of the breakpoint at `t`: (name of parameter or constant, derivative [s/unit]).
+
+    Raises
+    ------
+    RequestError
+        Several loads switch at that time, each of which could move on its own.
+    """
+    found: dict[tuple[tuple[str, float], ...], None] = {}
+    for item in inputs:
+        if item.kind == "gate" and values[item.rate] != 0.0:
+            rate = values[item.rate]
+            angle = values[item.offset] + rate * t
+            for names, (start, width) in zip(item.windows, _windows(item, values), strict=True):
+                if not 0.0 < width < TURN:
+                    continue
+                for name, edge in zip(names, (start, start + width), strict=True):
+                    past = (angle - edge + math.pi) % TURN - math.pi
+                    if abs(past) < 1e3 * ANGLE_RESOLUTION * max(1.0, abs(angle)):
+                        found[((name, 1.0 / rate), (item.offset, -1.0 / rate), (item.rate, -t / rate))] = None
+        elif item.kind == "table":
+            times = _knots(item, values)[0]
+            near = np.flatnonzero(np.abs(times - t) <= TIME_RESOLUTION * max(abs(t), float(np.max(np.abs(times)))))
+            for k in near:
+                found[((item.times[int(k)], 1.0),)] = None
+    if len(found) > 1:
+        raise RequestError(
+            f"At t = {t:.9g} s several loads switch at once ({', '.join(entry[0][0] for entry in found)}): the motion "
+            "has no derivative along a parameter that moves only one of them. Move their edges apart."
+        )
+    return [pair for entry in found for pair in entry]
+
+
+def _table(item: InputInfo, values: Values, t: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Value at `t`, or slope, of the piece of a table that holds at `inside`."""
+    times, heights = _knots(item, values)
+    k = np.searchsorted(times, inside, side="right")
+    within = (k > 0) & (k < len(times))
+    # pieces before the first knot and behind the last are flat
+    slopes = np.concatenate([[0.0], np.diff(heights) / np.diff(times), [0.0]])[k]
+    if item.kind == "table_rate":
+        return np.asarray(slopes)
+    left = np.clip(k - 1, 0, len(times) - 1)
+    return np.where(within, heights[left] + slopes * (t - times[left]), heights[left])
+
+
+def _windows(item: InputInfo, values: Values) -> list[tuple[float, float]]:
+    """(start in [0, 2 pi), width) of each window [rad]; an end before the start lies in the next turn."""
+    windows = []
+    for first, last in item.windows:
+        start, end = values[first], values[last]
+        width = end - start
+        if width < 0.0:
+            width %= TURN
+            if TURN - width < ANGLE_RESOLUTION:
+                width = 0.0
+        elif width > TURN - ANGLE_RESOLUTION:
+            width = TURN
+        windows.append((start % TURN, width))
+    return windows
+
+
+def _covers(angle: np.ndarray, start: float, width: float) -> np.ndarray:
+    """Whether each angle lies in [start, start + width), with edges hit by rounding counted as exact."""
+    if width <= 0.0 or width >= TURN:
+        return np.full(len(angle), width >= TURN)
+    past = (angle - start) % TURN
+    past[TURN - past < ANGLE_RESOLUTION] = 0.0
+    return np.asarray(past < width - ANGLE_RESOLUTION)
+
+
+def _passages(edge: float, offset: float, rate: float, t0: float, t1: float) -> np.ndarray:
+    """Times in [t0, t1] at which ``offset + rate t`` passes `edge` modulo a turn [s]."""
+    turns = sorted(((offset + rate * t0 - edge) / TURN, (offset + rate * t1 - edge) / TURN))
+    first, last = math.ceil(turns[0] - 1e-9), math.floor(turns[1] + 1e-9)
+    return np.asarray((edge - offset + TURN * np.arange(first, last + 1)) / rate)
+
+
+def _knots(item: InputInfo, values: Values) -> tuple[np.ndarray, np.ndarray]:
+    times = np.array([values[name] for name in item.times])
+    heights = np.array([values[name] for name in item.values])
+    steps = np.diff(times)
+    if np.any(steps <= 0.0):
+        k = int(np.argmax(steps <= 0.0))
+        raise RequestError(
+            f"The times of a table must increase: {item.times[k + 1]} = {times[k + 1]:g} s was given after "
+            f"{item.times[k]} = {times[k]:g} s. Change one of the two."
+        )
+    return times, heights

@@ -1,0 +1,120 @@
+"""How much work a run may take before it is given up, so that no request runs for hours unseen.
+
+A step takes some 0.2 to 0.5 microseconds, with reductions up to one, so a run of some turns that reaches its limit has
+taken seconds.  The limits are far above what any method needs that fits its model: a turn of a press takes a thousand
+steps.  What meets them is an explicit method on an overdamped contact, whose steps are bounded by 3.3 / decay, and
+motion that grows without bound.  They are the same for runs with samples, runs with reductions, and each member of an
+ensemble.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.run.scales import Scales
+
+#: Steps, accepted and rejected, that any run may take, a turn, and a second of the machine's time.
+STEPS_A_RUN = 20_000_000
+STEPS_A_TURN = 10_000_000
+STEPS_A_SECOND = 1_000_000
+
+#: So many steps must bring a run so far, as a fraction of it, or as far as the limits of a turn and of a second allow,
+#: whichever is less.  What does not come so far diverges or chatters, or is an explicit method on a stiff model: in a
+#: long run it would crawl for hours before the run's own limit is met.
+STEPS_A_LOOK = 1_000_000
+LEAST_PROGRESS = 0.01
+
+#: Steps of a run that others wait for: a member in lanes, which goes on alone behind them, and one of many trials.
+BRIEF_A_RUN = 1_000_000
+BRIEF_A_TURN = 100_000
+
+#: Step size times fastest decay at which an explicit method of order five becomes unstable [1].
+STABLE = 3.3
+
+
+def step_limit(duration: float, turn: float) -> int:
+    """Most steps of a run, accepted and rejected.
+
+    Parameters
+    ----------
+    duration : length of the run [s]
+    turn : time of a turn, infinite when nothing turns [s]
+    """
+    turns = math.ceil(duration / turn)
+    return STEPS_A_RUN + STEPS_A_TURN * turns + math.ceil(min(STEPS_A_SECOND * duration, 1e15))
+
+
+def brief_limit(duration: float, turn: float) -> int:
+    """Most steps of a run that others wait for; parameters as for `step_limit`."""
+    turns = math.ceil(duration / turn)
+    wanted = BRIEF_A_RUN + BRIEF_A_TURN * turns + math.ceil(min(STEPS_A_SECOND * duration, 1e15))
+    return min(wanted, step_limit(duration, turn))
+
+
+def least_progress(duration: float, turn: float, part: float, steps: int) -> float:
+    """How far so many steps must bring a run [s].
+
+    Parameters
+    ----------
+    duration, turn : as for `step_limit` [s]
+    part : fraction of the run that is enough in any case
+    steps : accepted and rejected
+    """
+    return min(part * duration, steps * min(turn / STEPS_A_TURN, 1.0 / STEPS_A_SECOND))
+
+
+@dataclass(slots=True)
+class Allowance:
+    """What a run may still take, and whether it comes on.
+
+    Attributes
+    ----------
+    left : steps, accepted and rejected
+    least : how far `STEPS_A_LOOK` steps must come [s]
+    time : of the last look [s]
+    since : steps since
+    """
+
+    left: int
+    least: float
+    time: float = 0.0
+    since: int = 0
+
+    def spend(self, steps: int, time: float) -> bool:
+        """Note steps that brought the run to a time; whether it has to be given up."""
+        self.left -= steps
+        self.since += steps
+        if self.left <= 0:
+            return True
+        if self.since < STEPS_A_LOOK:
+            return False
+        crawls = time - self.time < self.least
+        if not crawls:
+            self.time, self.since = time, 0
+        return crawls
+
+
+def allowance(duration: float, turn: float, begin: float = 0.0, taken: int = 0) -> Allowance:
+    """What a run may take that has come to `begin` [s] in so many steps."""
+    least = least_progress(duration, turn, LEAST_PROGRESS, STEPS_A_LOOK)
+    return Allowance(left=max(step_limit(duration, turn) - taken, 1), least=least, time=begin)
+
+
+def refuse_crawl(method: str, scales: Scales, duration: float, turn: float) -> None:
+    """Refuse an explicit method that tells no steps where stability alone would make it take more than allowed.
+
+    Raises
+    ------
+    RequestError
+        With the number of steps, its reason and the methods to take instead.
+    """
+    needed, allowed = scales.decay * duration / STABLE, step_limit(duration, turn)
+    if needed > allowed:
+        raise RequestError(
+            f"method {method}: damping decays at up to {scales.decay:.3g} 1/s, which bounds the steps of an explicit "
+            f"method to {STABLE / scales.decay:.3g} s: some {needed:.2g} of them for this run, {allowed:.2g} are "
+            "allowed. Take method stepper or rosenbrock, made for stiff models, or a shorter run, and check the "
+            "damping coefficient and its unit."
+        )

@@ -1,0 +1,107 @@
+"""Kinks of the laws: stepped over by error control, or located so that steps end on them.
+
+In: what a user asks for, a model, a method.  Out: the choice, checked, and the driver that follows it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.native.driver_library import SWITCHES
+from ballpass.runtime.native.stepper import METHODS as STEPPERS
+
+if TYPE_CHECKING:
+    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.model import Model
+    from ballpass.runtime.native.stepper import Stepper
+
+Kinks = Literal["stepped-over", "located"]
+
+STEPPED_OVER: Kinks = "stepped-over"
+LOCATED: Kinks = "located"
+CHOICES: tuple[Kinks, ...] = (STEPPED_OVER, LOCATED)
+
+#: Tolerances from which on the stepper locates kinks by itself: there it takes less time to an equal error.  First
+#: where the motion has kinks, then where a law jumps [1].
+TIGHT, TIGHT_JUMPS = 3e-7, 1e-6
+
+
+def check_kinks(asked: str) -> Kinks:
+    """One of `CHOICES`.
+
+    Raises
+    ------
+    RequestError
+        Another word.
+    """
+    for known in CHOICES:
+        if asked == known:
+            return known
+    raise RequestError(unknown_name("choice of kinks", asked, CHOICES))
+
+
+def has_kinks(manifest: Manifest) -> bool:
+    """Whether the motion has kinks; where the laws are smoothed it has none, and both choices are one.
+
+    One-sided damping of the rate alone has a kink in the force of each ball, but opposite balls take it out of the
+    motion: the generated folder tells.  Hertz's law always has one.
+    """
+    written = any(name == SWITCHES for name, _ in manifest.files)
+    return written or any(name == "elastic" and word != "twice smooth" for name, word in manifest.smoothness)
+
+
+def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float) -> Kinks:
+    """What a run does at kinks.
+
+    Parameters
+    ----------
+    asked : one of `CHOICES`, None for the default
+    method : name of the method that runs
+    rtol : its tolerance [1]
+
+    Returns
+    -------
+    Kinks
+        By default ``located`` at tight tolerances of ``stepper``, else ``stepped-over``.
+
+    Raises
+    ------
+    RequestError
+        Another word, or kinks are to be located by a method that cannot.
+    """
+    if asked is None:
+        tight = rtol <= tight_below(manifest)
+        return LOCATED if method == "stepper" and tight and has_kinks(manifest) else STEPPED_OVER
+    return check_located(asked, method)
+
+
+def tight_below(manifest: Manifest) -> float:
+    """Tolerance from which on `stepper` locates kinks by itself [1]."""
+    return TIGHT_JUMPS if any(word == "discontinuous" for _, word in manifest.smoothness) else TIGHT
+
+
+def check_located(asked: str, method: str) -> Kinks:
+    """One of `CHOICES` that a method can follow; errors as for `choose_kinks`."""
+    chosen = check_kinks(asked)
+    if chosen == LOCATED and method not in STEPPERS:
+        raise RequestError(
+            f"kinks = {LOCATED!r}: method {method} cannot end its steps on them. Allowed: {', '.join(STEPPERS)}. Take "
+            f"one of these, or leave kinks {STEPPED_OVER}."
+        )
+    return chosen
+
+
+def refuse_with_error(kinks: str | None, error: object) -> None:
+    """Raise `RequestError` where a run to a named error is told what to do at kinks."""
+    if kinks is not None and error is not None:
+        raise RequestError(
+            f"kinks = {kinks!r} and an error were both given: a run to a named error chooses its own way. Leave kinks "
+            "out, or name method and rtol instead of the error."
+        )
+
+
+def stepper_for(model: Model, kinks: Kinks) -> Stepper:
+    """Driver of single runs; errors as for `Model.stepper`."""
+    return model.locating_stepper if kinks == LOCATED and has_kinks(model.manifest) else model.stepper

@@ -1,0 +1,85 @@
+"""Magnitudes of the states of a run, from its most loaded moments (see `ballpass.runtime.run.scales`).
+
+In: a model, numbers, the length of a run.  Out: one magnitude for each state, which tolerances are relative to.  Where
+the stepper runs, its own C finds them; elsewhere Python does, and the rates with them that tell a stiff model.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.stepper import Stepper
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.scales import Scales, find_scales
+from ballpass.runtime.run.segments import segment_edges
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+#: Moments of the run that are looked at for magnitudes: so many between breakpoints, and so many evenly spread.
+MOMENTS = 32
+
+
+def stepper_magnitudes(
+    model: Model,
+    stepper: Stepper,
+    numbers: Numbers,
+    initial: np.ndarray,
+    duration: float,
+    turn: float,
+    edges: np.ndarray | None = None,
+) -> np.ndarray:
+    """Magnitudes as the stepper finds them, shape (states,).
+
+    Parameters
+    ----------
+    stepper : one of the model's
+    initial : state at the start, shape (states,)
+    duration, turn : of the run, and of a turn [s]
+    edges : of the run's segments, where they are known [s]
+    """
+    inputs, horizon = _moments(model, numbers, duration, turn, edges)
+    return stepper.magnitudes(numbers.p, numbers.c, initial, inputs, horizon)
+
+
+def model_scales(model: Model, numbers: Numbers, initial: np.ndarray, duration: float, turn: float) -> Scales:
+    """Magnitudes and stiffness of a run, by Python.
+
+    Parameters
+    ----------
+    initial : state at the start, shape (states,)
+    duration, turn : of the run, and of a turn, infinite where nothing turns [s]
+    """
+    inputs, horizon = _moments(model, numbers, duration, turn)
+    fixed = {"t": 0.0, "p": numbers.p, "c": numbers.c}
+    rhs, jacobian = model.kernel("rhs"), model.kernel("rhs_jac_x")
+    return find_scales(
+        lambda u, x: rhs({**fixed, "u": u, "x": x}),
+        lambda u, x: jacobian({**fixed, "u": u, "x": x}).reshape(len(x), len(x)),
+        list(inputs),
+        initial,
+        horizon,
+        moved_masses(numbers, len(initial) // 2).tolist() if model.manifest.bearing is not None else None,
+    )
+
+
+def moved_masses(numbers: Numbers, coordinates: int) -> np.ndarray:
+    """Mass of each coordinate, shape (coordinates,) [kg]."""
+    inner, outer = numbers.values["bearing.m_ei"], numbers.values.get("bearing.outer_ring.mass", 0.0)
+    return np.array([inner, inner, outer, outer])[:coordinates]
+
+
+def _moments(
+    model: Model, numbers: Numbers, duration: float, turn: float, edges: np.ndarray | None = None
+) -> tuple[np.ndarray, float]:
+    """Inputs at the moments that are looked at, shape (moments, inputs), and the time that bounds travel [s]."""
+    horizon = min(duration, turn)
+    if edges is None:
+        edges = segment_edges(model, numbers, 0.0, duration, turn)
+    middles = 0.5 * (edges[:-1] + edges[1:])
+    picked = middles[np.unique(np.linspace(0, len(middles) - 1, MOMENTS).astype(int))]
+    moments = np.concatenate([picked, horizon * (np.arange(MOMENTS) + 0.5) / MOMENTS])
+    return clock.inputs_over(model.manifest.inputs, numbers.values, moments, moments), horizon

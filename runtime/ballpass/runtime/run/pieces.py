@@ -1,0 +1,107 @@
+"""A run by CasADi's integrators: segment after segment, in pieces that end at samples.
+
+In: a `Trajectory` and an integrator.  Out: the same, filled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.status import Status
+from ballpass.runtime.native.kernel import EvaluationError
+from ballpass.runtime.run.casadi_integrators import Frozen, Integrator
+from ballpass.runtime.run.trajectory import Interrupted, Trajectory
+
+
+def integrate(
+    numbers: Numbers,
+    integrator: Integrator | None,
+    scale: np.ndarray,
+    trajectory: Trajectory,
+    progress: Callable[[float], None] | None = None,
+) -> None:
+    """Fill the samples of `trajectory`; without integrator there are no states, and nothing to fill.
+
+    Parameters
+    ----------
+    scale : error allowed in a step, shape (states,)
+
+    Raises
+    ------
+    Interrupted
+        The integrator could not reach the end.
+    """
+    if integrator is None:
+        trajectory.finished = len(trajectory.t)
+        trajectory.passed = len(trajectory.segments.inputs)
+        return
+    segments, stops = trajectory.segments, trajectory.stops
+    state = trajectory.initial.copy()
+    for k, u in enumerate(segments.inputs):
+        frozen = Frozen(scale=scale, u=u, p=numbers.p, c=numbers.c)
+        interval = (float(segments.times[k]), float(segments.times[k + 1]))
+        trajectory.passed = k + 1
+        state = _segment(integrator, frozen, trajectory, state, interval, (int(stops[k]), int(stops[k + 1])))
+        if progress is not None:
+            progress((interval[1] - trajectory.begin) / (trajectory.end - trajectory.begin))
+
+
+def _segment(
+    integrator: Integrator,
+    frozen: Frozen,
+    trajectory: Trajectory,
+    state: np.ndarray,
+    interval: tuple[float, float],
+    samples: tuple[int, int],
+) -> np.ndarray:
+    """Integrate over one segment; the state at its end."""
+    left, right = interval
+    k, stop = samples
+    times, near = trajectory.t, trajectory.near
+    now = left
+
+    def go(until: float, intervals: int) -> np.ndarray:
+        nonlocal now, state
+        trajectory.calls += 1
+        try:
+            block = integrator.advance(state, now - left, until - now, intervals, frozen)
+        except EvaluationError as fault:
+            raise Interrupted(Status.INTEGRATOR_FAILED, now, str(fault)) from fault
+        if not np.isfinite(block).all():
+            raise Interrupted(Status.NOT_FINITE, now, "")
+        now, state = until, block[-1]
+        return block
+
+    def fill(size: int) -> None:
+        """The next `size` samples, which one call can take."""
+        nonlocal k
+        last = float(times[k + size - 1])
+        if last > now + near:
+            trajectory.x[k : k + size] = go(last, size)
+        else:
+            trajectory.x[k : k + size] = state
+        k += size
+        trajectory.finished = k
+
+    if k < stop:
+        if times[k] > now + near:
+            go(float(times[k]), 1)
+        trajectory.x[k] = state
+        k += 1
+        trajectory.finished = k
+        # within a piece the samples lie evenly
+        for size in integrator.pieces(stop - k) if trajectory.even else [1] * (stop - k):
+            try:
+                fill(size)
+            except Interrupted:
+                if size == 1:
+                    raise
+                # a call that fails gives nothing: walk through it again, to keep the samples before its failure
+                for _ in range(size):
+                    fill(1)
+    if right > now + near:
+        go(right, 1)
+    return state

@@ -1,0 +1,292 @@
+"""What a run is asked for, checked: length, sample times, tolerance, outputs, state at the start.
+
+In: a `Request` as the user gave it.  Out: a `Plan` without open questions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers, real, unknown_name, vector
+from ballpass.runtime.run import inputs as clock
+
+if TYPE_CHECKING:
+    from ballpass.runtime.contract import Manifest, RunInfo
+    from ballpass.runtime.model import Model
+
+#: Smallest and largest relative tolerance [1].
+TOLERANCES = (1e-13, 1e-1)
+
+#: Most numbers that the samples of a run may hold, its derivatives, or its segments: 4 GiB.
+MAX_NUMBERS = 2**29
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What to simulate; None takes the scene's run settings.
+
+    Attributes
+    ----------
+    cycles, duration : turns of the driver or shaft, or time [s]; one of them
+    method : a name of a method, or "auto"
+    rtol : relative tolerance [1]
+    sensitivity_rtol : that of the derivatives, where a run has some; None lets the states alone choose the steps [1]
+    samples_per_cycle : samples in a turn; in the whole run where nothing turns
+    times : sample times instead, increasing, shape (samples,) [s]
+    outputs : names of the outputs to evaluate; None: all of the scene
+    initial : state at the start, shape (states,)
+    transient_cycles : turns at the start that `Solution.steady` leaves out
+    kinks : "stepped-over" or "located"; None: as the tolerance is
+    progress : called with the finished fraction of the run
+    """
+
+    cycles: float | None = None
+    duration: float | None = None
+    method: str | None = None
+    rtol: float | None = None
+    sensitivity_rtol: float | None = None
+    samples_per_cycle: int | None = None
+    times: Sequence[float] | np.ndarray | None = None
+    outputs: Sequence[str] | None = None
+    initial: np.ndarray | None = None
+    transient_cycles: float | None = None
+    kinks: str | None = None
+    progress: Callable[[float], None] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plan:
+    """A request with all that it left to the scene filled in.
+
+    Attributes
+    ----------
+    turn : time of a turn, infinite where nothing turns [s]
+    duration : length of the run [s]
+    times : of the samples, increasing, from 0 to `duration`, shape (samples,) [s]
+    even : whether they are the ends of equal intervals of the whole run
+    rtol, sensitivity_rtol : relative tolerances [1]
+    outputs : names of the outputs to evaluate
+    initial : state at the start, shape (states,)
+    transient_cycles : turns at the start that `Solution.steady` leaves out
+    """
+
+    turn: float
+    duration: float
+    times: np.ndarray
+    even: bool
+    rtol: float
+    sensitivity_rtol: float | None
+    outputs: tuple[str, ...]
+    initial: np.ndarray
+    transient_cycles: float
+
+
+def make_plan(model: Model, numbers: Numbers, request: Request) -> Plan:
+    """Check a request and fill it in from the scene's run settings.
+
+    Raises
+    ------
+    RequestError
+        What was asked for is wrong, with what is allowed.
+    """
+    run = model.manifest.run
+    turn = clock.period(model.manifest, numbers.values)
+    transient = run.transient_cycles if request.transient_cycles is None else real(request.transient_cycles)
+    if not 0.0 <= transient < math.inf:
+        raise RequestError(f"transient: a number of cycles from 0 on is expected, not {request.transient_cycles!r}.")
+    outputs = output_names(model, request.outputs)
+    duration, times = _sample_times(model, request, turn, outputs)
+    return Plan(
+        turn=turn,
+        duration=duration,
+        times=times,
+        even=request.times is None,
+        rtol=tolerance("rtol", run.rtol if request.rtol is None else request.rtol),
+        sensitivity_rtol=(
+            None if request.sensitivity_rtol is None else tolerance("sensitivity_rtol", request.sensitivity_rtol)
+        ),
+        outputs=outputs,
+        initial=start_state(model, numbers, request.initial),
+        transient_cycles=transient,
+    )
+
+
+def _sample_times(model: Model, request: Request, turn: float, outputs: Sequence[str]) -> tuple[float, np.ndarray]:
+    """Length of the run, and the times of its samples."""
+    if request.times is None:
+        duration = run_length(model, request, turn)
+        per_cycle = _whole("samples_per_cycle", request.samples_per_cycle, model.manifest.run.samples_per_cycle)
+        count = max(1, round(per_cycle * duration / turn)) if math.isfinite(turn) else per_cycle
+        _check_memory(model, count, outputs)
+        return duration, duration * (np.arange(count + 1) / count)
+    if request.samples_per_cycle is not None:
+        raise RequestError(
+            f"samples_per_cycle = {request.samples_per_cycle!r} and times were both given: give one of them."
+        )
+    times = vector(request.times)
+    if times.ndim != 1 or not times.size or not np.all(np.isfinite(times)):
+        raise RequestError(
+            f"times: one or more finite times [s] in a row are expected, not an array of shape {times.shape}"
+            f"{' with NaN or inf' if times.size and not np.all(np.isfinite(times)) else ''}."
+        )
+    falls = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(falls):
+        k = int(falls[0])
+        raise RequestError(
+            f"times: they must increase, but {float(times[k + 1])!r} s follows {float(times[k])!r} s "
+            f"(places {k} and {k + 1}). Sort them, each once: numpy.unique does."
+        )
+    if request.cycles is None and request.duration is None:
+        duration = float(times[-1])
+        if not duration > 0.0:
+            raise RequestError(
+                f"times: the run ends at the last one, which must be above 0 s, not {duration!r}. Or give cycles."
+            )
+    else:
+        duration = run_length(model, request, turn)
+        if times[-1] > duration * (1.0 + clock.TIME_RESOLUTION):
+            raise RequestError(
+                f"times: the run ends at {duration!r} s, and {float(times[-1])!r} s lies behind it. Run longer, or "
+                "leave cycles and duration out: the run then ends at the last time."
+            )
+    if times[0] < 0.0:
+        raise RequestError(
+            f"times: the run starts at 0 s, and {float(times[0])!r} s lies before it. Leave earlier times out."
+        )
+    _check_memory(model, len(times), outputs)
+    return duration, times
+
+
+def _check_memory(model: Model, count: int, outputs: Sequence[str]) -> None:
+    wanted = set(outputs)
+    columns = len(model.states) + sum(info.size for info in model.manifest.outputs if info.name in wanted)
+    columns += len(model.manifest.inputs)
+    check_memory(
+        f"{count} samples of",
+        count,
+        columns,
+        "Take fewer samples a cycle or a shorter run, or keep extremes and means only: `Model.reduce` runs any number "
+        "of cycles without samples.",
+    )
+
+
+def check_memory(what: str, rows: float, columns: int, remedy: str) -> None:
+    """Refuse what would hold more than `MAX_NUMBERS`, before there is memory for any of it.
+
+    Parameters
+    ----------
+    what : words for the rows, which "... numbers would not fit into memory" follows
+    rows : how many there would be; may be infinite
+    columns : numbers of a row
+    remedy : what to do instead
+
+    Raises
+    ------
+    RequestError
+        It would not fit.
+    """
+    if not rows * columns <= MAX_NUMBERS:
+        raise RequestError(f"{what} {columns} numbers would not fit into memory. {remedy}")
+
+
+def output_names(model: Model, asked: Sequence[str] | None) -> tuple[str, ...]:
+    """Names of outputs, each once; None: all of the scene.
+
+    Raises
+    ------
+    RequestError
+        There is no such output.
+    """
+    if asked is None:
+        return model.outputs
+    names = (asked,) if isinstance(asked, str) else tuple(dict.fromkeys(asked))
+    faults = [no_output(model.manifest, name, model.outputs) for name in names if name not in model.outputs]
+    if faults:
+        raise RequestError("\n".join(faults))
+    return names
+
+
+def no_output(manifest: Manifest, name: object, known: Sequence[str], what: str = "output") -> str:
+    """Why a name is no output, and what to do: the scene may not ask for it, or there is no such thing.
+
+    Parameters
+    ----------
+    known : the names to choose from
+    what : word for them
+    """
+    if any(name == info.name for info in manifest.quantities):
+        part, dot, _ = str(name).rpartition(".")
+        return (
+            f'{name!r} is not among this scene\'s run.outputs: add "{f"{part}.*" if dot else name}" there; the model '
+            "is then derived anew."
+        )
+    return f"{unknown_name(what, name, known)} The scene's run.outputs says which are computed."
+
+
+def asked_length(run: RunInfo, cycles: float | None, duration: float | None) -> tuple[float | None, float | None]:
+    """Turns or time [s] to run, one of them None: as given, else as the scene's run settings say.
+
+    Raises
+    ------
+    RequestError
+        Both were given, or one that is no number above 0.
+    """
+    if cycles is not None and duration is not None:
+        raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
+    if cycles is None and duration is None:
+        cycles, duration = run.cycles, run.duration
+    if cycles is not None:
+        if not 0.0 < real(cycles) < math.inf:
+            raise RequestError(f"cycles: a number above 0 is expected, not {cycles!r:.80}.")
+        return float(cycles), None
+    if duration is None or not 0.0 < real(duration) < math.inf:
+        raise RequestError(f"duration: a time above 0 s is expected, not {duration!r:.80}.")
+    return None, float(duration)
+
+
+def run_length(model: Model, request: Request, turn: float) -> float:
+    """Length of the run that is asked for [s]; RequestError as for `asked_length`, or for turns of what never turns."""
+    cycles, duration = asked_length(model.manifest.run, request.cycles, request.duration)
+    if duration is not None:
+        return duration
+    assert cycles is not None
+    if not math.isfinite(turn):
+        raise RequestError("cycles: nothing turns in this model (its speed is zero). Give duration in seconds.")
+    return cycles * turn
+
+
+def start_state(model: Model, numbers: Numbers, given: np.ndarray | None) -> np.ndarray:
+    """State at the start, shape (states,): as given, else from the parameters; RequestError for another shape."""
+    if given is None:
+        return np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
+    names = [state.name for state in model.manifest.states]
+    initial = vector(given)
+    if initial.shape != (len(names),) or not np.all(np.isfinite(initial)):
+        raise RequestError(
+            f"initial: {len(names)} finite numbers are expected ({', '.join(names)}), "
+            f"not an array of shape {initial.shape}{'' if np.all(np.isfinite(initial)) else ' with NaN or inf'}."
+        )
+    return initial
+
+
+def tolerance(name: str, given: float) -> float:
+    """A relative tolerance that the methods can keep [1]; RequestError for one beyond `TOLERANCES`."""
+    rtol = real(given)
+    if not TOLERANCES[0] <= rtol <= TOLERANCES[1]:
+        raise RequestError(
+            f"{name}: a number from {TOLERANCES[0]:g} to {TOLERANCES[1]:g} is expected, not {given!r:.80}."
+        )
+    return rtol
+
+
+def _whole(name: str, given: int | None, default: int) -> int:
+    value = default if given is None else given
+    if not (1.0 <= real(value) < math.inf and int(value) == value):
+        raise RequestError(f"{name}: a whole number from 1 on is expected, not {value!r:.80}.")
+    return int(value)

@@ -1,0 +1,143 @@
+"""Into which segments a run falls: split where a load switches and at every whole turn.
+
+In: a model, numbers, an interval of time.  Out: edges, and the inputs that hold between them.  Within a segment gates
+and slopes are constant and the phases are taken anew at its start, so that angles stay small in the thousandth turn as
+well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ballpass.runtime.contract import InputInfo
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.stepper import Segments
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.request import check_memory
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+
+
+#: Largest angle that a phase may reach within a segment [rad]: sines of larger ones lose digits.
+LARGEST_PHASE = 1e6
+
+#: Numbers that a segment takes besides its inputs while segments are made: ends, middles, jumps, samples.
+WORK = 5
+
+
+def time_resolution(begin: float, end: float, turn: float) -> float:
+    """Times of a run closer than this are one time [s].  It does not depend on how the run is sampled."""
+    return clock.TIME_RESOLUTION * max(abs(begin), abs(end), turn if math.isfinite(turn) else 0.0)
+
+
+def segment_edges(model: Model, numbers: Numbers, begin: float, end: float, turn: float) -> np.ndarray:
+    """Begin, breakpoints, whole turns and end, increasing, none twice, shape (segments + 1,) [s].
+
+    Raises
+    ------
+    RequestError
+        They would not fit into memory, or the times of a table do not increase.
+    """
+    check_count(model.manifest.inputs, numbers, end - begin, turn)
+    cuts = clock.breakpoints(model.manifest.inputs, numbers.values, begin, end)
+    if math.isfinite(turn):
+        near = time_resolution(begin, end, turn)
+        whole = turn * np.arange(math.floor(begin / turn) + 1, math.ceil(end / turn))
+        whole = whole[(begin + near < whole) & (whole < end - near)]
+        # a turn that meets a breakpoint is that breakpoint
+        fenced = np.concatenate([[-math.inf], cuts, [math.inf]])
+        right = np.searchsorted(fenced, whole)
+        free = (fenced[right] - whole > near) & (whole - fenced[right - 1] > near)
+        cuts = np.sort(np.concatenate([cuts, whole[free]]))
+    return _short_of_rounding(model.manifest.inputs, numbers, np.concatenate([[begin], cuts, [end]]))
+
+
+def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, turn: float, columns: int = WORK) -> None:
+    """Refuse a time with more segments than fit into memory: the most that there can be, before any is made.
+
+    Parameters
+    ----------
+    length, turn : of the time, and of a turn, infinite where nothing turns [s]
+    columns : numbers that a segment takes besides its inputs
+
+    Raises
+    ------
+    RequestError
+        They would not fit.
+    """
+    count = 1.0 + length / turn + length * _fastest(inputs, numbers) / LARGEST_PHASE
+    for item in inputs:
+        if item.kind == "gate":
+            count += 2.0 * len(item.windows) * (1.0 + length * abs(numbers.values[item.rate]) / clock.TURN)
+        else:
+            count += len(item.times)
+    check_memory(
+        f"Up to {count:.10g} segments, cut where a load switches and at every whole turn, of",
+        count,
+        len(inputs) + columns,
+        "Take a shorter run, or slower loads; `Model.reduce` makes the segments of a few turns at a time.",
+    )
+
+
+def _fastest(inputs: Sequence[InputInfo], numbers: Numbers) -> float:
+    """Rate of the fastest phase [rad/s]."""
+    return max((abs(numbers.values[item.rate]) for item in inputs if item.kind == "phase"), default=0.0)
+
+
+def _short_of_rounding(inputs: Sequence[InputInfo], numbers: Numbers, edges: np.ndarray) -> np.ndarray:
+    """The edges, and more where a phase would get beyond `LARGEST_PHASE` between two: a fast load on a slow shaft."""
+    fastest = _fastest(inputs, numbers)
+    parts = np.ceil(np.diff(edges) * fastest / LARGEST_PHASE)
+    if not np.any(parts > 1.0) or not np.all(np.isfinite(parts)):
+        return edges
+    pieces = [
+        np.linspace(a, b, int(n) + 1)[:-1]
+        for a, b, n in zip(edges[:-1], edges[1:], np.maximum(parts, 1.0), strict=True)
+    ]
+    return np.concatenate([*pieces, edges[-1:]])
+
+
+def make_segments(
+    inputs: Sequence[InputInfo], numbers: Numbers, edges: np.ndarray, before: Segments | None = None
+) -> Segments:
+    """Segments between edges, with the inputs that hold in them and where a load jumps.
+
+    Parameters
+    ----------
+    edges : shape (segments + 1,), increasing [s]
+    before : segments that end where these begin; None: the run begins there
+    """
+    u = clock.inputs_over(inputs, numbers.values, edges[:-1], 0.5 * (edges[:-1] + edges[1:]))
+    switching = [k for k, info in enumerate(inputs) if info.kind != "phase"]
+    jumps = np.ones(len(u), dtype=bool)
+    jumps[1:] = np.any(np.diff(u[:, switching], axis=0) != 0.0, axis=1)
+    if before is not None:
+        jumps[0] = not np.array_equal(before.inputs[-1, switching], u[0, switching])
+    return Segments(times=edges, inputs=u, restarts=jumps)
+
+
+def part_of(segments: Segments, first: int, last: int) -> Segments:
+    """Segments `first` ... `last`, the last one excluded."""
+    return Segments(
+        times=segments.times[first : last + 1],
+        inputs=segments.inputs[first:last],
+        restarts=segments.restarts[first:last],
+    )
+
+
+def rest_of(segments: Segments, time: float, inputs: Sequence[InputInfo], numbers: Numbers) -> Segments | None:
+    """What is left of segments at a time within them; no load jumps there.  None where nothing is left."""
+    k = int(np.searchsorted(segments.times, time, side="right")) - 1
+    if k >= len(segments.inputs):
+        return None
+    middle = 0.5 * (segments.times[k] + segments.times[k + 1])
+    left = part_of(segments, k, len(segments.inputs))
+    times, u, restarts = left.times.copy(), left.inputs.copy(), left.restarts.copy()
+    times[0], restarts[0] = time, False
+    u[0] = clock.inputs_at(inputs, numbers.values, time, float(middle))
+    return Segments(times=times, inputs=u, restarts=restarts)

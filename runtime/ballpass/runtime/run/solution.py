@@ -1,0 +1,304 @@
+"""What a simulation gives: samples of states and outputs, with all that is needed to read them later."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ballpass.runtime.contract import Manifest, VariableInfo
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.status import Status
+from ballpass.runtime.run.request import no_output
+
+if TYPE_CHECKING:
+    import xarray
+
+    from ballpass.runtime.certify.error_target import Accuracy
+
+#: Number of the layout of saved files.
+FILE_SCHEMA = 1
+
+#: What stands behind the data of a saved file, which HDF5 does not look at: the digest of all bytes before it.  The
+#: HDF5 library may end the process, or give other numbers, where bytes of a file have changed; so they are checked
+#: first.
+_SEAL = b"\nballpass sha256 "
+_SEAL_LENGTH = len(_SEAL) + 64 + 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Statistics:
+    """How a solution came about.
+
+    Attributes
+    ----------
+    method : the integrator that ran, and `reason` why
+    rtol : relative tolerance, and `magnitudes` of the states it refers to
+    steps, rejected : accepted and rejected steps; None where the integrator does not tell (CasADi's in C do not)
+    segments : intervals between breakpoints, integrated one by one
+    calls : calls of the integrator
+    wall_time : time the simulation took [s]
+    compiled : whether generated C ran, else CasADi's virtual machine
+    kinks : "stepped-over" or "located"; None for methods that do not know the kinks of the laws
+    located : kinks located, None where they are stepped over
+    initial : state at its start; None where an earlier version wrote the solution
+    duration : length of the run, which may end behind the last sample [s]; None as above
+    """
+
+    method: str
+    reason: str
+    rtol: float
+    magnitudes: tuple[float, ...]
+    steps: int | None
+    rejected: int | None
+    segments: int
+    calls: int
+    wall_time: float
+    compiled: bool
+    kinks: str | None = None
+    located: int | None = None
+    initial: tuple[float, ...] | None = None
+    duration: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solution:
+    """Samples of a simulation, in SI.
+
+    ``solution["inner.y"]`` is an output or a state by name: shape (samples,), or (samples, balls).
+
+    Attributes
+    ----------
+    t : times, increasing, not always evenly spaced, shape (samples,) [s]
+    x : states, shape (samples, states), in the order of the manifest
+    outputs : output name to samples; at a breakpoint, the value behind it
+    parameters, constants : numbers of the run by name
+    cycle_length : time of one turn [s]; None where nothing turns
+    transient_cycles : turns at the start that `steady` leaves out
+    manifest : names, units and descriptions
+    statistics : how the solution came about
+    status : how the simulation ended
+    accuracy : what was asked, chosen and estimated, where an error was named instead of a method
+    """
+
+    t: np.ndarray
+    x: np.ndarray
+    outputs: Mapping[str, np.ndarray]
+    parameters: Mapping[str, float]
+    constants: Mapping[str, float]
+    cycle_length: float | None
+    transient_cycles: float
+    manifest: Manifest
+    statistics: Statistics
+    status: Status
+    accuracy: Accuracy | None = None
+
+    def __post_init__(self) -> None:
+        for array in (self.t, self.x, *self.outputs.values()):
+            array.flags.writeable = False
+        for name in ("outputs", "parameters", "constants"):
+            object.__setattr__(self, name, dict(getattr(self, name)))
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name in self.outputs:
+            return self.outputs[name]
+        names = self.states
+        if name in names:
+            return self.x[:, names.index(name)]
+        if any(name == info.name for info in self.manifest.outputs):
+            raise RequestError(
+                f"{name!r} was not kept in this run: name it in simulate(outputs=...), or leave outputs away to keep "
+                "all."
+            )
+        known = tuple(dict.fromkeys((*self.outputs, *names)))
+        raise RequestError(no_output(self.manifest, name, known, "output or state"))
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.outputs or name in self.states
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        span = f"{self.t[0]:.6g} ... {self.t[-1]:.6g} s" if len(self.t) else "no samples"
+        return (
+            f"Solution({self.manifest.scene}: {len(self.t)} samples, {span}; {self.statistics.method}, "
+            f"rtol {self.statistics.rtol:g}; {self.status.name.lower()}; outputs: {', '.join(self.outputs) or 'none'})"
+        )
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the samples, which is about the size of the file that `save` writes."""
+        return sum(array.nbytes for array in (self.t, self.x, *self.outputs.values()))
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the columns of `x`."""
+        return tuple(state.name for state in self.manifest.states)
+
+    def steady(self) -> Solution:
+        """The samples behind the transient cycles; times are kept.
+
+        Raises
+        ------
+        RequestError
+            Nothing turns, or the simulation ended within the transient cycles.
+        """
+        if self.transient_cycles == 0.0:
+            return self
+        if self.cycle_length is None:
+            raise RequestError("Transient cycles are turns, and nothing turns in this run: set transient to 0.")
+        start = self.transient_cycles * self.cycle_length
+        keep = self.t >= start * (1.0 - 1e-12)
+        if np.count_nonzero(keep) < 2:
+            last = self.t[-1] if len(self.t) else 0.0
+            raise RequestError(
+                f"The run of {last / self.cycle_length:g} cycles lies within its {self.transient_cycles:g} transient "
+                "cycles: nothing is left. Simulate more cycles, or set fewer transient ones."
+            )
+        outputs = {name: samples[keep] for name, samples in self.outputs.items()}
+        return replace(self, t=self.t[keep], x=self.x[keep], outputs=outputs)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions."""
+        import xarray
+
+        variables: dict[str, Any] = {}
+        for k, state in enumerate(self.manifest.states):
+            variables[state.name] = ("time", self.x[:, k], _attributes(state))
+        infos = {info.name: info for info in self.manifest.outputs}
+        balls = 0
+        for name, samples in self.outputs.items():
+            if samples.ndim == 2:
+                balls = samples.shape[1]
+            variables[name] = (("time", "ball")[: samples.ndim], samples, _attributes(infos[name]))
+        coordinates: dict[str, Any] = {"time": ("time", self.t, {"units": "s", "long_name": "time"})}
+        if balls:
+            coordinates["ball"] = ("ball", np.arange(1, balls + 1), {"units": "1", "long_name": "number of the ball"})
+        facts = {
+            "title": self.manifest.title,
+            "scene": self.manifest.scene,
+            "status": self.status.name,
+            "ballpass_schema": FILE_SCHEMA,
+            "ballpass_parameters": json.dumps(dict(self.parameters)),
+            "ballpass_constants": json.dumps(dict(self.constants)),
+            "ballpass_run": json.dumps({"cycle_length": self.cycle_length, "transient_cycles": self.transient_cycles}),
+            "ballpass_outputs": json.dumps(list(self.outputs)),
+            "ballpass_statistics": json.dumps(asdict(self.statistics)),
+            "ballpass_manifest": self.manifest.to_json(),
+        }
+        return xarray.Dataset(variables, coords=coordinates, attrs=facts)
+
+    def save(self, path: str | Path) -> Path:
+        """Write NetCDF-4: the old file or the new one, never half of it.  `load_solution` reads it back.
+
+        Raises
+        ------
+        RequestError
+            The folder does not exist or cannot be written, or the disk is full.
+        """
+        target = Path(path)
+        try:
+            descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}-", suffix=".nc")
+        except OSError as fault:
+            raise RequestError(
+                f"{target}: cannot be written ({fault.strerror}). Give a folder you may write."
+            ) from fault
+        os.close(descriptor)
+        try:
+            # in memory first: a disk that is full fails in one plain write, not somewhere within HDF5
+            content = bytes(self.to_xarray().to_netcdf(engine="h5netcdf"))
+            with open(temporary, "wb") as stream:
+                stream.write(content)
+                stream.write(_SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n")
+            mask = os.umask(0)
+            os.umask(mask)
+            os.chmod(temporary, 0o666 & ~mask)
+            os.replace(temporary, target)
+        except OSError as fault:
+            Path(temporary).unlink(missing_ok=True)
+            raise RequestError(
+                f"{target}: cannot be written ({fault.strerror or fault}); a file that was there is as it was. Free "
+                "some space, or give another folder."
+            ) from fault
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
+        return target
+
+
+def load_solution(path: str | Path) -> Solution:
+    """Read a solution that `Solution.save` wrote.
+
+    Raises
+    ------
+    RequestError
+        There is no such file, it is none of ours, or it was cut short or edited.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except FileNotFoundError:
+        raise RequestError(f"{path}: there is no such file. `Solution.save` and `ballpass run` write one.") from None
+    except (OSError, ValueError) as fault:  # a folder, no permission; no path
+        raise RequestError(
+            f"{path}: cannot be read ({getattr(fault, 'strerror', None) or fault}). A file that `Solution.save` or "
+            "`ballpass run` wrote is expected."
+        ) from None
+    return read_bytes(path, content)
+
+
+def read_bytes(path: str | Path, content: bytes) -> Solution:
+    """Solution from the bytes of a file; errors as for `load_solution`."""
+    inner, seal = content[:-_SEAL_LENGTH], content[-_SEAL_LENGTH:]
+    if seal != _SEAL + hashlib.sha256(inner).hexdigest().encode() + b"\n":
+        ours = content.startswith(b"\x89HDF")
+        what = "the digest at its end does not fit its content" if ours else "not a NetCDF-4 file"
+        raise RequestError(
+            f"{path}: {what}: cut short, edited, or written by something else than `Solution.save` of this version. "
+            "Give a file that it wrote, or run the scene again."
+        )
+    return _read(path, inner)
+
+
+def _read(path: str | Path, content: bytes) -> Solution:
+    """Solution from the bytes of a file that nobody has touched."""
+    import xarray
+
+    with xarray.open_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False) as stored:
+        dataset = stored.load()
+    facts = dataset.attrs
+    schema = facts.get("ballpass_schema")
+    if schema is None or int(schema) != FILE_SCHEMA:
+        raise RequestError(
+            f"{path}: layout {schema!r} was found, this version reads layout {FILE_SCHEMA}. Run the scene again."
+        )
+    manifest = Manifest.from_json(facts["ballpass_manifest"], source=f"{path}, manifest")
+    statistics = json.loads(facts["ballpass_statistics"])
+    statistics["magnitudes"] = tuple(statistics["magnitudes"])
+    if statistics.get("initial") is not None:
+        statistics["initial"] = tuple(statistics["initial"])
+    columns = [np.asarray(dataset[state.name].values) for state in manifest.states]
+    t = np.asarray(dataset["time"].values)
+    return Solution(
+        t=t,
+        x=np.stack(columns, axis=1) if columns else np.zeros((len(t), 0)),
+        outputs={name: np.asarray(dataset[name].values) for name in json.loads(facts["ballpass_outputs"])},
+        parameters=json.loads(facts["ballpass_parameters"]),
+        constants=json.loads(facts["ballpass_constants"]),
+        manifest=manifest,
+        statistics=Statistics(**statistics),
+        status=Status[facts["status"]],
+        **json.loads(facts["ballpass_run"]),
+    )
+
+
+def _attributes(info: VariableInfo) -> dict[str, str]:
+    return {"units": info.unit, "long_name": info.description}

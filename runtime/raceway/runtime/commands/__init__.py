@@ -1,1 +1,0 @@
-"""The commands of ``raceway``, a module each."""

@@ -1,1 +1,0 @@
-"""What a generated folder needs to run: compiled libraries, functions without overhead, export to plain C."""

@@ -1,1 +1,0 @@
-"""Integration of a model over time: segments, steps, samples, reductions."""
