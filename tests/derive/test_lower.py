@@ -10,8 +10,7 @@ import pytest
 import sympy as sp
 
 from ballpass.derive import derive
-from ballpass.derive.lower.functions import functions as lower
-from ballpass.derive.lower.functions import operations
+from ballpass.derive.lower.functions import lower, operations
 from ballpass.derive.lower.visitor import Visitor
 from ballpass.derive.scene.read import scene_from_text
 from ballpass.derive.system import System

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ballpass.derive import derive
-from ballpass.derive.lower.functions import functions as lower
+from ballpass.derive.lower.functions import lower
 from ballpass.derive.scene.read import scene_from_text
 from ballpass.runtime import Model
 

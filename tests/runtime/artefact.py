@@ -186,7 +186,7 @@ def manifest(
         )
         if mechanism
         else None,
-        bearing=None,
+        bearings=(),
         run=mf.RunInfo(
             cycles=3.0, duration=None, transient_cycles=1.0, samples_per_cycle=200, method="auto", rtol=1e-8
         ),

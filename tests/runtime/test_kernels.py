@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from ballpass.derive import derive, generate
-from ballpass.derive.lower.functions import Functions
-from ballpass.derive.lower.functions import functions as lower
+from ballpass.derive.lower.functions import Functions, lower
 from ballpass.derive.scene.read import scene_from_text
 from ballpass.derive.system import System
 from ballpass.runtime.native.compile import compile_sources, find_compiler

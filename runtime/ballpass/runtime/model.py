@@ -5,29 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
-import casadi
 import numpy as np
 
 from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.named_error import Models, simulate_to_error
-from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
-from ballpass.runtime.certify.quasi_static import QuasiStatic
 from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.contract.folders import LOOKS
-from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters, vector
+from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
 from ballpass.runtime.many.members import Table
 from ballpass.runtime.native.compile import CompiledLibrary, compile_model
-from ballpass.runtime.native.drivers import Drivers
-from ballpass.runtime.native.ensemble_driver import EnsembleDriver
-from ballpass.runtime.native.functions import Functions
-from ballpass.runtime.native.kernel import Array, Kernel
-from ballpass.runtime.native.loops import PointLoop
-from ballpass.runtime.native.stepper import METHODS as STEPPERS
-from ballpass.runtime.native.stepper import Stepper
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.evaluate import checked_time, evaluate_point
 from ballpass.runtime.point.explain import Explanation, explain
@@ -35,12 +26,11 @@ from ballpass.runtime.point.jacobian import jacobian
 from ballpass.runtime.point.jacobian_function import JacobianFunction
 from ballpass.runtime.point.second_derivatives import hessian
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.casadi_integrators import available_methods
 from ballpass.runtime.run.locating import Kinks, refuse_with_error
 from ballpass.runtime.run.reductions import Reductions, reduce_run
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.sensitivity import Sensitivities, refuse_located, sensitivities
-from ballpass.runtime.run.simulate import simulate
+from ballpass.runtime.run.simulate import method_names, simulate
 
 if TYPE_CHECKING:
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport
@@ -85,7 +75,7 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     return Model(place, manifest, library, compiler=compiler)
 
 
-class Model:
+class Model(LoadedModel):
     """Functions of one scene with their names, units and defaults.  All numbers are SI.
 
     For any number of threads at once, with the bits of calls one after the other.  What `kernel` and `loop` give
@@ -100,121 +90,13 @@ class Model:
     def __init__(
         self, folder: Path, manifest: Manifest, library: CompiledLibrary | None, *, compiler: str | None = None
     ) -> None:
-        self.manifest = manifest
-        self.library = library
-        self._functions = Functions(folder, manifest, library, compiler)
-        self._drivers = Drivers(folder, manifest, compiler, compiled=library is not None)
+        super().__init__(folder, manifest, library, compiler=compiler)
         self._assembled = b""  # parameters whose linkage was looked at last
-
-    def __repr__(self) -> str:
-        how = "compiled" if self.compiled else "in CasADi's virtual machine"
-        return (
-            f"Model({self.manifest.scene}: {len(self.states)} states, {len(self.manifest.parameters)} parameters, "
-            f"{len(self.outputs)} outputs, {how})"
-        )
-
-    @property
-    def compiled(self) -> bool:
-        """Whether generated C runs."""
-        return self.library is not None
-
-    @property
-    def parameters(self) -> Parameters:
-        """Names and defaults; prints as a table with units and descriptions."""
-        return resolve_parameters(self.manifest, None)
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names of the states: positions, then velocities."""
-        return tuple(state.name for state in self.manifest.states)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the outputs."""
-        return tuple(output.name for output in self.manifest.outputs)
 
     @property
     def methods(self) -> tuple[str, ...]:
         """Integration methods of this model, besides ``auto``."""
-        return (*((*STEPPERS, QUASI_STATIC) if self.has_stepper else ()), *available_methods(self))
-
-    @property
-    def has_stepper(self) -> bool:
-        """Whether the folder brings the kernels of the project's own stepper, and a compiler made code of the rest."""
-        return self._drivers.available
-
-    @property
-    def stepper(self) -> Stepper:
-        """The project's own stepper, compiled when first asked for.
-
-        Raises
-        ------
-        RequestError
-            There is no compiler, or the folder brings no kernels.
-        CompileError
-            The compiler failed.
-        """
-        return self._drivers.stepper
-
-    @property
-    def differentiating_stepper(self) -> Stepper:
-        """The stepper with the derivatives of its steps, compiled when first asked for; errors as for `stepper`."""
-        return self._drivers.differentiating_stepper
-
-    @property
-    def locating_stepper(self) -> Stepper:
-        """The stepper whose steps end on kinks of the laws, compiled when first asked for; errors as for `stepper`."""
-        return self._drivers.locating_stepper
-
-    @property
-    def ensemble_driver(self) -> EnsembleDriver:
-        """The driver of ensembles and reductions, compiled when first asked for; errors as for `stepper`."""
-        return self._drivers.ensemble
-
-    @property
-    def quasi_static(self) -> QuasiStatic:
-        """The driver of the quasi-static model, compiled when first asked for; errors as for `stepper`."""
-        return self._drivers.quasi_static
-
-    def has(self, name: str) -> bool:
-        """Whether the model has a function of that name."""
-        return self._functions.has(name)
-
-    def function(self, name: str) -> casadi.Function:
-        """CasADi function by name, compiled if possible.
-
-        Raises
-        ------
-        RequestError
-            The model has no such function.
-        """
-        return self._functions.function(name)
-
-    def kernel(self, name: str) -> Kernel:
-        """Function by name on memory of its own: ``kernel({"t": 0.0, "x": x, ...})`` costs microseconds."""
-        return self._functions.kernel(name)
-
-    def loop(self, name: str, varying: tuple[str, ...]) -> PointLoop:
-        """Function by name for many points at once; `varying` names the inputs that change between them."""
-        return self._functions.loop(name, varying)
-
-    def sample_outputs(
-        self, count: int, values: Mapping[str, Any], names: Sequence[str], *, lean: bool
-    ) -> dict[str, Array]:
-        """Outputs at many points (see `ballpass.runtime.native.functions`)."""
-        return self._functions.sample_outputs(count, values, names, lean=lean)
-
-    def symbolic(self, name: str) -> casadi.Function:
-        """CasADi function by name as an expression graph, which can be differentiated further."""
-        return self._functions.symbolic(name)
-
-    def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function:
-        """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `integrators`)."""
-        return self._functions.virtual_integrator(plugin, intervals)
-
-    def numbers(self, parameters: Mapping[str, float] | None = None) -> Numbers:
-        """Parameters with overrides, checked, and the derived constants that follow."""
-        return numbers_of(self.manifest, parameters, lambda p: self.kernel("constants")({"p": p}))
+        return method_names(self)
 
     def _runnable(self, parameters: Mapping[str, float] | None) -> Numbers:
         """Numbers of a run whose linkage can be assembled; what was looked at last is not looked at again."""

@@ -296,7 +296,7 @@ def _manifest(system: System, functions: Functions, files: tuple[tuple[str, str]
         ),
         smoothness=tuple((name, s.value) for name, s in system.smoothness),
         mechanism=_mechanism(system),
-        bearing=_bearing(system),
+        bearings=_bearings(system),
         run=_run(scene),
         files=files,
     )
@@ -321,16 +321,21 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
     )
 
 
-def _bearing(system: System) -> mf.BearingInfo | None:
+def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
     bearing, scene = system.scene.bearing, system.scene
     if bearing is None:
-        return None
+        return ()
     speed = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
     assert speed is not None
-    return mf.BearingInfo(
-        balls=bearing.balls,
-        joint=bearing.joint or "",
-        shaft_speed=speed.path,
-        outer_ring=bearing.outer is not None,
-        damping_law=bearing.damping.law,
+    return (
+        mf.BearingInfo(
+            name="",
+            prefix="",
+            path="bearing",
+            balls=bearing.balls,
+            joint=bearing.joint or "",
+            shaft_speed=speed.path,
+            outer_ring=bearing.outer is not None,
+            damping_law=bearing.damping.law,
+        ),
     )

@@ -11,19 +11,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.ask.track import Stepping, Track
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import End, Segments
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.reductions import RunFailed
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 Array = NDArray[np.float64]
 
@@ -62,7 +59,7 @@ class Extreme:
 
 
 def find_extreme(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     track: Track,
     values: Array,
@@ -109,7 +106,7 @@ def _tops(height: Array, segment: NDArray[np.int_], count: int) -> list[int]:
 
 
 def _closely(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     track: Track,
     channel: str,
@@ -193,7 +190,7 @@ def _crossing(
 
 
 def _values(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     x: Array,
     begin: float,

@@ -17,6 +17,7 @@ import numpy as np
 from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.segments import segment_edges, time_resolution
 from ballpass.runtime.run.simulate import fill
@@ -24,7 +25,6 @@ from ballpass.runtime.run.stepping import Cost
 from ballpass.runtime.run.trajectory import Interrupted, Trajectory, evaluate_outputs, start_trajectory
 
 if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
     from ballpass.runtime.run.solution import Solution
 
 #: Points of a survey that are evaluated at a time: an interrupt is heard between.
@@ -109,7 +109,7 @@ class Still:
     model, numbers, solution : the model, the run's numbers, the run
     """
 
-    def __init__(self, model: Model, numbers: Numbers, solution: Solution) -> None:
+    def __init__(self, model: LoadedModel, numbers: Numbers, solution: Solution) -> None:
         self._model, self._numbers, self._solution = model, numbers, solution
 
     def look(self, windows: Sequence[Window], names: Sequence[str]) -> list[Seen]:
@@ -154,7 +154,7 @@ class Resumed:
     model, numbers, solution : the model, the run's numbers, the run
     """
 
-    def __init__(self, model: Model, numbers: Numbers, solution: Solution) -> None:
+    def __init__(self, model: LoadedModel, numbers: Numbers, solution: Solution) -> None:
         self._model, self._numbers, self._solution = model, numbers, solution
         self._turn = clock.period(model.manifest, numbers.values)
         self._at_rest = solution.statistics.method == QUASI_STATIC
@@ -242,12 +242,12 @@ class Resumed:
         return next(iter(self._model.loop("rhs", ("t", "x", "u"))(len(t), given).values()))
 
 
-def follow_from_time(model: Model, names: Sequence[str]) -> tuple[str, ...]:
+def follow_from_time(model: LoadedModel, names: Sequence[str]) -> tuple[str, ...]:
     """Those of some outputs that do not depend on the states."""
     return tuple(name for name in dict.fromkeys(names) if not _depends(model, name, "x"))
 
 
-def one_turn(model: Model, numbers: Numbers, solution: Solution, names: Sequence[str]) -> Solution:
+def one_turn(model: LoadedModel, numbers: Numbers, solution: Solution, names: Sequence[str]) -> Solution:
     """As much of a solution as shows all of some outputs that follow from time alone: its first turn where what they
     depend on comes back with it, else the whole."""
     turn = clock.period(model.manifest, numbers.values)
@@ -263,7 +263,7 @@ def one_turn(model: Model, numbers: Numbers, solution: Solution, names: Sequence
     return replace(solution, t=solution.t[:keep], x=solution.x[:keep], outputs=outputs)
 
 
-def _depends(model: Model, output: str, argument: str) -> list[int]:
+def _depends(model: LoadedModel, output: str, argument: str) -> list[int]:
     """Entries of an argument of the outputs that one of them depends on."""
     graph = model.symbolic("outputs")
     if argument not in graph.name_in():
@@ -274,7 +274,7 @@ def _depends(model: Model, output: str, argument: str) -> list[int]:
 
 
 def sampled_outputs(
-    model: Model, numbers: Numbers, trajectory: Trajectory, names: Sequence[str], at_rest: bool
+    model: LoadedModel, numbers: Numbers, trajectory: Trajectory, names: Sequence[str], at_rest: bool
 ) -> dict[str, np.ndarray]:
     """Outputs of a trajectory, each of shape (samples, columns); a few of them are no reason to compile."""
     found = evaluate_outputs(model, numbers, trajectory, tuple(names), lean=False, at_rest=at_rest)
@@ -282,13 +282,13 @@ def sampled_outputs(
 
 
 def _outputs(
-    model: Model, numbers: Numbers, times: np.ndarray, x: np.ndarray, names: Sequence[str], *, at_rest: bool
+    model: LoadedModel, numbers: Numbers, times: np.ndarray, x: np.ndarray, names: Sequence[str], *, at_rest: bool
 ) -> dict[str, np.ndarray]:
     """Outputs at increasing times and given states."""
     return sampled_outputs(model, numbers, _along(model, numbers, times, x), names, at_rest)
 
 
-def _along(model: Model, numbers: Numbers, times: np.ndarray, x: np.ndarray) -> Trajectory:
+def _along(model: LoadedModel, numbers: Numbers, times: np.ndarray, x: np.ndarray) -> Trajectory:
     """A trajectory whose states are known."""
     turn = clock.period(model.manifest, numbers.values)
     span = (float(times[0]), float(times[-1]))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,14 +16,12 @@ from ballpass.runtime.ask.nodes import Plan, place
 from ballpass.runtime.ask.quantity_records import Array
 from ballpass.runtime.ask.track import Outlook, Track
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.sensitivity import Chain
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 
 def released(
-    model: Model, numbers: Numbers, track: Track, regular: Track, plan: Plan, kinks: Sequence[Kink], chain: Chain
+    model: LoadedModel, numbers: Numbers, track: Track, regular: Track, plan: Plan, kinks: Sequence[Kink], chain: Chain
 ) -> Track:
     """The track along nodes that move with the kinks.
 

@@ -13,18 +13,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.segments import segment_edges
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 Array = NDArray[np.float64]
 
@@ -120,7 +117,7 @@ class Nodes:
 
 
 def make_edges(
-    model: Model, numbers: Numbers, window: Window, slopes: Slopes | None = None, directions: int = 0
+    model: LoadedModel, numbers: Numbers, window: Window, slopes: Slopes | None = None, directions: int = 0
 ) -> Edges:
     """Edges of a run and their derivatives along `directions`.
 
@@ -166,7 +163,7 @@ def with_kinks(edges: Edges, times: Sequence[float]) -> Edges:
     )
 
 
-def turn_slope(model: Model, numbers: Numbers, slopes: Slopes) -> Array:
+def turn_slope(model: LoadedModel, numbers: Numbers, slopes: Slopes) -> Array:
     """Derivative of the time of a turn, shape (directions,) [s/unit]; zero when nothing turns."""
     manifest = model.manifest
     speed = clock.shaft_speed(manifest, numbers.values)

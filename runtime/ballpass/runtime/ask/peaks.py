@@ -26,12 +26,12 @@ from ballpass.runtime.ask.between_samples import Resumed, Seen, Source, Still, W
 from ballpass.runtime.ask.replay import Replay, replay
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.casadi_integrators import GRID
 from ballpass.runtime.run.segments import time_resolution
 
 if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
     from ballpass.runtime.run.solution import Solution
 
 Kind = Literal["max", "min"]
@@ -137,7 +137,7 @@ class _Top:
 
 
 def refine_peak(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     solution: Solution,
     name: str,
@@ -166,7 +166,7 @@ def refine_peak(
 
 
 def refine_peaks(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     solution: Solution,
     wanted: Sequence[tuple[str, Kind]],

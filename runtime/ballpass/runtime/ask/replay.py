@@ -20,6 +20,7 @@ import numpy as np
 from ballpass.runtime.ask.between_samples import POINTS, Seen, Survey, Window, sampled_outputs
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.ensemble_driver import BALL_CHANNELS, HEAD, ROWS
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.native.stepper import Family, Segments
 from ballpass.runtime.run import inputs as clock
@@ -29,7 +30,6 @@ from ballpass.runtime.run.stepping import Cost, step_through
 from ballpass.runtime.run.trajectory import Interrupted, Trajectory, start_trajectory
 
 if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
     from ballpass.runtime.run.solution import Solution
 
 #: Points for each step, on average, where outputs that the driver does not reduce are looked at; fewest and most points
@@ -78,7 +78,7 @@ class Replay:
     steps : accepted, of the whole run
     """
 
-    model: Model
+    model: LoadedModel
     numbers: Numbers
     solution: Solution
     family: Family
@@ -179,7 +179,7 @@ class Replay:
         return trajectory
 
 
-def replay(model: Model, numbers: Numbers, solution: Solution, channels: Collection[str]) -> Replay | None:
+def replay(model: LoadedModel, numbers: Numbers, solution: Solution, channels: Collection[str]) -> Replay | None:
     """Integrate a run of the stepper once more, reducing `channels`; None where it is not met to the bit.
 
     Parameters

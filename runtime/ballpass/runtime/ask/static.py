@@ -5,21 +5,17 @@ In: a model, numbers, a `Quantity` of a static kind.  Out: its `Estimate`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ballpass.runtime.ask.quantity_location import named_place, place_slope
 from ballpass.runtime.ask.quantity_records import Estimate, Quantity
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.equilibrium import instant, static_equilibrium
 from ballpass.runtime.run.sensitivity import Chain
 
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
-
-def at_rest(model: Model, numbers: Numbers, quantity: Quantity, chain: Chain | None) -> Estimate:
+def at_rest(model: LoadedModel, numbers: Numbers, quantity: Quantity, chain: Chain | None) -> Estimate:
     """A static quantity; its derivative follows from the implicit function of the equilibrium.
 
     Parameters

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,13 +37,11 @@ from ballpass.runtime.ask.static import at_rest
 from ballpass.runtime.ask.track import Outlook, Signal, Stepping, Track, follow
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.reductions import check_span
 from ballpass.runtime.run.request import check_memory
 from ballpass.runtime.run.sensitivity import Chain
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 Array = NDArray[np.float64]
 
@@ -116,7 +113,7 @@ class Study:
     per_turn : nodes in a turn
     """
 
-    def __init__(self, model: Model, quantities: Sequence[Quantity], span: Span, per_turn: int) -> None:
+    def __init__(self, model: LoadedModel, quantities: Sequence[Quantity], span: Span, per_turn: int) -> None:
         self.model = model
         self.quantities = tuple(quantities)
         self.span = span

@@ -21,6 +21,7 @@ from ballpass.runtime.ask.nodes import Edges, Nodes
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.kernel import Loop
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import End, Family
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.run.reductions import RunFailed
@@ -29,7 +30,6 @@ from ballpass.runtime.run.segments import make_segments
 from ballpass.runtime.run.sensitivity import Directions
 
 if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
     from ballpass.runtime.run.sensitivity import Chain
 
 Array = NDArray[np.float64]
@@ -117,7 +117,7 @@ class Signal:
 
 
 def follow(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     edges: Edges,
     nodes: Nodes,
@@ -199,7 +199,7 @@ class Outlook:
         An unknown channel.
     """
 
-    def __init__(self, model: Model, channels: Sequence[str]) -> None:
+    def __init__(self, model: LoadedModel, channels: Sequence[str]) -> None:
         self._model = model
         known = list(dict.fromkeys((*model.states, *model.outputs, *(q.name for q in model.manifest.quantities))))
         for name in channels:

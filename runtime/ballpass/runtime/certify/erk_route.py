@@ -25,13 +25,13 @@ from ballpass.runtime.ask.track import Stepping, Track
 from ballpass.runtime.certify.certificate import Second
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Family
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.sensitivity import Chain
 
 if TYPE_CHECKING:
     from ballpass.runtime.ask.study import Course, Prepared, Study
-    from ballpass.runtime.model import Model
     from ballpass.runtime.run.scales import Scales
 
 Array = NDArray[np.float64]
@@ -115,7 +115,7 @@ def _adjoint(study: Study, prepared: Prepared, follow: _Follower) -> Array:
 class _Follower:
     """Runs of one model along nodes with a number of fixed steps between neighbours."""
 
-    def __init__(self, model: Model, numbers: Numbers, chain: Chain, magnitude: Array, steps: int) -> None:
+    def __init__(self, model: LoadedModel, numbers: Numbers, chain: Chain, magnitude: Array, steps: int) -> None:
         self._model, self._numbers, self._chain, self._magnitude = model, numbers, chain, magnitude
         self._integrator = make_fixed_erk(model, steps)
 
@@ -218,7 +218,7 @@ class _Follower:
         return np.asarray(total + np.einsum("ri,rid->d", by_numbers, intervals.slopes))
 
 
-def make_fixed_erk(model: Model, steps: int) -> casadi.Function:
+def make_fixed_erk(model: LoadedModel, steps: int) -> casadi.Function:
     """``erk`` over one interval in `steps` equal steps: (scaled state, parameter vector) to scaled state at the end."""
     manifest = model.manifest
     sizes = {"u": len(manifest.inputs), "p": len(manifest.parameters), "c": len(manifest.constants)}

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ballpass.runtime.certify.certificate import UNCHECKED, Check, Verdict, compare
 from ballpass.runtime.certify.differences import richardson
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour, point
 from ballpass.runtime.point.jacobian import (
     CRANK_ANGLE,
@@ -31,9 +32,6 @@ from ballpass.runtime.point.jacobian import (
 )
 from ballpass.runtime.point.linearize import kink_notes
 from ballpass.runtime.run import inputs as clock
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 Array = NDArray[np.float64]
 
@@ -117,7 +115,7 @@ class CheckedJacobian:
 
 
 def checked_jacobian(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     of: str | Sequence[str],
     wrt: str | Sequence[str],
@@ -176,7 +174,7 @@ def checked_jacobian(
 
 
 def _motion(
-    model: Model, numbers: Numbers, parts: Sequence[Rows], name: str, unit: str, t: float, x: Array
+    model: LoadedModel, numbers: Numbers, parts: Sequence[Rows], name: str, unit: str, t: float, x: Array
 ) -> tuple[float, float, Callable[[float], Array]]:
     """Where a name stands, the largest step for it, and the rows as a function of its value."""
     there = point(model, numbers, t, x)
@@ -204,7 +202,7 @@ def _motion(
     return base, STEP * abs(base) or STEP_FROM_ZERO.get(unit, STEP), with_parameter
 
 
-def _same_kind(model: Model, k: int) -> slice:
+def _same_kind(model: LoadedModel, k: int) -> slice:
     half = len(model.states) // 2
     return slice(0, half) if k < half else slice(half, 2 * half)
 

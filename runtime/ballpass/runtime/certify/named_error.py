@@ -19,6 +19,7 @@ from ballpass.runtime.certify.trade import FULL, Trade
 from ballpass.runtime.contract import read_artefact
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.status import Status
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.request import Plan, Request, make_plan
 from ballpass.runtime.run.segments import time_resolution
 from ballpass.runtime.run.simulate import to_solution
@@ -27,7 +28,6 @@ from ballpass.runtime.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
-    from ballpass.runtime.model import Model
     from ballpass.runtime.run.solution import Solution
 
 #: Which models may be taken: the full one alone, or simpler ones that the trade was measured with as well.
@@ -35,7 +35,7 @@ Models = Literal["any", "full"]
 
 
 def simulate_to_error(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     request: Request,
     target: float,
@@ -98,7 +98,7 @@ def simulate_to_error(
     return replace(solution, accuracy=found)
 
 
-def _check(model: Model, request: Request, trade: Trade | None, models: str) -> None:
+def _check(model: LoadedModel, request: Request, trade: Trade | None, models: str) -> None:
     if request.method is not None or request.rtol is not None:
         raise RequestError(
             "error was given, and method or rtol as well: with an error named, the tool chooses both. Give one or the "
@@ -126,7 +126,7 @@ def _usable(trade: Trade, plan: Plan) -> list[str]:
     return found
 
 
-def _simpler(model: Model, run: Prepared, plan: Plan) -> Prepared:
+def _simpler(model: LoadedModel, run: Prepared, plan: Plan) -> Prepared:
     """The same run of a simpler model, which has no parameters and no states for what it leaves out."""
     own = dict(zip(run.model.states, run.initial.tolist(), strict=True))
     return prepare(

@@ -22,6 +22,7 @@ from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.many.members import edge_windows
 from ballpass.runtime.native.ensemble_driver import BALL_CHANNELS, EnsembleDriver
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.point.assembly import check_assembly
@@ -43,7 +44,6 @@ from ballpass.runtime.run.trajectory import Interrupted, Trajectory, evaluate_ou
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
-    from ballpass.runtime.model import Model
 
 #: Time of this thread on its processor where the system counts it finely: other programs do not enter.
 _now = clocks.thread_time if clocks.get_clock_info("thread_time").resolution < 1e-5 else clocks.perf_counter
@@ -83,7 +83,7 @@ class Prepared:
         `ballpass.runtime.certify.parts`)
     """
 
-    model: Model
+    model: LoadedModel
     numbers: Numbers
     initial: np.ndarray
     magnitude: np.ndarray
@@ -201,7 +201,7 @@ class Prepared:
 
 
 def prepare(
-    model: Model,
+    model: LoadedModel,
     parameters: Mapping[str, float] | None = None,
     *,
     cycles: float | None = None,
@@ -240,7 +240,7 @@ def prepare(
 
 
 def _segments(
-    model: Model, numbers: Numbers, duration: float, turn: float, start: float
+    model: LoadedModel, numbers: Numbers, duration: float, turn: float, start: float
 ) -> tuple[Segments, tuple[int, ...]]:
     """Segments of a run, and where its parts begin among them."""
     times = part_times(duration, turn, start)
@@ -259,7 +259,7 @@ def _segments(
     return Segments(times=edges, inputs=u, restarts=restarts), parts
 
 
-def check_observables(model: Model, names: Sequence[str]) -> tuple[Observable, ...]:
+def check_observables(model: LoadedModel, names: Sequence[str]) -> tuple[Observable, ...]:
     """Kind and channel of observables by name: ``peak_ball_force``, ``rms:inner.y``.
 
     Raises
@@ -277,7 +277,7 @@ def check_observables(model: Model, names: Sequence[str]) -> tuple[Observable, .
     return tuple(known[name] for name in names)
 
 
-def _fault(model: Model, name: str, known: Mapping[str, Observable]) -> str:
+def _fault(model: LoadedModel, name: str, known: Mapping[str, Observable]) -> str:
     """Why there is no error of a quantity."""
     channel = str(name).rpartition(":")[2]
     offered = ", ".join(dict.fromkeys(channel for _, channel in known.values()))
@@ -295,7 +295,7 @@ def _fault(model: Model, name: str, known: Mapping[str, Observable]) -> str:
 KINDS = ("max", "min", "mean", "rms", "range")
 
 
-def default_observables(model: Model) -> tuple[str, ...]:
+def default_observables(model: LoadedModel) -> tuple[str, ...]:
     """Peak ball force, rms and range of the inner ring's motion."""
     rings = [state.name for state in model.manifest.states if state.name in ("inner.x", "inner.y")]
     return ("peak_ball_force", *(f"{kind}_{name.replace('.', '_')}" for kind in ("rms", "range") for name in rings))

@@ -15,6 +15,7 @@ from ballpass.runtime.certify.quasi_static import STATUS_OF_END, End
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.many.members import edge_windows
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.segments import make_segments
 from ballpass.runtime.run.stepping import Cost
@@ -22,11 +23,10 @@ from ballpass.runtime.run.trajectory import Interrupted, Trajectory
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
-    from ballpass.runtime.model import Model
 
 
 def fill_quasi_static(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     tolerance: np.ndarray,
     trajectory: Trajectory,
@@ -64,7 +64,7 @@ def fill_quasi_static(
 
 
 def reduce_quasi_static(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     tolerance: np.ndarray,
     state: np.ndarray,

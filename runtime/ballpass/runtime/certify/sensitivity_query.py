@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from ballpass.runtime.certify.sensitivity_report import QuantityValue, Sensitivi
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real, unknown_name
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS, Family
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.evaluate import neighbour
@@ -37,9 +38,6 @@ from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.request import TOLERANCES, asked_length
 from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.run.simulate import STIFF_RATIO
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 Array = NDArray[np.float64]
 
@@ -162,7 +160,7 @@ def make_query(
     )
 
 
-def answer(model: Model, numbers: Numbers, query: Query) -> SensitivityReport:
+def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityReport:
     """Run a model and differentiate quantities by parameters, with certificates.
 
     Raises
@@ -369,7 +367,7 @@ def _difference_scales(manifest: Manifest, numbers: Numbers, names: Sequence[str
 
 def _second(
     study: Study,
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     names: Sequence[str],
     route: str,
@@ -403,7 +401,7 @@ def _second(
     )
 
 
-def _grazing(model: Model, numbers: Numbers, course: Course, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:
+def _grazing(model: LoadedModel, numbers: Numbers, course: Course, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:
     """Where the run grazes a kink, whether or not the scene's outputs name the balls' deflections."""
     manifest, track = model.manifest, course.track
     if track is None or manifest.bearing is None:

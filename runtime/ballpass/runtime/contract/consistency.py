@@ -41,8 +41,7 @@ def contradictions(manifest: Manifest) -> list[str]:
     if manifest.mechanism is not None:
         used += [(f"mechanism.{k}", getattr(manifest.mechanism, k), values) for k in ("speed", "start_angle")]
         faults += _force_faults(manifest, manifest.mechanism, parameters)
-    if manifest.bearing is not None:
-        used.append(("bearing.shaft_speed", manifest.bearing.shaft_speed, values))
+    used += [(f"{bearing.path}.shaft_speed", bearing.shaft_speed, values) for bearing in manifest.bearings]
     faults += [f"{place}: {name!r} is no parameter or constant" for place, name, known in used if name not in known]
     if (manifest.run.cycles is None) == (manifest.run.duration is None):
         faults.append("run: exactly one of cycles and duration must be a number")

@@ -11,7 +11,7 @@ from ballpass.runtime.contract.consistency import contradictions
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.json_text import DIGEST, kind_of, read_record, text_digest, text_of
 
-SCHEMA = 2
+SCHEMA = 3
 FILE_NAME = "manifest.json"
 
 #: Where a generated function lives: ``<library>.c`` and, serialised, ``<library>.casadi``.
@@ -131,8 +131,15 @@ class RunInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BearingInfo:
-    """What observables need of the bearing: balls, and the names of its kinematic parameters and constants."""
+    """What observables need of a bearing: balls, and the names of its kinematic parameters and constants.
 
+    `name` is empty for the scene's only ``[bearing]``.  Its states and outputs begin with `prefix`, ``""`` or
+    ``"<name>."``; its parameters and constants with `path`, ``bearing`` or ``bearings.<name>``.
+    """
+
+    name: str
+    prefix: str
+    path: str
     balls: int
     joint: str
     shaft_speed: str
@@ -175,11 +182,16 @@ class Manifest:
     functions: tuple[FunctionInfo, ...]
     smoothness: tuple[tuple[str, str], ...]  # law -> smooth, kinked, discontinuous
     mechanism: MechanismInfo | None
-    bearing: BearingInfo | None
+    bearings: tuple[BearingInfo, ...]
     run: RunInfo
     quantities: tuple[QuantityInfo, ...] = ()
     relations: tuple[tuple[str, float, str], ...] = ()  # (name, factor, other): value > factor * value of the other
     files: tuple[tuple[str, str], ...] = field(default=())  # file name -> sha256
+
+    @property
+    def bearing(self) -> BearingInfo | None:
+        """The first bearing, None where the scene has none."""
+        return self.bearings[0] if self.bearings else None
 
     def function(self, name: str) -> FunctionInfo:
         """Signature of a generated function; KeyError where there is none of that name."""

@@ -26,9 +26,9 @@ from ballpass.runtime.export.scene_numbers import (
     scene_header,
     scene_source,
 )
-from ballpass.runtime.model import Model
 from ballpass.runtime.native.compilers import FLAGS as BASE_FLAGS
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS, SWITCHES
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.locating import has_kinks
 
 #: C sources that are the same for every scene, beside the driver.
@@ -70,7 +70,7 @@ def export_c(folder: str | Path, out: str | Path) -> Path:
             f"{place / 'model.c'}. A scene with a bearing can be exported."
         )
     # in CasADi's virtual machine: nothing has to be compiled to write C
-    texts = _texts(Model(place, manifest, None), place)
+    texts = _texts(LoadedModel(place, manifest, None), place)
     target.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".writing-", dir=target) as name:
         made = Path(name)
@@ -81,7 +81,7 @@ def export_c(folder: str | Path, out: str | Path) -> Path:
     return target
 
 
-def _texts(model: Model, folder: Path) -> dict[str, str]:
+def _texts(model: LoadedModel, folder: Path) -> dict[str, str]:
     """Content of the exported files by name."""
     manifest = model.manifest
     texts = {

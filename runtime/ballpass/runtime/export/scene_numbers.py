@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 import casadi
 
 from ballpass.runtime.contract import InputInfo, Manifest, MarginInfo
-from ballpass.runtime.model import Model
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.run.locating import has_kinks, tight_below
 
@@ -205,7 +205,7 @@ def _inputs(inputs: Sequence[InputInfo], place: dict[str, int]) -> tuple[list[st
     return arrays, "\n".join(entries) or "    {SCHEDULE_PHASE, -1, -1, 0, NULL, 0, NULL, NULL}, /* none */"
 
 
-def constants_source(model: Model) -> str:
+def constants_source(model: LoadedModel) -> str:
     """C of ``constants``; of nothing where there are none."""
     if not model.manifest.constants:
         body = "{\n    (void)p;\n    (void)c;\n}"
@@ -214,7 +214,7 @@ def constants_source(model: Model) -> str:
     return _behind("The derived constants", model.symbolic("constants"), "scene_constants", given, "c")
 
 
-def margins_source(model: Model) -> str:
+def margins_source(model: LoadedModel) -> str:
     """C of ``assembly``, in the same way."""
     given = (("double t", "&t"), ("const double *u", "u"), ("const double *p", "p"), ("const double *c", "c"))
     return _behind("The linkage's margins", model.symbolic("assembly"), "scene_margins", given, "margins")

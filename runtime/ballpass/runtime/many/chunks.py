@@ -12,20 +12,17 @@ import ctypes
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Members, Span
 from ballpass.runtime.native.ensemble_driver import STOPPED, EnsembleDriver, MemberNumbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import End, Family
 from ballpass.runtime.run.limits import brief_limit
 from ballpass.runtime.run.reductions import Begun, RunFailed, integrate_reduced
 from ballpass.runtime.run.stepping import STATUS_OF_END
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 #: Most members of a chunk: enough that lanes which run out of members at its end do not count.
 CHUNK = 128
@@ -74,7 +71,7 @@ class Work:
     stop : asks the threads to end soon when it becomes nonzero
     """
 
-    model: Model
+    model: LoadedModel
     driver: EnsembleDriver
     members: Members
     span: Span

@@ -26,6 +26,7 @@ from ballpass.runtime.contract.parameters import real, unknown_name
 from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, run_chunks
 from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
 from ballpass.runtime.native.ensemble_driver import LANE_FAMILIES
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
 from ballpass.runtime.run.reductions import (
@@ -40,8 +41,6 @@ from ballpass.runtime.run.request import check_memory
 
 if TYPE_CHECKING:
     import xarray
-
-    from ballpass.runtime.model import Model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,7 +137,7 @@ class EnsembleResult(Mapping[str, np.ndarray]):
 
 
 def simulate_many(
-    model: Model,
+    model: LoadedModel,
     table: Table,
     observables: str | Sequence[str],
     *,
@@ -247,7 +246,7 @@ def _threads(given: int | None) -> int:
     return int(given)
 
 
-def _span(model: Model, members: Members, cycles: float | None, duration: float | None, transient: float) -> Span:
+def _span(model: LoadedModel, members: Members, cycles: float | None, duration: float | None, transient: float) -> Span:
     """Lengths of the members' runs; members for which there is none are refused."""
     run = model.manifest.run
     if cycles is not None and duration is not None:

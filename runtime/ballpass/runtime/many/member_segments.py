@@ -12,20 +12,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ballpass.runtime.contract import InputInfo
 from ballpass.runtime.many.members import TURNS_A_SEARCH, Members, Span, edge_windows, groups
 from ballpass.runtime.native.ensemble_driver import MemberArrays
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.magnitudes import MOMENTS
 from ballpass.runtime.run.reductions import SCALED_TURNS
 from ballpass.runtime.run.segments import LARGEST_PHASE, segment_edges
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 #: Edges closer than this fraction of run or turn are left to `edge_windows`; far above its own resolutions [1].
 CLOSE = 1e-8
@@ -60,7 +57,7 @@ class _Part:
     starts: np.ndarray
 
 
-def stretches(model: Model, members: Members, span: Span, which: np.ndarray) -> Iterator[MemberArrays]:
+def stretches(model: LoadedModel, members: Members, span: Span, which: np.ndarray) -> Iterator[MemberArrays]:
     """Segments of some members, a stretch of their runs after the other; memory does not grow with the runs.
 
     A member whose run is over has no segments in later stretches.
@@ -88,7 +85,9 @@ def stretches(model: Model, members: Members, span: Span, which: np.ndarray) -> 
         yield MemberArrays(**numbers, first=first, times=edges[np.isfinite(edges)], inputs=u, restarts=restarts)
 
 
-def moments(model: Model, members: Members, span: Span, which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def moments(
+    model: LoadedModel, members: Members, span: Span, which: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The moments that `ballpass.runtime.run.magnitudes` looks at, as for a single run with reductions.
 
     Returns
@@ -118,7 +117,7 @@ def moments(model: Model, members: Members, span: Span, which: np.ndarray) -> tu
     return np.concatenate([[0], np.cumsum(number)]).astype(np.int_), u, horizons
 
 
-def _part(model: Model, members: Members, span: Span, which: np.ndarray) -> _Part:
+def _part(model: LoadedModel, members: Members, span: Span, which: np.ndarray) -> _Part:
     return _Part(
         which=which,
         columns={name: members.columns[name][which] for name in _named(model.manifest.inputs)},
@@ -128,7 +127,7 @@ def _part(model: Model, members: Members, span: Span, which: np.ndarray) -> _Par
     )
 
 
-def _edges(model: Model, members: Members, part: _Part, windows: int | None) -> Iterator[np.ndarray]:
+def _edges(model: LoadedModel, members: Members, part: _Part, windows: int | None) -> Iterator[np.ndarray]:
     """Begin, breakpoints, whole turns, where reductions start, and end of each member's run, a stretch after the other.
 
     Parameters

@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,12 +16,10 @@ from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.bounds import violations
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, scalar, unknown_name
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.segments import segment_edges
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 #: Turns whose edges are sought at a time: the search compares all with all.
 TURNS_A_SEARCH = 64
@@ -53,13 +50,13 @@ class Members:
     def __len__(self) -> int:
         return len(self.p)
 
-    def numbers(self, model: Model, member: int) -> Numbers:
+    def numbers(self, model: LoadedModel, member: int) -> Numbers:
         """The numbers of one member, by name as well."""
         values = {name: float(column[member]) for name, column in self.columns.items()}
         parameters = Parameters(model.manifest.parameters, values)
         return Numbers(parameters=parameters, p=self.p[member], c=self.c[member], values=values)
 
-    def timing(self, model: Model, names: Sequence[str], member: int) -> Numbers:
+    def timing(self, model: LoadedModel, names: Sequence[str], member: int) -> Numbers:
         """The same with only these of its values by name: all that edges of segments need."""
         values = {name: float(self.columns[name][member]) for name in names}
         parameters = Parameters((), {})
@@ -144,7 +141,7 @@ def _plain(given: object) -> bool:
     return np.asarray(given).dtype.kind in "iufO"
 
 
-def make_members(model: Model, table: Table) -> Members:
+def make_members(model: LoadedModel, table: Table) -> Members:
     """Members with their derived constants; those that cannot be simulated are noted, not raised."""
     manifest = model.manifest
     varied = read_table(manifest, table)
@@ -188,7 +185,7 @@ def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused:
                 refused[member] = str(fault)
 
 
-def _check_assembly(model: Model, members: Members) -> None:
+def _check_assembly(model: LoadedModel, members: Members) -> None:
     """Note members whose linkage cannot be assembled; each distinct geometry is looked at once."""
     manifest = model.manifest
     mechanism = manifest.mechanism
@@ -237,7 +234,9 @@ class Span:
     starts: np.ndarray
 
 
-def edge_windows(model: Model, numbers: Numbers, duration: float, turn: float, start: float) -> Iterator[np.ndarray]:
+def edge_windows(
+    model: LoadedModel, numbers: Numbers, duration: float, turn: float, start: float
+) -> Iterator[np.ndarray]:
     """Begin, breakpoints, whole turns, `start` and end of a run, some turns at a time, increasing [s].
 
     Memory does not grow with the run; each window begins with the last edge of the one before.

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
-    from ballpass.runtime.model import Model
 
 #: Angles looked at in a turn; between them minima are refined.
 ANGLES = 720
@@ -21,7 +21,7 @@ ANGLES = 720
 SWEEPS, FINE = 3, 128
 
 
-def check_assembly(model: Model, numbers: Numbers) -> None:
+def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
     """Look at every margin of the linkage over a turn.
 
     Raises
@@ -51,14 +51,14 @@ def check_assembly(model: Model, numbers: Numbers) -> None:
         raise RequestError("\n".join(faults) + "\nChange the lengths of the bodies that meet at the joint.")
 
 
-def _margins(model: Model, numbers: Numbers, times: np.ndarray) -> np.ndarray:
+def _margins(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> np.ndarray:
     """Margins at times counted from t = 0, shape (times, margins); no number is no assembly."""
     fixed = {"u": clock.inputs_at(model.manifest.inputs, numbers.values, 0.0), "p": numbers.p, "c": numbers.c}
     (found,) = model.loop("assembly", ("t",))(len(times), {"t": times, **fixed}).values()
     return np.where(np.isnan(found), -np.inf, found)
 
 
-def _refine(model: Model, numbers: Numbers, row: int, time: float, reach: float) -> tuple[float, float]:
+def _refine(model: LoadedModel, numbers: Numbers, row: int, time: float, reach: float) -> tuple[float, float]:
     """Time and value of the minimum of a margin within `reach` of a sample."""
     for _ in range(SWEEPS):
         times = time + reach * np.linspace(-1.0, 1.0, 2 * FINE + 1)

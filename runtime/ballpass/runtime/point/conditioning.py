@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
-    from ballpass.runtime.model import Model
 
 #: Name of the generated function with A.
 FUNCTION = "reaction_system"
@@ -58,12 +58,12 @@ class Conditioning:
     scaled_angle: float
 
 
-def has_reactions(model: Model) -> bool:
+def has_reactions(model: LoadedModel) -> bool:
     """Whether the model has a mechanism, and so the matrix."""
     return model.manifest.mechanism is not None and model.has(FUNCTION)
 
 
-def conditioning(model: Model, numbers: Numbers) -> Conditioning:
+def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
     """Look at a turn; where nothing turns, at the position that stands.
 
     Warns

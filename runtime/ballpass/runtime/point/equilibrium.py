@@ -15,7 +15,6 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +25,10 @@ from scipy.optimize import brentq
 from ballpass.runtime.app.printed import printed
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real, vector
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import RHS, Rows, contract, directions_of, rows_of
 from ballpass.runtime.run import inputs as clock
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 Array = NDArray[np.float64]
 
@@ -82,7 +79,7 @@ class StaticEquilibrium:
     free_directions: Array
     iterations: int
     residual: float
-    model: Model = field(repr=False)
+    model: LoadedModel = field(repr=False)
     numbers: Numbers = field(repr=False)
     load_is_given: bool = field(repr=False)
 
@@ -160,7 +157,7 @@ class StaticEquilibrium:
         return np.asarray(total[:, 0] if isinstance(wrt, str) else total)
 
 
-def instant(model: Model, numbers: Numbers, t: float | None, crank_angle: float | None) -> float:
+def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: float | None) -> float:
     """Time of an instant given by itself [s] or by the crank's angle [rad], in the first turn; 0 by default.
 
     Raises
@@ -190,7 +187,7 @@ def instant(model: Model, numbers: Numbers, t: float | None, crank_angle: float 
 
 
 def static_equilibrium(
-    model: Model, numbers: Numbers, *, t: float = 0.0, load: tuple[float, float] | None = None
+    model: LoadedModel, numbers: Numbers, *, t: float = 0.0, load: tuple[float, float] | None = None
 ) -> StaticEquilibrium:
     """Positions at which the rings rest; see `ballpass.runtime.Model.static_equilibrium`.
 
@@ -284,14 +281,14 @@ def _render(found: StaticEquilibrium) -> Table:
     return table
 
 
-def _force_rows(model: Model) -> Rows:
+def _force_rows(model: LoadedModel) -> Rows:
     half = len(model.states) // 2
     return Rows(
         function="static_forces", indices=np.arange(half), labels=tuple(model.states[:half]), units=("N",) * half
     )
 
 
-def _balls(model: Model, numbers: Numbers, t: float, x: Array) -> tuple[Array, Array]:
+def _balls(model: LoadedModel, numbers: Numbers, t: float, x: Array) -> tuple[Array, Array]:
     """Deflection and elastic force of each ball."""
     there = point(model, numbers, t, x)
     found = []
@@ -301,7 +298,7 @@ def _balls(model: Model, numbers: Numbers, t: float, x: Array) -> tuple[Array, A
     return found[0], found[1]
 
 
-def _start(model: Model, numbers: Numbers, force: Callable[[Array], Array], applied: Array, half: int) -> Array:
+def _start(model: LoadedModel, numbers: Numbers, force: Callable[[Array], Array], applied: Array, half: int) -> Array:
     """Equilibrium along the load alone, the housing carrying all of it; concentric rings where there is no load."""
     size = float(np.linalg.norm(applied))
     q = np.zeros(half)

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, real, unchecked_numbers, vector
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.request import no_output
 
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
-
 
 def evaluate_point(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     t: float,
     x: Sequence[float] | np.ndarray | None,
@@ -47,7 +44,7 @@ def evaluate_point(
     return results
 
 
-def neighbour(model: Model, numbers: Numbers, change: Mapping[str, float]) -> Numbers:
+def neighbour(model: LoadedModel, numbers: Numbers, change: Mapping[str, float]) -> Numbers:
     """Numbers beside those of a run.  Bounds do not hold: a difference looks a hair beyond a value at its bound."""
     manifest = model.manifest
     parameters = Parameters(manifest.parameters, {**numbers.parameters, **change})
@@ -55,7 +52,7 @@ def neighbour(model: Model, numbers: Numbers, change: Mapping[str, float]) -> Nu
 
 
 def point(
-    model: Model, numbers: Numbers, t: float, x: Sequence[float] | np.ndarray | None
+    model: LoadedModel, numbers: Numbers, t: float, x: Sequence[float] | np.ndarray | None
 ) -> dict[str, float | np.ndarray]:
     """Arguments of a generated function at time `t` and state `x` (None: the initial one): t, x, u, p, c by name.
 

@@ -10,20 +10,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ballpass.runtime.contract.errors import BallpassError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.point.equilibrium import static_equilibrium
 from ballpass.runtime.point.evaluate import point
-from ballpass.runtime.point.jacobian import rows_of
+from ballpass.runtime.point.jacobian import jacobian, rows_of
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.run.simulate import STIFF_RATIO, choose_method
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 #: Instants of a turn that are searched for the lightest and the heaviest load.
 INSTANTS = 360
@@ -99,7 +98,7 @@ class Explanation:
     reason: str
 
 
-def explain(model: Model, parameters: Mapping[str, float] | None = None) -> Explanation:
+def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -> Explanation:
     """Breakpoints, smoothness and time scales of a model.
 
     Raises
@@ -107,8 +106,9 @@ def explain(model: Model, parameters: Mapping[str, float] | None = None) -> Expl
     RequestError
         Unknown parameters, or a linkage that cannot be assembled.
     """
-    model.check_assembly(parameters)
-    values = model.numbers(parameters).values
+    numbers = model.numbers(parameters)
+    check_assembly(model, numbers)
+    values = numbers.values
     manifest = model.manifest
     turn = clock.period(manifest, values)
     span = turn if math.isfinite(turn) else (manifest.run.duration or 1.0)
@@ -127,7 +127,7 @@ def explain(model: Model, parameters: Mapping[str, float] | None = None) -> Expl
     )
 
 
-def _breakpoints(model: Model, values: Mapping[str, float], span: float) -> tuple[Breakpoint, ...]:
+def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float) -> tuple[Breakpoint, ...]:
     found = []
     inputs = model.manifest.inputs
     # a little over the turn's end, so that an edge at t = 0 counts once
@@ -145,7 +145,7 @@ def _breakpoints(model: Model, values: Mapping[str, float], span: float) -> tupl
 
 
 def _time_scales(
-    model: Model, parameters: Mapping[str, float] | None, span: float
+    model: LoadedModel, parameters: Mapping[str, float] | None, span: float
 ) -> tuple[tuple[TimeScale, ...], tuple[str, ...]]:
     numbers = model.numbers(parameters)
     values = numbers.values
@@ -170,7 +170,7 @@ def _time_scales(
         time = float(times[k])
         angle = clock.crank_angle(model.manifest, values, time)
         try:
-            x = model.static_equilibrium(t=time, parameters=parameters).x
+            x = static_equilibrium(model, numbers, t=time, load=None).x
         except BallpassError as fault:
             unsupported.append(f"{name}, {math.degrees(angle):.4g} deg: {fault}")
             continue
@@ -178,7 +178,7 @@ def _time_scales(
         slowest = math.inf
         speed = math.sqrt(pull[k] * max(float(np.max(np.abs(x[:half]))), 1e-12))
         for kick in (np.zeros(half), *(sign * speed * unit for unit in np.eye(half) for sign in (1.0, -1.0))):
-            matrix = model.jacobian("rhs", "states", t=time, x=np.concatenate([x[:half], kick]), parameters=parameters)
+            matrix = jacobian(model, numbers, "rhs", "states", t=time, x=np.concatenate([x[:half], kick]))
             eigenvalues = np.linalg.eigvals(matrix)
             decay = max(decay, float(np.max(-eigenvalues.real)))
             slowest = min(slowest, float(np.min(np.abs(eigenvalues))))
@@ -197,7 +197,7 @@ def _time_scales(
     return tuple(scales), tuple(unsupported)
 
 
-def _is_constant(model: Model, numbers: Numbers, times: np.ndarray) -> bool:
+def _is_constant(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> bool:
     """Whether the load is the same at all these times, to rounding."""
     if not any(info.name == "load.x" for info in model.manifest.quantities):
         return False
@@ -207,7 +207,7 @@ def _is_constant(model: Model, numbers: Numbers, times: np.ndarray) -> bool:
     return bool(np.max(np.ptp(loads, axis=0)) <= 1e-12 * np.max(np.abs(loads)))
 
 
-def _method(model: Model, scales: tuple[TimeScale, ...], turn: float) -> tuple[str, str]:
+def _method(model: LoadedModel, scales: tuple[TimeScale, ...], turn: float) -> tuple[str, str]:
     """What ``auto`` takes for these rates and turns of `turn` [s], and why."""
     if not model.states:
         return "none", "the model has no states: its outputs follow from time alone"

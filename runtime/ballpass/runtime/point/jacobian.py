@@ -16,18 +16,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.run import inputs as clock
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 Array = NDArray[np.float64]
 
@@ -73,7 +70,7 @@ class Directions:
         return {"t": self.t, "x": self.x, "u": self.u, "p": self.p, "c": self.c}[argument]
 
 
-def rows_of(model: Model, of: str | Sequence[str]) -> list[Rows]:
+def rows_of(model: LoadedModel, of: str | Sequence[str]) -> list[Rows]:
     """Rows of the right-hand side ("rhs") or of quantities by name or pattern, one record per generated function.
 
     Raises
@@ -129,7 +126,7 @@ def _merged(found: Sequence[Rows]) -> list[Rows]:
     return out
 
 
-def directions_of(model: Model, numbers: Numbers, wrt: str | Sequence[str], t: float) -> Directions:
+def directions_of(model: LoadedModel, numbers: Numbers, wrt: str | Sequence[str], t: float) -> Directions:
     """Directions along states ("states": all), "time", "crank_angle" or parameters, at time `t` [s].
 
     Raises
@@ -186,7 +183,7 @@ def directions_of(model: Model, numbers: Numbers, wrt: str | Sequence[str], t: f
     )
 
 
-def turning_speed(model: Model, numbers: Numbers) -> float:
+def turning_speed(model: LoadedModel, numbers: Numbers) -> float:
     """Speed of crank or shaft [rad/s].
 
     Raises
@@ -204,7 +201,7 @@ def turning_speed(model: Model, numbers: Numbers) -> float:
 
 
 def jacobian(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     of: str | Sequence[str],
     wrt: str | Sequence[str],
@@ -225,7 +222,7 @@ def jacobian(
     return np.asarray(dense, dtype=float)
 
 
-def contract(model: Model, rows: Rows, directions: Directions, there: Mapping[str, object]) -> Array:
+def contract(model: LoadedModel, rows: Rows, directions: Directions, there: Mapping[str, object]) -> Array:
     """Sum over the arguments of block times direction, shape (rows, directions)."""
     total = np.zeros((len(rows.indices), len(directions.labels)))
     for argument in ARGUMENTS:
@@ -240,19 +237,19 @@ def contract(model: Model, rows: Rows, directions: Directions, there: Mapping[st
 
 
 def quantity_values(
-    model: Model, numbers: Numbers, of: str | Sequence[str], *, t: float, x: Sequence[float] | np.ndarray | None
+    model: LoadedModel, numbers: Numbers, of: str | Sequence[str], *, t: float, x: Sequence[float] | np.ndarray | None
 ) -> Array:
     """Values of what `jacobian` differentiates, all rows one below the other, shape (rows,)."""
     return values_of_rows(model, rows_of(model, of), point(model, numbers, checked_time(t), x))
 
 
-def values_of_rows(model: Model, parts: Sequence[Rows], there: Mapping[str, object]) -> Array:
+def values_of_rows(model: LoadedModel, parts: Sequence[Rows], there: Mapping[str, object]) -> Array:
     """Values of rows with the arguments `there`, shape (rows,)."""
     return np.concatenate([model.kernel(part.function)(there)[part.indices] for part in parts])
 
 
 def output_tangents(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     of: str | Sequence[str],
     *,

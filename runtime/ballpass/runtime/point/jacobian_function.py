@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import ARGUMENTS, Directions, Rows, directions_of, rows_of
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-    from ballpass.runtime.model import Model
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -65,7 +65,7 @@ class JacobianFunction:
     """
 
     def __init__(
-        self, model: Model, numbers: Numbers, of: str | Sequence[str], wrt: str | Sequence[str], *, t: float
+        self, model: LoadedModel, numbers: Numbers, of: str | Sequence[str], wrt: str | Sequence[str], *, t: float
     ) -> None:
         self._model, self._wrt = model, wrt
         chosen = rows_of(model, of)

@@ -15,7 +15,7 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -27,11 +27,9 @@ from rich.table import Table
 from ballpass.runtime.app.printed import printed
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import rows_of
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 Array = NDArray[np.float64]
 
@@ -149,7 +147,7 @@ class Linearization:
 
 
 def linearize(
-    model: Model, numbers: Numbers, *, t: float, x: Sequence[float] | np.ndarray | None, at_equilibrium: bool
+    model: LoadedModel, numbers: Numbers, *, t: float, x: Sequence[float] | np.ndarray | None, at_equilibrium: bool
 ) -> Linearization:
     """Linearise about a state; see `ballpass.runtime.Model.linearize`.
 
@@ -188,7 +186,7 @@ def linearize(
     )
 
 
-def masses(model: Model, numbers: Numbers) -> Array:
+def masses(model: LoadedModel, numbers: Numbers) -> Array:
     """Mass moved along each coordinate, shape (coordinates,) [kg]."""
     names = {"inner": "bearing.m_ei", "outer": "bearing.outer_ring.mass"}
     half = len(model.states) // 2
@@ -227,7 +225,7 @@ def _modes(mass: Array, damping: Array, stiffness: Array) -> tuple[Mode, ...]:
     return tuple(sorted(modes, key=lambda m: (m.natural_frequency, m.eigenvalue.imag)))
 
 
-def kink_notes(model: Model, numbers: Numbers, t: float, x: Array) -> tuple[str, ...]:
+def kink_notes(model: LoadedModel, numbers: Numbers, t: float, x: Array) -> tuple[str, ...]:
     """Where the damping law has no derivative at this state, in words; empty where it has one."""
     smoothness = dict(model.manifest.smoothness).get("damping")
     if smoothness not in ("kinked", "discontinuous") or model.manifest.bearing is None:
@@ -261,7 +259,7 @@ def _balls(indices: Sequence[int]) -> str:
     return "ball " + ", ".join(str(k + 1) for k in indices)
 
 
-def _deflections(model: Model, numbers: Numbers, t: float, x: Array) -> tuple[Array, Array, float]:
+def _deflections(model: LoadedModel, numbers: Numbers, t: float, x: Array) -> tuple[Array, Array, float]:
     """Deflection of each ball, its rate, and the largest speed in it [m], [m/s]."""
     there = point(model, numbers, t, x)
     (rows,) = rows_of(model, "ball.deflection")

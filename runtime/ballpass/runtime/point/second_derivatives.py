@@ -10,7 +10,6 @@ derivative at contact onset, d2F/d(delta)2 ~ delta^(-1/2): such a query is refus
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -20,12 +19,10 @@ from ballpass.runtime.contract import InputInfo
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.smoothness import WORDS
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import CRANK_ANGLE, RHS, TIME, directions_of, rows_of, turning_speed
 from ballpass.runtime.run import inputs as clock
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 Array = NDArray[np.float64]
 
@@ -34,7 +31,7 @@ _BY_LAW = ("ball.elastic_force", "ball.damping_force", "ball.force", "ring_force
 
 
 def hessian(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     of: str | Sequence[str],
     wrt: tuple[str, str],
@@ -94,7 +91,7 @@ def hessian(
     return np.asarray(result[0] if single else result, dtype=float)
 
 
-def _refuse_unbounded(model: Model, labels: Sequence[str], functions: Sequence[str]) -> None:
+def _refuse_unbounded(model: LoadedModel, labels: Sequence[str], functions: Sequence[str]) -> None:
     rough = [f"{law}: {WORDS[kind]}" for law, kind in model.manifest.smoothness if kind != "twice smooth"]
     asked = [label for label in labels if label.startswith(_BY_LAW)] + ([RHS] if RHS in functions else [])
     if rough and asked:
@@ -106,7 +103,7 @@ def _refuse_unbounded(model: Model, labels: Sequence[str], functions: Sequence[s
         )
 
 
-def _symbol(model: Model, numbers: Numbers, symbols: dict[str, ca.SX], name: str) -> ca.SX:
+def _symbol(model: LoadedModel, numbers: Numbers, symbols: dict[str, ca.SX], name: str) -> ca.SX:
     if name == TIME:
         return symbols["moved"]
     if name == CRANK_ANGLE:

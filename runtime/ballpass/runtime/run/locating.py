@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Literal
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.driver_library import SWITCHES
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract import Manifest
-    from ballpass.runtime.model import Model
     from ballpass.runtime.native.stepper import Stepper
 
 Kinks = Literal["stepped-over", "located"]
@@ -102,6 +102,6 @@ def refuse_with_error(kinks: str | None, error: object) -> None:
         )
 
 
-def stepper_for(model: Model, kinks: Kinks) -> Stepper:
+def stepper_for(model: LoadedModel, kinks: Kinks) -> Stepper:
     """Driver of single runs; errors as for `Model.stepper`."""
     return model.locating_stepper if kinks == LOCATED and has_kinks(model.manifest) else model.stepper

@@ -6,25 +6,21 @@ the stepper runs, its own C finds them; elsewhere Python does, and the rates wit
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Stepper
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.scales import Scales, find_scales
 from ballpass.runtime.run.segments import segment_edges
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 #: Moments of the run that are looked at for magnitudes: so many between breakpoints, and so many evenly spread.
 MOMENTS = 32
 
 
 def stepper_magnitudes(
-    model: Model,
+    model: LoadedModel,
     stepper: Stepper,
     numbers: Numbers,
     initial: np.ndarray,
@@ -45,7 +41,7 @@ def stepper_magnitudes(
     return stepper.magnitudes(numbers.p, numbers.c, initial, inputs, horizon)
 
 
-def model_scales(model: Model, numbers: Numbers, initial: np.ndarray, duration: float, turn: float) -> Scales:
+def model_scales(model: LoadedModel, numbers: Numbers, initial: np.ndarray, duration: float, turn: float) -> Scales:
     """Magnitudes and stiffness of a run, by Python.
 
     Parameters
@@ -73,7 +69,7 @@ def moved_masses(numbers: Numbers, coordinates: int) -> np.ndarray:
 
 
 def _moments(
-    model: Model, numbers: Numbers, duration: float, turn: float, edges: np.ndarray | None = None
+    model: LoadedModel, numbers: Numbers, duration: float, turn: float, edges: np.ndarray | None = None
 ) -> tuple[np.ndarray, float]:
     """Inputs at the moments that are looked at, shape (moments, inputs), and the time that bounds travel [s]."""
     horizon = min(duration, turn)

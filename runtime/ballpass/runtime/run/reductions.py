@@ -14,7 +14,6 @@ import ctypes
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real, unknown_name
 from ballpass.runtime.many.members import edge_windows
 from ballpass.runtime.native.ensemble_driver import BALL_CHANNELS, HEAD, ROWS, EnsembleDriver
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.native.stepper import End, Family, Outcome, Segments, Stepper
 from ballpass.runtime.run import inputs as clock
@@ -35,10 +35,6 @@ from ballpass.runtime.run.magnitudes import stepper_magnitudes
 from ballpass.runtime.run.request import Request, run_length, start_state, tolerance
 from ballpass.runtime.run.segments import make_segments, rest_of
 from ballpass.runtime.run.stepping import STATUS_OF_END
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
-
 
 #: Steps, accepted and rejected, that one call of the stepper takes: a fraction of a second.  Between calls progress is
 #: told, and an interrupt or the wish of an ensemble to stop is heard.
@@ -166,7 +162,7 @@ def choose_family(asked: str) -> Family:
     return STEPPERS[asked]
 
 
-def reduce_run(model: Model, numbers: Numbers, request: Request) -> Reductions:
+def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reductions:
     """Integrate from t = 0 and reduce; what the request leaves open is as the scene's run settings say.
 
     Raises
@@ -213,7 +209,7 @@ def reduce_run(model: Model, numbers: Numbers, request: Request) -> Reductions:
 
 
 def integrate_reduced(
-    model: Model,
+    model: LoadedModel,
     driver: EnsembleDriver,
     numbers: Numbers,
     family: Family,
@@ -279,7 +275,7 @@ class Begun:
 
 def _calls(
     stepper: Stepper,
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     family: Family,
     tolerance: np.ndarray,

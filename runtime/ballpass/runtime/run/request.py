@@ -14,11 +14,11 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real, unknown_name, vector
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract import Manifest, RunInfo
-    from ballpass.runtime.model import Model
 
 #: Smallest and largest relative tolerance [1].
 TOLERANCES = (1e-13, 1e-1)
@@ -87,7 +87,7 @@ class Plan:
     transient_cycles: float
 
 
-def make_plan(model: Model, numbers: Numbers, request: Request) -> Plan:
+def make_plan(model: LoadedModel, numbers: Numbers, request: Request) -> Plan:
     """Check a request and fill it in from the scene's run settings.
 
     Raises
@@ -117,7 +117,9 @@ def make_plan(model: Model, numbers: Numbers, request: Request) -> Plan:
     )
 
 
-def _sample_times(model: Model, request: Request, turn: float, outputs: Sequence[str]) -> tuple[float, np.ndarray]:
+def _sample_times(
+    model: LoadedModel, request: Request, turn: float, outputs: Sequence[str]
+) -> tuple[float, np.ndarray]:
     """Length of the run, and the times of its samples."""
     if request.times is None:
         duration = run_length(model, request, turn)
@@ -163,7 +165,7 @@ def _sample_times(model: Model, request: Request, turn: float, outputs: Sequence
     return duration, times
 
 
-def _check_memory(model: Model, count: int, outputs: Sequence[str]) -> None:
+def _check_memory(model: LoadedModel, count: int, outputs: Sequence[str]) -> None:
     wanted = set(outputs)
     columns = len(model.states) + sum(info.size for info in model.manifest.outputs if info.name in wanted)
     columns += len(model.manifest.inputs)
@@ -195,7 +197,7 @@ def check_memory(what: str, rows: float, columns: int, remedy: str) -> None:
         raise RequestError(f"{what} {columns} numbers would not fit into memory. {remedy}")
 
 
-def output_names(model: Model, asked: Sequence[str] | None) -> tuple[str, ...]:
+def output_names(model: LoadedModel, asked: Sequence[str] | None) -> tuple[str, ...]:
     """Names of outputs, each once; None: all of the scene.
 
     Raises
@@ -250,7 +252,7 @@ def asked_length(run: RunInfo, cycles: float | None, duration: float | None) -> 
     return None, float(duration)
 
 
-def run_length(model: Model, request: Request, turn: float) -> float:
+def run_length(model: LoadedModel, request: Request, turn: float) -> float:
     """Length of the run that is asked for [s]; RequestError as for `asked_length`, or for turns of what never turns."""
     cycles, duration = asked_length(model.manifest.run, request.cycles, request.duration)
     if duration is not None:
@@ -261,7 +263,7 @@ def run_length(model: Model, request: Request, turn: float) -> float:
     return cycles * turn
 
 
-def start_state(model: Model, numbers: Numbers, given: np.ndarray | None) -> np.ndarray:
+def start_state(model: LoadedModel, numbers: Numbers, given: np.ndarray | None) -> np.ndarray:
     """State at the start, shape (states,): as given, else from the parameters; RequestError for another shape."""
     if given is None:
         return np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)

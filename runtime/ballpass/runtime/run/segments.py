@@ -9,19 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ballpass.runtime.contract import InputInfo
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.request import check_memory
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
-
 
 #: Largest angle that a phase may reach within a segment [rad]: sines of larger ones lose digits.
 LARGEST_PHASE = 1e6
@@ -35,7 +31,7 @@ def time_resolution(begin: float, end: float, turn: float) -> float:
     return clock.TIME_RESOLUTION * max(abs(begin), abs(end), turn if math.isfinite(turn) else 0.0)
 
 
-def segment_edges(model: Model, numbers: Numbers, begin: float, end: float, turn: float) -> np.ndarray:
+def segment_edges(model: LoadedModel, numbers: Numbers, begin: float, end: float, turn: float) -> np.ndarray:
     """Begin, breakpoints, whole turns and end, increasing, none twice, shape (segments + 1,) [s].
 
     Raises

@@ -18,6 +18,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS, Segments, Tangents
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.direction_scales import direction_scales
@@ -26,7 +27,6 @@ from ballpass.runtime.run.request import check_memory
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
-    from ballpass.runtime.model import Model
     from ballpass.runtime.run.request import Request
     from ballpass.runtime.run.solution import Solution
 
@@ -77,7 +77,7 @@ class Chain:
         An unknown parameter.
     """
 
-    def __init__(self, model: Model, numbers: Numbers, names: Sequence[str]) -> None:
+    def __init__(self, model: LoadedModel, numbers: Numbers, names: Sequence[str]) -> None:
         self._inputs = model.manifest.inputs
         self._values = numbers.values
         rows = {name: row for row, name in enumerate(numbers.parameters)}
@@ -139,7 +139,7 @@ class Directions:
         An unknown parameter, or derivatives that would not fit into memory.
     """
 
-    def __init__(self, model: Model, numbers: Numbers, names: Sequence[str], samples: int) -> None:
+    def __init__(self, model: LoadedModel, numbers: Numbers, names: Sequence[str], samples: int) -> None:
         self.chain = Chain(model, numbers, names)
         self.names = self.chain.names
         count, lanes = len(names), model.differentiating_stepper.lanes
@@ -243,7 +243,7 @@ def refuse_located(kinks: str | None) -> None:
         )
 
 
-def sensitivities(model: Model, numbers: Numbers, request: Request, names: Sequence[str]) -> Sensitivities:
+def sensitivities(model: LoadedModel, numbers: Numbers, request: Request, names: Sequence[str]) -> Sensitivities:
     """Run a model with its derivatives along parameters.
 
     Raises

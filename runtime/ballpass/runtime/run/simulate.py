@@ -22,6 +22,7 @@ from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.contract.status import IntegrationError, Status
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.run.casadi_integrators import METHODS, available_methods
 from ballpass.runtime.run.failure_location import whereabouts
@@ -36,7 +37,6 @@ from ballpass.runtime.run.stepping import Cost, step_through
 from ballpass.runtime.run.trajectory import Interrupted, Trajectory, evaluate_outputs, start_trajectory
 
 if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
     from ballpass.runtime.run.sensitivity import Directions
 
 #: `auto` takes ``rosenbrock`` above this ratio of fastest decay to fastest natural frequency.  Measured on a press with
@@ -46,7 +46,7 @@ STIFF_RATIO = 3.0
 
 
 def simulate(
-    model: Model, numbers: Numbers, request: Request, prepare: Callable[[int], Directions] | None = None
+    model: LoadedModel, numbers: Numbers, request: Request, prepare: Callable[[int], Directions] | None = None
 ) -> Solution:
     """Run a model; with derivatives along the directions that `prepare` makes for a number of samples.
 
@@ -105,7 +105,7 @@ def simulate(
 
 
 def to_solution(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     plan: Plan,
     trajectory: Trajectory,
@@ -156,7 +156,7 @@ def to_solution(
 
 
 def fill(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     method: str,
     tolerance: np.ndarray,
@@ -190,7 +190,7 @@ def fill(
 
 
 def _choose(
-    model: Model, numbers: Numbers, asked: str | None, plan: Plan, trajectory: Trajectory
+    model: LoadedModel, numbers: Numbers, asked: str | None, plan: Plan, trajectory: Trajectory
 ) -> tuple[str, str, np.ndarray]:
     """Method, the reason for it, and the magnitudes of the states."""
     if not len(plan.initial):
@@ -209,7 +209,12 @@ def _choose(
     return method, reason, magnitude
 
 
-def choose_method(model: Model, asked: str, scales: Scales | None) -> tuple[str, str]:
+def method_names(model: LoadedModel) -> tuple[str, ...]:
+    """Integration methods of a model, besides ``auto``."""
+    return (*((*STEPPERS, QUASI_STATIC) if model.has_stepper else ()), *available_methods(model))
+
+
+def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tuple[str, str]:
     """Name of the method and the reason for it.
 
     Parameters
@@ -242,5 +247,5 @@ def choose_method(model: Model, asked: str, scales: Scales | None) -> tuple[str,
         )
         raise RequestError(f"method {asked}: {missing}. Or take one of {', '.join(('auto', *available))}.")
     if asked not in available:
-        raise RequestError(unknown_name("method", asked, ("auto", *model.methods)))
+        raise RequestError(unknown_name("method", asked, ("auto", *method_names(model))))
     return asked, "asked for"

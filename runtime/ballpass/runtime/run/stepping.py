@@ -14,6 +14,7 @@ import numpy as np
 
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import End, Family, Outcome
 from ballpass.runtime.run.limits import LEAST_PROGRESS, STEPS_A_LOOK, least_progress, step_limit
 from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, Kinks, stepper_for
@@ -21,7 +22,6 @@ from ballpass.runtime.run.segments import part_of, rest_of
 from ballpass.runtime.run.trajectory import Interrupted, Trajectory
 
 if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
     from ballpass.runtime.run.sensitivity import Directions
 
 #: Segments that one call of the stepper takes, ...
@@ -53,7 +53,7 @@ class Cost:
 
 
 def step_through(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     family: Family,
     tolerance: np.ndarray,
@@ -157,7 +157,7 @@ def _note(cost: Cost, outcome: Outcome, family: Family) -> None:
         cost.families.append(outcome.family.name.lower())
 
 
-def _failure(model: Model, trajectory: Trajectory, outcome: Outcome, start: float) -> Interrupted:
+def _failure(model: LoadedModel, trajectory: Trajectory, outcome: Outcome, start: float) -> Interrupted:
     edges = trajectory.segments.times[:-1]
     trajectory.passed = max(int(np.searchsorted(edges, outcome.time, side="right")), 1)
     detail = f"Step size {outcome.step:.3g} s"

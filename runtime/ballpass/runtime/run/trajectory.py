@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.run.segments import make_segments, segment_edges, time_resolution
-
-if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -65,7 +62,7 @@ class Interrupted(Exception):
 
 
 def start_trajectory(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     times: np.ndarray,
     initial: np.ndarray,
@@ -104,7 +101,7 @@ def start_trajectory(
 
 
 def evaluate_outputs(
-    model: Model,
+    model: LoadedModel,
     numbers: Numbers,
     trajectory: Trajectory,
     names: Sequence[str],
