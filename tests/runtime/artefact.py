@@ -65,7 +65,7 @@ OUTPUTS = (
 
 
 def functions(*, extra_term: float = 0.0, states: bool = True) -> list[ca.Function]:
-    """The functions of the folder, without integrators; `extra_term` changes the source, `states` False leaves none."""
+    """The functions of the folder; `extra_term` changes the source, `states` False leaves none."""
     t, x, u = ca.SX.sym("t"), ca.SX.sym("x", 2), ca.SX.sym("u", len(INPUTS))
     p, c = ca.SX.sym("p", len(DEFAULTS)), ca.SX.sym("c", 1)
     value = dict(zip(DEFAULTS, ca.vertsplit(p), strict=True))
@@ -101,23 +101,6 @@ def functions(*, extra_term: float = 0.0, states: bool = True) -> list[ca.Functi
     return made
 
 
-def integrators(rhs: ca.Function) -> list[ca.Function]:
-    """``erk`` and ``rosenbrock`` over 1 and 64 intervals, as the contract describes them."""
-    s, t0, h = ca.SX.sym("s"), ca.SX.sym("t0"), ca.SX.sym("h")
-    z, scale, u = ca.SX.sym("z", 2), ca.SX.sym("scale", 2), ca.SX.sym("u", len(INPUTS))
-    p, c = ca.SX.sym("p", len(DEFAULTS)), ca.SX.sym("c", 1)
-    ode = h * rhs(t0 + s * h, z * scale, u, p, c) / scale
-    dae = {"x": z, "t": s, "p": ca.vertcat(t0, h, scale, u, p, c), "ode": ode}
-    options = {"abstol": 1.0, "reltol": 1e-14, "max_num_steps": 20_000}
-    made = []
-    for plugin in ("erk", "rosenbrock"):
-        for intervals in (1, 64):
-            grid = [(k + 1) / intervals for k in range(intervals)]
-            chosen = {**options, "control_group_size": [intervals]}
-            made.append(ca.integrator(f"{plugin}_{intervals}", plugin, dae, 0, grid, chosen))
-    return made
-
-
 def write_folder(
     folder: Path,
     *,
@@ -129,9 +112,8 @@ def write_folder(
     """Write the generated folder; `defaults` replaces default values and touches the manifest only."""
     folder.mkdir(parents=True, exist_ok=True)
     made = functions(extra_term=extra_term, states=states)
-    grids = integrators(next(f for f in made if f.name() == "rhs")) if states else []
     generator = ca.CodeGenerator("model.c")
-    for function in (*made, *grids):
+    for function in made:
         generator.add(function)
     generator.generate(f"{folder}/")
     pack = ca.FileSerializer(str(folder / "model.casadi"))
@@ -139,7 +121,7 @@ def write_folder(
     for function in made:
         pack.pack(function)
     del pack
-    mf.write(folder, manifest((*made, *grids), folder, defaults or {}, states, mechanism))
+    mf.write(folder, manifest(made, folder, defaults or {}, states, mechanism))
     return folder
 
 

@@ -12,9 +12,8 @@ from artefact import DEFAULTS, write_folder
 from ballpass.runtime import IntegrationError, Model, RequestError, Status, load, load_solution
 from ballpass.runtime.native import compile
 from ballpass.runtime.native.kernel import EvaluationError
-from ballpass.runtime.run.casadi_integrators import CvodesIntegrator, Frozen, GeneratedIntegrator, Method
+from ballpass.runtime.run.casadi_integrators import METHODS, Frozen, OneStepIntegrator
 
-METHODS = ("erk", "rosenbrock", "cvodes")
 TURN = 2.0 * math.pi
 
 
@@ -175,14 +174,12 @@ def test_integration_that_diverges_stops_and_keeps_what_it_has(model: Model) -> 
 def test_integrator_that_returns_no_numbers_is_stopped_at_that_piece(
     model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class Failing(GeneratedIntegrator):
+    class Failing(OneStepIntegrator):
         def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
             block = super().advance(state, start, step, intervals, frozen)
             return block * np.nan if frozen.u[1] else block
 
-    broken = Method(make=lambda m: Failing(m, "erk"), required=())
-    monkeypatch.setattr("ballpass.runtime.run.casadi_integrators.METHODS", {"broken": broken})
-    monkeypatch.setattr("ballpass.runtime.run.simulate.METHODS", {"broken": broken})
+    monkeypatch.setitem(METHODS, "broken", lambda m: Failing(m, "erk"))
     # the push starts at a quarter turn
     changes = {"driver.start_angle": 0.0, "push.window.start": TURN / 4, "push.window.end": TURN / 2}
     with pytest.raises(IntegrationError) as caught:
@@ -197,9 +194,9 @@ def test_integrator_that_returns_no_numbers_is_stopped_at_that_piece(
 def test_a_call_that_fails_loses_no_sample_before_its_failure(
     model: Model, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
-    # CVODES crosses a whole segment in one call, the generated integrators up to 64 samples; the failure lies amid both
+    # CVODES crosses a whole segment in one call, the one-step methods up to 64 samples; the failure lies amid both
     duration, last = 0.09, 0.0271
-    family = {"cvodes": CvodesIntegrator, "erk": lambda m: GeneratedIntegrator(m, "erk")}[method]
+    family = METHODS[method]
 
     class Failing:
         def __init__(self, model: Model) -> None:
@@ -217,9 +214,7 @@ def test_a_call_that_fails_loses_no_sample_before_its_failure(
     request["parameters"] = {"push.window.start": 1.0, "push.window.end": 1.0}
     whole = model.simulate(method="rosenbrock", **request)
     assert whole.statistics.segments == 1
-    for place in ("integrators", "simulate"):
-        broken = {"failing": Method(make=Failing, required=())}
-        monkeypatch.setattr(f"ballpass.runtime.run.{place}.METHODS", broken)
+    monkeypatch.setitem(METHODS, "failing", Failing)
     with pytest.raises(IntegrationError, match="integrator could not go on") as caught:
         model.simulate(method="failing", **request)
     kept = caught.value.partial

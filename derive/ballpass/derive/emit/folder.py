@@ -2,7 +2,7 @@
 
 In: a scene file.  Out: ``generated/<scene>/`` with
 
-model.c, model.h   every function and the integrators as C99
+model.c, model.h   every function as C99
 kernels.h          the model cut into inline functions for the project's own stepper
 tangents.h         derivatives of these along several directions at once, for sensitivities
 ensemble_kernels.h the kernels for several members of an ensemble at once, and what reductions need
@@ -177,7 +177,7 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene) -> None:
 
 
 def _write(folder: Path, system: System, functions: Functions) -> None:
-    _write_c(folder, "model", (*functions.functions, *functions.integrators))
+    _write_c(folder, "model", functions.functions)
     _write_c(folder, "jacobians", functions.jacobians)
     if functions.kernels is not None:
         header = kernels_header(system, functions, functions.kernels)
@@ -288,10 +288,7 @@ def _manifest(system: System, functions: Functions, files: tuple[tuple[str, str]
                 description=words,
                 library=library,
             )
-            for library, group in (
-                (mf.MODEL, (*functions.functions, *functions.integrators)),
-                (mf.JACOBIANS, functions.jacobians),
-            )
+            for library, group in ((mf.MODEL, functions.functions), (mf.JACOBIANS, functions.jacobians))
             for f, words in group
         ),
         smoothness=tuple((name, s.value) for name, s in system.smoothness),

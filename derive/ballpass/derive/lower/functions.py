@@ -26,10 +26,6 @@ from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
 from ballpass.derive.variables import Output
 
-#: Output intervals of one call of a generated integrator: single ones to land exactly, many for speed.
-INTEGRATOR_GRIDS = (1, 64)
-INTEGRATORS = ("erk", "rosenbrock")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constant:
@@ -46,21 +42,19 @@ class Constant:
 class Functions:
     """Named functions in the order they are written, with a line for people each.
 
-    `integrators` are kept apart: they go to C only; a machine without compiler makes them from ``rhs``.
     `jacobians` go to files of their own, read and compiled when a derivative is first asked for; `groups` says which
     quantities they differentiate.  `switches` are None where the laws have no kinks.
     """
 
     constants: tuple[Constant, ...]
     functions: tuple[Described, ...]
-    integrators: tuple[Described, ...]
     jacobians: tuple[Described, ...]
     groups: tuple[Group, ...]
     kernels: Kernels | None
     switches: SwitchKernels | None
 
     def __getitem__(self, name: str) -> ca.Function:
-        for function, _ in (*self.functions, *self.integrators, *self.jacobians):
+        for function, _ in (*self.functions, *self.jacobians):
             if function.name() == name:
                 return function
         raise KeyError(name)
@@ -169,10 +163,9 @@ class _Lowering:
         for name, results, words in bodies:
             takes = {k: v for k, v in arguments.items() if k in ("u", "p", "c") or _uses(results, v)}
             made.append((ca.Function(name, [*takes.values()], [*results.values()], [*takes], [*results]), words))
-            if name == "rhs":  # the integrators need these two
+            if name == "rhs":  # the choice of a method needs these two
                 made += partials(name, "xdot", results["xdot"], arguments, "xt")
         rhs = bodies[0][1]["xdot"] if system.states else None
-        integrators = self._integrators(rhs, arguments) if rhs is not None else []
         groups, jacobians = self._jacobians(rhs, arguments)
         named = [
             Constant(name=d.symbol.name, unit=d.unit, description=d.description, latex=d.latex)
@@ -183,7 +176,6 @@ class _Lowering:
         return Functions(
             constants=(*named, *found, *self._series_constants()),
             functions=tuple(made),
-            integrators=tuple(integrators),
             jacobians=tuple(jacobians),
             groups=tuple(groups),
             kernels=kernels,
@@ -351,32 +343,6 @@ class _Lowering:
             ["delta", "delta_rate", "p", "c"],
             ["elastic_force", "damping_force"],
         )
-
-    def _integrators(self, rhs: ca.SX, arguments: Mapping[str, ca.SX]) -> list[tuple[ca.Function, str]]:
-        """CasADi's integrators for scaled states over a normalised step.
-
-        z = x / scale over s in [0, 1] with t = t0 + h s.  Steps are controlled to one absolute unit of z, so that the
-        tolerance is the run-time number `scale` and not a compiled one.
-        """
-        n = len(self.system.states)
-        z, s, t0, h, scale = (ca.SX.sym(k, m) for k, m in (("z", n), ("s", 1), ("t0", 1), ("h", 1), ("scale", n)))
-        f = ca.Function("f", [*arguments.values()], [rhs])
-        at = {**arguments, "t": t0 + h * s, "x": z * scale}
-        ode = h * f(*at.values()) / scale
-        dae = {
-            "x": z,
-            "t": s,
-            "p": ca.vertcat(t0, h, scale, arguments["u"], arguments["p"], arguments["c"]),
-            "ode": ca.cse(ode),
-        }
-        options = {"abstol": 1.0, "reltol": 1e-14, "max_num_steps": 1_000_000}
-        out = []
-        for plugin in INTEGRATORS:
-            for intervals in INTEGRATOR_GRIDS:
-                grid = [(k + 1) / intervals for k in range(intervals)]
-                function = ca.integrator(f"{plugin}_{intervals}", plugin, dae, 0, grid, options)
-                out.append((function, f"{plugin} over {intervals} equal output intervals"))
-        return out
 
 
 def _uses(results: Mapping[str, ca.SX], argument: ca.SX) -> bool:

@@ -89,7 +89,6 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
         "method": statistic.method,
         "compiled": statistic.compiled,
         "rtol": _value(statistic.rtol, "1", "rtol"),
-        # null where the integrator does not tell: erk and rosenbrock in compiled code
         "steps": {"value": statistic.steps, "unit": "1"},
         **({"located_kinks": {"value": statistic.located, "unit": "1"}} if statistic.located is not None else {}),
         "wall_time": _value(statistic.wall_time, "s", "wall_time"),

@@ -27,10 +27,8 @@ from ballpass.runtime.run.casadi_integrators import make_integrator
 #: Arguments of a function of outputs that change from sample to sample.
 _MOVING = ("t", "x", "u")
 
-
-#: Names of derivatives, and of integrators over a grid.
+#: Names of derivatives.
 _DERIVATIVE = re.compile(r"(?P<of>\w+?)_(?:jac_(?P<along>[a-z])|tangent)")
-_INTEGRATOR = re.compile(r"(?P<plugin>\w+)_(?P<intervals>\d+)")
 
 
 class _OwnMemory(threading.local):
@@ -70,6 +68,7 @@ class Functions:
         self._making = threading.RLock()
         self._loop_driver: LoopDriver | None = None
         self._symbolic: dict[str, casadi.Function] = {}
+        self._integrators: dict[tuple[str, int], casadi.Function] = {}
 
     def has(self, name: str) -> bool:
         """Whether the manifest has a function of that name."""
@@ -175,14 +174,11 @@ class Functions:
                 self._symbolic |= self._read_file(path)
                 self._read.add(where)
             if name not in self._symbolic:
-                derivative, integrator = _DERIVATIVE.fullmatch(name), _INTEGRATOR.fullmatch(name)
-                # derivatives and integrators are generated to C only; here they are made from what they belong to
-                if derivative is not None and self.has(derivative["of"]):
-                    self._symbolic[name] = _differentiate(self.symbolic(derivative["of"]), name, derivative["along"])
-                elif integrator is not None:
-                    self._symbolic[name] = self.virtual_integrator(integrator["plugin"], int(integrator["intervals"]))
-                else:
+                # derivatives are generated to C only; here they are made from what they belong to
+                derivative = _DERIVATIVE.fullmatch(name)
+                if derivative is None or not self.has(derivative["of"]):
                     raise ArtefactError(f"{path}: has no function {name!r}. Write the folder again.")
+                self._symbolic[name] = _differentiate(self.symbolic(derivative["of"]), name, derivative["along"])
             return self._symbolic[name]
 
     def _read_file(self, path: Path) -> dict[str, casadi.Function]:
@@ -194,10 +190,14 @@ class Functions:
         return functions
 
     def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function:
-        """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `integrators`)."""
-        manifest = self.manifest
-        sizes = {"u": len(manifest.inputs), "p": len(manifest.parameters), "c": len(manifest.constants)}
-        return make_integrator(self.symbolic("rhs"), sizes, plugin, intervals)
+        """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `casadi_integrators`)."""
+        with self._making:
+            if (plugin, intervals) not in self._integrators:
+                manifest = self.manifest
+                sizes = {"u": len(manifest.inputs), "p": len(manifest.parameters), "c": len(manifest.constants)}
+                made = make_integrator(self.symbolic("rhs"), sizes, plugin, intervals)
+                self._integrators[plugin, intervals] = made
+            return self._integrators[plugin, intervals]
 
     def _require(self, name: str) -> None:
         if not self.has(name):

@@ -136,7 +136,7 @@ class LoadedModel:
         return self._functions.symbolic(name)
 
     def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function:
-        """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `integrators`)."""
+        """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `casadi_integrators`)."""
         return self._functions.virtual_integrator(plugin, intervals)
 
     def numbers(self, parameters: Mapping[str, float] | None = None) -> Numbers:

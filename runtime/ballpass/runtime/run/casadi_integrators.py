@@ -1,14 +1,15 @@
-"""The integration methods, behind one interface and a registry of names.
+"""CasADi's integration methods, behind one interface and a registry of names.
 
 Every method integrates the scaled states ``z = x / scale`` over the normalised time of a piece, with an absolute
-tolerance of one: ``scale = rtol * magnitude`` is the tolerance, chosen at run time, and changing it recompiles nothing.
-The local error of a step is kept below `rtol` times the magnitude of each state (see `scales`).
+tolerance of one: ``scale = rtol * magnitude`` is the tolerance, chosen at run time.  The local error of a step is kept
+below `rtol` times the magnitude of each state (see `scales`).  All run in CasADi's virtual machine: they need no
+compiler, and check the compiled stepper.
 
-erk         explicit Runge-Kutta 5(4), generated C
-rosenbrock  linearly implicit, L-stable, order 5(4), generated C
-cvodes      SUNDIALS' variable-order BDF in CasADi's virtual machine: slower, and independent of the others
+erk         explicit Runge-Kutta 5(4)
+rosenbrock  linearly implicit, L-stable, order 5(4)
+cvodes      SUNDIALS' variable-order BDF
 
-A further method is a class with `pieces` and `advance`, and a line in `METHODS`.
+A further method is a line in `METHODS`.
 """
 
 from __future__ import annotations
@@ -26,29 +27,25 @@ from typing import Any, Protocol
 import casadi
 import numpy as np
 
-from ballpass.runtime.native.kernel import EvaluationError, Kernel
+from ballpass.runtime.native.kernel import EvaluationError
 
-#: Output intervals of the generated integrators with a fine grid.
+#: Output intervals of the one-step methods with a fine grid.
 GRID = 64
 
 
 class ModelFunctions(Protocol):
     """What a method needs of a model."""
 
-    @property
-    def compiled(self) -> bool: ...
     def has(self, name: str) -> bool: ...
-    def function(self, name: str) -> casadi.Function: ...
-    def kernel(self, name: str) -> Kernel: ...
     def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function: ...
 
 
 class Integrator(Protocol):
     """One method at work on one model."""
 
-    #: Accepted and rejected steps so far; None where the method does not tell.
-    steps: int | None
-    rejected: int | None
+    #: Accepted and rejected steps so far.
+    steps: int
+    rejected: int
 
     def pieces(self, intervals: int) -> list[int]:
         """Numbers of intervals, adding up to `intervals`, that single calls can take."""
@@ -77,24 +74,40 @@ class Frozen:
         return np.concatenate([(start, step), self.scale, self.u, self.p, self.c])
 
 
-class GeneratedIntegrator:
-    """``erk`` and ``rosenbrock``: integrators with a grid of 1 and of `GRID` intervals.
+class VirtualIntegrator:
+    """One of CasADi's plugins at work on one model."""
+
+    #: Names under which the plugin counts accepted and rejected steps.
+    counters = ("nsteps", "netfails")
+
+    def __init__(self, model: ModelFunctions, plugin: str) -> None:
+        self._model = model
+        self._plugin = plugin
+        self.steps = 0
+        self.rejected = 0
+
+    def pieces(self, intervals: int) -> list[int]:
+        """All at once: a multistep method starts with tiny steps, so there are as few starts as possible."""
+        return [intervals] if intervals else []
+
+    def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
+        """As `Integrator` says."""
+        function = self._model.virtual_integrator(self._plugin, intervals)
+        samples = _call(function, {"x0": state / frozen.scale, "p": frozen.pack(start, step)})
+        statistics = function.stats()
+        self.steps += int(statistics[self.counters[0]])
+        self.rejected += int(statistics[self.counters[1]])
+        return np.asarray(samples.reshape(len(state), intervals).T * frozen.scale)
+
+
+class OneStepIntegrator(VirtualIntegrator):
+    """``erk`` and ``rosenbrock``: functions for a grid of 1 and of `GRID` intervals, whatever a run is sampled like.
 
     A piece of fewer intervals (a power of two) is integrated on the fine grid, of which every second, fourth ... point
-    is kept: outputs within a step cost next to nothing, calls do.
+    is kept: outputs within a step cost next to nothing, another function would take a fraction of a second to make.
     """
 
-    def __init__(self, model: ModelFunctions, name: str) -> None:
-        self._model = model
-        self._name = name
-        # the virtual machine counts steps, compiled code does not
-        self.steps: int | None = None if model.compiled else 0
-        self.rejected: int | None = None if model.compiled else 0
-
-    @staticmethod
-    def required(name: str) -> tuple[str, ...]:
-        """Functions that a model must have for a method of that name."""
-        return (f"{name}_1", f"{name}_{GRID}")
+    counters = ("n_steps", "n_reject")
 
     def pieces(self, intervals: int) -> list[int]:
         """Powers of two, as many of `GRID` as there are."""
@@ -109,49 +122,8 @@ class GeneratedIntegrator:
     def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
         """As `Integrator` says."""
         grid = 1 if intervals == 1 else GRID
-        values = {"x0": state / frozen.scale, "p": frozen.pack(start, step)}
-        name = f"{self._name}_{grid}"
-        if self.steps is None or self.rejected is None:
-            samples = self._model.kernel(name)(values)
-        else:
-            function = self._model.function(name)
-            samples = _call(function, values)
-            statistics = function.stats()
-            self.steps += int(statistics["n_steps"])
-            self.rejected += int(statistics["n_reject"])
-        samples = samples.reshape(len(state), grid).T
-        return np.asarray(samples[grid // intervals - 1 :: grid // intervals] * frozen.scale)
-
-
-class CvodesIntegrator:
-    """CVODES on the serialised right-hand side; one integrator for each number of intervals, made when first needed."""
-
-    def __init__(self, model: ModelFunctions) -> None:
-        self._model = model
-        self._made: dict[int, casadi.Function] = {}
-        self.steps: int | None = 0
-        self.rejected: int | None = 0
-
-    @staticmethod
-    def required(name: str) -> tuple[str, ...]:
-        """Functions that a model must have for this method."""
-        return ("rhs",)
-
-    def pieces(self, intervals: int) -> list[int]:
-        """All at once."""
-        # a multistep method starts with tiny steps: as few starts as possible
-        return [intervals] if intervals else []
-
-    def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
-        """As `Integrator` says."""
-        if intervals not in self._made:
-            self._made[intervals] = self._model.virtual_integrator("cvodes", intervals)
-        function = self._made[intervals]
-        samples = _call(function, {"x0": state / frozen.scale, "p": frozen.pack(start, step)})
-        statistics = function.stats()
-        self.steps = (self.steps or 0) + int(statistics["nsteps"])
-        self.rejected = (self.rejected or 0) + int(statistics["netfails"])
-        return np.asarray(samples.reshape(len(state), intervals).T * frozen.scale)
+        every = grid // intervals
+        return super().advance(state, start, step, grid, frozen)[every - 1 :: every]
 
 
 def make_integrator(rhs: casadi.Function, sizes: Mapping[str, int], plugin: str, intervals: int) -> casadi.Function:
@@ -185,28 +157,17 @@ def make_integrator(rhs: casadi.Function, sizes: Mapping[str, int], plugin: str,
     return casadi.integrator(f"{plugin}_{intervals}", plugin, equations, 0.0, grid, options)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Method:
-    """An entry of the registry: how to make the integrator, and which functions it needs."""
-
-    make: Callable[[ModelFunctions], Integrator]
-    required: tuple[str, ...]
-
-
-#: Name of a method to how it is made; the order is that of messages.
-METHODS: Mapping[str, Method] = {
-    "erk": Method(make=lambda model: GeneratedIntegrator(model, "erk"), required=GeneratedIntegrator.required("erk")),
-    "rosenbrock": Method(
-        make=lambda model: GeneratedIntegrator(model, "rosenbrock"),
-        required=GeneratedIntegrator.required("rosenbrock"),
-    ),
-    "cvodes": Method(make=CvodesIntegrator, required=CvodesIntegrator.required("cvodes")),
+#: Name of a method to how it is made for a model; the order is that of messages.
+METHODS: Mapping[str, Callable[[ModelFunctions], Integrator]] = {
+    "erk": lambda model: OneStepIntegrator(model, "erk"),
+    "rosenbrock": lambda model: OneStepIntegrator(model, "rosenbrock"),
+    "cvodes": lambda model: VirtualIntegrator(model, "cvodes"),
 }
 
 
 def available_methods(model: ModelFunctions) -> tuple[str, ...]:
-    """Names of the methods whose functions the model has."""
-    return tuple(name for name, method in METHODS.items() if all(model.has(needed) for needed in method.required))
+    """Names of the methods that can integrate a model: all, where it has a right-hand side."""
+    return tuple(METHODS) if model.has("rhs") else ()
 
 
 def _call(function: casadi.Function, values: Mapping[str, Any]) -> np.ndarray:

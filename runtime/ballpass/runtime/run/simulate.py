@@ -149,7 +149,7 @@ def to_solution(
             segments=trajectory.passed,
             calls=trajectory.calls,
             wall_time=clocks.perf_counter() - started,
-            compiled=model.compiled and method != "cvodes",
+            compiled=model.compiled and method not in METHODS,
         ),
         status=status,
     )
@@ -181,7 +181,7 @@ def fill(
 
         fill_quasi_static(model, numbers, tolerance, trajectory, cost, progress)
         return
-    integrator = METHODS[method].make(model) if method != "none" else None
+    integrator = METHODS[method](model) if method != "none" else None
     try:
         integrate(numbers, integrator, tolerance, trajectory, progress)
     finally:
@@ -236,8 +236,6 @@ def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tupl
         name, why = ("rosenbrock", "stiff") if scales.stiffness > STIFF_RATIO else ("erk", "not stiff")
         if name in available:
             return name, f"{why}: {ratio}"
-        if available:
-            return available[-1], f"{why}: {ratio}; the model was generated without {name}"
         raise RequestError("The model has no right-hand side to integrate. Generate it again with `ballpass derive`.")
     if asked in STEPPERS or asked == QUASI_STATIC:
         missing = (

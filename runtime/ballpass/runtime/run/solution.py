@@ -42,7 +42,7 @@ class Statistics:
     ----------
     method : the integrator that ran, and `reason` why
     rtol : relative tolerance, and `magnitudes` of the states it refers to
-    steps, rejected : accepted and rejected steps; None where the integrator does not tell (CasADi's in C do not)
+    steps, rejected : accepted and rejected steps; None for a model without states
     segments : intervals between breakpoints, integrated one by one
     calls : calls of the integrator
     wall_time : time the simulation took [s]
