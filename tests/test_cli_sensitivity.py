@@ -99,7 +99,6 @@ def test_a_disagreement_ends_with_exit_code_1_and_both_numbers(
     [
         (["--of", "peak_bal_force"], "peak_ball_force"),
         (["--wrt", "bearing.clearanse"], "bearing.clearance"),
-        (["--check", "diferences"], "differences"),
         (["--rtol", "7"], "rtol"),
     ],
 )

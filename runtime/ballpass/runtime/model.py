@@ -285,8 +285,7 @@ class Model(LoadedModel):
         transient: float | None = None,
         parameters: Mapping[str, float] | None = None,
         method: str = "auto",
-        direction: Literal["forward", "adjoint"] = "forward",
-        check: bool | Literal["differences", "erk", "adjoint"] = True,
+        check: bool = True,
         rtol: float | None = None,
         sensitivity_rtol: float | None = None,
         samples_per_cycle: int | None = None,
@@ -301,9 +300,8 @@ class Model(LoadedModel):
         of : quantities (see `ballpass.runtime.ask.quantities`).  Default: peak ball force and motion of the rings
         wrt : parameters.  Default: all
         cycles, duration, transient, parameters : as for `simulate`
-        method : of the derivatives: ``auto``, one of the stepper's, or ``erk``
-        direction : of ``erk``
-        check : the second route: True (differences), "erk", "adjoint", or False for none
+        method : of the derivatives: ``auto``, or one of the stepper's
+        check : compare with differences, the second route; False gives derivatives without certificates
         rtol, sensitivity_rtol : tolerances of states and derivatives; tight ones by default
         samples_per_cycle : nodes of quadratures in a turn
         kinks : ``stepped-over`` at any tolerance, as for `sensitivities`
@@ -331,7 +329,6 @@ class Model(LoadedModel):
             duration=duration,
             transient=transient,
             method=method,
-            direction=direction,
             check=check,
             rtol=rtol,
             sensitivity_rtol=sensitivity_rtol,

@@ -173,7 +173,7 @@ def turn_slope(model: LoadedModel, numbers: Numbers, slopes: Slopes) -> Array:
     return np.asarray(-clock.period(manifest, numbers.values) / speed * slopes(name))
 
 
-def uniform_plan(edges: Edges, per_turn: int, *, from_start: bool = False) -> Plan:
+def uniform_plan(edges: Edges, per_turn: int) -> Plan:
     """Panels of Gauss's rule over the time that counts, and both sides of each edge.
 
     In a segment that ends at a kink the panels are equal in s, where the fraction is ``s^2 (3 - 2 s)``: what grows like
@@ -182,7 +182,6 @@ def uniform_plan(edges: Edges, per_turn: int, *, from_start: bool = False) -> Pl
     Parameters
     ----------
     per_turn : nodes in a turn; in the whole run where nothing turns
-    from_start : lay nodes without weight over the transient as well
     """
     window = edges.window
     span = window.turn if math.isfinite(window.turn) else window.duration
@@ -190,13 +189,11 @@ def uniform_plan(edges: Edges, per_turn: int, *, from_start: bool = False) -> Pl
     segment: list[Array] = []
     fraction: list[Array] = []
     weight: list[Array] = []
-    for k in range(0 if from_start else edges.first, len(lengths)):
+    for k in range(edges.first, len(lengths)):
         panels = max(1, math.ceil(lengths[k] / span * per_turn / len(GAUSS)))
         places, shares = ((np.arange(panels)[:, None] + GAUSS) / panels).ravel(), np.tile(WEIGHTS / panels, panels)
         if k in edges.kinks or k + 1 in edges.kinks:
             places, shares = places**2 * (3.0 - 2.0 * places), shares * 6.0 * places * (1.0 - places)
-        if k < edges.first:
-            shares = np.zeros_like(shares)
         fraction.append(np.concatenate([[0.0], places, [1.0]]))
         weight.append(np.concatenate([[0.0], shares, [0.0]]))
         segment.append(np.full(len(places) + 2, k))

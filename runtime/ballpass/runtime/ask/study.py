@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,9 +50,6 @@ AT_EDGE = 1e-12
 #: Numbers that a node takes for each state, and those that each direction adds: states, channels, and what they are
 #: made of, on the way from the driver to the quantities.  Lanes without a direction are counted where they are made.
 VALUES, SLOPES = 16, 8
-
-#: Nodes whose weights in a quantity are found at once.
-TOGETHER = 512
 
 #: Outputs with kinks where contacts begin and end.
 BROKEN = ("ball.", "ring_force.")
@@ -137,9 +133,9 @@ class Study:
         start = check_span(duration, turn, span.transient)
         return Window(duration=duration, start=start, turn=turn, cycles=span.cycles, transient=span.transient)
 
-    def _check_memory(self, window: Window, directions: int = 0, *, from_start: bool = False) -> None:
+    def _check_memory(self, window: Window, directions: int = 0) -> None:
         """Refuse nodes that would not fit into memory, before any is laid."""
-        length = window.duration - (0.0 if from_start else window.start)
+        length = window.duration - window.start
         nodes = self.per_turn * (length / window.turn if np.isfinite(window.turn) else length / window.duration)
         derivatives = f" and derivatives by {directions} parameters" if directions else ""
         check_memory(
@@ -215,19 +211,12 @@ class Study:
         track = prepared.track or follow(self.model, numbers, prepared.edges, prepared.nodes, stepping, chain)
         return self.finish(prepared, track)
 
-    def prepare(
-        self, numbers: Numbers, chain: Chain, stepping: Stepping, *, from_start: bool = False
-    ) -> Prepared | None:
-        """Find extremes and kinks, and lay nodes accordingly; None where nothing needs to be run.
-
-        Parameters
-        ----------
-        from_start : lay nodes over the transient as well
-        """
+    def prepare(self, numbers: Numbers, chain: Chain, stepping: Stepping) -> Prepared | None:
+        """Find extremes and kinks, and lay nodes accordingly; None where nothing needs to be run."""
         if not self._moving:
             return None
         directions, window = len(chain.names), self.window(numbers)
-        self._check_memory(window, directions, from_start=from_start)
+        self._check_memory(window, directions)
         edges = make_edges(self.model, numbers, window, chain.derivative, directions)
         extremes: dict[tuple[str, str], Extreme] = {}
         kinks: tuple[Kink, ...] = ()
@@ -240,7 +229,7 @@ class Study:
         extremes = {key: _moved(item, edges, broken) for key, item in extremes.items()}
         edges = broken
         points = list(dict.fromkeys((item.segment, item.fraction) for item in extremes.values()))
-        full = with_points(uniform_plan(edges, self.per_turn, from_start=from_start), points)
+        full = with_points(uniform_plan(edges, self.per_turn), points)
         nodes, marks = self._nodes(numbers, edges, full, chain)
         track = None
         if kinks:
@@ -278,48 +267,6 @@ class Study:
             slopes=prepared.chain.derivative,
             directions=len(prepared.chain.names),
         )
-
-    def state_weights(self, prepared: Prepared, track: Track, quantity: Quantity) -> Array | None:
-        """Derivative of a quantity by the states at all nodes, shape (nodes, states); None for one that is static.
-
-        Raises
-        ------
-        RequestError
-            The quantity lies where two balls change rank: the moment then depends on the states as well.
-        """
-        kind = KINDS[quantity.kind]
-        if kind.evaluate is None:
-            return None
-        marks = [prepared.marks[quantity.name, name] for name in kind.extremes]
-        if any(mark.other is not None for mark in marks):
-            raise RequestError(f"{quantity.name}: two balls change rank there, which the adjoint does not follow.")
-        signal = self._outlook.look(track, prepared.numbers, prepared.chain)[quantity.channel]
-        by_states = self._outlook.by_states(track, prepared.numbers)[quantity.channel]
-        count = len(track.nodes)
-        columns = np.argmax(signal.value, axis=1)
-        if quantity.ball is not None:
-            columns[:] = quantity.ball - 1
-        for mark in marks:
-            columns[mark.node] = mark.ball
-        rows = np.arange(count)
-        # linear in the channel's change at each node: one direction for each node shows its weight
-        value = signal.value[rows, columns][:, None]
-        at = {(quantity.name, name): replace(prepared.marks[quantity.name, name], ball=0) for name in kind.extremes}
-        weights = np.zeros(count)
-        for first in range(0, count, TOGETHER):
-            some = min(TOGETHER, count - first)
-            unit = np.zeros((count, 1, some))
-            unit[first + np.arange(some), 0, np.arange(some)] = 1.0
-            still = np.zeros((count, some))
-            view = replace(
-                self._view(prepared, {quantity.channel: Signal(value=value, slope=unit)}),
-                nodes=replace(prepared.nodes, slope=still, weight_slope=still),
-                marks={**prepared.marks, **at},
-                slopes=partial(_still, some),
-                directions=some,
-            )
-            weights[first : first + some] = kind.evaluate(view, replace(quantity, ball=None)).slope
-        return np.asarray(weights[:, None] * by_states[rows, columns])
 
     def _all_at_rest(self, numbers: Numbers, chain: Chain | None) -> Course:
         """The quantities where all are static."""
@@ -422,11 +369,6 @@ def _appended(nodes: Nodes, edges: Edges, time: float, slope: Array, kind: Place
         slope=np.vstack([nodes.slope, slope[None, :]]),
         weight_slope=np.vstack([nodes.weight_slope, np.zeros((1, len(slope)))]),
     )
-
-
-def _still(directions: int, _name: str) -> Array:
-    """Derivative of a number that does not move."""
-    return np.zeros(directions)
 
 
 def _moved(extreme: Extreme, edges: Edges, broken: Edges) -> Extreme:

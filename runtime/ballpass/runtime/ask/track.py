@@ -227,25 +227,6 @@ class Outlook:
             found |= self._values(track, numbers) if chain is None else self._differentiated(track, numbers, chain)
         return found
 
-    def by_states(self, track: Track, numbers: Numbers) -> Mapping[str, Array]:
-        """Derivative of every channel by the states, shape (nodes, columns, states)."""
-        states, count = self._model.states, len(track.nodes)
-        found = {}
-        for name in self.channels:
-            if name in states:
-                found[name] = np.tile(np.eye(len(states))[states.index(name)], (count, 1, 1))
-        if self._columns:
-            if self._derivatives is None:
-                self._derivatives = self._loop()
-            results = self._derivatives(count, self._given(track, numbers))
-            rows = results["g"].shape[1]
-            every = results["g_x"].reshape(count, -1, rows).transpose(0, 2, 1)
-            column = 0
-            for name, size in self._columns:
-                found[name] = every[:, column : column + size]
-                column += size
-        return found
-
     def _given(self, track: Track, numbers: Numbers) -> dict[str, Array]:
         return {"t": track.local, "x": track.x, "u": track.u, "p": numbers.p, "c": numbers.c}
 

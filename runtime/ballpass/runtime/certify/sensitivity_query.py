@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,7 @@ from ballpass.runtime.ask.nodes import Window
 from ballpass.runtime.ask.quantities import default_quantities, parse_quantity
 from ballpass.runtime.ask.study import Course, Span, Study
 from ballpass.runtime.ask.track import Outlook, Stepping
-from ballpass.runtime.certify.certificate import AGREEMENT, FLOOR, UNCHECKED, Second, by_differences, compare
+from ballpass.runtime.certify.certificate import AGREEMENT, FLOOR, UNCHECKED, by_differences, compare
 from ballpass.runtime.certify.grazing import TOLERANCE, Grazing, find_grazing
 from ballpass.runtime.certify.sensitivity_report import QuantityValue, Sensitivity, SensitivityReport, ratio_unit
 from ballpass.runtime.contract import Manifest
@@ -61,9 +60,6 @@ NODES_A_RADIAN, MOST = 3, 4
 #: A change of the start by this share of the motion is a large one: it stays near, so that its effect is linear.
 START_SHARE = 1e-2
 
-#: Ways to check.
-CHECKS = ("differences", "erk", "adjoint")
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Query:
@@ -86,8 +82,7 @@ class Query:
     wrt: Sequence[str] | None
     span: Span
     method: str = "auto"
-    direction: Literal["forward", "adjoint"] = "forward"
-    check: bool | str = True
+    check: bool = True
     rtol: float = RTOL
     sensitivity_rtol: float = SENSITIVITY_RTOL
     samples_per_cycle: int | None = None
@@ -119,8 +114,7 @@ def make_query(
     duration: float | None,
     transient: float | None,
     method: str,
-    direction: Literal["forward", "adjoint"],
-    check: bool | str,
+    check: bool,
     rtol: float | None,
     sensitivity_rtol: float | None,
     samples_per_cycle: int | None,
@@ -143,14 +137,13 @@ def make_query(
         raise RequestError(f"samples_per_cycle: a whole number from 8 on is expected, not {samples_per_cycle!r}.")
     if agreement is not None and not 0.0 < agreement < 1.0:
         raise RequestError(f"agreement: a number between 0 and 1 is expected, not {agreement!r}.")
-    if direction not in ("forward", "adjoint"):
-        raise RequestError(f"direction: forward or adjoint is expected, not {direction!r}.")
+    if not isinstance(check, bool):
+        raise RequestError(f"check: True or False is expected, not {check!r}: differences are the second route.")
     return Query(
         of=[of] if isinstance(of, str) else of,
         wrt=[wrt] if isinstance(wrt, str) else wrt,
         span=make_span(manifest, cycles, duration, transient),
         method=method,
-        direction=direction,
         check=check,
         rtol=RTOL if rtol is None else rtol,
         sensitivity_rtol=SENSITIVITY_RTOL if sensitivity_rtol is None else sensitivity_rtol,
@@ -175,7 +168,6 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     check_assembly(model, numbers)
     quantities = [parse_quantity(manifest, name) for name in _listed("of", query.of, default_quantities(manifest))]
     names = _chosen(_listed("wrt", query.wrt, tuple(numbers.parameters)), numbers.parameters)
-    route = _check_route(query)
     study = Study(model, quantities, query.span, 4)
     window = study.window(numbers)
     magnitude, family, fine = np.zeros(0), Family.AUTO, Family.AUTO
@@ -189,33 +181,34 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     tell = query.progress or (lambda _words, _fraction: None)
     stepping = Stepping(family=family, rtol=query.rtol, magnitude=magnitude, sensitivity_rtol=query.sensitivity_rtol)
 
-    if query.method == "erk":
-        from ballpass.runtime.certify.erk_route import by_erk
-
-        found = by_erk(study, numbers, names, scales, direction=query.direction, progress=lambda f: tell("erk", f))
-        course = study.measure(numbers, stepping)
-        values = np.array([item.value for item in course.estimates])
-        slopes, own = found.value, found.uncertainty
-        tolerance: float | None = None
-    else:
-        tell("differentiating", 0.0)
-        course, tolerance = _differentiate(study, numbers, names, stepping)
-        values = np.array([item.value for item in course.estimates])
-        slopes = np.array([item.slope for item in course.estimates])
-        own = np.zeros_like(slopes)
-        if route is not None and model.states:
-            tell("differentiating", 0.5)
-            looser = replace(stepping, rtol=min(10.0 * query.rtol, 1e-3), sensitivity_rtol=10.0 * tolerance)
-            own = np.abs(
-                slopes - np.array([e.slope for e in _differentiate(study, numbers, names, looser)[0].estimates])
-            )
+    tell("differentiating", 0.0)
+    course, tolerance = _differentiate(study, numbers, names, stepping)
+    values = np.array([item.value for item in course.estimates])
+    slopes = np.array([item.slope for item in course.estimates])
+    own = np.zeros_like(slopes)
+    if query.check and model.states:
+        tell("differentiating", 0.5)
+        looser = replace(stepping, rtol=min(10.0 * query.rtol, 1e-3), sensitivity_rtol=10.0 * tolerance)
+        own = np.abs(slopes - np.array([e.slope for e in _differentiate(study, numbers, names, looser)[0].estimates]))
     difference_scales = _difference_scales(manifest, numbers, names, magnitude)
     with np.errstate(invalid="ignore", divide="ignore"):
         quantum = FLOOR * np.abs(values)[:, None] / difference_scales[None, :]
     second = None
-    if route is not None:
+    if query.check:
         plain = Stepping(family=fine, rtol=DIFFERENCE_RTOL, magnitude=magnitude)
-        second = _second(study, model, numbers, names, route, plain, scales, difference_scales, quantum, query, tell)
+
+        def measure(change: Mapping[str, float]) -> Array:
+            course = study.measure(neighbour(model, numbers, change), plain)
+            return np.array([item.value for item in course.estimates])
+
+        second = by_differences(
+            measure,
+            {name: numbers.parameters[name] for name in names},
+            difference_scales,
+            quantum=quantum,
+            agreement=query.agreement,
+            progress=lambda fraction: tell("checking", fraction),
+        )
     pairs = []
     units = {info.name: info.unit for info in manifest.parameters}
     for row, (quantity, estimate) in enumerate(zip(quantities, course.estimates, strict=True)):
@@ -242,7 +235,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
                     unit=ratio_unit(quantity.unit, units[name]),
                     dimensionless=at * derivative / estimate.value if at * estimate.value != 0.0 else math.nan,
                     scale=float(difference_scales[column]),
-                    uncertainty=float(own[row, column]) if route is not None else None,
+                    uncertainty=float(own[row, column]) if query.check else None,
                     check=check,
                 )
             )
@@ -306,24 +299,11 @@ def _chosen(patterns: Sequence[str], known: Mapping[str, float]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _check_route(query: Query) -> str | None:
-    if query.check is False:
-        return None
-    route = "differences" if query.check is True else str(query.check)
-    if route not in CHECKS:
-        raise RequestError(f"check: {unknown_name('route', route, CHECKS)} Or True, or False for none.")
-    if query.method == "erk" and route in ("erk", "adjoint"):
-        raise RequestError(
-            "check: the derivatives come from erk themselves, so that erk is no second route. Take differences."
-        )
-    return route
-
-
 def _families(method: str, scales: Scales) -> tuple[Family, Family]:
     """Family for derivatives, and family for the tight runs of difference quotients."""
-    if method not in ("auto", "erk", *METHODS):
+    if method not in ("auto", *METHODS):
         raise RequestError(
-            f"sensitivity: the method {method!r} was given; allowed are auto, {', '.join(METHODS)} and erk, which "
+            f"sensitivity: the method {method!r} was given; allowed are auto, {', '.join(METHODS)}, which "
             "differentiate their own steps."
         )
     stiff = scales.stiffness > STIFF_RATIO
@@ -363,42 +343,6 @@ def _difference_scales(manifest: Manifest, numbers: Numbers, names: Sequence[str
             value = position if units[name] == "m" else max(alike, default=0.0)
         scales.append(value or 1.0)
     return np.array(scales)
-
-
-def _second(
-    study: Study,
-    model: LoadedModel,
-    numbers: Numbers,
-    names: Sequence[str],
-    route: str,
-    plain: Stepping,
-    scales_of_states: Scales,
-    scales: Array,
-    quantum: Array,
-    query: Query,
-    tell: Callable[[str, float], None],
-) -> Second:
-    """Derivatives by the second route."""
-    if route != "differences":
-        from ballpass.runtime.certify.erk_route import by_erk
-
-        direction: Literal["forward", "adjoint"] = "adjoint" if route == "adjoint" else "forward"
-        return by_erk(
-            study, numbers, names, scales_of_states, direction=direction, progress=lambda f: tell("checking", f)
-        )
-
-    def measure(change: Mapping[str, float]) -> Array:
-        course = study.measure(neighbour(model, numbers, change), plain)
-        return np.array([item.value for item in course.estimates])
-
-    return by_differences(
-        measure,
-        {name: numbers.parameters[name] for name in names},
-        scales,
-        quantum=quantum,
-        agreement=query.agreement,
-        progress=lambda fraction: tell("checking", fraction),
-    )
 
 
 def _grazing(model: LoadedModel, numbers: Numbers, course: Course, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:

@@ -54,12 +54,8 @@ def sensitivity(
         float | None, typer.Option(metavar="R", help="Tolerance of the derivatives; tight if not given.")
     ] = None,
     method: Annotated[
-        str, typer.Option(metavar="NAME", help="Of the derivatives: auto, a stepper's name, or erk.")
+        str, typer.Option(metavar="NAME", help="Of the derivatives: auto, or a stepper's name.")
     ] = "auto",
-    check: Annotated[
-        str,
-        typer.Option("--check", metavar="ROUTE", help="Second route: differences, erk (forward) or adjoint (of erk)."),
-    ] = "differences",
     no_check: Annotated[bool, typer.Option("--no-check", help="Give derivatives without certificates.")] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for report and charts; none are written if not given.")
@@ -92,7 +88,7 @@ def sensitivity(
             transient=transient,
             parameters=overrides,
             method=method,
-            check=False if no_check else check,  # type: ignore[arg-type]  # wrong words are refused with a message
+            check=not no_check,
             rtol=rtol,
             sensitivity_rtol=sensitivity_rtol,
             progress=progress,
