@@ -3,8 +3,7 @@
 # make lint    style, types, import contract, freshness of the committed artefact
 # make docs    builds the documentation into docs/_build/html
 # make generated   derives the committed artefact anew
-# make extremes   runs the tour of extremes and writes docs/extremes.md (ten minutes); QUICK=1: the test suite's part
-# make extremes-sanitized   the tour under the compiler's sanitizers alone (six minutes; part of make extremes)
+# make extremes   runs all extreme cases, also the long ones, and writes docs/extremes.md (some minutes)
 # make trade   measures accuracy against time on the shipped scenes and writes docs/trade.md (about ten minutes)
 # make bench   installs the peers into a venv of their own and measures (25 minutes); QUICK=1: two minutes, for show
 # make bench-test   tests the benchmarks, and that page and results belong together (a minute)
@@ -14,7 +13,7 @@ VENV ?= .venv
 export PYTHON VENV
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint docs generated trade bench bench-test clean extremes extremes-sanitized compiler
+.PHONY: demo test lint docs generated trade bench bench-test clean extremes compiler
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.ready
@@ -49,10 +48,7 @@ bench: $(BENCH_VENV)/.ready
 	$(BENCH_VENV)/bin/python -m benchmarks $(if $(QUICK),--quick --out build/benchmarks/quick) $(if $(FRESH),--fresh)
 
 extremes: $(VENV)/.ready-dev $(VENV)/.ready-compiler
-	$(BIN)/python -m extremes $(if $(QUICK),--quick)
-
-extremes-sanitized: $(VENV)/.ready-dev
-	$(BIN)/python -m extremes sanitizers
+	$(BIN)/python -m pytest -n 2 -m extreme tests/extremes --extremes-page docs/extremes.md
 
 bench-test: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest benchmarks

@@ -1,4 +1,5 @@
-"""A crank-slider press and its bearing written down by hand, for any numbers: the independent reference of the tour.
+"""A crank-slider press and its bearing written down by hand, for any numbers: the independent reference
+of the extreme cases.
 
 Nothing of it comes from the package.  The linkage is solved with complex numbers and one 8 by 8 system of Newton and
 Euler's equations at each instant, the bearing by Eqs. (2) to (11) in NumPy, and SciPy integrates from one step of the
@@ -10,7 +11,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Self
 
@@ -272,10 +273,6 @@ class Machine:
             states[inside] = run.y.T[places]
             state = run.y[:, -1]
         return states
-
-    def with_bearing(self, **changes: Any) -> Self:
-        """The machine with other numbers of its bearing."""
-        return replace(self, bearing=replace(self.bearing, **changes))
 
 
 def _linkage(p: Mapping[str, float]) -> Linkage:
