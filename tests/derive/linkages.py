@@ -9,24 +9,39 @@ from typing import Any
 
 import sympy as sp
 
+from ballpass.derive.drive import Drive
+from ballpass.derive.mechanism.forces import BodyTorque, Constant, Forces, PointForce, Windows, derive_forces
+from ballpass.derive.mechanism.forces.windows import Window
 from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
 from ballpass.derive.mechanism.numeric import Evaluator
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
 from ballpass.derive.scene.records import (
-    AppliedForce,
-    AppliedTorque,
     Body,
     Driver,
+    Force,
     Joint,
     Mechanism,
     NamedPoint,
     Quantity,
     Vector,
 )
+from ballpass.derive.terms import TIME
+from ballpass.derive.variables import phase
 
 ANGLE = sp.Symbol("theta", real=True)
 SPEED = sp.Symbol("mechanism.driver.speed", real=True)
 DEGREE = math.pi / 180.0
+
+#: Of constant speed, with symbols of its own.
+DRIVE = Drive(
+    angle=ANGLE,
+    speed=SPEED,
+    acceleration=sp.S.Zero,
+    description="the driver's speed is constant",
+    definitions=(),
+    phase=phase("driver", "angle", "q", offset="mechanism.driver.start_angle", rate="mechanism.driver.speed"),
+    advance=SPEED * TIME,
+)
 
 #: None: zero.  A number: along the body's x axis.  ("xy", x, y).  ("polar", length, angle).
 Place = None | float | tuple[str, float, float]
@@ -70,12 +85,21 @@ class Machine:
     values: dict[str, float]
 
     def linkage(self) -> Linkage:
-        return derive_linkage(self.mechanism, ANGLE, SPEED)
+        return derive_linkage(self.mechanism, DRIVE)
 
-    def reactions(
-        self, linkage: Linkage, gates: Mapping[str, sp.Expr] | None = None, moments: Sequence[str] = ()
-    ) -> Reactions:
-        return derive_reactions(self.mechanism, linkage, gates or {}, frozenset(moments))
+    def forces(self, linkage: Linkage) -> Forces:
+        return derive_forces(self.mechanism, linkage, DRIVE)
+
+    def reactions(self, linkage: Linkage, moments: Sequence[str] = ()) -> Reactions:
+        return derive_reactions(self.mechanism, linkage, self.forces(linkage).loads, frozenset(moments))
+
+    def with_windows(self, name: str) -> Machine:
+        """The force `name` acts within a window; its gate is the symbol ``gate.<name>``."""
+        window = Window(start=self.mechanism.driver.start_angle, end=self.mechanism.driver.start_angle)
+        forces = tuple(
+            replace(f, law=Windows(windows=(window,))) if f.name == name else f for f in self.mechanism.forces
+        )
+        return Machine(mechanism=replace(self.mechanism, forces=forces), values=self.values)
 
     def with_values(self, **changes: float) -> Machine:
         """Other numbers; `changes` by path with ``__`` for the dot."""
@@ -137,21 +161,22 @@ def build(
         bodies=tuple(_body(numbers, name, data) for name, data in bodies.items()),
         joints=tuple(_joint(numbers, name, data) for name, data in joints.items()),
         forces=tuple(
-            AppliedForce(
+            Force(
                 name=name,
-                body=body,
-                point=point,
-                force=numbers.vector(f"{root}.forces.{name}.force", force, "N"),
-                windows=(),
+                table="forces",
+                pathway=PointForce(
+                    body=body, point=point, force=numbers.vector(f"{root}.forces.{name}.force", force, "N")
+                ),
+                law=Constant(),
             )
             for name, (body, point, force) in (forces or {}).items()
-        ),
-        torques=tuple(
-            AppliedTorque(
+        )
+        + tuple(
+            Force(
                 name=name,
-                body=body,
-                torque=numbers.quantity(f"{root}.torques.{name}.torque", torque, "N*m"),
-                windows=(),
+                table="torques",
+                pathway=BodyTorque(body=body, torque=numbers.quantity(f"{root}.torques.{name}.torque", torque, "N*m")),
+                law=Constant(),
             )
             for name, (body, torque) in (torques or {}).items()
         ),

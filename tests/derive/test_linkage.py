@@ -13,6 +13,7 @@ import sympy as sp
 from linkages import (
     ANGLE,
     DEGREE,
+    DRIVE,
     MACHINES,
     SPEED,
     Machine,
@@ -324,7 +325,7 @@ def test_dyad_that_fails_behind_another_is_named():
 
 
 def derive_only(mechanism) -> Linkage:
-    return derive_linkage(mechanism, ANGLE, SPEED)
+    return derive_linkage(mechanism, DRIVE)
 
 
 def without_joint(machine: Machine, name: str):

@@ -264,7 +264,7 @@ def worst_difference_from_lapack(machine: Machine, moments: Sequence[str] = (), 
     random = np.random.default_rng(seed)
     angle, speed = random.uniform(0, 2 * np.pi, STATES), random.uniform(1, 100, STATES)
     results = [*reactions.matrix, *reactions.right_side, *reactions.unknowns]
-    numbers = {**machine.numbers(angle), linkage.speed: speed}
+    numbers = {**machine.numbers(angle), linkage.drive.speed: speed}
     rows = Evaluator(linkage.definitions + reactions.definitions, results)(numbers)
     values = np.array([np.broadcast_to(row, STATES) for row in rows], dtype=float).T
     worst = 0.0
@@ -357,8 +357,7 @@ def test_forces_on_the_frame_and_the_loads_change_the_momentum():
 def test_gate_switches_its_load_and_no_other():
     machine = four_bar()
     linkage = machine.linkage()
-    gate = sp.Symbol("gate.push", real=True)
-    gated = machine.reactions(linkage, gates={"push": gate})
+    gated = machine.with_windows("push").reactions(linkage)
     free = machine.reactions(linkage)
     run = Evaluator(linkage.definitions + gated.definitions, gated.unknowns)
     always = np.array(evaluate(machine, free.unknowns, 0.4, linkage, free))
@@ -394,7 +393,7 @@ def test_moving_guide_always_has_its_moment():
 @pytest.mark.parametrize("name", list(MACHINES))
 def test_every_unknown_is_defined_once_from_earlier_symbols(name):
     machine, linkage, reactions = derived(name)
-    known = {sp.Symbol(path, real=True) for path in machine.values} | {linkage.angle}
+    known = {sp.Symbol(path, real=True) for path in machine.values} | {linkage.drive.angle}
     known |= {d.symbol for d in linkage.definitions}
     for definition in reactions.definitions:
         assert definition.symbol not in known

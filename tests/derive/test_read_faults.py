@@ -107,13 +107,6 @@ REFUSED = [
         "mechanism.joints.C.direction",
         "delete the key",
     ),
-    (
-        "guide with branch",
-        'direction = "270 deg"',
-        'direction = "270 deg"\nbranch = "left"',
-        "mechanism.joints.D.branch",
-        "revolute",
-    ),
     ("unknown branch", 'branch = "ahead"', 'branch = "before"', "mechanism.joints.C.branch", "branch"),
     (
         "driver unknown",

@@ -28,9 +28,9 @@ WINDOW = (237.0, 267.0)
 
 @cache
 def press() -> tuple[Machine, Linkage, Reactions, Evaluator]:
-    machine = crank_slider()
+    machine = crank_slider().with_windows("punch")
     linkage = machine.linkage()
-    reactions = machine.reactions(linkage, gates={"punch": sp.Symbol("gate.punch", real=True)})
+    reactions = machine.reactions(linkage)
     height = linkage.motion(machine.mechanism, "slider", "C").position[1]
     run = Evaluator(linkage.definitions + reactions.definitions, [reactions.drive_torque, height])
     return machine, linkage, reactions, run
@@ -92,7 +92,8 @@ def test_drive_power_equals_rate_of_energy_minus_external_power(name):
 
     poses = [linkage.poses[b.name] for b in mechanism.bodies]
     places = [*(p.center_of_mass.position for p in poses), *((p.cos, p.sin) for p in poses)]
-    places += [linkage.motion(mechanism, f.body, f.point).position for f in mechanism.forces]
+    forces = [f.pathway for f in mechanism.forces if f.table == "forces"]
+    places += [linkage.motion(mechanism, f.body, f.point).position for f in forces]
     run = Evaluator(linkage.definitions, [c for place in places for c in place])
     raw = np.array([np.broadcast_to(v, points) for v in run(machine.numbers(angle + 1e-30j))], dtype=complex)
     place = raw.real.reshape(len(places), 2, points)
@@ -111,11 +112,11 @@ def test_drive_power_equals_rate_of_energy_minus_external_power(name):
     rate = np.fft.irfft(1j * np.arange(waves.size) * waves, points) * speed
 
     external = np.zeros(points)
-    for k, force in enumerate(mechanism.forces):
+    for k, force in enumerate(forces):
         for axis, quantity in enumerate(force.force.quantities()):
             external += values[quantity.path] * velocity[2 * n + k, axis]
     names = [b.name for b in mechanism.bodies]
-    for torque in mechanism.torques:
+    for torque in (f.pathway for f in mechanism.forces if f.table == "torques"):
         external += values[torque.torque.path] * turning[names.index(torque.body)]
 
     (drive,) = evaluate(machine, [reactions.drive_torque], angle, linkage, reactions)

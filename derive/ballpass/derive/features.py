@@ -130,20 +130,12 @@ def _of_mechanism(scene: Scene, mechanism: Mechanism) -> Iterator[Feature]:
             without=replace(scene, mechanism=replace(mechanism, gravity=None)),
         )
     for force in mechanism.forces:
-        rest = tuple(f for f in mechanism.forces if f.name != force.name)
+        rest = tuple(f for f in mechanism.forces if f is not force)
         yield Feature(
-            name=f"force {force.name}",
-            path=f"mechanism.forces.{force.name}",
-            modelled=f"force on {force.body}.{force.point}" + _windows(len(force.windows)),
+            name=f"{force.table.removesuffix('s').replace('_', ' ')} {force.name}",
+            path=f"mechanism.{force.table}.{force.name}",
+            modelled=force.pathway.words() + force.law.words(),
             without=replace(scene, mechanism=replace(mechanism, forces=rest)),
-        )
-    for torque in mechanism.torques:
-        others = tuple(t for t in mechanism.torques if t.name != torque.name)
-        yield Feature(
-            name=f"torque {torque.name}",
-            path=f"mechanism.torques.{torque.name}",
-            modelled=f"torque on {torque.body}" + _windows(len(torque.windows)),
-            without=replace(scene, mechanism=replace(mechanism, torques=others)),
         )
 
 
@@ -208,10 +200,6 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
 
 def _without_smoothing(scene: Scene, bearing: Bearing, path: str) -> Scene:
     return replace(scene, bearing=bearing, quantities=tuple(q for q in scene.quantities if q.path != path))
-
-
-def _windows(count: int) -> str:
-    return "" if count == 0 else f", within {count} window{'s' if count > 1 else ''} of the driver's angle"
 
 
 def _no_load() -> ConstantLoad:

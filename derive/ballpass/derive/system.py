@@ -15,13 +15,15 @@ import sympy as sp
 from ballpass.derive.bearing.equations import BearingModel, derive_bearing, equivalent_mass
 from ballpass.derive.bearing.load_harmonics import LoadSeries
 from ballpass.derive.bearing.ring_load import ring_load
+from ballpass.derive.drive import constant_speed
+from ballpass.derive.mechanism.forces import Forces, derive_forces
 from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.records import FRAME, AppliedForce, AppliedTorque, Bearing, EquivalentMass, Mechanism, Scene
-from ballpass.derive.terms import TIME, Definition, Smoothness, symbol_of
-from ballpass.derive.variables import DRIVER_ANGLE, Input, Output, Parameter, State, phase
+from ballpass.derive.scene.records import FRAME, Bearing, EquivalentMass, Mechanism, Scene
+from ballpass.derive.terms import Definition, Smoothness, symbol_of
+from ballpass.derive.variables import Input, Output, Parameter, State, phase
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,27 +71,20 @@ def derive(scene: Scene) -> System:
     definitions: list[Definition] = []
     linkage: Linkage | None = None
     reactions: Reactions | None = None
+    forces: Forces | None = None
     mechanism = scene.mechanism
     if mechanism is not None:
-        inputs += _driver_inputs(mechanism)
-        definitions.append(
-            Definition(
-                symbol=DRIVER_ANGLE,
-                expression=inputs[0].symbol + symbol_of(mechanism.driver.speed) * TIME,
-                unit="rad",
-                description="Angle of the driven body",
-                latex=r"\theta_1",
-            )
-        )
-        linkage = derive_linkage(mechanism, DRIVER_ANGLE, symbol_of(mechanism.driver.speed))
-        gates = {i.name.removeprefix("gate."): i.symbol for i in inputs if i.kind == "gate"}
+        drive = constant_speed(mechanism.driver)
+        linkage = derive_linkage(mechanism, drive)
+        forces = derive_forces(mechanism, linkage, drive)
         moments = frozenset(
             j.name
             for j in mechanism.joints
             if j.kind == "prismatic" and is_asked(scene.outputs, f"reaction.{j.name}.moment")
         )
-        reactions = derive_reactions(mechanism, linkage, gates, moments)
-        definitions += [*linkage.definitions, *reactions.definitions]
+        reactions = derive_reactions(mechanism, linkage, forces.loads, moments)
+        inputs += [drive.phase, *forces.inputs]
+        definitions += [*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions]
 
     bearing: BearingModel | None = None
     constants: tuple[Definition, ...] = ()
@@ -116,8 +111,8 @@ def derive(scene: Scene) -> System:
         constants = bearing.constants + inner_load.constants
 
     quantities = bearing_outputs(bearing, load) if bearing is not None else []
-    if mechanism is not None and linkage is not None and reactions is not None:
-        quantities += mechanism_outputs(mechanism, linkage, reactions)
+    if mechanism is not None and linkage is not None and reactions is not None and forces is not None:
+        quantities += [*mechanism_outputs(mechanism, linkage, reactions), *forces.outputs]
     return System(
         scene=scene,
         parameters=tuple(
@@ -141,30 +136,6 @@ def derive(scene: Scene) -> System:
         smoothness=bearing.smoothness if bearing else (),
         load_series=series,
     )
-
-
-def _driver_inputs(mechanism: Mechanism) -> list[Input]:
-    """Phase of the driver, and a gate for each load that acts within windows only."""
-    driver = mechanism.driver
-    words = "Angle of the driven body at the reference time"
-    out = [phase("driver", words, r"\theta_{1,0}", offset=driver.start_angle.path, rate=driver.speed.path)]
-    loads: tuple[AppliedForce | AppliedTorque, ...] = (*mechanism.forces, *mechanism.torques)
-    for load in loads:
-        if load.windows:
-            out.append(
-                Input(
-                    name=f"gate.{load.name}",
-                    symbol=sp.Symbol(f"gate.{load.name}", real=True),
-                    kind="gate",
-                    unit="1",
-                    description=f"1 while {load.name} acts, else 0",
-                    latex=rf"g_{{\mathrm{{{load.name}}}}}",
-                    offset=driver.start_angle.path,
-                    rate=driver.speed.path,
-                    windows=tuple((w.start.path, w.end.path) for w in load.windows),
-                )
-            )
-    return out
 
 
 def _inner_mass(bearing: Bearing, mechanism: Mechanism | None) -> sp.Expr:

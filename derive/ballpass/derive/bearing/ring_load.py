@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.bearing.load_harmonics import GatedPart, LoadSeries, load_series
+from ballpass.derive.mechanism.forces import Windows
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.records import (
     FRAME,
-    AppliedForce,
-    AppliedTorque,
     ConstantLoad,
     HarmonicLoad,
     Mechanism,
@@ -64,14 +63,13 @@ def ring_load(scene: Scene, reactions: Reactions | None) -> RingLoad:
 
 
 def _gated_parts(mechanism: Mechanism) -> tuple[GatedPart, ...]:
-    loads: tuple[AppliedForce | AppliedTorque, ...] = (*mechanism.forces, *mechanism.torques)
     return tuple(
         GatedPart(
-            gate=sp.Symbol(f"gate.{load.name}", real=True),
-            windows=tuple((symbol_of(w.start), symbol_of(w.end)) for w in load.windows),
+            gate=sp.Symbol(f"gate.{force.name}", real=True),
+            windows=tuple((symbol_of(w.start), symbol_of(w.end)) for w in force.law.windows),
         )
-        for load in loads
-        if load.windows
+        for force in mechanism.forces
+        if isinstance(force.law, Windows)
     )
 
 

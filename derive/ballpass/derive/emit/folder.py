@@ -39,6 +39,7 @@ from ballpass.derive.emit.stepper_headers import kernels_header, methods_header,
 from ballpass.derive.lower.functions import Functions, lower, operations
 from ballpass.derive.lower.jacobians import DERIVATIVES, Described
 from ballpass.derive.lower.switch_kernels import switches_header
+from ballpass.derive.mechanism.forces import drawn_forces
 from ballpass.derive.mechanism.linkage import check_assembly
 from ballpass.derive.scene.read import read_scene
 from ballpass.derive.scene.records import Scene
@@ -314,7 +315,7 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
         joints=tuple((j.name, j.kind, j.bodies[0], j.points[0], j.bodies[1], j.points[1]) for j in mechanism.joints),
         points=tuple(mf.PointInfo(body=p.body, point=p.point) for p in linkage.points),
         margins=tuple(mf.MarginInfo(joint=m.joint, description=m.description) for m in linkage.margins),
-        forces=tuple((f.name, f.body, f.point, f"gate.{f.name}" if f.windows else "") for f in mechanism.forces),
+        forces=drawn_forces(mechanism),
     )
 
 

@@ -1,48 +1,17 @@
 """In which order a linkage is put together: the driven body first, then Assur dyads until every body has its place.
 
 In: a `Mechanism`.  Out: an `Assembly`, or a `LinkageError` that names joints, bodies and the count of unknowns and
-equations.  Two dyads are known, each with a revolute inner joint:
-
-RRR  two bodies, each hinged to a body already placed or to the frame
-RRP  a rod hinged, and a slider guided, on bodies already placed or on the frame
+equations.  Which dyads there are is `dyads.DYADS`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
+from ballpass.derive.mechanism.dyads import DYADS, Dyad
 from ballpass.derive.scene.errors import Fault, LinkageError
 from ballpass.derive.scene.records import FRAME, Joint, Mechanism
-
-#: Values of `Joint.branch` at the inner joint, by the kind of the dyad.
-BRANCHES: dict[str, tuple[str, str]] = {"RRR": ("left", "right"), "RRP": ("ahead", "behind")}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Group:
-    """An Assur dyad.
-
-    Attributes
-    ----------
-    kind : RRR or RRP
-    bodies : RRR: in the order of the inner joint's bodies; RRP: rod, slider
-    hosts : the placed bodies that carry them
-    outer : their joints to the hosts; for RRP the revolute joint of the rod, the prismatic joint of the slider
-    inner : the revolute joint between the two bodies
-    """
-
-    kind: Literal["RRR", "RRP"]
-    bodies: tuple[str, str]
-    hosts: tuple[str, str]
-    outer: tuple[Joint, Joint]
-    inner: Joint
-
-    @property
-    def sign(self) -> int:
-        """+1 on the branches ``left`` and ``ahead``, −1 on ``right`` and ``behind``."""
-        return 1 if self.inner.branch in ("left", "ahead") else -1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +20,7 @@ class Assembly:
 
     driver: Joint
     driven: str
-    groups: tuple[Group, ...]
+    dyads: tuple[Dyad, ...]
 
 
 def assemble(mechanism: Mechanism) -> Assembly:
@@ -67,28 +36,18 @@ def assemble(mechanism: Mechanism) -> Assembly:
     if faults:
         raise LinkageError(faults)
     driver = mechanism.joint(mechanism.driver.joint)
-    driven = _other(driver, FRAME)
-    placed, groups = [FRAME, driven], list[Group]()
-    while (group := _next_group(mechanism, placed)) is not None:
-        groups.append(group)
-        placed.extend(group.bodies)
+    driven = driver.other(FRAME)
+    placed, dyads = [FRAME, driven], list[Dyad]()
+    while (dyad := _next_dyad(mechanism, placed)) is not None:
+        dyads.append(dyad)
+        placed.extend(dyad.bodies)
     left_over = [b.name for b in mechanism.bodies if b.name not in placed]
     if left_over:
         raise LinkageError([_order_fault(mechanism, placed, left_over)])
-    faults = [*_idle_faults(driven, groups), *_branch_faults(mechanism, groups)]
+    faults = [*_idle_faults(driven, dyads), *_branch_faults(mechanism, dyads)]
     if faults:
         raise LinkageError(faults)
-    return Assembly(driver=driver, driven=driven, groups=tuple(groups))
-
-
-def point_name(joint: Joint, body: str) -> str:
-    """Name of the joint's point on one of its bodies."""
-    return joint.points[joint.bodies.index(body)]
-
-
-def _other(joint: Joint, body: str) -> str:
-    first, second = joint.bodies
-    return second if first == body else first
+    return Assembly(driver=driver, driven=driven, dyads=tuple(dyads))
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -140,27 +99,22 @@ def _driver_faults(mechanism: Mechanism) -> list[Fault]:
 
 
 def _joints_to(mechanism: Mechanism, body: str, others: Sequence[str]) -> list[Joint]:
-    return [j for j in mechanism.joints if body in j.bodies and _other(j, body) in others]
+    return [j for j in mechanism.joints if body in j.bodies and j.other(body) in others]
 
 
-def _next_group(mechanism: Mechanism, placed: Sequence[str]) -> Group | None:
+def _next_dyad(mechanism: Mechanism, placed: Sequence[str]) -> Dyad | None:
     """The first dyad, in the order of the scene's joints, whose outer joints lie on bodies already placed."""
     for inner in mechanism.joints:
-        if inner.kind != "revolute" or any(body in placed for body in inner.bodies):
-            continue
         first, second = inner.bodies
+        if first in placed or second in placed or len(_joints_to(mechanism, first, [second])) != 1:
+            continue
         outer = [_joints_to(mechanism, body, placed) for body in inner.bodies]
-        between = _joints_to(mechanism, first, [second])
-        if len(between) != 1 or any(len(joints) != 1 for joints in outer):
+        if any(len(joints) != 1 for joints in outer):
             continue
-        one, two = outer[0][0], outer[1][0]
-        if one.kind == "prismatic" and two.kind == "prismatic":
-            continue
-        kind: Literal["RRR", "RRP"] = "RRR" if one.kind == two.kind else "RRP"
-        if one.kind == "prismatic":
-            first, second, one, two = second, first, two, one
-        hosts = (_other(one, first), _other(two, second))
-        return Group(kind=kind, bodies=(first, second), hosts=hosts, outer=(one, two), inner=inner)
+        for kind in DYADS:
+            dyad = kind.find(inner, (outer[0][0], outer[1][0]))
+            if dyad is not None:
+                return dyad
     return None
 
 
@@ -183,27 +137,27 @@ def _order_fault(mechanism: Mechanism, placed: Sequence[str], left_over: Sequenc
         ),
         given=f"placed so far: {_listed(placed)}",
         allowed=(
-            "dyads of two bodies with a revolute inner joint, each body with exactly one joint to a body already "
-            "placed: both revolute (RRR), or one revolute and one prismatic (RRP)"
+            "dyads of two bodies with a joint between them, each with exactly one joint to a body already placed: "
+            + "; ".join(f"{kind.words} ({kind.kind})" for kind in DYADS)
         ),
         remedy="check the bodies named by each of these joints",
     )
 
 
-def _idle_faults(driven: str, groups: Sequence[Group]) -> list[Fault]:
+def _idle_faults(driven: str, dyads: Sequence[Dyad]) -> list[Fault]:
     """Dyads that hang on the frame alone: a truss, which the driver does not reach."""
     faults, moving = [], [driven]
-    for group in groups:
-        if any(host in moving for host in group.hosts):
-            moving.extend(group.bodies)
+    for dyad in dyads:
+        if any(host in moving for host in dyad.hosts):
+            moving.extend(dyad.bodies)
             continue
-        joints = _listed([group.outer[0].name, group.inner.name, group.outer[1].name])
+        joints = _listed(dyad.joints)
         faults.append(
             Fault(
                 key="mechanism.joints",
-                problem=f"the driver does not move {group.bodies[0]} and {group.bodies[1]}: 6 unknowns and 6 equations "
+                problem=f"the driver does not move {dyad.bodies[0]} and {dyad.bodies[1]}: 6 unknowns and 6 equations "
                 f"of the joints {joints} fix them to the frame",
-                given=f"they hang on {group.hosts[0]} and {group.hosts[1]}",
+                given=f"they hang on {dyad.hosts[0]} and {dyad.hosts[1]}",
                 allowed="bodies that a chain of joints links to the driven body",
                 remedy=f"hang one of them on {driven} or on a body that it moves",
             )
@@ -211,48 +165,37 @@ def _idle_faults(driven: str, groups: Sequence[Group]) -> list[Fault]:
     return faults
 
 
-def _branch_faults(mechanism: Mechanism, groups: Sequence[Group]) -> list[Fault]:
+def _branch_faults(mechanism: Mechanism, dyads: Sequence[Dyad]) -> list[Fault]:
     faults = []
     for joint in mechanism.joints:
-        group = next((g for g in groups if g.inner is joint), None)
+        dyad = next((d for d in dyads if d.inner is joint), None)
         key = f"mechanism.joints.{joint.name}.branch"
-        if group is None:
+        if dyad is None:
             if joint.branch is not None:
                 faults.append(
                     Fault(
                         key=key,
                         problem=f"a branch means nothing at joint {joint.name}, which closes no dyad",
                         given=joint.branch,
-                        allowed="a branch at the inner revolute joint of a dyad only: "
-                        + (_listed([g.inner.name for g in groups])),
+                        allowed=f"a branch at the inner joint of a dyad only: {_listed([d.inner.name for d in dyads])}",
                         remedy="remove the key",
                     )
                 )
             continue
-        if joint.branch in BRANCHES[group.kind]:
+        if joint.branch in dyad.branches:
             continue
-        one, two = BRANCHES[group.kind]
+        one, two = dyad.branches
         missing = joint.branch is None
         faults.append(
             Fault(
                 key=key,
                 problem=(
-                    f"joint {joint.name} closes the {group.kind} dyad of {group.bodies[0]} and {group.bodies[1]} and "
+                    f"joint {joint.name} closes the {dyad.kind} dyad of {dyad.bodies[0]} and {dyad.bodies[1]} and "
                     + ("has no branch" if missing else "has a branch of another dyad")
                 ),
                 given="nothing" if joint.branch is None else joint.branch,
                 allowed=f"{one} or {two}",
-                remedy=_branch_remedy(group),
+                remedy=f"say {dyad.branch_meaning()}",
             )
         )
     return faults
-
-
-def _branch_remedy(group: Group) -> str:
-    inner, one, two = group.inner.name, group.outer[0].name, group.outer[1].name
-    if group.kind == "RRR":
-        return f"say on which side of the line from {one} to {two} joint {inner} lies"
-    return (
-        f"say whether joint {inner} lies ahead of or behind the foot of the perpendicular from {one} onto its path, "
-        f"seen along the direction of guide {two}"
-    )

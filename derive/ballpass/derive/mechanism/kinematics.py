@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from ballpass.derive.scene.records import FRAME, Mechanism
+from ballpass.derive.scene.records import FRAME, Joint, Mechanism
 from ballpass.derive.terms import Definition, components
 
 #: Plane vector: x and y components.
@@ -227,3 +227,13 @@ def body_point(mechanism: Mechanism, body: str, point: str) -> Pair:
     if body == FRAME:
         return components(next(p.position for p in mechanism.frame_points if p.name == point))
     return components(mechanism.body(body).point(point))
+
+
+def joint_point(mechanism: Mechanism, joint: Joint, body: str) -> Pair:
+    """Coordinates [m] of a joint's point in the axes of one of its bodies."""
+    return body_point(mechanism, body, joint.point(body))
+
+
+def name_joint(ledger: Ledger, joint: Joint, motion: Motion) -> Motion:
+    """The motion of a joint under the names ``joint.<name>.x`` and so on."""
+    return ledger.name_motion(f"joint.{joint.name}", motion, f"joint {joint.name}", subscript(joint.name))

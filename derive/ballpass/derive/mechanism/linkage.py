@@ -1,7 +1,7 @@
 """From geometry to kinematics: positions, velocities and accelerations of a planar linkage with one driver.
 
-In: a `Mechanism`, the driver's angle and speed as expressions.  Out: one frozen `Linkage`.  Structure only: numbers are
-symbols named by their path in the scene (law 1).  The driver turns at constant speed.
+In: a `Mechanism` and its `Drive`.  Out: one frozen `Linkage`.  Structure only: numbers are symbols named by their path
+in the scene (law 1).
 """
 
 from __future__ import annotations
@@ -12,11 +12,20 @@ from types import MappingProxyType
 
 import sympy as sp
 
-from ballpass.derive.mechanism.assembly import assemble, point_name
-from ballpass.derive.mechanism.dyads.dyad import Dyad, Margin
-from ballpass.derive.mechanism.dyads.rrp import place_rrp
-from ballpass.derive.mechanism.dyads.rrr import place_rrr
-from ballpass.derive.mechanism.kinematics import Ledger, Motion, Pair, Pose, body_point, frame_pose, place, subscript
+from ballpass.derive.drive import Drive
+from ballpass.derive.mechanism.assembly import assemble
+from ballpass.derive.mechanism.dyads import Dyad, Margin, Placement
+from ballpass.derive.mechanism.kinematics import (
+    Ledger,
+    Motion,
+    Pair,
+    Pose,
+    body_point,
+    frame_pose,
+    joint_point,
+    place,
+    subscript,
+)
 from ballpass.derive.mechanism.sweep import locked_positions
 from ballpass.derive.scene.errors import LinkageError
 from ballpass.derive.scene.records import FRAME, Joint, Mechanism
@@ -38,30 +47,36 @@ class PlacedPoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Linkage:
-    """Kinematics of a linkage as functions of the driver's angle and speed.
+    """Kinematics of a linkage as functions of the driver's motion.
 
     Attributes
     ----------
-    angle : of the driven body's x axis from +x [rad]
-    speed : of the driven body [rad/s], constant
+    drive : what turns the driven body
     driver : the driver's joint
     driven : the driven body
-    definitions : ordered; each uses parameters, `angle`, `speed` and earlier symbols only
+    definitions : ordered; each uses parameters, the drive's symbols and earlier ones only
     poses : by body, in the order of assembly; the frame is none of them
-    dyads : in the order of assembly
-    margins : one per dyad, in the same order
+    placements : the dyads, placed, in the order of assembly
     points : all points of the frame and of the bodies, and the centres of mass, for drawing
     """
 
-    angle: sp.Expr
-    speed: sp.Expr
+    drive: Drive
     driver: Joint
     driven: str
     definitions: tuple[Definition, ...]
     poses: Mapping[str, Pose]
-    dyads: tuple[Dyad, ...]
-    margins: tuple[Margin, ...]
+    placements: tuple[Placement, ...]
     points: tuple[PlacedPoint, ...]
+
+    @property
+    def dyads(self) -> tuple[Dyad, ...]:
+        """In the order of assembly."""
+        return tuple(p.dyad for p in self.placements)
+
+    @property
+    def margins(self) -> tuple[Margin, ...]:
+        """Where each dyad can be assembled, in the same order."""
+        return tuple(p.margin for p in self.placements)
 
     def pose(self, body: str) -> Pose:
         """Pose of a moving body or of the frame."""
@@ -72,14 +87,13 @@ class Linkage:
         return self.pose(body).motion(body_point(mechanism, body, point))
 
 
-def derive_linkage(mechanism: Mechanism, angle: sp.Expr, speed: sp.Expr) -> Linkage:
+def derive_linkage(mechanism: Mechanism, drive: Drive) -> Linkage:
     """Derive the kinematics of a linkage.
 
     Parameters
     ----------
     mechanism : bodies, joints and driver
-    angle : driver's angle [rad], as the equations shall show it
-    speed : driver's speed [rad/s], constant
+    drive : angle, speed and acceleration of the driven body
 
     Raises
     ------
@@ -90,25 +104,21 @@ def derive_linkage(mechanism: Mechanism, angle: sp.Expr, speed: sp.Expr) -> Link
     assembly = assemble(mechanism)
     ledger = Ledger()
     poses = {FRAME: frame_pose()}
-    driven = _place_driven(ledger, mechanism, assembly.driver, assembly.driven, angle, speed)
+    driven = _place_driven(ledger, mechanism, assembly.driver, assembly.driven, drive)
     poses[driven.body] = driven
-    dyads, margins = [], []
-    for group in assembly.groups:
-        placed = (place_rrr if group.kind == "RRR" else place_rrp)(ledger, mechanism, group, poses)
-        for pose in placed.poses:
-            poses[pose.body] = pose
-        dyads.append(placed.dyad)
-        margins.append(placed.margin)
+    placements = []
+    for dyad in assembly.dyads:
+        placement = dyad.place(ledger, mechanism, poses)
+        poses |= {pose.body: pose for pose in placement.poses}
+        placements.append(placement)
     moving = {name: pose for name, pose in poses.items() if name != FRAME}
     return Linkage(
-        angle=angle,
-        speed=speed,
+        drive=drive,
         driver=assembly.driver,
         driven=assembly.driven,
         definitions=ledger.definitions,
         poses=MappingProxyType(moving),
-        dyads=tuple(dyads),
-        margins=tuple(margins),
+        placements=tuple(placements),
         points=_points(mechanism, poses),
     )
 
@@ -129,35 +139,33 @@ def check_assembly(linkage: Linkage, values: Mapping[str, float]) -> None:
         a parameter without a value.
     """
     driven = linkage.poses[linkage.driven]
-    faults = locked_positions(linkage.definitions, linkage.margins, linkage.dyads, driven, values)
+    faults = locked_positions(linkage.definitions, linkage.placements, driven, values)
     if faults:
         raise LinkageError(faults)
 
 
-def _place_driven(
-    ledger: Ledger, mechanism: Mechanism, driver: Joint, body: str, angle: sp.Expr, speed: sp.Expr
-) -> Pose:
+def _place_driven(ledger: Ledger, mechanism: Mechanism, driver: Joint, body: str, drive: Drive) -> Pose:
     mark = subscript(body)
-    cos = ledger.define(f"body.{body}.cos", sp.cos(angle), "1", f"cosine of the angle of {body}", f"c_{{{mark}}}")
-    sin = ledger.define(f"body.{body}.sin", sp.sin(angle), "1", f"sine of the angle of {body}", f"s_{{{mark}}}")
+    cos = ledger.define(f"body.{body}.cos", sp.cos(drive.angle), "1", f"cosine of the angle of {body}", f"c_{{{mark}}}")
+    sin = ledger.define(f"body.{body}.sin", sp.sin(drive.angle), "1", f"sine of the angle of {body}", f"s_{{{mark}}}")
     # Zero, but a symbol: Eq. (1) prints the crank's moment of inertia with it.
     acceleration = ledger.define(
         f"body.{body}.angular_acceleration",
-        sp.S.Zero,
+        drive.acceleration,
         "rad/s^2",
-        f"angular acceleration of {body}: the driver's speed is constant",
+        f"angular acceleration of {body}: {drive.description}",
         rf"\ddot{{\varphi}}_{{{mark}}}",
     )
-    pivot = frame_pose().motion(body_point(mechanism, FRAME, point_name(driver, FRAME)))
+    pivot = frame_pose().motion(joint_point(mechanism, driver, FRAME))
     return place(
         ledger,
         mechanism,
         body,
         cos=cos,
         sin=sin,
-        rate=speed,
+        rate=drive.speed,
         acceleration=acceleration,
-        anchor=body_point(mechanism, body, point_name(driver, body)),
+        anchor=joint_point(mechanism, driver, body),
         anchor_motion=pivot,
     )
 

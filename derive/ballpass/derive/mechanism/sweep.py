@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import sympy as sp
 
-from ballpass.derive.mechanism.dyads.dyad import Dyad, Margin
+from ballpass.derive.mechanism.dyads import Placement
 from ballpass.derive.mechanism.kinematics import Pose
 from ballpass.derive.mechanism.numeric import Evaluator
 from ballpass.derive.scene.errors import Fault
@@ -25,8 +25,7 @@ Array = npt.NDArray[np.float64]
 
 def locked_positions(
     definitions: Sequence[Definition],
-    margins: Sequence[Margin],
-    dyads: Sequence[Dyad],
+    placements: Sequence[Placement],
     driven: Pose,
     values: Mapping[str, float],
 ) -> list[Fault]:
@@ -36,7 +35,7 @@ def locked_positions(
 
     Parameters
     ----------
-    definitions, margins, dyads : of a `Linkage`; a margin for each dyad, in the same order
+    definitions, placements : of a `Linkage`
     driven : pose of the driven body, whose cosine and sine are swept
     values : SI value of every parameter, by its path
 
@@ -45,7 +44,7 @@ def locked_positions(
     KeyError
         a parameter without a value.
     """
-    evaluator = Evaluator(definitions, [m.expression for m in margins], given=(driven.cos, driven.sin))
+    evaluator = Evaluator(definitions, [p.margin.expression for p in placements], given=(driven.cos, driven.sin))
     parameters: dict[sp.Symbol, Any] = {sp.Symbol(name, real=True): np.float64(v) for name, v in values.items()}
 
     def sweep(degrees: Array) -> Array:
@@ -58,14 +57,14 @@ def locked_positions(
     grid = np.arange(0.0, 360.0, STEP)
     swept = sweep(grid)
     faults = []
-    for row, (margin, dyad) in enumerate(zip(margins, dyads, strict=True)):
+    for row, placement in enumerate(placements):
         # Where an earlier dyad has failed, this one has no place to start from.
         reachable = np.all(swept[:row] > DEAD_CENTER, axis=0)
         here = np.where(np.isnan(swept[row]), -np.inf, swept[row])
         here = np.where(reachable, here, np.inf)
         angle, least = _least(sweep, row, grid, here)
         if least <= DEAD_CENTER:
-            faults.append(_fault(margin, dyad, angle, least, grid[here <= DEAD_CENTER]))
+            faults.append(_fault(placement, angle, least, grid[here <= DEAD_CENTER]))
     return faults
 
 
@@ -88,7 +87,8 @@ def _least(sweep: Callable[[Array], Array], row: int, grid: Array, here: Array) 
     return best
 
 
-def _fault(margin: Margin, dyad: Dyad, angle: float, least: float, closed: Array) -> Fault:
+def _fault(placement: Placement, angle: float, least: float, closed: Array) -> Fault:
+    margin, dyad = placement.margin, placement.dyad
     joints = ", ".join(dyad.joints)
     if np.isneginf(least):
         problem = f"the dyad at joint {margin.joint} has no finite position at {angle:.4g} deg: is a length zero?"

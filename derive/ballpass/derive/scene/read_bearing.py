@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from ballpass.derive.scene.read_mechanism import words_of_force
 from ballpass.derive.scene.records import (
     DAMPING_LAWS,
     FRAME,
@@ -28,7 +27,7 @@ from ballpass.derive.scene.records import (
     Shaft,
     TableLoad,
 )
-from ballpass.derive.scene.schema import Table, listing, suggest
+from ballpass.derive.scene.schema import Table, listing, suggest, words_of_force
 from ballpass.derive.scene.units import show
 
 _HERTZ_KEYS = ("inner_groove_radius", "outer_groove_radius", "young_modulus", "poisson_ratio")

@@ -6,24 +6,16 @@ linkage can be assembled is no question of reading: `derive` answers it.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
-from ballpass.derive.scene.records import (
-    FRAME,
-    AppliedForce,
-    AppliedTorque,
-    Body,
-    Driver,
-    Joint,
-    Mechanism,
-    NamedPoint,
-    Window,
-)
-from ballpass.derive.scene.schema import Table, VectorWords, listing, suggest
+from ballpass.derive.mechanism.dyads import BRANCHES
+from ballpass.derive.mechanism.forces import FORCE_TABLES
+from ballpass.derive.scene.body_keys import Points, read_pair, refuse_unknown_body, refuse_unknown_point
+from ballpass.derive.scene.records import FRAME, Body, Driver, Force, Joint, Mechanism, NamedPoint
+from ballpass.derive.scene.schema import Table, VectorWords, listing, suggest, upright
 from ballpass.derive.scene.units import show
 
 _JOINT_TYPES: tuple[Literal["revolute", "prismatic"], ...] = ("revolute", "prismatic")
-_BRANCHES: tuple[Literal["left", "right", "ahead", "behind"], ...] = ("left", "right", "ahead", "behind")
 
 
 def words_of_gravity() -> VectorWords:
@@ -34,28 +26,6 @@ def words_of_gravity() -> VectorWords:
         latex=("g", "g_x", "g_y", "g", r"\alpha_g"),
         polar=("magnitude", "direction"),
     )
-
-
-def words_of_force(what: str, symbol: str, index: str = "") -> VectorWords:
-    """Words of a force: no single number, because nothing says along which axis it would act."""
-    comma = "," if index else ""
-    return VectorWords(
-        what=what,
-        latex=(
-            "",
-            f"{symbol}_{{{index}{comma}x}}",
-            f"{symbol}_{{{index}{comma}y}}",
-            f"{symbol}_{{{index}}}" if index else symbol,
-            rf"\alpha_{{{index or symbol}}}",
-        ),
-        polar=("magnitude", "direction"),
-    )
-
-
-def upright(name: str) -> str:
-    """A name of the scene as LaTeX text."""
-    escaped = name.replace("_", r"\_")
-    return rf"\mathrm{{{escaped}}}"
 
 
 def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
@@ -70,12 +40,11 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
         with table.table("frame", "its points") as frame:
             frame_points = _read_points(frame, FRAME)
         bodies = _read_bodies(table)
-        points = {FRAME: [point.name for point in frame_points]}
+        points: dict[str, list[str]] = {FRAME: [point.name for point in frame_points]}
         points |= {body.name: [point.name for point in body.points] for body in bodies}
         joints, sound = _read_joints(table, points)
         driven = _check_driver(table, driver, joints, sound)
         forces = _read_forces(table, points)
-        torques = _read_torques(table, points)
     mechanism = Mechanism(
         gravity=gravity,
         driver=driver,
@@ -83,7 +52,6 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
         bodies=bodies,
         joints=joints,
         forces=forces,
-        torques=torques,
     )
     return mechanism, driven
 
@@ -158,7 +126,7 @@ def _read_body(listed: Table, name: str) -> Body:
         )
 
 
-def _read_joints(table: Table, points: dict[str, list[str]]) -> tuple[tuple[Joint, ...], list[str]]:
+def _read_joints(table: Table, points: Points) -> tuple[tuple[Joint, ...], list[str]]:
     """All joints, and the names of those whose type and bodies are without fault."""
     joints, sound = [], []
     with table.table("joints", "one table for each joint") as listed:
@@ -173,13 +141,13 @@ def _read_joints(table: Table, points: dict[str, list[str]]) -> tuple[tuple[Join
     return tuple(joints), sound
 
 
-def _read_joint(data: Table, name: str, points: dict[str, list[str]]) -> tuple[Joint, bool]:
+def _read_joint(data: Table, name: str, points: Points) -> tuple[Joint, bool]:
     kind = data.choice("type", _JOINT_TYPES)
-    bodies = _pair(data, "bodies", '["frame", "crank"]')
+    bodies = read_pair(data, "bodies", '["frame", "crank"]')
     good = kind is not None and bodies is not None
     if bodies is not None:
         for body in bodies:
-            good = _known_body(data, "bodies", body, points) and good
+            good = refuse_unknown_body(data, "bodies", body, points) and good
         if bodies[0] == bodies[1]:
             good = False
             data.fault(
@@ -189,10 +157,10 @@ def _read_joint(data: Table, name: str, points: dict[str, list[str]]) -> tuple[J
                 allowed="two different bodies",
                 remedy="name the other body",
             )
-    ends = _pair(data, "points", f'["{name}", "{name}"]') if data.has("points") else (name, name)
+    ends = read_pair(data, "points", f'["{name}", "{name}"]') if data.has("points") else (name, name)
     if bodies is not None and ends is not None:
         for body, point in zip(bodies, ends, strict=True):
-            _known_point(data, "points", body, point, points)
+            refuse_unknown_point(data, "points", body, point, points)
     direction = None
     if kind == "prismatic":
         direction = data.quantity(
@@ -209,15 +177,7 @@ def _read_joint(data: Table, name: str, points: dict[str, list[str]]) -> tuple[J
             given=show(data.data["direction"]),
             remedy='delete the key, or write type = "prismatic"',
         )
-    branch = data.choice("branch", _BRANCHES) if data.has("branch") else None
-    if branch is not None and kind == "prismatic":
-        data.fault(
-            "branch",
-            "a prismatic joint has no branch",
-            given=show(branch),
-            allowed="a branch at the inner revolute joint of each dyad",
-            remedy="delete the key here; write it at the revolute joint between the two bodies of the dyad",
-        )
+    branch = data.choice("branch", BRANCHES) if data.has("branch") else None
     return Joint(
         name=name,
         kind=kind or "revolute",
@@ -226,46 +186,6 @@ def _read_joint(data: Table, name: str, points: dict[str, list[str]]) -> tuple[J
         direction=direction,
         branch=branch,
     ), good
-
-
-def _pair(data: Table, key: str, example: str) -> tuple[str, str] | None:
-    given = data.take(key, example)
-    if given is None:
-        return None
-    if isinstance(given, list) and len(given) == 2 and all(isinstance(item, str) for item in given):
-        return given[0], given[1]
-    data.fault(
-        key, "this is not a list of two names", given=show(given), allowed=example, remedy=f"write {key} = {example}"
-    )
-    return None
-
-
-def _known_body(data: Table, key: str, body: str, points: dict[str, list[str]]) -> bool:
-    if body in points:
-        return True
-    names = list(points)
-    data.fault(
-        key,
-        f"there is no body {show(body)}",
-        given=show(data.data[key]),
-        allowed=listing(names),
-        remedy=suggest(body, names, f"add the table [mechanism.bodies.{body}], or name one of the bodies"),
-    )
-    return False
-
-
-def _known_point(data: Table, key: str, body: str, point: str, points: dict[str, list[str]]) -> None:
-    if body not in points or point in points[body]:
-        return
-    place = "mechanism.frame.points" if body == FRAME else f"mechanism.bodies.{body}.points"
-    near = suggest(point, points[body], "")
-    data.fault(
-        key,
-        f"the body {show(body)} has no point {show(point)}",
-        given=show(data.data[key]) if key in data.data else f"nothing, which means the joint's own name {show(point)}",
-        allowed=listing(points[body]),
-        remedy=f"{near + ' Or ' if near else ''}add {show(point)} to [{place}], or name its point",
-    )
 
 
 def _check_driver(table: Table, driver: Driver, joints: tuple[Joint, ...], sound: list[str]) -> str | None:
@@ -310,99 +230,11 @@ def _check_driver(table: Table, driver: Driver, joints: tuple[Joint, ...], sound
     return joint.bodies[1]
 
 
-def _read_forces(table: Table, points: dict[str, list[str]]) -> tuple[AppliedForce, ...]:
+def _read_forces(table: Table, points: Points) -> tuple[Force, ...]:
     forces = []
-    with table.table("forces", required=False) as listed:
-        for name in listed.names("force"):
-            with listed.table(name, "body, point and force") as data:
-                body = _read_target(data, points)
-                point = data.text("point", "C") or ""
-                if body and point:
-                    _known_point(data, "point", body, point, points)
-                words = words_of_force(f"the force {name} on the {body.replace('_', ' ')}", "F", upright(name))
-                forces.append(
-                    AppliedForce(
-                        name=name,
-                        body=body,
-                        point=point,
-                        force=data.vector("force", "N", words),
-                        windows=_read_windows(data, name),
-                    )
-                )
+    for kind in FORCE_TABLES:
+        with table.table(kind.key, required=False) as listed:
+            for name in listed.names(kind.word):
+                with listed.table(name, kind.example) as data:
+                    forces.append(kind.read(data, name, points))
     return tuple(forces)
-
-
-def _read_torques(table: Table, points: dict[str, list[str]]) -> tuple[AppliedTorque, ...]:
-    torques = []
-    with table.table("torques", required=False) as listed:
-        for name in listed.names("torque"):
-            with listed.table(name, "body and torque") as data:
-                body = _read_target(data, points)
-                torque = data.quantity(
-                    "torque",
-                    "N*m",
-                    f"Torque {name} on the {body.replace('_', ' ')}, counter-clockwise",
-                    f"M_{{{upright(name)}}}",
-                    example="20 N*m",
-                )
-                torques.append(AppliedTorque(name=name, body=body, torque=torque, windows=_read_windows(data, name)))
-    return tuple(torques)
-
-
-def _read_target(data: Table, points: dict[str, list[str]]) -> str:
-    """The moving body a load acts on; empty, with a fault, where there is none."""
-    body = data.text("body", "slider")
-    if not body:
-        return ""
-    if body == FRAME:
-        data.fault(
-            "body",
-            "a load on the frame moves nothing",
-            given=show(body),
-            allowed=listing([name for name in points if name != FRAME]),
-            remedy="name a moving body",
-        )
-        return ""
-    return body if _known_body(data, "body", body, points) else ""
-
-
-def _read_windows(data: Table, name: str) -> tuple[Window, ...]:
-    if not data.has("window"):
-        return ()
-    given: Any = data.data["window"]
-    if not isinstance(given, list):
-        return (_read_window(data.table("window", "start and end"), name, ""),)
-    if not given:
-        data.fault(
-            "window",
-            "there is no window in this list",
-            given="[]",
-            allowed='{ start = "237 deg", end = "267 deg" }, or a list of such tables',
-            remedy="add a window, or delete the key for a load that always acts",
-        )
-    numbered = Table(
-        data.collector, (*data.path, "window"), {str(number): item for number, item in enumerate(given, start=1)}
-    )
-    return tuple(_read_window(numbered.table(number, "start and end"), name, f",{number}") for number in numbered.data)
-
-
-def _read_window(table: Table, name: str, number: str) -> Window:
-    place = f"the window {number[1:]} of {name}".replace("  ", " ") if number else f"the window of {name}"
-    index = f"{upright(name)}{number}"
-    with table as window:
-        return Window(
-            start=window.quantity(
-                "start",
-                "rad",
-                f"Driver angle at the start of {place}",
-                rf"\theta_{{\mathrm{{start}},{index}}}",
-                example="237 deg",
-            ),
-            end=window.quantity(
-                "end",
-                "rad",
-                f"Driver angle at the end of {place}",
-                rf"\theta_{{\mathrm{{end}},{index}}}",
-                example="267 deg",
-            ),
-        )

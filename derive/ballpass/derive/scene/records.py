@@ -95,11 +95,7 @@ class Joint:
     [rad] in that body's axes.  ``points[1]`` of ``bodies[1]`` (the slider) stays on the line; the slider's axes stay
     parallel to those of ``bodies[0]``.
 
-    `branch` is set at the inner revolute joint of a dyad, else None:
-    RRR ``left``/``right``: the joint lies left/right of the directed line from the outer joint of ``bodies[0]``
-    to the outer joint of ``bodies[1]``.
-    RRP ``ahead``/``behind``: the joint lies ahead of/behind the foot of the perpendicular dropped from the rod's
-    outer joint onto the joint's path, seen along the guide's direction.
+    `branch` is set at the inner joint of a dyad, else None; each kind of dyad has its own words.
 
     The joint's reaction is the force of ``bodies[1]`` on ``bodies[0]``.
     """
@@ -109,7 +105,15 @@ class Joint:
     bodies: tuple[str, str]
     points: tuple[str, str]
     direction: Quantity | None
-    branch: Literal["left", "right", "ahead", "behind"] | None
+    branch: str | None
+
+    def point(self, body: str) -> str:
+        """Name of the joint's point on one of its bodies."""
+        return self.points[self.bodies.index(body)]
+
+    def other(self, body: str) -> str:
+        """The body on the other side."""
+        return self.bodies[1 - self.bodies.index(body)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,35 +129,17 @@ class Driver:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Window:
-    """Driver angles [rad] between which a load acts: from `start` on, up to and without `end`, modulo a turn."""
+class Force:
+    """A force or torque on the linkage, from ``[mechanism.<table>.<name>]``.
 
-    start: Quantity
-    end: Quantity
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AppliedForce:
-    """A force [N] with constant components in the frame's axes on a named point of a body.
-
-    Without windows it acts always.
+    `pathway` says which bodies it acts on and along what, `law` how large it is: records of
+    `ballpass.derive.mechanism.forces`, which this layer only carries.
     """
 
     name: str
-    body: str
-    point: str
-    force: Vector
-    windows: tuple[Window, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AppliedTorque:
-    """A torque [N*m], counter-clockwise, on a body."""
-
-    name: str
-    body: str
-    torque: Quantity
-    windows: tuple[Window, ...]
+    table: str
+    pathway: Any
+    law: Any
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,8 +151,7 @@ class Mechanism:
     frame_points: tuple[NamedPoint, ...]
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
-    forces: tuple[AppliedForce, ...]
-    torques: tuple[AppliedTorque, ...]
+    forces: tuple[Force, ...]
 
     def body(self, name: str) -> Body:
         """Moving body by name."""

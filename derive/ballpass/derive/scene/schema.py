@@ -120,6 +120,28 @@ class VectorWords:
         return ", ".join(forms[:-1]) + " or " + forms[-1]
 
 
+def words_of_force(what: str, symbol: str, index: str = "") -> VectorWords:
+    """Words of a force: no single number, because nothing says along which axis it would act."""
+    comma = "," if index else ""
+    return VectorWords(
+        what=what,
+        latex=(
+            "",
+            f"{symbol}_{{{index}{comma}x}}",
+            f"{symbol}_{{{index}{comma}y}}",
+            f"{symbol}_{{{index}}}" if index else symbol,
+            rf"\alpha_{{{index or symbol}}}",
+        ),
+        polar=("magnitude", "direction"),
+    )
+
+
+def upright(name: str) -> str:
+    """A name of the scene as LaTeX text."""
+    escaped = name.replace("_", r"\_")
+    return rf"\mathrm{{{escaped}}}"
+
+
 class Table:
     """A table of the file; as a context it reports the keys nobody asked for.
 

@@ -23,7 +23,6 @@ from ballpass.derive.scene.records import (
     Scene,
     TableLoad,
     Vector,
-    Window,
 )
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 
@@ -68,7 +67,7 @@ def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
     scene : NaN stands for a value that has been reported before; it passes every check
     given : text of a value by path, where the file has one; others are shown in SI
     """
-    checker = _Checker(given)
+    checker = Checker(given)
     if scene.mechanism is not None:
         _check_mechanism(checker, scene.mechanism)
     if isinstance(scene.load, HarmonicLoad):
@@ -83,7 +82,7 @@ def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
 
 def value_bounds(scene: Scene) -> dict[str, Bounds]:
     """What each quantity alone must satisfy, by path; quantities that may have any value are not in it."""
-    checker = _Checker({})
+    checker = Checker({})
     if scene.mechanism is not None:
         _check_mechanism(checker, scene.mechanism)
     if isinstance(scene.load, HarmonicLoad):
@@ -224,7 +223,7 @@ def _replaced(record: Any, changed: Mapping[str, Quantity]) -> Any:
     return record
 
 
-class _Checker:
+class Checker:
     """Notes faults, and the bounds it checks; a comparison with NaN is false, so every check asks for what is wrong."""
 
     def __init__(self, given: Mapping[str, str]) -> None:
@@ -233,13 +232,16 @@ class _Checker:
         self.bounds: dict[str, Bounds] = {}
 
     def show(self, quantity: Quantity) -> str:
+        """The value as the file has it, else in SI."""
         unit = "" if quantity.unit == "1" else f" {quantity.unit}"
         return self.given.get(quantity.path, f"{quantity.value:.9g}{unit}")
 
     def fault(self, path: str, problem: str, given: str, allowed: str, remedy: str) -> None:
+        """Note a fault."""
         self.faults.append(Fault(key=path, problem=problem, given=given, allowed=allowed, remedy=remedy))
 
     def positive(self, quantity: Quantity | None, remedy: str = "give a positive value") -> None:
+        """Above zero."""
         if quantity is None:
             return
         self.bounds[quantity.path] = Bounds(above=0.0)
@@ -248,50 +250,36 @@ class _Checker:
             self.fault(quantity.path, f"the value is {what}", self.show(quantity), "a value above zero", remedy)
 
     def not_negative(self, quantity: Quantity | None, remedy: str = "give zero or a positive value") -> None:
+        """Zero or above."""
         if quantity is None:
             return
         self.bounds[quantity.path] = Bounds(least=0.0)
         if quantity.value < 0.0:
             self.fault(quantity.path, "the value is negative", self.show(quantity), "zero or a value above it", remedy)
 
+    def polar(self, vector: Vector) -> None:
+        """The amount of a vector in polar form is not negative."""
+        if vector.kind == "polar":
+            self.not_negative(vector.first, "give the amount, and turn the angle by 180 deg")
 
-def _check_mechanism(checker: _Checker, mechanism: Mechanism) -> None:
+
+def _check_mechanism(checker: Checker, mechanism: Mechanism) -> None:
     points = list(mechanism.frame_points)
     for body in mechanism.bodies:
         checker.positive(body.mass, "every moving body has a mass: give it, small where it hardly matters")
         checker.positive(body.inertia, "give a positive value, or delete the key for a body that does not rotate")
-        _check_polar(checker, body.center_of_mass)
+        checker.polar(body.center_of_mass)
         points += body.points
     for point in points:
         if point.position.kind == "axis":
             checker.positive(point.position.first, "give a positive length, or write the point as [x, y]")
-        _check_polar(checker, point.position)
+        checker.polar(point.position)
     for force in mechanism.forces:
-        _check_polar(checker, force.force)
-    windows = [window for force in mechanism.forces for window in force.windows]
-    windows += [window for torque in mechanism.torques for window in torque.windows]
-    for window in windows:
-        _check_window(checker, window)
+        force.pathway.check(checker)
+        force.law.check(checker)
 
 
-def _check_polar(checker: _Checker, vector: Vector) -> None:
-    if vector.kind == "polar":
-        checker.not_negative(vector.first, "give the amount, and turn the angle by 180 deg")
-
-
-def _check_window(checker: _Checker, window: Window) -> None:
-    span = window.end.value - window.start.value
-    if span == 0.0 or abs(span) >= _TURN * (1.0 - 1e-12):
-        checker.fault(
-            window.end.path,
-            "the window is empty or as long as a whole turn",
-            f"start {checker.show(window.start)}, end {checker.show(window.end)}",
-            "two angles that differ, by less than a turn; from start counter-clockwise to end",
-            "give another end, or delete the window for a load that always acts",
-        )
-
-
-def _check_table(checker: _Checker, load: TableLoad) -> None:
+def _check_table(checker: Checker, load: TableLoad) -> None:
     rows = {"time": len(load.time), "x": len(load.x), "y": len(load.y)}
     if min(rows.values()) == 0:  # reported when it was read
         return
@@ -322,7 +310,7 @@ def _check_table(checker: _Checker, load: TableLoad) -> None:
             )
 
 
-def _check_bearing(checker: _Checker, bearing: Bearing) -> None:
+def _check_bearing(checker: Checker, bearing: Bearing) -> None:
     if bearing.share is not None:
         checker.bounds[bearing.share.path] = Bounds(least=0.0, most=1.0)
     if bearing.share is not None and (bearing.share.value < 0.0 or bearing.share.value > 1.0):
@@ -359,7 +347,7 @@ def _check_bearing(checker: _Checker, bearing: Bearing) -> None:
         checker.not_negative(bearing.outer.damping)
 
 
-def _check_balls(checker: _Checker, bearing: Bearing) -> None:
+def _check_balls(checker: Checker, bearing: Bearing) -> None:
     ball, pitch = bearing.ball_diameter, bearing.pitch_diameter
     if ball.value <= 0.0 or pitch.value <= 0.0:
         return
@@ -384,7 +372,7 @@ def _check_balls(checker: _Checker, bearing: Bearing) -> None:
         )
 
 
-def _check_preload(checker: _Checker, bearing: Bearing) -> None:
+def _check_preload(checker: Checker, bearing: Bearing) -> None:
     """A preload as large as a ball leaves no room for one.  A clearance may be of any width: it is a free ring then."""
     ball, clearance = bearing.ball_diameter, bearing.clearance
     if ball.value <= 0.0 or not -clearance.value >= ball.value:
@@ -398,7 +386,7 @@ def _check_preload(checker: _Checker, bearing: Bearing) -> None:
     )
 
 
-def _check_hertz(checker: _Checker, contact: HertzContact, ball: Quantity) -> None:
+def _check_hertz(checker: Checker, contact: HertzContact, ball: Quantity) -> None:
     for radius in (contact.inner_groove_radius, contact.outer_groove_radius):
         checker.positive(radius)
         if 0.0 < radius.value <= 0.5 * ball.value:
@@ -425,7 +413,7 @@ def _check_hertz(checker: _Checker, contact: HertzContact, ball: Quantity) -> No
             )
 
 
-def _check_run(checker: _Checker, scene: Scene) -> None:
+def _check_run(checker: Checker, scene: Scene) -> None:
     source = scene.mechanism.driver if scene.mechanism is not None else scene.shaft
     if source is None:
         return

@@ -1,89 +1,38 @@
-"""Assur dyads once they are placed: their records, and the parts their closed forms share.
+"""What an Assur dyad is: a way to place two bodies at once, and to solve their joint reactions.
 
-`dyad_rrr.py` and `dyad_rrp.py` place one kind each.  Positions need one square root and no inverse function: cosine and
-sine of a body's angle are the quotient of its span in the plane and its span in body axes, taken as complex numbers.
-Rates follow from the differentiated loop closure, two equations at a time, by Cramer's rule.
+Each kind is one class in a file of its own, listed in `dyads/__init__.py`.  It says which joints form it and what its
+branches are called (find), gives the poses of its bodies in closed form (place), and walks its balances (reactions).
+
+Positions need one square root and no inverse function: cosine and sine of a body's angle are the quotient of its span
+in the plane and its span in body axes, taken as complex numbers.  Rates follow from the differentiated loop closure,
+two equations at a time, by Cramer's rule.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal, Self
 
 import sympy as sp
 
-from ballpass.derive.mechanism.assembly import Group, point_name
+from ballpass.derive.mechanism.balance import Balance, Guide
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Motion,
     Pair,
     Pose,
-    body_point,
     cross,
     dot,
-    quarter_turn,
+    joint_point,
+    name_joint,
     subscript,
     subtract,
 )
 from ballpass.derive.scene.errors import Fault, LinkageError
 from ballpass.derive.scene.records import Joint, Mechanism
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Guide:
-    """The prismatic joint of an RRP dyad.
-
-    Attributes
-    ----------
-    joint : the joint
-    host, slider : the body already placed and the body that slides on it
-    direction : unit vector of the guide in the frame's axes
-    travel : distance [m] of the slider from where the joint's two points coincide, along `direction`
-    fixed : the host is the frame, so the slider does not turn
-    """
-
-    joint: Joint
-    host: str
-    slider: str
-    direction: Pair
-    travel: sp.Expr
-    fixed: bool
-
-    @property
-    def normal(self) -> Pair:
-        """Unit vector to the left of `direction`."""
-        return quarter_turn(self.direction)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Dyad:
-    """A placed dyad.
-
-    Attributes
-    ----------
-    kind : RRR or RRP
-    bodies : RRR: in the order of the inner joint's bodies; RRP: rod, slider
-    hosts : the bodies that carry them
-    outer, inner : joints, `outer` in the order of `bodies`
-    spans : vectors [m] from the outer to the inner joint; of the rod alone for RRP
-    determinant : of the 2×2 systems for rates and forces: RRR, cross product of the spans [m^2]; RRP, component of the
-        rod's span along the guide [m]
-    guide : of RRP, else None
-    """
-
-    kind: Literal["RRR", "RRP"]
-    bodies: tuple[str, str]
-    hosts: tuple[str, str]
-    outer: tuple[Joint, Joint]
-    inner: Joint
-    spans: tuple[Pair, ...]
-    determinant: sp.Expr
-    guide: Guide | None
-
-    @property
-    def joints(self) -> tuple[str, str, str]:
-        """Names: outer joint of the first body, inner joint, outer joint of the second body."""
-        return self.outer[0].name, self.inner.name, self.outer[1].name
+from ballpass.derive.terms import symbol_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,23 +45,103 @@ class Margin:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlacedDyad:
-    """What `place_rrr` and `place_rrp` give."""
+class Dyad(ABC):
+    """Two bodies with a joint between them, each with one joint to a body already placed.
 
-    poses: tuple[Pose, Pose]
+    Attributes
+    ----------
+    kind : R (revolute) or P (prismatic) for each of outer joint of the first body, inner joint, outer joint of the
+        second
+    branches : values of `Joint.branch` at the inner joint; the first has the sign +1
+    words : what it is made of, for messages
+    bodies : in the order of `kind`; where that can be read from both ends, in the order of the inner joint's bodies
+    hosts : the bodies already placed that carry them
+    outer, inner : joints, `outer` in the order of `bodies`
+    """
+
+    kind: ClassVar[str]
+    branches: ClassVar[tuple[str, str]]
+    words: ClassVar[str]
+
+    bodies: tuple[str, str]
+    hosts: tuple[str, str]
+    outer: tuple[Joint, Joint]
+    inner: Joint
+
+    @classmethod
+    def find(cls, inner: Joint, outer: tuple[Joint, Joint]) -> Self | None:
+        """The dyad of these joints; None where they form another one.
+
+        Parameters
+        ----------
+        inner : joint between two bodies that have no place yet
+        outer : the joint of each of them to a body already placed, in the order of ``inner.bodies``
+        """
+        letters = {"revolute": "R", "prismatic": "P"}
+        for order in ((0, 1), (1, 0)):
+            joints = (outer[order[0]], inner, outer[order[1]])
+            if "".join(letters[joint.kind] for joint in joints) == cls.kind:
+                first, second = (inner.bodies[k] for k in order)
+                one, two = (outer[k] for k in order)
+                hosts = (one.other(first), two.other(second))
+                return cls(bodies=(first, second), hosts=hosts, outer=(one, two), inner=inner)
+        return None
+
+    @property
+    def joints(self) -> tuple[str, str, str]:
+        """Names: outer joint of the first body, inner joint, outer joint of the second body."""
+        return self.outer[0].name, self.inner.name, self.outer[1].name
+
+    @property
+    def sign(self) -> int:
+        """+1 on the first of the branches, −1 on the second."""
+        return 1 if self.inner.branch == self.branches[0] else -1
+
+    @abstractmethod
+    def branch_meaning(self) -> str:
+        """What the branch decides, as "on which side of ... the joint lies"."""
+
+    @abstractmethod
+    def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose]) -> Placement:
+        """Place the two bodies on the bodies in `poses`, writing the definitions into `ledger`.
+
+        Raises
+        ------
+        LinkageError
+            a body whose two joints of the dyad sit on one and the same point.
+        """
+
+    @abstractmethod
+    def solve(self, ledger: Ledger, balance: Balance, placement: Placement) -> None:
+        """Define the reactions of the dyad's joints; those of later dyads are known to `balance`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Placement:
+    """A dyad once it is placed.
+
+    Attributes
+    ----------
+    dyad : what was placed
+    poses : of its bodies, in their order
+    spans : vectors [m] that the reactions need; each kind says which
+    determinant : of the 2×2 systems for rates and forces
+    margin : where it can be assembled
+    guide : of its prismatic joint, None where it has none
+    """
+
     dyad: Dyad
+    poses: tuple[Pose, Pose]
+    spans: tuple[Pair, ...]
+    determinant: sp.Expr
     margin: Margin
+    guide: Guide | None = None
 
 
 def name_hinge(ledger: Ledger, mechanism: Mechanism, joint: Joint, host: Pose) -> Motion:
     """Motion of a revolute joint on a body already placed, under the names ``joint.<name>.x`` and so on."""
-    motion = host.motion(body_point(mechanism, host.body, point_name(joint, host.body)))
+    motion = host.motion(joint_point(mechanism, joint, host.body))
     return name_joint(ledger, joint, motion)
-
-
-def name_joint(ledger: Ledger, joint: Joint, motion: Motion) -> Motion:
-    """The motion of a joint under the names ``joint.<name>.x`` and so on."""
-    return ledger.name_motion(f"joint.{joint.name}", motion, f"joint {joint.name}", subscript(joint.name))
 
 
 def body_span(mechanism: Mechanism, body: str, outer: Joint, inner: Joint) -> tuple[Pair, Pair]:
@@ -123,15 +152,15 @@ def body_span(mechanism: Mechanism, body: str, outer: Joint, inner: Joint) -> tu
     LinkageError
         both joints sit on one and the same point.
     """
-    start = body_point(mechanism, body, point_name(outer, body))
-    span = subtract(body_point(mechanism, body, point_name(inner, body)), start)
+    start = joint_point(mechanism, outer, body)
+    span = subtract(joint_point(mechanism, inner, body), start)
     if span[0].is_zero and span[1].is_zero:
         raise LinkageError(
             [
                 Fault(
                     key=f"mechanism.bodies.{body}.points",
                     problem=f"joints {outer.name} and {inner.name} sit on the same point of {body}",
-                    given=f"points {point_name(outer, body)} and {point_name(inner, body)}",
+                    given=f"points {outer.point(body)} and {inner.point(body)}",
                     allowed="two points at a distance",
                     remedy="give one of them another place",
                 )
@@ -182,20 +211,40 @@ def _angle(function: str, body: str) -> str:
     return f"{function} of the angle of {body}"
 
 
-def name_rates(ledger: Ledger, body: str, rate: sp.Expr | None, acceleration: sp.Expr | None) -> sp.Expr:
-    """Name the rate or, where it is None, the angular acceleration of a body."""
-    mark = subscript(body)
-    if rate is not None:
-        return ledger.name(
-            f"body.{body}.rate", rate, "rad/s", f"angular velocity of {body}", rf"\dot{{\varphi}}_{{{mark}}}"
-        )
-    return ledger.name(
-        f"body.{body}.angular_acceleration",
-        acceleration,
-        "rad/s^2",
-        f"angular acceleration of {body}",
-        rf"\ddot{{\varphi}}_{{{mark}}}",
+def name_rate(ledger: Ledger, body: str, rate: sp.Expr) -> sp.Expr:
+    """Name the angular velocity of a body."""
+    latex = rf"\dot{{\varphi}}_{{{subscript(body)}}}"
+    return ledger.name(f"body.{body}.rate", rate, "rad/s", f"angular velocity of {body}", latex)
+
+
+def name_acceleration(ledger: Ledger, body: str, acceleration: sp.Expr) -> sp.Expr:
+    """Name the angular acceleration of a body."""
+    latex = rf"\ddot{{\varphi}}_{{{subscript(body)}}}"
+    name = f"body.{body}.angular_acceleration"
+    return ledger.name(name, acceleration, "rad/s^2", f"angular acceleration of {body}", latex)
+
+
+def name_direction(ledger: Ledger, guide: Joint, body: Pose) -> Pair:
+    """Name the unit vector of a guide on a body, in the frame's axes."""
+    assert guide.direction is not None  # a prismatic joint has a direction
+    angle = symbol_of(guide.direction)
+    return ledger.name_pair(
+        f"joint.{guide.name}.direction",
+        "",
+        body.rotate((sp.cos(angle), sp.sin(angle))),
+        "1",
+        f"component of the direction of guide {guide.name}",
+        f"t_{{{subscript(guide.name)},AXIS}}",
     )
+
+
+def name_travel(
+    ledger: Ledger, guide: Joint, slider: str, order: Literal["", "speed", "acceleration"], value: sp.Expr
+) -> sp.Expr:
+    """Name the travel [m] along a guide or, by `order`, its speed or acceleration."""
+    unit, accent = {"": ("m", "s"), "speed": ("m/s", r"\dot{s}"), "acceleration": ("m/s^2", r"\ddot{s}")}[order]
+    word, latex = order or "travel", f"{accent}_{{{subscript(guide.name)}}}"
+    return ledger.name(f"joint.{guide.name}.{word}", value, unit, f"{word} of {slider} along guide {guide.name}", latex)
 
 
 def name_gap(ledger: Ledger, inner: Joint, order: str, gap: Pair, unit: str) -> Pair:
@@ -207,18 +256,4 @@ def name_gap(ledger: Ledger, inner: Joint, order: str, gap: Pair, unit: str) -> 
         unit,
         f"component of the {'velocity' if order == 'v' else 'acceleration'} that closes the loop at {inner.name}",
         rf"\delta {order}_{{{subscript(inner.name)},AXIS}}",
-    )
-
-
-def placed_group(group: Group, spans: tuple[Pair, ...], determinant: sp.Expr, guide: Guide | None) -> Dyad:
-    """The group with what placing it has found: spans of its bodies [m], determinant of its loop, guide."""
-    return Dyad(
-        kind=group.kind,
-        bodies=group.bodies,
-        hosts=group.hosts,
-        outer=group.outer,
-        inner=group.inner,
-        spans=spans,
-        determinant=determinant,
-        guide=guide,
     )

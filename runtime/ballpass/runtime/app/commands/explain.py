@@ -145,7 +145,7 @@ def _absent(scene: Scene) -> list[str]:
     else:
         if mechanism.gravity is None:
             out.append("weight of the mechanism's bodies (mechanism.gravity)")
-        if not mechanism.forces and not mechanism.torques:
+        if not mechanism.forces:
             out.append("forces and torques of the process ([mechanism.forces.NAME], [mechanism.torques.NAME])")
     if bearing is None:
         out.append("a bearing: forces of the mechanism only ([bearing])")

@@ -173,10 +173,9 @@ def read_with_settings(
     transient : turns at its start that do not count, beside a duration
     """
     from ballpass.derive import SceneError, read_scene
+    from ballpass.derive.drive import constant_speed
     from ballpass.derive.mechanism.linkage import check_assembly, derive_linkage
     from ballpass.derive.scene.read import parse_override, with_values
-    from ballpass.derive.terms import symbol_of
-    from ballpass.derive.variables import DRIVER_ANGLE
 
     read = read_scene(path)
     faults: list[Fault] = []
@@ -207,7 +206,7 @@ def read_with_settings(
         asked = with_values(asked, overrides)
         if asked.mechanism is not None:
             # here, so that nothing is written for a linkage that locks
-            linkage = derive_linkage(asked.mechanism, DRIVER_ANGLE, symbol_of(asked.mechanism.driver.speed))
+            linkage = derive_linkage(asked.mechanism, constant_speed(asked.mechanism.driver))
             check_assembly(linkage, {quantity.path: quantity.value for quantity in asked.quantities})
     return read, asked, overrides
 

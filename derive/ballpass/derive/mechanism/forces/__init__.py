@@ -1,0 +1,22 @@
+"""Forces and torques on a linkage: tables of the scene file, each with a pathway and the laws that go with it.
+
+A new pathway or law is a file here; an entry in `FORCE_TABLES` says in which table of the scene it may stand.
+"""
+
+from ballpass.derive.mechanism.forces.applied import Forces, derive_forces, drawn_forces
+from ballpass.derive.mechanism.forces.body_torque import BodyTorque
+from ballpass.derive.mechanism.forces.constant import Constant
+from ballpass.derive.mechanism.forces.force import ForceTable, Law, Pathway
+from ballpass.derive.mechanism.forces.point_force import PointForce
+from ballpass.derive.mechanism.forces.windows import Windows
+
+__all__ = ["FORCE_TABLES", "BodyTorque", "Constant", "ForceTable", "Forces", "Law", "Pathway", "PointForce", "Windows"]
+__all__ += ["derive_forces", "drawn_forces"]
+
+#: In the order in which their numbers are listed; of the laws of a table the first whose key is there is taken.
+FORCE_TABLES: tuple[ForceTable, ...] = (
+    ForceTable(
+        key="forces", word="force", example="body, point and force", pathway=PointForce, laws=(Windows, Constant)
+    ),
+    ForceTable(key="torques", word="torque", example="body and torque", pathway=BodyTorque, laws=(Windows, Constant)),
+)

@@ -1,0 +1,48 @@
+"""From the forces of a scene to what acts on each body of its linkage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ballpass.derive.drive import Drive
+from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.forces.force import Setting
+from ballpass.derive.mechanism.forces.point_force import PointForce
+from ballpass.derive.mechanism.linkage import Linkage
+from ballpass.derive.scene.records import Mechanism
+from ballpass.derive.terms import Definition
+from ballpass.derive.variables import Input, Output
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Forces:
+    """What acts on the bodies, and the definitions, inputs and outputs that come with it."""
+
+    loads: tuple[Load, ...]
+    definitions: tuple[Definition, ...]
+    inputs: tuple[Input, ...]
+    outputs: tuple[Output, ...]
+
+
+def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Forces:
+    """Derive the loads of all forces and torques of a mechanism."""
+    setting = Setting(mechanism=mechanism, linkage=linkage, drive=drive)
+    loads: list[Load] = []
+    for force in mechanism.forces:
+        action = force.pathway.act(force.name, setting)
+        loads += action.loads(force.law.amount(force.name, action, setting))
+    return Forces(
+        loads=tuple(loads),
+        definitions=setting.ledger.definitions,
+        inputs=tuple(setting.inputs),
+        outputs=tuple(setting.outputs),
+    )
+
+
+def drawn_forces(mechanism: Mechanism) -> tuple[tuple[str, str, str, str], ...]:
+    """Forces whose components are parameters: name, body, point, and input that gates it or "" (acts always)."""
+    return tuple(
+        (force.name, force.pathway.body, force.pathway.point, f"gate.{force.name}" if force.law.key else "")
+        for force in mechanism.forces
+        if isinstance(force.pathway, PointForce) and force.law.factor
+    )

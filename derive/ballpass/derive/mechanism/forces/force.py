@@ -1,0 +1,122 @@
+"""What a force on a linkage is made of: a pathway, which bodies it acts on and along what, and a law, how large it is.
+
+::
+
+    [mechanism.forces.punch]     pathway: on a point, components in the frame's axes     law: within windows of an angle
+    [mechanism.springs.return]   pathway: along the line between two points              law: spring and damper
+
+A law gives an amount.  The pathway multiplies it by its own direction, and gives what acts on each body.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar, Self
+
+import sympy as sp
+
+from ballpass.derive.drive import Drive
+from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.kinematics import Ledger
+from ballpass.derive.mechanism.linkage import Linkage
+from ballpass.derive.scene.records import Force, Mechanism
+from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.values import Checker
+from ballpass.derive.variables import Input, Output
+
+#: Names of the points of every body and of the frame.
+Points = Mapping[str, Sequence[str]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """What forces act in, and what they add: definitions, inputs, outputs."""
+
+    mechanism: Mechanism
+    linkage: Linkage
+    drive: Drive
+    ledger: Ledger = field(default_factory=Ledger)
+    inputs: list[Input] = field(default_factory=list)
+    outputs: list[Output] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Action:
+    """A pathway in its linkage: `loads` gives what an amount does to the bodies."""
+
+    loads: Callable[[sp.Expr], tuple[Load, ...]]
+
+
+class Pathway(ABC):
+    """Which bodies a force acts on, and along what; a frozen record of the scene."""
+
+    __slots__ = ()
+
+    @classmethod
+    @abstractmethod
+    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
+        """The pathway from the keys of a force's table, faults noted there."""
+
+    @abstractmethod
+    def act(self, name: str, setting: Setting) -> Action:
+        """Place it in the linkage."""
+
+    @abstractmethod
+    def words(self) -> str:
+        """What it is, for people: "force on slider.C"."""
+
+    def check(self, checker: Checker) -> None:  # noqa: B027  most have no number that could be wrong
+        """Note faults of its numbers."""
+
+
+class Law(ABC):
+    """How large a force is; a frozen record of the scene.
+
+    Attributes
+    ----------
+    key : the key of the scene that asks for it; empty for the law that holds where no other is asked for
+    factor : it gives a factor [1] for the force or torque that the pathway names, not an amount of its own
+    """
+
+    __slots__ = ()
+    key: ClassVar[str] = ""
+    factor: ClassVar[bool] = False
+
+    @classmethod
+    @abstractmethod
+    def read(cls, data: Table, name: str, pathway: type[Pathway]) -> Self:
+        """The law from the keys of a force's table, faults noted there."""
+
+    @abstractmethod
+    def amount(self, name: str, action: Action, setting: Setting) -> sp.Expr:
+        """Factor [1], force [N] or torque [N*m]."""
+
+    def words(self) -> str:
+        """What it adds to the pathway's words, for people."""
+        return ""
+
+    def check(self, checker: Checker) -> None:  # noqa: B027  most have no number that could be wrong
+        """Note faults of its numbers."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceTable:
+    """A table of the scene file, ``[mechanism.<key>.<name>]``, its pathway, and the laws that may stand there."""
+
+    key: str
+    word: str
+    example: str
+    pathway: type[Pathway]
+    laws: tuple[type[Law], ...]
+
+    def read(self, data: Table, name: str, points: Points) -> Force:
+        """One force of the table."""
+        law = next(law for law in self.laws if not law.key or data.has(law.key))
+        return Force(
+            name=name,
+            table=self.key,
+            pathway=self.pathway.read(data, name, points, law),
+            law=law.read(data, name, self.pathway),
+        )

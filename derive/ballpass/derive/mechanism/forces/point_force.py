@@ -1,0 +1,50 @@
+"""Pathway: a force on a point of a body, with components in the frame's axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points, Setting
+from ballpass.derive.mechanism.kinematics import body_point, scale
+from ballpass.derive.scene.body_keys import read_moving_body, refuse_unknown_point
+from ballpass.derive.scene.records import Vector
+from ballpass.derive.scene.schema import Table, upright, words_of_force
+from ballpass.derive.scene.values import Checker
+from ballpass.derive.terms import components
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointForce(Pathway):
+    """`force` [N] on a named point; where the law gives the amount, its direction alone."""
+
+    body: str
+    point: str
+    force: Vector
+
+    @classmethod
+    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
+        """Keys body, point and force; instead of the force its direction where the law gives the amount."""
+        body = read_moving_body(data, points)
+        point = data.text("point", "C") or ""
+        if body and point:
+            refuse_unknown_point(data, "point", body, point, points)
+        what = f"the force {name} on the {body.replace('_', ' ')}"
+        return cls(body=body, point=point, force=data.vector("force", "N", words_of_force(what, "F", upright(name))))
+
+    def act(self, name: str, setting: Setting) -> Action:
+        """The force times the law's factor."""
+        point = body_point(setting.mechanism, self.body, self.point)
+        force = components(self.force)
+        return Action(
+            loads=lambda amount: (Load(body=self.body, point=point, force=scale(amount, force)),),
+        )
+
+    def words(self) -> str:
+        """Force and point."""
+        return f"force on {self.body}.{self.point}"
+
+    def check(self, checker: Checker) -> None:
+        """A magnitude is not negative."""
+        checker.polar(self.force)
