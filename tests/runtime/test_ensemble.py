@@ -16,12 +16,12 @@ from press_laws import press
 from ballpass.runtime import Model, RequestError, SimulationError
 from ballpass.runtime.many.ensemble import EnsembleResult
 from ballpass.runtime.many.member_segments import inputs_of, moments, stretches
-from ballpass.runtime.many.members import Members, Span, edge_windows, make_members
+from ballpass.runtime.many.members import Members, Span, make_members
 from ballpass.runtime.native.ensemble_driver import EnsembleDriver, MemberArrays, MemberNumbers
 from ballpass.runtime.native.stepper import End
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.magnitudes import MOMENTS, model_scales
-from ballpass.runtime.run.reductions import SCALED_TURNS, choose_family
+from ballpass.runtime.run.reduced_run import SCALED_TURNS, choose_family, edge_windows
 from ballpass.runtime.run.segments import segment_edges
 
 ModelMaker = Callable[..., Model]

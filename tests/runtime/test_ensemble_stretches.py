@@ -22,7 +22,7 @@ from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Span, make_members
 from ballpass.runtime.native.ensemble_driver import RESULT, EnsembleDriver, MemberArrays
 from ballpass.runtime.run.locating import Kinks
-from ballpass.runtime.run.reductions import choose_family
+from ballpass.runtime.run.reduced_run import choose_family
 
 ModelMaker = Callable[..., Model]
 OBSERVABLES = ("max:ball.force", "peak_time:ball.force", "min:inner.y", "rms_inner_y", "end:inner.vx")

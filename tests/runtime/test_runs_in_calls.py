@@ -20,9 +20,10 @@ from ballpass.runtime.contract.status import Status
 from ballpass.runtime.many import chunks
 from ballpass.runtime.native.stepper import METHODS, End, Outcome, Stepper
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run import limits, reductions, stepping
+from ballpass.runtime.run import limits, reduced_run, stepping
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
-from ballpass.runtime.run.reductions import RunFailed, channel_names
+from ballpass.runtime.run.reduced_run import RunFailed
+from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.segments import make_segments, segment_edges
 
 ModelMaker = Callable[..., Model]
@@ -94,7 +95,7 @@ def test_reduced_runs_tell_progress_within_a_turn_and_keep_their_bits(
     model = press(make_model)
     given: dict[str, Any] = {"cycles": 1.5, "transient": 0.4, "rtol": 1e-7, "method": method, "kinks": kinks}
     whole = model.reduce(**given)
-    monkeypatch.setattr(reductions, "STEPS_A_CALL", 20)
+    monkeypatch.setattr(reduced_run, "STEPS_A_CALL", 20)
     told: list[float] = []
     assert model.reduce(**given, progress=told.append) == whole
     assert len(told) > 50
@@ -108,7 +109,7 @@ def test_members_one_by_one_tell_progress_within_a_turn(
 ) -> None:
     """And hear, wherever they are, that their ensemble is to stop."""
     model = press(make_model)
-    monkeypatch.setattr(reductions, "STEPS_A_CALL", 20)
+    monkeypatch.setattr(reduced_run, "STEPS_A_CALL", 20)
     run = Stepper.run
     calls: list[Outcome] = []
     begun: list[chunks.Work] = []
@@ -210,7 +211,7 @@ def test_runs_with_samples_and_with_reductions_have_one_limit(
     needed = model.simulate(cycles=2, transient=0, rtol=rtol).statistics
     steps = (needed.steps or 0) + (needed.rejected or 0)
     monkeypatch.setattr(stepping, "STEPS_A_CALL", 100)
-    monkeypatch.setattr(reductions, "STEPS_A_CALL", 10)
+    monkeypatch.setattr(reduced_run, "STEPS_A_CALL", 10)
     for name in ("STEPS_A_TURN", "STEPS_A_SECOND", "BRIEF_A_TURN"):  # what is left is the limit of a run
         monkeypatch.setattr(limits, name, 1)
     monkeypatch.setattr(limits, "LEAST_PROGRESS", 0.0)
@@ -248,12 +249,12 @@ def test_a_member_that_goes_on_alone_is_the_run_it_was(make_model: ModelMaker, m
     whole = model.simulate_many(columns, names, **given)
     assert whole.failures == ()
     alone = model.simulate_many({name: column[2:] for name, column in columns.items()}, names, **given).statistics
-    limit, run = limits.brief_limit, reductions.integrate_reduced
+    limit, run = limits.brief_limit, reduced_run.integrate_reduced
     monkeypatch.setattr(
         "ballpass.runtime.many.chunks.brief_limit",
         lambda duration, turn: alone.steps // 2 if turn > 0.2 else limit(duration, turn),
     )
-    begun: list[reductions.Begun] = []
+    begun: list[reduced_run.Begun] = []
 
     def noted(*arguments: Any, **more: Any) -> tuple[int, int]:
         begun.append(more["begun"])

@@ -234,22 +234,6 @@ def test_model_without_states_only_evaluates_outputs(tmp_path: Path, cache: Path
     assert model.refine_peak(solution, "ball.force").value == pytest.approx(-997.0, rel=1e-6)
 
 
-def test_peak_between_samples_is_found(model: Model) -> None:
-    # the first swing of a free oscillator, against its closed form
-    changes = {"push.force": 0.0, "initial.x": 0.0, "initial.v": 1.0}
-    solution = model.simulate(cycles=1, parameters=changes, rtol=1e-10, samples_per_cycle=12)
-    ring = math.sqrt(500.0 - 4.0)
-    when = math.atan2(ring, 2.0) / ring
-    height = math.exp(-2.0 * when) * math.sin(ring * when) / ring
-    peak = model.refine_peak(solution, "body.x")
-    assert peak.sampled < height * 0.99
-    assert peak.value == pytest.approx(height, rel=1e-4)
-    assert peak.time == pytest.approx(when, abs=solution.t[1] / 60)
-    lowest = model.refine_peak(solution, "ball.force", kind="min")
-    assert lowest.ball == 3
-    assert lowest.value == pytest.approx(-3 * 1000.0 * height, rel=1e-4)
-
-
 def test_solution_survives_netcdf(model: Model, tmp_path: Path) -> None:
     solution = model.simulate(cycles=2, method="cvodes", transient=0.5)
     path = solution.save(tmp_path / "solution.nc")

@@ -58,11 +58,13 @@ def test_stiffness_and_frequencies_are_the_reference_values(summary: dict[str, A
     assert summary["frequencies"]["ball_pass_outer"] * 0.12 == pytest.approx(3.052239, abs=1e-6)
 
 
-def test_motions_are_those_of_the_steady_samples(press: tuple[Model, Solution], summary: dict[str, Any]) -> None:
+def test_motions_are_those_of_the_steady_part(press: tuple[Model, Solution], summary: dict[str, Any]) -> None:
+    """Of its steps, which see a little more than 4000 samples."""
     _, solution = press
     kept = solution["inner.y"][solution.t >= 0.24 * (1.0 - 1e-12)]
     found = summary["inner.y"]
-    assert (found["min"], found["max"]) == (kept.min(), kept.max())
+    assert kept.min() - 0.5e-6 < found["min"] <= kept.min()
+    assert kept.max() <= found["max"] < kept.max() + 0.5e-6
     # 4000 equal steps: sums over the samples differ from integrals by the end points only
     assert found["rms"] == pytest.approx(np.sqrt(np.mean(kept**2)), rel=2e-3)
     assert found["std"] == pytest.approx(np.std(kept), rel=2e-3)
@@ -115,8 +117,10 @@ def test_values_that_are_not_finite_are_refused(press: tuple[Model, Solution]) -
     model, solution = press
     broken = np.array(solution["inner.y"])
     broken[-5] = np.nan
+    outputs = {**solution.outputs, "inner.y": broken}
+    sampled = replace(solution, outputs=outputs, reductions=None, steady_reductions=None)
     with pytest.raises(SimulationError, match=r"inner\.y holds nan"):
-        summarize(model, replace(solution, outputs={**solution.outputs, "inner.y": broken}))
+        summarize(model, sampled)
 
 
 def test_table_fits_a_terminal_and_shows_micrometres(summary: dict[str, Any]) -> None:

@@ -27,7 +27,8 @@ from ballpass.runtime.point.jacobian_function import JacobianFunction
 from ballpass.runtime.point.second_derivatives import hessian
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.locating import Kinks, refuse_with_error
-from ballpass.runtime.run.reductions import Reductions, reduce_run
+from ballpass.runtime.run.reduced_run import reduce_run
+from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.sensitivity import Sensitivities, refuse_located, sensitivities
 from ballpass.runtime.run.simulate import method_names, simulate
@@ -436,28 +437,25 @@ class Model(LoadedModel):
             progress=progress,
         )
 
-    def refine_peak(
-        self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max", candidates: int = 6
-    ) -> Peak:
+    def refine_peak(self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max") -> Peak:
         """Peak of an output of a run of this model, between its samples too (see `ballpass.runtime.ask.peaks`).
 
-        It is looked for within every step where the project's own stepper ran, between all samples as far as these tell
-        where another method did; the result's ``searched`` says which.
+        It is that of every step where the project's own stepper ran and reduced the output, that of the samples where
+        another method did; the result's ``searched`` says which.
 
         Parameters
         ----------
         solution : the run, or its steady part
         name : an output
         kind : which extreme
-        candidates : so many places are looked at closely at a time
 
         Raises
         ------
         RequestError
-            No such output, fewer than three samples, or another `kind`.
+            No such output, no samples, or another `kind`.
         """
         numbers = self.numbers(solution.parameters)
-        return refine_peak(self, numbers, solution, name, kind=kind, candidates=candidates)
+        return refine_peak(self, numbers, solution, name, kind=kind)
 
     def check_assembly(self, parameters: Mapping[str, float] | None = None) -> None:
         """Raise `RequestError`, naming joint and crank angle, when the linkage locks somewhere in a turn."""

@@ -2,9 +2,9 @@
 
 In: a `Model` and its `Solution`.  Out: a dict; every number stands in an object with its ``unit``.
 
-Only steady cycles count, transient ones are dropped.  Extremes of forces and torques are looked for between the samples
-as well; those of motions are of samples.  ``rms`` is the plain root mean square; ``std`` that of the deviation from the
-mean.
+Only steady cycles count, transient ones are dropped.  Extremes are looked for between the samples as well, and means
+are taken over every step, where the project's own stepper ran.  ``rms`` is the plain root mean square; ``std`` that of
+the deviation from the mean.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     ``steady_cycles``, ``samples``, ``cycle_length``
         ``{"value": , "unit": }``
     ``reaction.<joint>.x`` and other reactions, ``drive_torque``, ``load.x``, ``load.y``
-        ``{"min": , "max": , "unit": }``; beside them ``unsearched`` as below, where it is not zero
+        ``{"min": , "max": , "unit": }``
     ``drive_work``
         work of the drive in a turn, mean over the steady turns: ``{"value": , "unit": "J"}``
     ``reaction_condition``
@@ -63,9 +63,9 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
         ``{"unscaled": , "scaled": , "unit": "1"}``; beside them ``crank_angle`` with the same two keys and a unit
     ``peak_ball_force``
         highest force of any ball, also between samples: ``{"elastic": , "total": , "unit": "N"}``; beside them, with
-        the same two keys and a unit each, ``time`` and ``ball`` of the peak (balls are counted from 1), ``sampled``,
-        what the samples alone show, and ``unsearched``, the intervals between samples that promised more and were not
-        looked at; and ``searched``, where was looked, in words (see `ballpass.runtime.ask.peaks.Peak`)
+        the same two keys and a unit each, ``time`` and ``ball`` of the peak (balls are counted from 1), and
+        ``sampled``, what the samples alone show; and ``searched``, where was looked, in words (see
+        `ballpass.runtime.ask.peaks.Peak`)
     ``inner.x`` and other motions of the rings
         ``{"min": , "max": , "mean": , "rms": , "std": , "unit": }``
     ``k_b`` and other derived constants
@@ -130,8 +130,6 @@ def _forces(sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, 
                 "max": _finite(high.value, info.name),
                 "unit": info.unit,
             }
-            if low.unsearched or high.unsearched:
-                found[info.name]["unsearched"] = {"min": low.unsearched, "max": high.unsearched, "unit": "1"}
     mechanism = sol.manifest.mechanism
     length = sol.cycle_length
     if mechanism is not None and "drive_torque" in found and length is not None and turns(sol.t, length):
@@ -168,7 +166,6 @@ def _balls(found_peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
     found["ball"] = {**{key: peak.ball for key, peak in peaks.items()}, "unit": "1"}
     found["sampled"] = {**{key: peak.sampled for key, peak in peaks.items()}, "unit": "N"}
     found["searched"] = {key: peak.searched for key, peak in peaks.items()}
-    found["unsearched"] = {**{key: peak.unsearched for key, peak in peaks.items()}, "unit": "1"}
     return {"peak_ball_force": found}
 
 
@@ -176,16 +173,18 @@ def _motions(sol: Solution) -> dict[str, Any]:
     units = {info.name: info.unit for info in (*sol.manifest.states, *sol.manifest.outputs)}
     found: dict[str, Any] = {}
     for name in _MOTIONS:
-        if name in sol:
-            values = statistics(sol.t, sol[name])
-            found[name] = {
-                "min": _finite(values.minimum, name),
-                "max": _finite(values.maximum, name),
-                "mean": _finite(values.mean, name),
-                "rms": _finite(values.rms, name),
-                "std": _finite(values.std, name),
-                "unit": units[name],
-            }
+        if name not in sol:
+            continue
+        reduced = None if sol.reductions is None else sol.reductions.get(name)
+        values = reduced or statistics(sol.t, sol[name])
+        found[name] = {
+            "min": _finite(values.minimum, name),
+            "max": _finite(values.maximum, name),
+            "mean": _finite(values.mean, name),
+            "rms": _finite(values.rms, name),
+            "std": _finite(values.std, name),
+            "unit": units[name],
+        }
     return found
 
 

@@ -20,7 +20,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import End, Segments
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.reductions import RunFailed
+from ballpass.runtime.run.reduced_run import RunFailed
 
 Array = NDArray[np.float64]
 

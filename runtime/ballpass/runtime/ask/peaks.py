@@ -1,61 +1,46 @@
-"""The true peak of an output, between the samples.
+"""The true peak of an output, which may lie between the samples of a run.
 
-Ball forces have spikes narrower than a sample interval; samples alone read them low, or show nothing of them.  Where
-the peak may be is found first, as well as the run allows:
+Ball forces have spikes narrower than a sample interval; samples alone read them low, or show nothing of them.
 
-- a run of the project's own stepper is integrated once more, to the bit (`replay`): states and largest ball forces are
-  reduced on line, within every step; other outputs are evaluated at several points for each step, on average;
-- outputs that follow from time alone are evaluated between all samples, and on both sides of every edge, of one turn
-  where they come back with it;
-- all other runs are surveyed by interpolation between their samples, from states and rates (`looks`).
-
-There, and around the largest samples, the output is evaluated on a grid; around the best of what that shows, on a
-finer one, until the value stays.  A run that is met again is sampled on these grids, its steps being what they were;
-others are gone on with from the sampled states.
+- States, and the largest ball forces, are reduced in every step of a run of the project's own stepper
+  (`Solution.reductions`): their extremes are there.
+- Outputs that follow from time alone are evaluated on a grid in every segment between load switches, both its ends
+  included, and on finer ones around the best point.
+- Of all others, the smallest force of any ball or whatever a run of CasADi's integrators gives, the samples are told.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from ballpass.runtime.ask.between_samples import Resumed, Seen, Source, Still, Window, follow_from_time, one_turn
-from ballpass.runtime.ask.replay import Replay, replay
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.casadi_integrators import GRID
-from ballpass.runtime.run.segments import time_resolution
-
-if TYPE_CHECKING:
-    from ballpass.runtime.run.solution import Solution
+from ballpass.runtime.run.segments import make_segments, segment_edges
+from ballpass.runtime.run.solution import Solution
 
 Kind = Literal["max", "min"]
+
+#: What makes either extreme a largest value.
+SIGNS: Mapping[Kind, float] = {"max": 1.0, "min": -1.0}
 
 #: How a peak was looked for between the samples.
 Searched = Literal["every step", "dense samples", "samples"]
 
-#: Balls' channels of the reductions whose maximum, that of the most loaded ball, is the output's.
-_OF_BALLS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
+#: Points of the first grid in a turn, the fewest in a segment, and segments that are evaluated at once.
+POINTS, FEWEST, TOGETHER = 512, 16, 256
 
-#: A peak whose value changes by less than this, relative to itself, from one grid to the next is settled [1].
-SETTLED = 1e-9
+#: Grids around the best point, each 32 times as fine as the one before, and the intervals of each.
+ROUNDS, FINER = 3, 64
 
-#: Narrowest interval that is looked at, in times that count as different.
-NARROWEST = 1e3
-
-#: Intervals that a survey shows to be promising are looked at, the best first, up to so many for each candidate.
-LOOKS = 16
-
-#: Calls of the stepper in which a peak is settled: those with the largest values, less the largest by no more than
-#: this [1].  Reductions meet smooth tops to 1e-9, those where a force jumps to a part of a step.
-CALLS, NEARLY = 3, 1e-3
-
-#: Features of an output that differ by less than this, relative to its largest value, are one that comes back [1].
+#: What turns so many times in a turn, to this fraction, comes back with it [1].
 ALIKE = 1e-9
 
 
@@ -69,11 +54,8 @@ class Peak:
     time : when [s]
     ball : which ball, counted from 1; None for outputs without balls
     sampled : the value that the samples alone show
-    searched : where was looked for it.  ``every step``: in each step of this very run.  ``dense samples``: at several
-        points for each of its steps on average, or of each interval between samples where the output follows from time
-        alone.  ``samples``: where the samples and the rates there promise something; a spike that shows in neither is
-        missed, which more samples rule out
-    unsearched : intervals between samples that promised more than `value` and were not looked at, for there are so many
+    searched : where was looked for it.  ``every step``: in each step of the run.  ``dense samples``: on a grid of its
+        own, for the output follows from time alone.  ``samples``: nowhere else; more samples may show more
     """
 
     value: float
@@ -81,72 +63,10 @@ class Peak:
     ball: int | None
     sampled: float
     searched: Searched = "samples"
-    unsearched: int = 0
 
 
-@dataclass(slots=True, kw_only=True, eq=False)
-class _Search:
-    """One extreme of one output.
-
-    Attributes
-    ----------
-    name, kind : which
-    samples : of the output, times `sign`, shape (samples, columns)
-    best : highest value known, times `sign`, its time [s] and its column
-    windows : to be looked into
-    promises : what intervals between samples promise, times `sign`, and these intervals, the best first
-    """
-
-    name: str
-    kind: Kind
-    samples: np.ndarray
-    best: tuple[float, float, int]
-    sampled: float
-    searched: Searched = "samples"
-    unsearched: int = 0
-    windows: list[Window] = field(default_factory=list)
-    promises: list[tuple[float, int]] = field(default_factory=list)
-
-    @property
-    def sign(self) -> float:
-        return 1.0 if self.kind == "max" else -1.0
-
-    def offer(self, value: float, time: float, column: int) -> None:
-        """A value that the output takes, times `sign`."""
-        if value > self.best[0]:
-            self.best = (value, time, column)
-
-    def look_around(self, solution: Solution, candidates: int) -> None:
-        """Windows around the largest samples; where every step was looked into, only around those that may be higher
-        still by as much as they are above their neighbours."""
-        largest = np.max(self.samples, axis=1)
-        for k in _tops(self.samples, candidates):
-            low, high = max(k - 1, 0), min(k + 1, len(solution) - 1)
-            reach = largest[k] - min(largest[low], largest[high])
-            if self.searched != "every step" or largest[k] + reach > self.best[0]:
-                self.windows.append(_window(solution, low, high))
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Top:
-    """Best point of a grid: its value, and how much higher the output may be between it and its neighbours."""
-
-    value: float
-    reach: float
-    around: Window
-
-
-def refine_peak(
-    model: LoadedModel,
-    numbers: Numbers,
-    solution: Solution,
-    name: str,
-    *,
-    kind: Kind = "max",
-    candidates: int = 6,
-) -> Peak:
-    """Peak of an output over the time between the first and the last sample of `solution` (for its steady part, give
-    `Solution.steady`).
+def refine_peak(model: LoadedModel, numbers: Numbers, solution: Solution, name: str, *, kind: Kind = "max") -> Peak:
+    """Peak of an output over a run; for its steady part, give `Solution.steady`.
 
     Parameters
     ----------
@@ -154,222 +74,135 @@ def refine_peak(
     solution : a run of this model
     name : an output
     kind : which extreme
-    candidates : so many of the largest samples that top their neighbours are looked at closely, and so many at a time
-        of the intervals between samples that promise more
 
     Raises
     ------
     RequestError
-        No such output, fewer than three samples, or another `kind`.
+        No such output, no samples, or another `kind`.
     """
-    return refine_peaks(model, numbers, solution, [(name, kind)], candidates=candidates)[0]
+    return refine_peaks(model, numbers, solution, [(name, kind)])[0]
 
 
 def refine_peaks(
-    model: LoadedModel,
-    numbers: Numbers,
-    solution: Solution,
-    wanted: Sequence[tuple[str, Kind]],
-    *,
-    candidates: int = 6,
+    model: LoadedModel, numbers: Numbers, solution: Solution, wanted: Sequence[tuple[str, Kind]]
 ) -> list[Peak]:
-    """Several peaks of one run, which is integrated for all of them together; else as `refine_peak`."""
-    searches = [_start(solution, name, kind) for name, kind in wanted]
-    still = follow_from_time(model, [name for name, _ in wanted])
-    of_time = [search for search in searches if search.name in still]
-    moving = [search for search in searches if search.name not in still]
-    turn = clock.period(model.manifest, numbers.values)
-    if of_time:
-        part = one_turn(model, numbers, solution, still)
-        source = Still(model, numbers, part)
-        for search in of_time:
-            search.searched = "dense samples"
-            search.samples = search.samples[: len(part)]
-            search.look_around(part, candidates)
-        _edges(source, part, of_time)
-        _survey(source, part, of_time)
-        _find(source, part, of_time, candidates, turn)
-    if moving:
-        met = replay(model, numbers, solution, [search.name for search in moving])
-        surveyed = moving
-        if met is not None:
-            surveyed = [search for search in moving if not _reduced(met, solution, search)]
-        for search in moving:
-            search.look_around(solution, candidates)
-        chosen = Resumed(model, numbers, solution) if met is None else met
-        if surveyed:
-            _survey(chosen, solution, surveyed)
-        _find(chosen, solution, moving, candidates, turn)
-    return [_peak(solution, search) for search in searches]
-
-
-def _start(solution: Solution, name: str, kind: Kind) -> _Search:
-    """A search that knows the samples."""
-    if kind not in ("max", "min"):
-        raise RequestError(f"kind: 'max' or 'min' is expected, not {kind!r}.")
-    if name not in solution.outputs:
-        solution[name]  # unknown names are refused with the nearest known ones
-        raise RequestError(f"{name!r} is a state but no output: add it to the scene's run.outputs.")
-    if len(solution) < 3:
-        raise RequestError(
-            f"A peak needs three samples at least; the solution has {len(solution)}. Run longer, or take more "
-            "samples_per_cycle."
-        )
-    sign = 1.0 if kind == "max" else -1.0
-    samples = sign * solution[name].reshape(len(solution), -1)
-    k, column = divmod(int(np.argmax(samples)), samples.shape[1])
-    best = (float(samples[k, column]), float(solution.t[k]), column)
-    return _Search(name=name, kind=kind, samples=samples, best=best, sampled=sign * best[0])
-
-
-def _window(solution: Solution, low: int, high: int) -> Window:
-    """From one sample to another."""
-    begin, end = float(solution.t[low]), float(solution.t[high])
-    return Window(begin=begin, end=end, count=GRID * (high - low), x=solution.x[low])
-
-
-def _tops(samples: np.ndarray, count: int) -> list[int]:
-    """Indices of the largest samples that no neighbour exceeds, each index once; of features that come back, one."""
-    padded = np.pad(samples, ((1, 1), (0, 0)), constant_values=-np.inf)
-    top = (samples >= padded[:-2]) & (samples >= padded[2:])
-    heights = np.max(np.where(top, samples, -np.inf), axis=1)
-    largest = np.max(samples, axis=1)
-    return _different(heights, largest, count)
-
-
-def _different(heights: np.ndarray, shape: np.ndarray, count: int) -> list[int]:
-    """Places of the largest `heights`, those with equal `shape` around them once."""
-    order = np.argsort(-heights, kind="stable")
-    finite = np.where(np.isfinite(shape), shape, 0.0)
-    scale = ALIKE * max(float(np.max(np.abs(finite))), float(np.finfo(float).tiny) / ALIKE)
-    around = np.pad(finite, 1, mode="edge")
-    seen: dict[tuple[float, ...], None] = {}
-    found: list[int] = []
-    for k in order.tolist():
-        if len(found) == count or heights[k] == -np.inf:
-            break
-        key = tuple(np.rint(around[k : k + 3] / scale).tolist()) if np.isfinite(heights[k]) else (k,)
-        if key not in seen:
-            seen[key] = None
-            found.append(k)
+    """Several peaks of one run; else as `refine_peak`."""
+    sampled = [_of_samples(solution, name, kind) for name, kind in wanted]
+    found = [_of_steps(solution, name, kind, peak) for (name, kind), peak in zip(wanted, sampled, strict=True)]
+    of_time = {
+        name
+        for (name, _), peak in zip(wanted, found, strict=True)
+        if peak.searched == "samples" and name not in model.states and not _depends(model, name, "x")
+    }
+    if of_time and len(solution) > 1:
+        grid = _TimeGrid(model, numbers, solution, sorted(of_time))
+        found = [
+            grid.peak(name, kind, peak) if name in of_time else peak
+            for (name, kind), peak in zip(wanted, found, strict=True)
+        ]
     return found
 
 
-def _reduced(met: Replay, solution: Solution, search: _Search) -> bool:
-    """Windows around the extremes that the run's reductions show; whether these cover the search."""
-    search.searched = "dense samples"
-    if search.name not in met.model.states and (search.name not in _OF_BALLS or search.kind == "min"):
+def _of_samples(solution: Solution, name: str, kind: Kind) -> Peak:
+    if kind not in SIGNS:
+        raise RequestError(f"kind: 'max' or 'min' is expected, not {kind!r}.")
+    samples = solution[name]  # unknown names are refused with the nearest known ones
+    if not len(solution):
+        raise RequestError("A peak needs a sample at least; the solution has none. Run longer.")
+    sign = SIGNS[kind]
+    table = sign * samples.reshape(len(solution), -1)
+    k, column = divmod(int(np.argmax(table)), table.shape[1])
+    value = float(sign * table[k, column])
+    return Peak(value=value, time=float(solution.t[k]), ball=column + 1 if samples.ndim == 2 else None, sampled=value)
+
+
+def _of_steps(solution: Solution, name: str, kind: Kind, peak: Peak) -> Peak:
+    """The extreme that the run's own reductions hold, where they hold it."""
+    reductions = solution.reductions
+    if reductions is None or name not in reductions:
+        return peak
+    of_balls = name in reduction_rows(solution.manifest).balls
+    if of_balls and kind == "min":
+        return peak  # what is reduced is the most loaded ball's smallest, not that of any ball
+    entry = reductions[name]
+    value, time, ball = (
+        (entry.maximum, entry.maximum_time, entry.maximum_ball)
+        if kind == "max"
+        else (entry.minimum, entry.minimum_time, entry.minimum_ball)
+    )
+    return Peak(value=value, time=time, ball=ball, sampled=peak.sampled, searched="every step")
+
+
+class _TimeGrid:
+    """Outputs that follow from time alone, on a grid over the samples' time that ends on both sides of every edge."""
+
+    def __init__(self, model: LoadedModel, numbers: Numbers, solution: Solution, names: Sequence[str]) -> None:
+        self._model, self._numbers, self._names = model, numbers, names
+        begin, end = float(solution.t[0]), float(solution.t[-1])
+        turn = clock.period(model.manifest, numbers.values)
+        if _comes_back(model, numbers, names, turn):
+            end = min(end, begin + turn)
+        self._segments = make_segments(model.manifest.inputs, numbers, segment_edges(model, numbers, begin, end, turn))
+        self._lengths = np.diff(self._segments.times)
+        self._counts = np.maximum(FEWEST, np.ceil(POINTS * self._lengths / min(turn, end - begin))).astype(int)
+        #: Value, segment, time since its start and column of the best point of each output.
+        self._best: dict[tuple[str, Kind], tuple[float, int, float, int]] = {}
+        for first in range(0, len(self._lengths), TOGETHER):
+            some = range(first, min(first + TOGETHER, len(self._lengths)))
+            segment = np.repeat(some, self._counts[some] + 1)
+            self._look(segment, np.concatenate([np.linspace(0.0, self._lengths[k], self._counts[k] + 1) for k in some]))
+
+    def peak(self, name: str, kind: Kind, sampled: Peak) -> Peak:
+        """The extreme of one output, closely."""
+        _, segment, _, _ = self._best[name, kind]
+        length, width = self._lengths[segment], self._lengths[segment] / self._counts[segment]
+        for _ in range(ROUNDS):
+            middle = self._best[name, kind][2]
+            around = np.clip(np.linspace(middle - width, middle + width, FINER + 1), 0.0, length)
+            self._look(np.full(len(around), segment), around)
+            width *= 2.0 / FINER
+        value, _, local, column = self._best[name, kind]
+        return Peak(
+            value=value,
+            time=float(self._segments.times[segment]) + local,
+            ball=None if sampled.ball is None else column + 1,
+            sampled=sampled.sampled,
+            searched="dense samples",
+        )
+
+    def _look(self, segment: np.ndarray, local: np.ndarray) -> None:
+        """Evaluate the outputs at times within segments, and keep the best point of each."""
+        given = {
+            "t": local,
+            "x": np.zeros((len(local), len(self._model.states))),
+            "u": self._segments.inputs[segment],
+            "p": self._numbers.p,
+            "c": self._numbers.c,
+        }
+        found = self._model.sample_outputs(len(local), given, list(self._names), lean=False)
+        for name in self._names:
+            for kind, sign in SIGNS.items():
+                k, column = divmod(int(np.argmax(sign * found[name])), found[name].shape[1])
+                value, known = float(found[name][k, column]), self._best.get((name, kind))
+                if known is None or sign * value > sign * known[0]:
+                    self._best[name, kind] = (value, int(segment[k]), float(local[k]), column)
+
+
+def _comes_back(model: LoadedModel, numbers: Numbers, names: Sequence[str], turn: float) -> bool:
+    """Whether what these outputs depend on comes back with each turn."""
+    places = dict.fromkeys(k for name in names for k in _depends(model, name, "u"))
+    inputs = [model.manifest.inputs[k] for k in places]
+    if not math.isfinite(turn) or not all(item.kind in ("phase", "gate") for item in inputs):
         return False
-    extremes, whole = met.extremes(search.name, search.kind)
-    extremes.sort(key=lambda found: -search.sign * found.value)
-    t = solution.t
-    for found in extremes[:CALLS]:
-        if search.sign * (extremes[0].value - found.value) > NEARLY * abs(extremes[0].value):
-            break
-        search.offer(search.sign * found.value, found.time, found.column)
-        k = int(np.clip(np.searchsorted(t, found.time, side="right") - 1, 0, len(t) - 2))
-        reach = min(float(t[k + 1] - t[k]), 4.0 * met.step)
-        begin, end = max(found.time - reach, float(t[0])), min(found.time + reach, float(t[-1]))
-        if begin < end:
-            search.windows.append(Window(begin=begin, end=end, count=2 * GRID, x=solution.x[k]))
-    if whole:
-        search.searched = "every step"
-    return whole
+    turns = np.array([numbers.values[item.rate] * turn / clock.TURN for item in inputs])
+    return bool(np.all(np.abs(turns - np.rint(turns)) <= ALIKE))
 
 
-def _edges(source: Still, solution: Solution, searches: Sequence[_Search]) -> None:
-    """Windows where an output is higher beside an edge than at the samples around it."""
-    seen = source.edges([search.name for search in searches])
-    place = np.clip(np.searchsorted(solution.t, seen.t, side="right") - 1, 0, len(solution) - 2)
-    for search in searches:
-        beside = np.max(search.sign * seen.values[search.name], axis=1)
-        around = np.max(np.maximum(search.samples[place], search.samples[place + 1]), axis=1)
-        search.promises += [(float(beside[k]), int(place[k])) for k in np.flatnonzero(beside > around)]
-
-
-def _survey(source: Source, solution: Solution, searches: Sequence[_Search]) -> None:
-    """What every interval promises that goes beyond the samples at its ends; what is no number promises everything."""
-    inside = {id(search): np.full(len(solution) - 1, -np.inf) for search in searches}
-    for part in source.survey(list(dict.fromkeys(search.name for search in searches))):
-        for search in searches:
-            values = search.sign * part.values[search.name]
-            highest = np.max(np.where(np.isnan(values), np.inf, values), axis=(1, 2))
-            inside[id(search)][part.first : part.first + len(highest)] = highest
-    for search in searches:
-        highest = inside[id(search)]
-        ends = np.max(search.samples, axis=1)
-        beyond = highest > np.maximum(ends[:-1], ends[1:])
-        search.promises += [(float(highest[k]), int(k)) for k in np.flatnonzero(beyond)]
-
-
-def _find(source: Source, solution: Solution, searches: Sequence[_Search], candidates: int, turn: float) -> None:
-    """Look into the windows, then into the intervals that promise more than was found, as long as there are any."""
-    _settle(source, searches, turn)
-    for search in searches:
-        heights = np.full(len(solution) - 1, -np.inf)
-        for promise, k in search.promises:
-            heights[k] = max(heights[k], promise)
-        order = _different(heights, heights, len(heights))
-        search.promises = [(float(heights[k]), k) for k in order]
-    for _ in range(LOOKS):
-        for search in searches:
-            search.promises = [(promise, k) for promise, k in search.promises if promise > search.best[0]]
-            search.windows = [_window(solution, k, k + 1) for _, k in search.promises[:candidates]]
-            del search.promises[:candidates]
-        if not any(search.windows for search in searches):
-            break
-        _settle(source, searches, turn)
-    for search in searches:
-        search.unsearched = sum(promise > search.best[0] for promise, _ in search.promises)
-
-
-def _settle(source: Source, searches: Sequence[_Search], turn: float) -> None:
-    """Look into all windows, and around the best point of each on grids that get finer until its value stays, or time
-    has no finer steps.
-
-    No curve is laid through the points: where a load jumps or two balls change rank, none would fit.
-    """
-    active: list[tuple[_Search, Window, float | None]] = [
-        (search, window, None) for search in searches for window in search.windows
-    ]
-    while active:
-        names = list(dict.fromkeys(search.name for search, _, _ in active))
-        seen = source.look([window for _, window, _ in active], names)
-        tops = [_top(search, part) for (search, _, _), part in zip(active, seen, strict=True)]
-        following: list[tuple[_Search, Window, float | None]] = []
-        for (search, _, before), top in zip(active, tops, strict=True):
-            if before is not None and abs(top.value - before) <= SETTLED * abs(before):
-                continue
-            begin, end = top.around.begin, top.around.end
-            narrow = end - begin <= NARROWEST * time_resolution(begin, end, turn)
-            if top.value + top.reach > search.best[0] and not narrow:
-                following.append((search, top.around, top.value))
-        active = following
-    for search in searches:
-        search.windows = []
-
-
-def _top(search: _Search, seen: Seen) -> _Top:
-    """Best point of a grid, offered to the search."""
-    fine = search.sign * seen.values[search.name]
-    row, column = divmod(int(np.argmax(fine)), fine.shape[1])
-    value = float(fine[row, column])
-    search.offer(value, float(seen.t[row]), column)
-    low, high = max(row - 1, 0), min(row + 1, len(fine) - 1)
-    return _Top(
-        value=value,
-        reach=value - float(np.min(np.max(fine[[low, high]], axis=1))),
-        around=Window(begin=float(seen.t[low]), end=float(seen.t[high]), count=2 * GRID, x=seen.x[low]),
-    )
-
-
-def _peak(solution: Solution, search: _Search) -> Peak:
-    value, time, column = search.best
-    return Peak(
-        value=search.sign * value,
-        time=time,
-        ball=column + 1 if solution[search.name].ndim == 2 else None,
-        sampled=search.sampled,
-        searched=search.searched,
-        unsearched=search.unsearched,
-    )
+def _depends(model: LoadedModel, output: str, argument: str) -> list[int]:
+    """Entries of an argument of the outputs that one of them depends on."""
+    graph = model.symbolic("outputs")
+    if argument not in graph.name_in():
+        return []
+    known = [info.name for info in model.manifest.outputs]
+    sparsity = graph.jac_sparsity(known.index(output), graph.name_in().index(argument))
+    return list(dict.fromkeys(sparsity.get_col()))

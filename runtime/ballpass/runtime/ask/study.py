@@ -38,7 +38,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.reductions import check_span
+from ballpass.runtime.run.reduced_run import check_span
 from ballpass.runtime.run.request import check_memory
 from ballpass.runtime.run.sensitivity import Chain
 

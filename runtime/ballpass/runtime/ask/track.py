@@ -24,7 +24,7 @@ from ballpass.runtime.native.kernel import Loop
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import End, Family
 from ballpass.runtime.point.jacobian import rows_of
-from ballpass.runtime.run.reductions import RunFailed
+from ballpass.runtime.run.reduced_run import RunFailed
 from ballpass.runtime.run.request import no_output
 from ballpass.runtime.run.segments import make_segments
 from ballpass.runtime.run.sensitivity import Directions

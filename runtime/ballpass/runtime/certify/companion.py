@@ -20,8 +20,7 @@ import numpy as np
 
 from ballpass.runtime.certify.parts import InParts, integrate_parts, values_of
 from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
-from ballpass.runtime.native.ensemble_driver import HEAD
-from ballpass.runtime.run.reductions import column
+from ballpass.runtime.native.reduction_rows import HEAD
 
 if TYPE_CHECKING:
     from ballpass.runtime.certify.prepared import Observable, Prepared
@@ -153,9 +152,9 @@ def chosen_part(run: Prepared, done: InParts, observables: Sequence[Observable],
         kind, channel = observables[extreme]
         which = "min" if kind == "min" else "max"
         driver = run.model.ensemble_driver
-        values = done.rows[counted, column(driver, which, channel)]
+        values = done.rows[counted, driver.rows.column(which, channel)]
         first = last = counted[int(np.argmin(values) if which == "min" else np.argmax(values))]
-        peak = done.rows[last, column(driver, f"{which}_time", channel)]
+        peak = done.rows[last, driver.rows.column(f"{which}_time", channel)]
         lead = LEAD * (begins[last + 1] - begins[last])
         if peak - begins[first] < lead and first > 0 and _integrated(run, done, first - 1):
             first -= 1

@@ -19,11 +19,13 @@ from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
 from ballpass.runtime.certify.quasi_static import STATUS_OF_END as STATUS_AT_REST
 from ballpass.runtime.certify.quasi_static import End as EndAtRest
 from ballpass.runtime.certify.quasi_static_runs import QuasiStaticFailed
-from ballpass.runtime.native.ensemble_driver import HEAD, ROWS, EnsembleDriver
+from ballpass.runtime.native.ensemble_driver import EnsembleDriver
+from ballpass.runtime.native.reduction_rows import HEAD, ROWS
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.native.stepper import End
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.reductions import RunFailed, observe
+from ballpass.runtime.run.reduced_run import RunFailed
+from ballpass.runtime.run.reductions import observe
 from ballpass.runtime.run.segments import part_of
 from ballpass.runtime.run.trajectory import Trajectory
 
@@ -193,7 +195,7 @@ def values_of(run: Prepared, observables: Sequence[Observable], rows: np.ndarray
     if not len(counted):
         return np.full(len(observables), np.nan)
     one = counted[:1].copy()
-    width = len(driver.channels)
+    width = len(driver.rows.channels)
     columns = {kind: len(HEAD) + ROWS.index(kind) * width + np.arange(width) for kind in ROWS}
     one[0, HEAD.index("duration")] = counted[:, HEAD.index("duration")].sum()
     for kind in ("integral", "square"):
@@ -201,7 +203,7 @@ def values_of(run: Prepared, observables: Sequence[Observable], rows: np.ndarray
     one[0, columns["max"]] = counted[:, columns["max"]].max(axis=0)
     one[0, columns["min"]] = counted[:, columns["min"]].min(axis=0)
     end = np.zeros((1, len(run.initial)))
-    return np.array([float(observe(driver, *observable, one, end)[0]) for observable in observables])
+    return np.array([float(observe(driver.rows, *observable, one, end)[0]) for observable in observables])
 
 
 def _samples(trajectory: Trajectory | None, low: int, high: int) -> tuple[np.ndarray, np.ndarray | None]:

@@ -20,24 +20,19 @@ from ballpass.runtime.certify.parts import integrate_parts, part_times, values_o
 from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import unknown_name
-from ballpass.runtime.many.members import edge_windows
-from ballpass.runtime.native.ensemble_driver import BALL_CHANNELS, EnsembleDriver
+from ballpass.runtime.native.ensemble_driver import EnsembleDriver
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import BALL_CHANNELS
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.limits import brief_limit
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
-from ballpass.runtime.run.reductions import (
-    SCALED_TURNS,
-    channel_names,
-    check_span,
-    observable_aliases,
-    observe,
-)
+from ballpass.runtime.run.reduced_run import SCALED_TURNS, check_span
+from ballpass.runtime.run.reductions import channel_names, observable_aliases, observe
 from ballpass.runtime.run.request import Request, run_length, start_state
-from ballpass.runtime.run.segments import WORK, check_count, make_segments, segment_edges
+from ballpass.runtime.run.segments import WORK, check_count, edge_windows, make_segments, segment_edges
 from ballpass.runtime.run.simulate import fill
 from ballpass.runtime.run.stepping import Cost
 from ballpass.runtime.run.trajectory import Interrupted, Trajectory, evaluate_outputs, start_trajectory
@@ -193,7 +188,7 @@ class Prepared:
                 reduction=rows[0],
             )
         end = np.zeros((1, len(self.initial)))
-        seen = {what: float(observe(driver, what, channel, rows, end)[0]) for what in ("max", "min")}
+        seen = {what: float(observe(driver.rows, what, channel, rows, end)[0]) for what in ("max", "min")}
         if kind == "range":
             counted = series[first:]
             return max(seen["max"], float(counted.max())) - min(seen["min"], float(counted.min()))

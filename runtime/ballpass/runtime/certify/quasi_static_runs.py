@@ -14,10 +14,9 @@ import numpy as np
 from ballpass.runtime.certify.quasi_static import STATUS_OF_END, End
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.status import Status
-from ballpass.runtime.many.members import edge_windows
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.segments import make_segments
+from ballpass.runtime.run.segments import edge_windows, make_segments
 from ballpass.runtime.run.stepping import Cost
 from ballpass.runtime.run.trajectory import Interrupted, Trajectory
 

@@ -49,8 +49,8 @@ static double channel_at(const void *source, int channel, double theta, int *bal
 static void reduce_start(bp_run *run, double start)
 {
     run->reduction = run->options->reduction;
-    if (run->reduction == NULL || start < run->reduction[BP_FROM]) run->reduction = NULL;
-    else bp_channels(&run->numbers, 0.0, run->x, bp_balls_wanted(run->reduction), run->sampled[0]);
+    if (run->reduction != NULL && start < run->reduction[BP_FROM]) run->reduction = run->options->before;
+    if (run->reduction != NULL) bp_channels(&run->numbers, 0.0, run->x, bp_balls_wanted(run->reduction), run->sampled[0]);
 }
 
 static void reduce_step(bp_run *run, double start, double t, double h)

@@ -42,6 +42,7 @@ typedef struct {
     double *reduction;       /* on-line reductions, see reductions.h; NULL: none.  Only with BALLPASS_REDUCTIONS */
     void *work;              /* keeps a run that has taken all its steps, so that a later call can go on; NULL: it is not kept */
     int resume;              /* nonzero: go on with the run kept there */
+    double *before;          /* reductions of the time before the one where `reduction` begins; NULL: none */
 } ballpass_options;
 
 typedef struct {

@@ -21,7 +21,7 @@ from ballpass.runtime.native.ensemble_driver import STOPPED, EnsembleDriver, Mem
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import End, Family
 from ballpass.runtime.run.limits import brief_limit
-from ballpass.runtime.run.reductions import Begun, RunFailed, integrate_reduced
+from ballpass.runtime.run.reduced_run import Begun, RunFailed, integrate_reduced
 from ballpass.runtime.run.stepping import STATUS_OF_END
 
 #: Most members of a chunk: enough that lanes which run out of members at its end do not count.
@@ -235,7 +235,7 @@ def _alone(work: Work, chunk: _Chunk, place: int, tolerance: np.ndarray, counts:
     try:
         steps, rejected = integrate_reduced(
             work.model,
-            work.driver,
+            work.driver.stepper,
             work.members.numbers(work.model, member),
             work.family,
             tolerance,

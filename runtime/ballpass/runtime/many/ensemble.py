@@ -29,14 +29,8 @@ from ballpass.runtime.native.ensemble_driver import LANE_FAMILIES
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
-from ballpass.runtime.run.reductions import (
-    channel_names,
-    check_rtol,
-    check_span,
-    choose_family,
-    observable_aliases,
-    observe,
-)
+from ballpass.runtime.run.reduced_run import check_rtol, check_span, choose_family
+from ballpass.runtime.run.reductions import channel_names, observable_aliases, observe
 from ballpass.runtime.run.request import check_memory
 
 if TYPE_CHECKING:
@@ -204,7 +198,7 @@ def simulate_many(
     failed = sorted(work.results)
     found = {}
     for name, (kind, channel) in chosen.items():
-        values = observe(driver, kind, channel, work.rows, work.end)
+        values = observe(driver.rows, kind, channel, work.rows, work.end)
         values[failed] = np.nan
         found[name] = values
     return EnsembleResult(

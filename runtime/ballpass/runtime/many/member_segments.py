@@ -16,13 +16,13 @@ from itertools import islice
 import numpy as np
 
 from ballpass.runtime.contract import InputInfo
-from ballpass.runtime.many.members import TURNS_A_SEARCH, Members, Span, edge_windows, groups
+from ballpass.runtime.many.members import Members, Span, groups
 from ballpass.runtime.native.ensemble_driver import MemberArrays
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.magnitudes import MOMENTS
-from ballpass.runtime.run.reductions import SCALED_TURNS
-from ballpass.runtime.run.segments import LARGEST_PHASE, segment_edges
+from ballpass.runtime.run.reduced_run import SCALED_TURNS
+from ballpass.runtime.run.segments import LARGEST_PHASE, TURNS_A_SEARCH, edge_windows, segment_edges
 
 #: Edges closer than this fraction of run or turn are left to `edge_windows`; far above its own resolutions [1].
 CLOSE = 1e-8

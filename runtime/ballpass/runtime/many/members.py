@@ -6,9 +6,8 @@ In: a table of parameters.  Out: `Members`, the `Span` of their runs, and the ed
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, pairwise
 
 import numpy as np
 
@@ -19,10 +18,6 @@ from ballpass.runtime.contract.parameters import Numbers, Parameters, scalar, un
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.segments import segment_edges
-
-#: Turns whose edges are sought at a time: the search compares all with all.
-TURNS_A_SEARCH = 64
 
 Table = Mapping[str, object] | Sequence[Mapping[str, float]] | np.ndarray
 
@@ -232,23 +227,3 @@ class Span:
     durations: np.ndarray
     turns: np.ndarray
     starts: np.ndarray
-
-
-def edge_windows(
-    model: LoadedModel, numbers: Numbers, duration: float, turn: float, start: float
-) -> Iterator[np.ndarray]:
-    """Begin, breakpoints, whole turns, `start` and end of a run, some turns at a time, increasing [s].
-
-    Memory does not grow with the run; each window begins with the last edge of the one before.
-    """
-    near = 1e-9 * min(turn, duration)
-    wholes = range(TURNS_A_SEARCH, math.ceil(duration / turn), TURNS_A_SEARCH) if math.isfinite(turn) else ()
-    stops = (k * turn for k in wholes if k * turn < duration - near)
-    for left, right in pairwise(chain((0.0,), stops, (duration,))):
-        if left + near < start < right - near:
-            # not a window of its own: a window's first step size is estimated anew
-            before, behind = (segment_edges(model, numbers, a, b, turn) for a, b in ((left, start), (start, right)))
-            yield np.concatenate([before, behind[1:]])
-        else:
-            edges = segment_edges(model, numbers, left, right, turn)
-            yield np.where(np.abs(edges - start) <= near, start, edges)

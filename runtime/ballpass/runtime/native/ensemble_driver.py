@@ -28,17 +28,11 @@ from ballpass.runtime.native.driver_library import (
     padded,
     sizes_of,
 )
+from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import MAX_STEPS, Family, Stepper
 
 #: Status of members that were under way when the caller asked to stop; the others are those of `stepper.End`.
 STOPPED = 5
-
-#: Head of a reduction, and what follows for every channel; the layout of driver/reductions.h.
-HEAD = ("from", "wanted", "duration")
-ROWS = ("max", "max_time", "max_ball", "min", "min_time", "min_ball", "integral", "square")
-
-#: Channels behind those of the states: values of the most loaded ball.
-BALL_CHANNELS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
 
 #: Families of methods that advance in lanes.
 LANE_FAMILIES = (Family.AUTO, Family.DP54, Family.RODAS5P)
@@ -129,7 +123,7 @@ class EnsembleDriver:
     Attributes
     ----------
     stepper : driver of single runs, with reductions
-    channels : names of the channels that can be reduced: states, then `BALL_CHANNELS`
+    rows : layout of the reductions
     lanes : members that advance together
 
     Raises
@@ -140,15 +134,14 @@ class EnsembleDriver:
 
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
         self.stepper = Stepper(library, manifest)
-        self.channels = (*(state.name for state in manifest.states), *BALL_CHANNELS)
+        self.rows = reduction_rows(manifest)
         code = ctypes.CDLL(str(library.path))
-        self.row, channels, self.lanes, *records = sizes_of(code, "ballpass_ensemble_sizes")
+        row, channels, self.lanes, *records = sizes_of(code, "ballpass_ensemble_sizes")
         check_records(library, records, (_Options,))
-        expected = len(HEAD) + len(ROWS) * len(self.channels)
-        if (self.row, channels) != (expected, len(self.channels)):
+        if (row, channels) != (self.rows.size, len(self.rows.channels)):
             raise ArtefactError(
-                f"{library.path}: reductions of {self.row} numbers and {channels} channels, {expected} and "
-                f"{len(self.channels)} are expected. Write the folder again."
+                f"{library.path}: reductions of {row} numbers and {channels} channels, {self.rows.size} and "
+                f"{len(self.rows.channels)} are expected. Write the folder again."
             )
         self._inputs = input_columns(manifest)
         self._code = code
@@ -163,10 +156,7 @@ class EnsembleDriver:
 
     def reductions(self, members: int, start: np.ndarray | float, channels: Collection[str]) -> np.ndarray:
         """Empty rows of reductions of these channels that count from `start` on [s], shape (members, row)."""
-        rows = np.zeros((members, self.row))
-        rows[:, 0] = start
-        rows[:, 1] = sum(2**k for k, name in enumerate(self.channels) if name in channels)
-        return rows
+        return self.rows.empty(members, start, channels)
 
     def carry(self, members: int) -> Carried:
         """What so many members carry, before their first call."""

@@ -75,6 +75,7 @@ class _Options(ctypes.Structure):
         ("reduction", ctypes.c_void_p),
         ("work", ctypes.c_void_p),
         ("resume", ctypes.c_int),
+        ("before", ctypes.c_void_p),
     )
 
 
@@ -271,6 +272,7 @@ class Stepper:
         output_states: np.ndarray | None,
         tangents: Tangents | None = None,
         reduction: np.ndarray | None = None,
+        before: np.ndarray | None = None,
         max_steps: int = MAX_STEPS,
         first_step: float = 0.0,
         smallest_step: float = 0.0,
@@ -288,6 +290,7 @@ class Stepper:
         output_states : C-contiguous, shape (n, states), or None
         tangents : directions to differentiate along; the library must have been compiled with sensitivities
         reduction : row of on-line reductions to add to; the library must have been compiled with reductions
+        before : row that segments before the first one of `reduction` are added to
         max_steps : accepted and rejected
         held : from `hold`; where a call with it has taken all its steps, another goes on with the same arguments and
             more `max_steps`, which then count those of all calls, as the counts told do.  The bits are those of one
@@ -299,6 +302,8 @@ class Stepper:
         options = _Options(
             *(family, max_steps, first_step, smallest_step, largest_step, address("tolerance", tolerance), reduced)
         )
+        if before is not None:
+            options.before = address("before", before)
         result = _Result()
         if held is not None:
             result, options.work, options.resume = held.result, address("work", held.work), int(held.begun)

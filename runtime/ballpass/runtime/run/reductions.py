@@ -1,47 +1,22 @@
-"""On-line reductions of a run: extremes with their times, mean and rms, without a stored trajectory.
+"""On-line reductions of a run: extremes with their times, mean and rms of channels.
 
-In: a model, numbers, a length of time.  Out: `Reductions`.  The driver looks at every accepted step in its quarters and
-refines extremes from its own dense output, so that what is found does not depend on an output grid, and a run of any
-length takes the same memory.
-
-Channels are the states and four quantities of the balls, each with its value of the most loaded ball at the moment:
-``ball.force``, ``ball.elastic_force``, ``ball.damping_force``, ``ball.deflection``.
+In: rows that the driver has written (`ballpass.runtime.native.reduction_rows`).  Out: `Reductions`, or observables of
+many rows.  The driver looks at every accepted step in its quarters and refines extremes from its own dense output, so
+that what is found does not depend on samples, and a run of any length takes the same memory.
 """
 
 from __future__ import annotations
 
-import ctypes
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
-from ballpass.runtime.certify.quasi_static_runs import reduce_quasi_static
 from ballpass.runtime.contract import Manifest
-from ballpass.runtime.contract.errors import RequestError, SimulationError
-from ballpass.runtime.contract.parameters import Numbers, real, unknown_name
-from ballpass.runtime.many.members import edge_windows
-from ballpass.runtime.native.ensemble_driver import BALL_CHANNELS, HEAD, ROWS, EnsembleDriver
-from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import METHODS as STEPPERS
-from ballpass.runtime.native.stepper import End, Family, Outcome, Segments, Stepper
-from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.failure_location import Whereabouts, whereabouts
-from ballpass.runtime.run.limits import Allowance, allowance
-from ballpass.runtime.run.locating import LOCATED, choose_kinks, has_kinks
-from ballpass.runtime.run.magnitudes import stepper_magnitudes
-from ballpass.runtime.run.request import Request, run_length, start_state, tolerance
-from ballpass.runtime.run.segments import make_segments, rest_of
-from ballpass.runtime.run.stepping import STATUS_OF_END
-
-#: Steps, accepted and rejected, that one call of the stepper takes: a fraction of a second.  Between calls progress is
-#: told, and an interrupt or the wish of an ensemble to stop is heard.
-STEPS_A_CALL = 50_000
-
-#: Turns of a run that are looked at for the magnitudes of its states.
-SCALED_TURNS = 16
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.native.reduction_rows import BALL_CHANNELS, HEAD, ROWS, ReductionRows, reduction_rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +40,11 @@ class Reduction:
     minimum_ball: int | None
     mean: float
     rms: float
+
+    @property
+    def std(self) -> float:
+        """Root mean square of the deviation from the mean."""
+        return math.sqrt(max(self.rms**2 - self.mean**2, 0.0))
 
     @property
     def range(self) -> float:
@@ -105,228 +85,66 @@ class Reductions(Mapping[str, Reduction]):
     def __len__(self) -> int:
         return len(self.channels)
 
+    @staticmethod
+    def from_facts(facts: Mapping[str, Any]) -> Reductions:
+        """Reductions from what `dataclasses.asdict` gave of some."""
+        channels = {name: Reduction(**entry) for name, entry in facts["channels"].items()}
+        return Reductions(**{**facts, "channels": channels})
+
 
 def channel_names(manifest: Manifest) -> tuple[str, ...]:
-    """Channels of a model in the driver's order; without damping there is no damping force."""
-    law = manifest.bearing.damping_law if manifest.bearing is not None else "none"
-    balls = tuple(name for name in BALL_CHANNELS if law != "none" or name != "ball.damping_force")
+    """Channels that mean something, in the driver's order; without damping there is no damping force."""
+    balls = [
+        bearing.prefix + name
+        for bearing in manifest.bearings or ()
+        for name in BALL_CHANNELS
+        if bearing.damping_law != "none" or name != "ball.damping_force"
+    ]
     return (*(state.name for state in manifest.states), *balls)
 
 
-def column(driver: EnsembleDriver, row: str, channel: str) -> int:
-    """Place of an entry in a reduction."""
-    return len(HEAD) + ROWS.index(row) * len(driver.channels) + driver.channels.index(channel)
+def reduced_channels(manifest: Manifest, outputs: Sequence[str]) -> tuple[str, ...]:
+    """Channels that a run reduces beside its samples: the states and the outputs it keeps; none where it keeps none."""
+    balls = reduction_rows(manifest).balls
+    return tuple(name for name in channel_names(manifest) if outputs and (name in outputs or name not in balls))
 
 
-def check_span(duration: float, turn: float, transient: float) -> float:
-    """Time from which on is reduced [s].
+def reductions_of(
+    manifest: Manifest,
+    row: np.ndarray,
+    names: Sequence[str],
+    *,
+    end: np.ndarray,
+    steps: int,
+    rejected: int,
+    turn: float,
+) -> Reductions | None:
+    """What a row holds of the channels `names`; None where nothing was reduced.
 
-    Raises
-    ------
-    RequestError
-        The transient is no number of turns from 0 on, nothing turns, or nothing is left of the run.
+    Parameters
+    ----------
+    end : state at the end, shape (states,)
+    steps, rejected : of the run
+    turn : time of a turn, infinite where nothing turns [s]
     """
-    if not 0.0 <= transient < math.inf:
-        raise RequestError(f"transient: a number of cycles from 0 on is expected, not {transient!r}.")
-    if transient > 0.0 and not math.isfinite(turn):
-        raise RequestError("transient: its cycles are turns, and nothing turns in this model. Set it to 0.")
-    start = transient * turn if transient > 0.0 else 0.0
-    if start >= duration * (1.0 - 1e-9):
-        raise RequestError(
-            f"The run of {duration / turn:g} cycles lies within its {transient:g} transient cycles: nothing is left. "
-            "Run more cycles, or set fewer transient ones."
-        )
-    return start
-
-
-def check_rtol(rtol: float) -> float:
-    """A tolerance that the methods can keep."""
-    return tolerance("rtol", rtol)
-
-
-def choose_family(asked: str) -> Family:
-    """Family of the driver for a method's name.
-
-    Raises
-    ------
-    RequestError
-        Another method than the project's own stepper.
-    """
-    if asked == "auto":
-        return Family.AUTO
-    if asked not in STEPPERS:
-        raise RequestError(
-            f"method {asked!r}: reductions and ensembles are part of the project's own stepper. "
-            f"Take auto or one of {', '.join(STEPPERS)}; for other methods call simulate and reduce its samples."
-        )
-    return STEPPERS[asked]
-
-
-def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reductions:
-    """Integrate from t = 0 and reduce; what the request leaves open is as the scene's run settings say.
-
-    Raises
-    ------
-    RequestError
-        A wrong request.
-    SimulationError
-        The computation failed.
-    """
-    run = model.manifest.run
-    method, rtol = request.method or run.method, run.rtol if request.rtol is None else request.rtol
-    initial = start_state(model, numbers, request.initial)
-    turn = clock.period(model.manifest, numbers.values)
-    duration = run_length(model, request, turn)
-    transient = run.transient_cycles if request.transient_cycles is None else real(request.transient_cycles)
-    start = check_span(duration, turn, transient)
-    family = choose_family(method) if method != QUASI_STATIC else None
-    named = "stepper" if family is not None and method == "auto" else method
-    chosen = choose_kinks(request.kinks, named, model.manifest, check_rtol(rtol))
-    driver = model.ensemble_driver
-    looked_at = min(duration, SCALED_TURNS * turn)
-    tolerance = check_rtol(rtol) * stepper_magnitudes(model, driver.stepper, numbers, initial, looked_at, turn)
-    row = driver.reductions(1, start, channel_names(model.manifest))[0]
-    state = initial.copy()
-    if family is None:
-        steps, rejected = reduce_quasi_static(model, numbers, tolerance, state, row, (duration, turn, start))
-    else:
-        stepper = model.locating_stepper if chosen == LOCATED and has_kinks(model.manifest) else driver.stepper
-        steps, rejected = integrate_reduced(
-            *(model, driver, numbers, family, tolerance, state, row, (duration, turn, start)),
-            progress=request.progress,
-            stepper=stepper,
-        )
-    names = channel_names(model.manifest)
+    rows = reduction_rows(manifest)
+    duration = float(row[HEAD.index("duration")])
+    if not duration > 0.0:
+        return None
     return Reductions(
-        channels={name: _reduction(driver, row, name) for name in names},
-        start=start,
-        duration=float(row[HEAD.index("duration")]),
-        end=dict(zip(model.states, state.tolist(), strict=True)),
+        channels={name: _reduction(rows, row, name, duration) for name in names},
+        start=float(row[HEAD.index("from")]),
+        duration=duration,
+        end=dict(zip(rows.states, end.tolist(), strict=True)),
         steps=steps,
         rejected=rejected,
         cycle_length=turn if math.isfinite(turn) else None,
     )
 
 
-def integrate_reduced(
-    model: LoadedModel,
-    driver: EnsembleDriver,
-    numbers: Numbers,
-    family: Family,
-    tolerance: np.ndarray,
-    state: np.ndarray,
-    row: np.ndarray,
-    span: tuple[float, float, float],
-    *,
-    progress: Callable[[float], None] | None = None,
-    stop: ctypes.c_int | None = None,
-    stepper: Stepper | None = None,
-    begun: Begun | None = None,
-) -> tuple[int, int]:
-    """Integrate one run, adding to a reduction; `state` is brought to the end.  Returns steps, rejected steps.
-
-    A run takes calls of `STEPS_A_CALL` steps; its bits are those of one that is not cut.
-
-    Parameters
-    ----------
-    span : duration, time of a turn, time from which on is reduced [s]
-    progress : told the finished part between calls
-    stop : ends the run between calls, with the reduction as it is, when it becomes nonzero
-    stepper : another driver of single runs with reductions
-    begun : of a run that goes on where another driver ended, with its `state` and `row`
-
-    Raises
-    ------
-    RunFailed
-        The driver could not reach the end, or crawls.
-    """
-    duration, turn, start = span
-    begun = begun or Begun()
-    allowed = allowance(duration, turn, begun.time, begun.steps)
-    before: Segments | None = None
-    steps = rejected = 0
-    for edges in edge_windows(model, numbers, duration, turn, start):
-        before = left = make_segments(model.manifest.inputs, numbers, edges, before)
-        if edges[-1] <= begun.time:
-            continue
-        if edges[0] < begun.time:
-            rest = rest_of(left, begun.time, model.manifest.inputs, numbers)
-            if rest is None:
-                continue
-            left = rest
-        calls = _calls(stepper or driver.stepper, model, numbers, family, tolerance, state, row, left, allowed)
-        for outcome in calls:
-            if progress is not None:
-                progress(outcome.time / duration)
-            if stop is not None and stop.value:
-                return steps + outcome.steps, rejected + outcome.rejected
-        steps += outcome.steps
-        rejected += outcome.rejected
-    return steps, rejected
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Begun:
-    """How far a run has come by another driver: time [s], and steps, accepted and rejected."""
-
-    time: float = 0.0
-    steps: int = 0
-
-
-def _calls(
-    stepper: Stepper,
-    model: LoadedModel,
-    numbers: Numbers,
-    family: Family,
-    tolerance: np.ndarray,
-    state: np.ndarray,
-    row: np.ndarray,
-    segments: Segments,
-    allowed: Allowance,
-) -> Iterator[Outcome]:
-    """Integrate over segments; what each call tells of all so far.  Errors as for `integrate_reduced`."""
-    held = stepper.hold()
-    taken = 0
-    while True:
-        outcome = stepper.run(
-            family=family,
-            tolerance=tolerance,
-            p=numbers.p,
-            c=numbers.c,
-            x=state,
-            segments=segments,
-            output_times=np.zeros(0),
-            output_states=None,
-            reduction=row,
-            max_steps=taken + min(STEPS_A_CALL, allowed.left),
-            held=held,
-        )
-        more = outcome.steps + outcome.rejected - taken
-        taken += more
-        gives_up = allowed.spend(more, outcome.time)
-        if outcome.end is not End.DONE and (gives_up or outcome.end is not End.TOO_MANY_STEPS):
-            place = whereabouts(model.manifest, numbers, outcome.time, state)
-            raise RunFailed(outcome.end, outcome.time, outcome.step, place)
-        yield outcome
-        if outcome.end is End.DONE:
-            return
-
-
-class RunFailed(SimulationError):
-    """The driver could not reach the end of a run."""
-
-    def __init__(self, end: End, time: float, step: float, place: Whereabouts | None = None) -> None:
-        self.end, self.time, self.step, self.place = end, time, step, place
-        self.status = STATUS_OF_END[end]
-        angle = f", crank angle {math.degrees(place.crank_angle):.4f} deg" if place is not None else ""
-        words = f" {place.words}" if place is not None else ""
-        super().__init__(f"{self.status.value}\nt = {time:.9g} s{angle}, step size {step:.3g} s.{words}".rstrip())
-
-
-def _reduction(driver: EnsembleDriver, row: np.ndarray, channel: str) -> Reduction:
-    entry = {kind: float(row[column(driver, kind, channel)]) for kind in ROWS}
-    duration = float(row[HEAD.index("duration")])
-    of_ball = channel in BALL_CHANNELS
+def _reduction(rows: ReductionRows, row: np.ndarray, channel: str, duration: float) -> Reduction:
+    entry = {kind: float(row[rows.column(kind, channel)]) for kind in ROWS}
+    of_ball = channel in rows.balls
     return Reduction(
         maximum=entry["max"],
         maximum_time=entry["max_time"],
@@ -339,13 +157,44 @@ def _reduction(driver: EnsembleDriver, row: np.ndarray, channel: str) -> Reducti
     )
 
 
+def joined(first: Reductions | None, second: Reductions | None) -> Reductions | None:
+    """Reductions of a time and of the one behind it, as of both together."""
+    if first is None or second is None:
+        return first or second
+    length = first.duration + second.duration
+    return replace(
+        second,
+        channels={
+            name: _joined(first[name], second[name], first.duration / length, second.duration / length)
+            for name in second.channels
+        },
+        start=first.start,
+        duration=length,
+    )
+
+
+def _joined(first: Reduction, second: Reduction, share: float, rest: float) -> Reduction:
+    high = first if first.maximum > second.maximum else second
+    low = first if first.minimum < second.minimum else second
+    return Reduction(
+        maximum=high.maximum,
+        maximum_time=high.maximum_time,
+        maximum_ball=high.maximum_ball,
+        minimum=low.minimum,
+        minimum_time=low.minimum_time,
+        minimum_ball=low.minimum_ball,
+        mean=share * first.mean + rest * second.mean,
+        rms=math.sqrt(share * first.rms**2 + rest * second.rms**2),
+    )
+
+
 def observable_aliases(channels: Sequence[str]) -> dict[str, tuple[str, str]]:
     """Every name of an observable: ``max:ball.force``, and ``peak_ball_force`` for people; -> (kind, channel)."""
     found: dict[str, tuple[str, str]] = {}
     for channel in channels:
         plain = channel.replace(".", "_")
         for kind in KINDS:
-            if kind == "end" and channel in BALL_CHANNELS:
+            if kind == "end" and channel.endswith(BALL_CHANNELS):
                 continue
             found[f"{kind}:{channel}"] = (kind, channel)
             found[f"{kind}_{plain}"] = (kind, channel)
@@ -357,7 +206,7 @@ def observable_aliases(channels: Sequence[str]) -> dict[str, tuple[str, str]]:
 KINDS = ("max", "min", "mean", "rms", "range", "peak_time", "peak_ball", "min_time", "end")
 
 
-def observe(driver: EnsembleDriver, kind: str, channel: str, rows: np.ndarray, end: np.ndarray) -> np.ndarray:
+def observe(layout: ReductionRows, kind: str, channel: str, rows: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Values of an observable from reductions.
 
     Parameters
@@ -366,10 +215,10 @@ def observe(driver: EnsembleDriver, kind: str, channel: str, rows: np.ndarray, e
     end : states at the end, shape (members, states)
     """
     if kind == "end":
-        return end[:, driver.channels.index(channel)].copy()
+        return end[:, layout.states.index(channel)].copy()
 
     def of(row: str) -> np.ndarray:
-        values: np.ndarray = rows[:, column(driver, row, channel)]
+        values: np.ndarray = rows[:, layout.column(row, channel)]
         return values
 
     duration = rows[:, HEAD.index("duration")]

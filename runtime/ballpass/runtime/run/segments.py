@@ -8,7 +8,8 @@ well.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from ballpass.runtime.run.request import check_memory
 
 #: Largest angle that a phase may reach within a segment [rad]: sines of larger ones lose digits.
 LARGEST_PHASE = 1e6
+
+#: Turns whose edges are sought at a time: the search compares all with all.
+TURNS_A_SEARCH = 64
 
 #: Numbers that a segment takes besides its inputs while segments are made: ends, middles, jumps, samples.
 WORK = 5
@@ -51,6 +55,26 @@ def segment_edges(model: LoadedModel, numbers: Numbers, begin: float, end: float
         free = (fenced[right] - whole > near) & (whole - fenced[right - 1] > near)
         cuts = np.sort(np.concatenate([cuts, whole[free]]))
     return _short_of_rounding(model.manifest.inputs, numbers, np.concatenate([[begin], cuts, [end]]))
+
+
+def edge_windows(
+    model: LoadedModel, numbers: Numbers, duration: float, turn: float, start: float
+) -> Iterator[np.ndarray]:
+    """Begin, breakpoints, whole turns, `start` and end of a run, some turns at a time, increasing [s].
+
+    Memory does not grow with the run; each window begins with the last edge of the one before.
+    """
+    near = 1e-9 * min(turn, duration)
+    wholes = range(TURNS_A_SEARCH, math.ceil(duration / turn), TURNS_A_SEARCH) if math.isfinite(turn) else ()
+    stops = (k * turn for k in wholes if k * turn < duration - near)
+    for left, right in pairwise(chain((0.0,), stops, (duration,))):
+        if left + near < start < right - near:
+            # not a window of its own: a window's first step size is estimated anew
+            before, behind = (segment_edges(model, numbers, a, b, turn) for a, b in ((left, start), (start, right)))
+            yield np.concatenate([before, behind[1:]])
+        else:
+            edges = segment_edges(model, numbers, left, right, turn)
+            yield np.where(np.abs(edges - start) <= near, start, edges)
 
 
 def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, turn: float, columns: int = WORK) -> None:

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 import time as clocks
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.contract.status import IntegrationError, Status
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.run.casadi_integrators import METHODS, available_methods
 from ballpass.runtime.run.failure_location import whereabouts
@@ -30,6 +32,7 @@ from ballpass.runtime.run.limits import refuse_crawl
 from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, choose_kinks
 from ballpass.runtime.run.magnitudes import model_scales, stepper_magnitudes
 from ballpass.runtime.run.pieces import integrate
+from ballpass.runtime.run.reductions import joined, reduced_channels, reductions_of
 from ballpass.runtime.run.request import Plan, Request, make_plan
 from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.run.solution import Solution, Statistics
@@ -62,32 +65,48 @@ def simulate(
     # derivatives first: what would not fit into memory is told before there is memory for the rest
     directions = prepare(len(plan.times)) if prepare is not None else None
     interval = (0.0, plan.duration)
-    trajectory = start_trajectory(model, numbers, plan.times, plan.initial, interval, plan.turn, even=plan.even)
+    start = plan.transient_cycles * plan.turn if plan.transient_cycles > 0.0 else 0.0
+    trajectory = start_trajectory(
+        model, numbers, plan.times, plan.initial, interval, plan.turn, even=plan.even, start=start
+    )
     method, reason, magnitude = _choose(model, numbers, request.method, plan, trajectory)
     # derivatives are those of steps that go over kinks
     kinks = choose_kinks(request.kinks, method, model.manifest, plan.rtol) if prepare is None else STEPPED_OVER
+    channels = reduced_channels(model.manifest, plan.outputs)
+    # the edge at the start may lie a rounding before it
+    rows = reduction_rows(model.manifest).empty(2, [start - trajectory.near, 0.0], channels)
     failure = None
     cost = Cost()
     try:
         if directions is not None and plan.sensitivity_rtol is not None:
             directions.control(plan.sensitivity_rtol, magnitude)
-        fill(model, numbers, method, plan.rtol * magnitude, trajectory, cost, request.progress, directions, kinks)
+        fill(
+            *(model, numbers, method, plan.rtol * magnitude, trajectory, cost, request.progress, directions, kinks),
+            reductions=rows if channels and directions is None else None,
+        )
     except Interrupted as end:
         failure = end
     if cost.families:
         reason = f"{reason}; {', '.join(dict.fromkeys(cost.families))} at the end"
 
-    solution = to_solution(
+    solution = _with_reductions(
         model,
-        numbers,
-        plan,
-        trajectory,
+        rows,
+        channels,
         cost,
-        method=method,
-        reason=reason,
-        magnitude=magnitude,
-        started=started,
-        status=Status.DONE if failure is None else failure.status,
+        to_solution(
+            model,
+            numbers,
+            plan,
+            trajectory,
+            cost,
+            method=method,
+            reason=reason,
+            magnitude=magnitude,
+            started=started,
+            status=Status.DONE if failure is None else failure.status,
+        ),
+        trajectory,
     )
     if failure is not None:
         state = trajectory.x[max(trajectory.finished - 1, 0)] if failure.state is None else failure.state
@@ -102,6 +121,30 @@ def simulate(
             partial=solution,
         )
     return solution
+
+
+def _with_reductions(
+    model: LoadedModel,
+    rows: np.ndarray,
+    channels: Sequence[str],
+    cost: Cost,
+    solution: Solution,
+    trajectory: Trajectory,
+) -> Solution:
+    """The solution with what the stepper has reduced: of the time that counts, and of the whole run."""
+    counted, before = (
+        reductions_of(
+            model.manifest,
+            row,
+            channels,
+            end=trajectory.x[max(trajectory.finished - 1, 0)] if len(trajectory.x) else trajectory.initial,
+            steps=cost.steps or 0,
+            rejected=cost.rejected or 0,
+            turn=trajectory.turn,
+        )
+        for row in rows
+    )
+    return replace(solution, steady_reductions=counted, reductions=joined(before, counted))
 
 
 def to_solution(
@@ -165,6 +208,7 @@ def fill(
     progress: Callable[[float], None] | None = None,
     directions: Directions | None = None,
     kinks: Kinks = STEPPED_OVER,
+    reductions: np.ndarray | None = None,
 ) -> None:
     """Fill the samples of `trajectory` by a method of that name ("none" for a model without states); notes the cost.
 
@@ -174,7 +218,10 @@ def fill(
         The method could not reach the end.
     """
     if method in STEPPERS:
-        step_through(model, numbers, STEPPERS[method], tolerance, trajectory, cost, progress, directions, kinks)
+        step_through(
+            *(model, numbers, STEPPERS[method], tolerance, trajectory, cost, progress, directions, kinks),
+            reductions=reductions,
+        )
         return
     if method == QUASI_STATIC:
         from ballpass.runtime.certify.quasi_static_runs import fill_quasi_static  # it builds on this module

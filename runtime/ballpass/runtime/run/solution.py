@@ -17,6 +17,7 @@ import numpy as np
 from ballpass.runtime.contract import Manifest, VariableInfo
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.status import Status
+from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import no_output
 
 if TYPE_CHECKING:
@@ -87,6 +88,10 @@ class Solution:
     statistics : how the solution came about
     status : how the simulation ended
     accuracy : what was asked, chosen and estimated, where an error was named instead of a method
+    reductions : extremes, means and rms found in every step of the run, whatever its samples: of the states, and of
+        the most loaded ball for those outputs that are kept.  None for other methods than the project's own stepper,
+        beside derivatives, and where no output is kept
+    steady_reductions : the same from the end of the transient on
     """
 
     t: np.ndarray
@@ -100,6 +105,8 @@ class Solution:
     statistics: Statistics
     status: Status
     accuracy: Accuracy | None = None
+    reductions: Reductions | None = None
+    steady_reductions: Reductions | None = None
 
     def __post_init__(self) -> None:
         for array in (self.t, self.x, *self.outputs.values()):
@@ -165,7 +172,7 @@ class Solution:
                 "cycles: nothing is left. Simulate more cycles, or set fewer transient ones."
             )
         outputs = {name: samples[keep] for name, samples in self.outputs.items()}
-        return replace(self, t=self.t[keep], x=self.x[keep], outputs=outputs)
+        return replace(self, t=self.t[keep], x=self.x[keep], outputs=outputs, reductions=self.steady_reductions)
 
     def to_xarray(self) -> xarray.Dataset:
         """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions."""
@@ -192,6 +199,8 @@ class Solution:
             "ballpass_constants": json.dumps(dict(self.constants)),
             "ballpass_run": json.dumps({"cycle_length": self.cycle_length, "transient_cycles": self.transient_cycles}),
             "ballpass_outputs": json.dumps(list(self.outputs)),
+            "ballpass_reductions": json.dumps(_facts(self.reductions)),
+            "ballpass_steady_reductions": json.dumps(_facts(self.steady_reductions)),
             "ballpass_statistics": json.dumps(asdict(self.statistics)),
             "ballpass_manifest": self.manifest.to_json(),
         }
@@ -296,8 +305,19 @@ def _read(path: str | Path, content: bytes) -> Solution:
         manifest=manifest,
         statistics=Statistics(**statistics),
         status=Status[facts["status"]],
+        reductions=_reductions(facts.get("ballpass_reductions")),
+        steady_reductions=_reductions(facts.get("ballpass_steady_reductions")),
         **json.loads(facts["ballpass_run"]),
     )
+
+
+def _facts(reductions: Reductions | None) -> dict[str, Any] | None:
+    return None if reductions is None else asdict(reductions)
+
+
+def _reductions(text: str | None) -> Reductions | None:
+    facts = None if text is None else json.loads(text)
+    return None if facts is None else Reductions.from_facts(facts)
 
 
 def _attributes(info: VariableInfo) -> dict[str, str]:

@@ -63,6 +63,7 @@ def step_through(
     directions: Directions | None = None,
     kinks: Kinks = STEPPED_OVER,
     reduced: Callable[[int, int, np.ndarray], np.ndarray] | None = None,
+    reductions: np.ndarray | None = None,
 ) -> None:
     """Fill the samples of `trajectory`; with derivatives along `directions`.
 
@@ -70,6 +71,7 @@ def step_through(
     ----------
     reduced : gives the row of reductions that a call adds to, from its first and last segment (excluded) and the state
         it begins with; not with derivatives
+    reductions : instead, two rows to add to: of the time that counts, and of that before; not with derivatives
 
     Raises
     ------
@@ -89,7 +91,9 @@ def step_through(
         # a sample that rounding puts beside an edge lies on it
         wanted = np.clip(trajectory.t[sample:stop], left.times[0], left.times[-1])
         step = 0.0
-        row = None if reduced is None else reduced(first, last, state)
+        row, before = (None, None) if reductions is None else (reductions[0], reductions[1])
+        if reduced is not None:
+            row = reduced(first, last, state)
         while True:
             start = float(left.times[0])
             outcome = stepper.run(
@@ -103,6 +107,7 @@ def step_through(
                 output_states=trajectory.x[sample:stop],
                 tangents=None if directions is None else directions.tangents(left, sample, stop - sample),
                 reduction=row,
+                before=before,
                 max_steps=STEPS_A_CALL,
                 first_step=step,
             )

@@ -70,6 +70,7 @@ def start_trajectory(
     turn: float,
     *,
     even: bool,
+    start: float = 0.0,
 ) -> Trajectory:
     """Memory for samples, and the segments they lie in.
 
@@ -80,10 +81,14 @@ def start_trajectory(
     interval : begin and end of the run [s]
     turn : time of a turn, infinite where nothing turns [s]
     even : whether the samples are the ends of equal intervals of the whole run
+    start : time from which on the run counts, an edge where it lies within [s]
     """
     begin, end = interval
-    segments = make_segments(model.manifest.inputs, numbers, segment_edges(model, numbers, begin, end, turn))
     near = time_resolution(begin, end, turn)
+    edges = segment_edges(model, numbers, begin, end, turn)
+    if begin < start < end and np.min(np.abs(edges - start)) > near:
+        edges = np.sort(np.append(edges, start))
+    segments = make_segments(model.manifest.inputs, numbers, edges)
     stops = np.searchsorted(times, segments.times - near)
     stops[0], stops[-1] = 0, len(times)
     return Trajectory(

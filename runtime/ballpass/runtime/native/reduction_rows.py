@@ -1,0 +1,66 @@
+"""Rows of on-line reductions as the driver writes them (`driver/reductions.h`).
+
+A row is a head and, for every channel, one number of each kind in `ROWS`.  Channels are the states, then four
+quantities of the balls of each bearing, each with its value of the most loaded ball at the moment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ballpass.runtime.contract import Manifest
+
+#: Head of a row, and what follows for every channel.
+HEAD = ("from", "wanted", "duration")
+ROWS = ("max", "max_time", "max_ball", "min", "min_time", "min_ball", "integral", "square")
+
+#: Channels of a bearing behind those of the states, without its prefix: values of the most loaded ball.
+BALL_CHANNELS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
+
+
+@dataclass(frozen=True, slots=True)
+class ReductionRows:
+    """Layout of the rows of a model.
+
+    Attributes
+    ----------
+    states, balls : names of the channels: states, and quantities of the balls
+    """
+
+    states: tuple[str, ...]
+    balls: tuple[str, ...]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """All channels in the driver's order."""
+        return (*self.states, *self.balls)
+
+    @property
+    def size(self) -> int:
+        """Numbers of a row."""
+        return len(HEAD) + len(ROWS) * len(self.channels)
+
+    def column(self, kind: str, channel: str) -> int:
+        """Place of an entry of `ROWS` in a row."""
+        return len(HEAD) + ROWS.index(kind) * len(self.channels) + self.channels.index(channel)
+
+    def empty(self, count: int, start: ArrayLike, channels: Collection[str]) -> np.ndarray:
+        """Rows of reductions of these channels that count from `start` on [s], shape (count, size)."""
+        rows = np.zeros((count, self.size))
+        rows[:, HEAD.index("from")] = start
+        rows[:, HEAD.index("wanted")] = sum(2**k for k, name in enumerate(self.channels) if name in channels)
+        return rows
+
+
+def reduction_rows(manifest: Manifest) -> ReductionRows:
+    """Layout of the rows of a model."""
+    # a model without a bearing has the channels of one, which are zero
+    prefixes = [bearing.prefix for bearing in manifest.bearings] or [""]
+    return ReductionRows(
+        states=tuple(state.name for state in manifest.states),
+        balls=tuple(prefix + name for prefix in prefixes for name in BALL_CHANNELS),
+    )

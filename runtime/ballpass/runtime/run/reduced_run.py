@@ -1,0 +1,235 @@
+"""A run of the project's own stepper that keeps reductions only, in bounded memory.
+
+In: a model, numbers, a length of time.  Out: `Reductions`.  A run takes calls of `STEPS_A_CALL` steps, and its segments
+are made some turns at a time; its bits are those of one call.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
+from ballpass.runtime.certify.quasi_static_runs import reduce_quasi_static
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.parameters import Numbers, real
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import reduction_rows
+from ballpass.runtime.native.stepper import METHODS as STEPPERS
+from ballpass.runtime.native.stepper import End, Family, Outcome, Segments, Stepper
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.failure_location import Whereabouts, whereabouts
+from ballpass.runtime.run.limits import Allowance, allowance
+from ballpass.runtime.run.locating import LOCATED, choose_kinks, has_kinks
+from ballpass.runtime.run.magnitudes import stepper_magnitudes
+from ballpass.runtime.run.reductions import Reductions, channel_names, reductions_of
+from ballpass.runtime.run.request import Request, run_length, start_state, tolerance
+from ballpass.runtime.run.segments import edge_windows, make_segments, rest_of
+from ballpass.runtime.run.stepping import STATUS_OF_END
+
+#: Steps, accepted and rejected, that one call of the stepper takes: a fraction of a second.  Between calls progress is
+#: told, and an interrupt or the wish of an ensemble to stop is heard.
+STEPS_A_CALL = 50_000
+
+#: Turns of a run that are looked at for the magnitudes of its states.
+SCALED_TURNS = 16
+
+
+def check_span(duration: float, turn: float, transient: float) -> float:
+    """Time from which on is reduced [s].
+
+    Raises
+    ------
+    RequestError
+        The transient is no number of turns from 0 on, nothing turns, or nothing is left of the run.
+    """
+    if not 0.0 <= transient < math.inf:
+        raise RequestError(f"transient: a number of cycles from 0 on is expected, not {transient!r}.")
+    if transient > 0.0 and not math.isfinite(turn):
+        raise RequestError("transient: its cycles are turns, and nothing turns in this model. Set it to 0.")
+    start = transient * turn if transient > 0.0 else 0.0
+    if start >= duration * (1.0 - 1e-9):
+        raise RequestError(
+            f"The run of {duration / turn:g} cycles lies within its {transient:g} transient cycles: nothing is left. "
+            "Run more cycles, or set fewer transient ones."
+        )
+    return start
+
+
+def check_rtol(rtol: float) -> float:
+    """A tolerance that the methods can keep."""
+    return tolerance("rtol", rtol)
+
+
+def choose_family(asked: str) -> Family:
+    """Family of the driver for a method's name.
+
+    Raises
+    ------
+    RequestError
+        Another method than the project's own stepper.
+    """
+    if asked == "auto":
+        return Family.AUTO
+    if asked not in STEPPERS:
+        raise RequestError(
+            f"method {asked!r}: reductions and ensembles are part of the project's own stepper. "
+            f"Take auto or one of {', '.join(STEPPERS)}; for other methods call simulate and reduce its samples."
+        )
+    return STEPPERS[asked]
+
+
+def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reductions:
+    """Integrate from t = 0 and reduce; what the request leaves open is as the scene's run settings say.
+
+    Raises
+    ------
+    RequestError
+        A wrong request.
+    SimulationError
+        The computation failed.
+    """
+    run = model.manifest.run
+    method, rtol = request.method or run.method, run.rtol if request.rtol is None else request.rtol
+    initial = start_state(model, numbers, request.initial)
+    turn = clock.period(model.manifest, numbers.values)
+    duration = run_length(model, request, turn)
+    transient = run.transient_cycles if request.transient_cycles is None else real(request.transient_cycles)
+    start = check_span(duration, turn, transient)
+    family = choose_family(method) if method != QUASI_STATIC else None
+    named = "stepper" if family is not None and method == "auto" else method
+    chosen = choose_kinks(request.kinks, named, model.manifest, check_rtol(rtol))
+    looked_at = min(duration, SCALED_TURNS * turn)
+    tolerance = check_rtol(rtol) * stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn)
+    names = channel_names(model.manifest)
+    row = reduction_rows(model.manifest).empty(1, start, names)[0]
+    state = initial.copy()
+    if family is None:
+        steps, rejected = reduce_quasi_static(model, numbers, tolerance, state, row, (duration, turn, start))
+    else:
+        stepper = model.locating_stepper if chosen == LOCATED and has_kinks(model.manifest) else model.stepper
+        steps, rejected = integrate_reduced(
+            *(model, stepper, numbers, family, tolerance, state, row, (duration, turn, start)),
+            progress=request.progress,
+        )
+    found = reductions_of(model.manifest, row, names, end=state, steps=steps, rejected=rejected, turn=turn)
+    assert found is not None  # `check_span` leaves some time
+    return found
+
+
+def integrate_reduced(
+    model: LoadedModel,
+    stepper: Stepper,
+    numbers: Numbers,
+    family: Family,
+    tolerance: np.ndarray,
+    state: np.ndarray,
+    row: np.ndarray,
+    span: tuple[float, float, float],
+    *,
+    progress: Callable[[float], None] | None = None,
+    stop: ctypes.c_int | None = None,
+    begun: Begun | None = None,
+) -> tuple[int, int]:
+    """Integrate one run, adding to a reduction; `state` is brought to the end.  Returns steps, rejected steps.
+
+    A run takes calls of `STEPS_A_CALL` steps; its bits are those of one that is not cut.
+
+    Parameters
+    ----------
+    stepper : a driver with reductions
+    span : duration, time of a turn, time from which on is reduced [s]
+    progress : told the finished part between calls
+    stop : ends the run between calls, with the reduction as it is, when it becomes nonzero
+    begun : of a run that goes on where another driver ended, with its `state` and `row`
+
+    Raises
+    ------
+    RunFailed
+        The driver could not reach the end, or crawls.
+    """
+    duration, turn, start = span
+    begun = begun or Begun()
+    allowed = allowance(duration, turn, begun.time, begun.steps)
+    before: Segments | None = None
+    steps = rejected = 0
+    for edges in edge_windows(model, numbers, duration, turn, start):
+        before = left = make_segments(model.manifest.inputs, numbers, edges, before)
+        if edges[-1] <= begun.time:
+            continue
+        if edges[0] < begun.time:
+            rest = rest_of(left, begun.time, model.manifest.inputs, numbers)
+            if rest is None:
+                continue
+            left = rest
+        calls = _calls(stepper, model, numbers, family, tolerance, state, row, left, allowed)
+        for outcome in calls:
+            if progress is not None:
+                progress(outcome.time / duration)
+            if stop is not None and stop.value:
+                return steps + outcome.steps, rejected + outcome.rejected
+        steps += outcome.steps
+        rejected += outcome.rejected
+    return steps, rejected
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Begun:
+    """How far a run has come by another driver: time [s], and steps, accepted and rejected."""
+
+    time: float = 0.0
+    steps: int = 0
+
+
+def _calls(
+    stepper: Stepper,
+    model: LoadedModel,
+    numbers: Numbers,
+    family: Family,
+    tolerance: np.ndarray,
+    state: np.ndarray,
+    row: np.ndarray,
+    segments: Segments,
+    allowed: Allowance,
+) -> Iterator[Outcome]:
+    """Integrate over segments; what each call tells of all so far.  Errors as for `integrate_reduced`."""
+    held = stepper.hold()
+    taken = 0
+    while True:
+        outcome = stepper.run(
+            family=family,
+            tolerance=tolerance,
+            p=numbers.p,
+            c=numbers.c,
+            x=state,
+            segments=segments,
+            output_times=np.zeros(0),
+            output_states=None,
+            reduction=row,
+            max_steps=taken + min(STEPS_A_CALL, allowed.left),
+            held=held,
+        )
+        more = outcome.steps + outcome.rejected - taken
+        taken += more
+        gives_up = allowed.spend(more, outcome.time)
+        if outcome.end is not End.DONE and (gives_up or outcome.end is not End.TOO_MANY_STEPS):
+            place = whereabouts(model.manifest, numbers, outcome.time, state)
+            raise RunFailed(outcome.end, outcome.time, outcome.step, place)
+        yield outcome
+        if outcome.end is End.DONE:
+            return
+
+
+class RunFailed(SimulationError):
+    """The driver could not reach the end of a run."""
+
+    def __init__(self, end: End, time: float, step: float, place: Whereabouts | None = None) -> None:
+        self.end, self.time, self.step, self.place = end, time, step, place
+        self.status = STATUS_OF_END[end]
+        angle = f", crank angle {math.degrees(place.crank_angle):.4f} deg" if place is not None else ""
+        words = f" {place.words}" if place is not None else ""
+        super().__init__(f"{self.status.value}\nt = {time:.9g} s{angle}, step size {step:.3g} s.{words}".rstrip())
