@@ -21,7 +21,6 @@ from ballpass.derive.mechanism.kinematics import (
     Pose,
     add,
     cross,
-    dot,
     joint_point,
     quarter_turn,
     scale,
@@ -126,7 +125,7 @@ class Balance:
         self._solved: list[Contact] = []
 
     def _contact(self, joint: Joint) -> Contact:
-        first, second = (joint_point(self._mechanism, joint, body) for body in joint.bodies)
+        first, second = (self.point(joint, body) for body in joint.bodies)
         guide = self._guides.get(joint.name)
         prefix = f"reaction.{joint.name}"
         if guide is None:
@@ -164,7 +163,12 @@ class Balance:
         side = contact.joint.bodies.index(body)
         return add(self._arm(body, contact.points[side], about), contact.shifts[side])
 
-    def _center(self, body: str) -> Pair:
+    def point(self, joint: Joint, body: str) -> Pair:
+        """Point of a joint on one of its bodies, in body axes [m]."""
+        return joint_point(self._mechanism, joint, body)
+
+    def center(self, body: str) -> Pair:
+        """Centre of mass in body axes [m]."""
         return components(self._mechanism.body(body).center_of_mass)
 
     def _weight_and_inertia(self, body: str) -> Pair:
@@ -190,7 +194,7 @@ class Balance:
     def known_moment(self, body: str, about: Pair) -> sp.Expr:
         """Moment of the same about a body point."""
         terms = [
-            cross(self._arm(body, self._center(body), about), self._weight_and_inertia(body)),
+            cross(self._arm(body, self.center(body), about), self._weight_and_inertia(body)),
             -self._turning_inertia(body),
         ]
         for load in self._loads:
@@ -214,7 +218,7 @@ class Balance:
         right_side: list[sp.Expr] = []
         rows: list[tuple[str, str]] = []
         for body in (b.name for b in self._mechanism.bodies):
-            center = self._center(body)
+            center = self.center(body)
             known = self.known_force(body)
             x, y, moment = ([sp.S.Zero] * len(columns) for _ in range(3))
             for contact in self.contacts.values():
@@ -243,7 +247,7 @@ class Balance:
         """Name the known moment on a body about one of its joints [N*m]."""
         return ledger.name(
             f"body.{body}.known_moment",
-            self.known_moment(body, joint_point(self._mechanism, outer, body)),
+            self.known_moment(body, self.point(outer, body)),
             "N*m",
             f"moment about {outer.name} of loads, inertia and reactions already known on {body}",
             f"K_{{{subscript(body)}}}",
@@ -261,29 +265,28 @@ class Balance:
         """Define a revolute joint's unknowns by the balance of forces on a body."""
         self.solve_hinge(ledger, joint, body, scale(sp.Integer(-1), self.known_force(body)))
 
-    def solve_guide(self, ledger: Ledger, guide: Guide, normal: sp.Expr | None = None) -> None:
-        """Define the unknowns of a prismatic joint.
+    def solve_guide(self, ledger: Ledger, guide: Guide, normal: sp.Expr, about: Pair) -> None:
+        """Define the unknowns of a prismatic joint; its moment by the balance of moments on the slider.
 
         Parameters
         ----------
-        normal : normal force on the slider [N].  Default: by the balance of forces across the guide.  The moment
-            follows from the slider's balance of moments about its centre of mass, with the normal force known.
+        normal : normal force on the slider [N]
+        about : point of the slider about which no unknown force has a moment, in its axes [m]
         """
         joint, slider = guide.joint, guide.slider
         contact = self.contacts[joint.name]
         mark, sign, (on, by) = subscript(joint.name), contact.sign(slider), joint.bodies
         ((symbol, _),) = contact.along
-        on_slider = -dot(guide.normal, self.known_force(slider)) if normal is None else normal
         ledger.define(
             symbol.name,
-            sign * on_slider,
+            sign * normal,
             "N",
             f"normal force of {by} on {on} at guide {joint.name}, positive to the left of the guide",
             f"N_{{{mark}}}",
         )
         if contact.moment is not None:
             self._solved.append(replace(contact, moment=None))
-            moment = -sign * self.known_moment(slider, self._center(slider))
+            moment = -sign * self.known_moment(slider, about)
             words = f"moment of {by} on {on} at guide {joint.name}"
             ledger.define(contact.moment.name, moment, "N*m", words, f"M_{{{mark}}}")
             self._solved.pop()

@@ -224,14 +224,19 @@ def name_acceleration(ledger: Ledger, body: str, acceleration: sp.Expr) -> sp.Ex
     return ledger.name(name, acceleration, "rad/s^2", f"angular acceleration of {body}", latex)
 
 
-def name_direction(ledger: Ledger, guide: Joint, body: Pose) -> Pair:
-    """Name the unit vector of a guide on a body, in the frame's axes."""
+def guide_axis(guide: Joint) -> Pair:
+    """Unit vector of a guide in the axes of its bodies."""
     assert guide.direction is not None  # a prismatic joint has a direction
     angle = symbol_of(guide.direction)
+    return sp.cos(angle), sp.sin(angle)
+
+
+def name_direction(ledger: Ledger, guide: Joint, direction: Pair) -> Pair:
+    """Name the unit vector of a guide in the frame's axes."""
     return ledger.name_pair(
         f"joint.{guide.name}.direction",
         "",
-        body.rotate((sp.cos(angle), sp.sin(angle))),
+        direction,
         "1",
         f"component of the direction of guide {guide.name}",
         f"t_{{{subscript(guide.name)},AXIS}}",

@@ -18,6 +18,7 @@ from ballpass.derive.mechanism.dyads.dyad import (
     Margin,
     Placement,
     body_span,
+    guide_axis,
     name_acceleration,
     name_direction,
     name_gap,
@@ -84,7 +85,7 @@ class RRP(Dyad):
         path = host.motion(add(host_guide, subtract(slider_inner, slider_guide)))
         words = f"the path of joint {inner.name} where the points of {guide_joint.name} coincide"
         path = ledger.name_motion(f"joint.{guide_joint.name}.base", path, words, f"0,{subscript(guide_joint.name)}")
-        direction = name_direction(ledger, guide_joint, host)
+        direction = name_direction(ledger, guide_joint, host.rotate(guide_axis(guide_joint)))
         normal = quarter_turn(direction)
 
         to_path = subtract(path.position, hinge.position)
@@ -190,4 +191,5 @@ class RRP(Dyad):
         )
         balance.solve_hinge(ledger, self.inner, rod, on_rod)
         balance.solve_hinge_by_forces(ledger, self.outer[0], rod)
-        balance.solve_guide(ledger, guide)
+        across = -dot(guide.normal, balance.known_force(slider))
+        balance.solve_guide(ledger, guide, across, about=balance.center(slider))
