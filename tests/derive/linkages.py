@@ -390,6 +390,70 @@ def watt_six_bar(branch: str = "right") -> Machine:
     )
 
 
+def slotted_lever(branch: str = "ahead", crank: float = 0.05, guide_on_block: bool = False) -> Machine:
+    """Crank, block, slotted lever; slot and block beside their hinges.  With 0.18 m the crank takes the lever round."""
+    lever, block = ("lever", "slot"), ("block", "shoe")
+    first, second = (block, lever) if guide_on_block else (lever, block)
+    return build(
+        frame={"A": ("xy", 0.01, 0.02), "O": ("xy", 0.03, -0.1)},
+        bodies={
+            "crank": {"mass": 0.5, "inertia": 6e-4, "center": ("xy", 0.01, 0.006), "points": {"A": None, "B": crank}},
+            "block": {
+                "mass": 0.3,
+                "inertia": 2e-4,
+                "center": ("xy", 0.004, -0.003),
+                "points": {"B": ("xy", 0.003, 0.002), "shoe": ("xy", -0.006, 0.004)},
+            },
+            "lever": {
+                "mass": 1.4,
+                "inertia": 8e-3,
+                "center": ("xy", 0.11, 0.012),
+                "points": {"O": ("xy", 0.01, -0.01), "slot": ("xy", 0.05, 0.013), "tip": ("xy", 0.22, 0.02)},
+            },
+        },
+        joints={
+            "A": {"bodies": ("frame", "crank")},
+            "B": {"bodies": ("crank", "block")},
+            "S": {
+                "bodies": (first[0], second[0]),
+                "points": (first[1], second[1]),
+                "direction": 8 * DEGREE,
+                "branch": branch,
+            },
+            "O": {"bodies": ("lever", "frame")},
+        },
+        forces={"cut": ("lever", "tip", ("xy", 320.0, -45.0))},
+        torques={"brake": ("lever", 1.3)},
+        speed=12.0,
+    )
+
+
+def shaper_with_ram() -> Machine:
+    """The slotted lever moves a ram by a link: RRP on RPR."""
+    machine = slotted_lever()
+    further = build(
+        frame={"guide": ("xy", 0.0, 0.2)},
+        bodies={
+            "link": {"mass": 0.6, "inertia": 2e-3, "center": ("xy", 0.1, 0.01), "points": {"tip": None, "C": 0.25}},
+            "ram": {"mass": 4.0, "inertia": 1e-3, "center": ("xy", 0.01, 0.02), "points": {"C": None}},
+        },
+        joints={
+            "E": {"bodies": ("lever", "link"), "points": ("tip", "tip")},
+            "C": {"bodies": ("link", "ram"), "branch": "ahead"},
+            "G": {"bodies": ("frame", "ram"), "points": ("guide", "C"), "direction": 3 * DEGREE},
+        },
+        speed=12.0,
+    )
+    one, two = machine.mechanism, further.mechanism
+    both = replace(
+        one,
+        frame_points=one.frame_points + two.frame_points,
+        bodies=one.bodies + two.bodies,
+        joints=one.joints + two.joints,
+    )
+    return Machine(mechanism=both, values={**machine.values, **further.values})
+
+
 MACHINES = {
     "crank-slider": crank_slider,
     "crank-slider behind": lambda: crank_slider(branch="behind"),
@@ -404,4 +468,9 @@ MACHINES = {
     "guide on the slider": lambda: moving_guide(guide_on_slider=True),
     "watt six-bar": watt_six_bar,
     "watt six-bar left": lambda: watt_six_bar("left"),
+    "slotted lever": slotted_lever,
+    "slotted lever behind": lambda: slotted_lever("behind"),
+    "slotted lever, guide on the block": lambda: slotted_lever(guide_on_block=True),
+    "slotted lever that goes round": lambda: slotted_lever(crank=0.18),
+    "shaper with ram": shaper_with_ram,
 }

@@ -16,7 +16,7 @@ from ballpass.derive.scene.read import scene_from_text
 from ballpass.runtime.contract import read_manifest
 
 ROOT = Path(__file__).resolve().parents[2]
-SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
+SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "crank_shaper", "varying_compliance")
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -14,7 +14,7 @@ from ballpass.derive.scene.read import scene_from_text
 from ballpass.derive.scene.records import Scene
 
 ROOT = Path(__file__).resolve().parents[2]
-SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
+SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "crank_shaper", "varying_compliance")
 MODEL = ("model.c", "model.h", "kernels.h", "tangents.h", "ensemble_kernels.h", "methods.h", "model.casadi")
 
 
@@ -110,6 +110,7 @@ PLAIN = {
     "punching_press_tangent": (371, 8, 109),
     "offset_slider": (379, 8, 116),
     "four_bar": (406, 8, 142),
+    "crank_shaper": (368, 8, 105),
     "varying_compliance": (149, 5, 4),
 }
 

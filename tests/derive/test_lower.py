@@ -17,7 +17,7 @@ from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
 from ballpass.runtime import Model
 
-SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
+SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "crank_shaper", "varying_compliance")
 
 
 def by_sympy(

@@ -17,7 +17,9 @@ from linkages import (
     four_bar,
     moving_guide,
     offset_slider,
+    shaper_with_ram,
     six_bar_slider,
+    slotted_lever,
     watt_six_bar,
 )
 
@@ -287,6 +289,11 @@ CASES = {
     "guide on a moving body": (moving_guide, ()),
     "guide on the slider": (lambda: moving_guide(guide_on_slider=True), ()),
     "watt six-bar": (watt_six_bar, ()),
+    "slotted lever": (slotted_lever, ()),
+    "slotted lever, guide on the block": (lambda: slotted_lever(guide_on_block=True), ()),
+    "slotted lever that goes round": (lambda: slotted_lever(crank=0.18), ()),
+    "slotted lever near its dead centre": (lambda: slotted_lever(crank=0.107), ()),
+    "shaper with ram": (shaper_with_ram, ()),
 }
 
 

@@ -26,7 +26,7 @@ from ballpass.derive.scene.records import (
 )
 from ballpass.derive.scene.units import parse_quantity
 
-FILES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
+FILES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "crank_shaper", "varying_compliance")
 
 
 def values(scene: Scene) -> dict[str, float]:

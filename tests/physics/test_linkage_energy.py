@@ -16,7 +16,18 @@ from sympy.physics.mechanics import LagrangesMethod, Point, ReferenceFrame, Rigi
 
 sys.path.append(str(Path(__file__).parents[1] / "derive"))
 
-from linkages import DEGREE, Machine, crank_slider, evaluate, four_bar, moving_guide, offset_slider, watt_six_bar
+from linkages import (
+    DEGREE,
+    Machine,
+    crank_slider,
+    evaluate,
+    four_bar,
+    moving_guide,
+    offset_slider,
+    shaper_with_ram,
+    slotted_lever,
+    watt_six_bar,
+)
 
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.numeric import Evaluator
@@ -76,6 +87,9 @@ LINKAGES = {
     "guide on a moving body": moving_guide,
     "guide on the slider": lambda: moving_guide(guide_on_slider=True),
     "watt six-bar": watt_six_bar,
+    "slotted lever": slotted_lever,
+    "slotted lever that goes round": lambda: slotted_lever(crank=0.18),
+    "shaper with ram": shaper_with_ram,
 }
 
 

@@ -13,7 +13,7 @@ from stepper_runs import ORDERS, edges_of, run, segments_between
 from ballpass.runtime import Model
 from ballpass.runtime.native.stepper import METHODS, Family
 
-SCENES = ("punching_press", "punching_press_tangent", "four_bar", "offset_slider", "varying_compliance")
+SCENES = ("punching_press", "punching_press_tangent", "four_bar", "crank_shaper", "offset_slider", "varying_compliance")
 
 #: A rotor whose balls all stay loaded, under a load that depends on time: smooth, so that orders show.
 SMOOTH = (

@@ -1,12 +1,13 @@
 """Assur dyads: the kinds that a linkage may be made of.  A new kind is a file here and an entry in `DYADS`."""
 
 from ballpass.derive.mechanism.dyads.dyad import Dyad, Margin, Placement
+from ballpass.derive.mechanism.dyads.rpr import RPR
 from ballpass.derive.mechanism.dyads.rrp import RRP
 from ballpass.derive.mechanism.dyads.rrr import RRR
 
 __all__ = ["BRANCHES", "DYADS", "Dyad", "Margin", "Placement"]
 
-DYADS: tuple[type[Dyad], ...] = (RRR, RRP)
+DYADS: tuple[type[Dyad], ...] = (RRR, RRP, RPR)
 
 #: All values that `Joint.branch` may have.
 BRANCHES: tuple[str, ...] = tuple(dict.fromkeys(branch for dyad in DYADS for branch in dyad.branches))

@@ -1,0 +1,125 @@
+"""The RPR dyad: against a numerical solution of its loop closure, and against what textbooks say of a quick return."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+from linkages import DEGREE, DRIVE, Machine, evaluate, shaper_with_ram, slotted_lever
+from scipy.optimize import root
+
+from ballpass.derive import read_scene
+from ballpass.derive.mechanism.linkage import check_assembly, derive_linkage
+from ballpass.derive.scene.errors import LinkageError
+
+SCENE = Path(__file__).resolve().parents[2] / "scenes/crank_shaper.toml"
+
+
+def turned(angle: float, point: complex) -> complex:
+    return point * complex(math.cos(angle), math.sin(angle))
+
+
+def closed_numerically(crank: float, at: float, guess: np.ndarray) -> np.ndarray:
+    """Place and angle of block and lever by `scipy`, from the joints' definitions alone: (x, y, angle) of each."""
+    pin = 0.01 + 0.02j + turned(at, crank + 0j)
+
+    def gaps(unknown: np.ndarray) -> list[float]:
+        xb, yb, block, xl, yl, lever = unknown
+        hinge = complex(xb, yb) + turned(block, 0.003 + 0.002j) - pin
+        pivot = complex(xl, yl) + turned(lever, 0.01 - 0.01j) - (0.03 - 0.1j)
+        slot = complex(xl, yl) + turned(lever, 0.05 + 0.013j)
+        shoe = complex(xb, yb) + turned(block, -0.006 + 0.004j)
+        across = ((shoe - slot) / turned(lever + 8 * DEGREE, 1 + 0j)).imag
+        return [hinge.real, hinge.imag, pivot.real, pivot.imag, across, block - lever]
+
+    solved = root(gaps, guess, tol=1e-12)
+    assert solved.success, solved.message
+    assert np.max(np.abs(solved.fun)) < 1e-14
+    return np.asarray(solved.x)
+
+
+@pytest.mark.parametrize("crank", [0.05, 0.107, 0.18])
+@pytest.mark.parametrize("branch", ["ahead", "behind"])
+def test_places_are_those_of_the_loop_closure_solved_numerically(crank: float, branch: str) -> None:
+    machine = slotted_lever(branch, crank)
+    linkage = machine.linkage()
+    poses = [linkage.poses[body] for body in ("block", "lever")]
+    places = [c for pose in poses for c in (*pose.origin.position, pose.cos, pose.sin)]
+    angles = np.linspace(0.0, 2 * np.pi, 73)
+    derived = np.array([np.broadcast_to(v, angles.shape) for v in evaluate(machine, places, angles, linkage)])
+    turns = np.arctan2(derived[3::4], derived[2::4])
+    # each position starts the search of the next one, so that the branch is kept by continuity
+    guess = np.array([*derived[:2, 0], turns[0, 0], *derived[4:6, 0], turns[1, 0]])
+    for k, angle in enumerate(angles):
+        guess = closed_numerically(crank, float(angle), guess)
+        assert np.max(np.abs(derived[[0, 1, 4, 5], k] - guess[[0, 1, 3, 4]])) < 1e-12
+        for turn in (guess[2], guess[5]):
+            assert np.max(np.abs(derived[2:4, k] - (math.cos(turn), math.sin(turn)))) < 1e-12
+
+
+@pytest.mark.parametrize("guide_on_block", [False, True])
+def test_branch_is_ahead_or_behind_along_the_guide(guide_on_block: bool) -> None:
+    for branch, side in (("ahead", 1), ("behind", -1)):
+        machine = slotted_lever(branch, guide_on_block=guide_on_block)
+        linkage = machine.linkage()
+        direction = sp.Symbol("mechanism.joints.S.direction", real=True)
+        tx, ty = linkage.poses["lever"].rotate((sp.cos(direction), sp.sin(direction)))
+        (x0, y0), (x1, y1) = (
+            linkage.motion(machine.mechanism, b, p).position for b, p in (("lever", "O"), ("block", "B"))
+        )
+        order = -1 if guide_on_block else 1  # from the hinge of the guide's body to the other one
+        (along,) = evaluate(machine, [order * ((x1 - x0) * tx + (y1 - y0) * ty)], np.linspace(0, 6, 61), linkage)
+        assert np.all(side * along > 0)
+
+
+def test_dyads_are_found_in_a_shaper_with_ram() -> None:
+    linkage = shaper_with_ram().linkage()
+    assert [(d.kind, d.joints) for d in linkage.dyads] == [("RPR", ("O", "S", "B")), ("RRP", ("E", "C", "G"))]
+
+
+def test_shipped_shaper_has_the_quick_return_of_its_lengths() -> None:
+    """Crank 80 mm, pivots 200 mm apart: the lever swings by 2 asin(0.4); its strokes are as 180 ± 2 asin(0.4) deg."""
+    scene = read_scene(SCENE)
+    assert scene.mechanism is not None
+    machine = Machine(mechanism=scene.mechanism, values={q.path: q.value for q in scene.quantities})
+    linkage = derive_linkage(scene.mechanism, DRIVE)
+    lever = linkage.poses["lever"]
+    swing = math.asin(80 / 200)
+    crank = np.linspace(0.0, 2 * np.pi, 360001)
+    cos, sin, rate = evaluate(machine, [lever.cos, lever.sin, lever.rate], crank, linkage)
+    angle = np.arctan2(sin, cos)
+    assert np.max(angle) - math.pi / 2 == pytest.approx(swing, abs=1e-9)
+    assert math.pi / 2 - np.min(angle) == pytest.approx(swing, abs=1e-9)
+    assert np.mean(rate > 0) == pytest.approx((math.pi + 2 * swing) / (2 * math.pi), abs=1e-5)
+
+
+def test_hinges_that_meet_are_refused() -> None:
+    """Crank as long as the pivots are apart, slot through both hinges: the block comes to the pivot."""
+    scene = read_scene(SCENE)
+    assert scene.mechanism is not None
+    values = {q.path: q.value for q in scene.quantities}
+    linkage = derive_linkage(scene.mechanism, DRIVE)
+    check_assembly(linkage, values)
+    with pytest.raises(LinkageError, match=r"joint S .* 270"):
+        check_assembly(linkage, values | {"mechanism.bodies.crank.points.B": 0.2})
+
+
+def test_slot_too_far_beside_its_pivot_is_refused() -> None:
+    """The block's path passes the lever's pivot at 80 mm, and the pin comes nearer to it than that."""
+    machine = slotted_lever().with_values(mechanism__bodies__lever__points__slot__y=0.08)
+    with pytest.raises(LinkageError, match="cannot be assembled at joint S"):
+        check_assembly(machine.linkage(), machine.values)
+
+
+def test_missing_branch_is_refused() -> None:
+    with pytest.raises(
+        LinkageError, match="joint S closes the RPR dyad of lever and block and has no branch"
+    ) as caught:
+        slotted_lever().with_joint("S", branch=None).linkage()
+    (fault,) = caught.value.faults
+    assert fault.allowed == "ahead or behind"
+    with pytest.raises(LinkageError, match="branch of another dyad"):
+        slotted_lever().with_joint("S", branch="left").linkage()
