@@ -6,14 +6,13 @@
 # make extremes   runs all extreme cases, also the long ones, and writes docs/extremes.md (some minutes)
 # make trade   measures accuracy against time on the shipped scenes and writes docs/trade.md (about ten minutes)
 # make bench   installs the peers into a venv of their own and measures (25 minutes); QUICK=1: two minutes, for show
-# make bench-test   tests the benchmarks, and that page and results belong together (a minute)
 
 PYTHON ?= python3
 VENV ?= .venv
 export PYTHON VENV
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint docs generated trade bench bench-test clean extremes compiler
+.PHONY: demo test lint docs generated trade bench clean extremes compiler
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.ready
@@ -45,13 +44,10 @@ trade: $(VENV)/.ready
 BENCH_VENV := benchmarks/.venv
 
 bench: $(BENCH_VENV)/.ready
-	$(BENCH_VENV)/bin/python -m benchmarks $(if $(QUICK),--quick --out build/benchmarks/quick) $(if $(FRESH),--fresh)
+	$(BENCH_VENV)/bin/python -m benchmarks $(if $(QUICK),--quick)
 
 extremes: $(VENV)/.ready-dev $(VENV)/.ready-compiler
 	$(BIN)/python -m pytest -n 2 -m extreme tests/extremes --extremes-page docs/extremes.md
-
-bench-test: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest benchmarks
 
 $(BENCH_VENV)/.ready: pyproject.toml requirements.txt benchmarks/requirements.txt scripts/setup.sh
 	@VENV=$(BENCH_VENV) scripts/setup.sh

@@ -21,7 +21,7 @@ from scipy.integrate import solve_ivp
 
 from ballpass.runtime.native.compile import compile_sources
 from ballpass.runtime.native.compilers import find_compiler
-from benchmarks.own import HALVES, HAND_FLAGS, Contender, Kept, Unavailable, c_numbers
+from benchmarks.contenders import HALVES, Contender, Kept, UnavailableError
 from benchmarks.press import Press, make_load, make_loop_rate, make_vector_rate
 from benchmarks.problem import ROOT, Member
 
@@ -31,17 +31,17 @@ def imported(name: str) -> Any:
 
     Raises
     ------
-    Unavailable
+    UnavailableError
         It is not installed, or cannot be loaded.
     """
     try:
         return importlib.import_module(name)
     except ImportError as fault:
         if isinstance(fault, ModuleNotFoundError) and (fault.name or "").split(".")[0] == name.split(".")[0]:
-            raise Unavailable("not installed") from fault
-        raise Unavailable(f"cannot be loaded ({fault})") from fault
+            raise UnavailableError("not installed") from fault
+        raise UnavailableError(f"cannot be loaded ({fault})") from fault
     except OSError as fault:
-        raise Unavailable(f"cannot be loaded ({fault})") from fault
+        raise UnavailableError(f"cannot be loaded ({fault})") from fault
 
 
 def _needs(*names: str) -> Callable[[], None]:
@@ -117,11 +117,9 @@ def _scipy(method: str, how: str) -> Contender:
             state = done.y[:, -1]
         return np.asarray(np.concatenate(rows) * scale)
 
-    words = "numba" if how == "numba" else "NumPy"
     return Contender(
-        key=f"scipy-{method.lower()}-{how}",
-        label=f"SciPy {method}, {words}",
-        group=f"SciPy, {words}",
+        label=f"SciPy {method}, {how}",
+        group=f"SciPy, {how}",
         solve=solve,
         ready=_needs("numba") if how == "numba" else lambda: None,
     )
@@ -204,7 +202,6 @@ def _numbalsoda(method: str) -> Contender:
         return np.asarray(cycle(data, member.start, member.edges, gates, counts, member.times, tolerance))
 
     return Contender(
-        key=f"numbalsoda-{method}",
         label=f"numbalsoda {method.upper()}",
         group="numbalsoda",
         solve=solve,
@@ -216,35 +213,15 @@ def _numbalsoda(method: str) -> Contender:
 # ----------------------------------------------------------------------------------------------------------- SUNDIALS
 
 
-def _sundae(member: Member, tolerance: float) -> np.ndarray:
-    cvode = imported("sksundae.cvode")
-    n, scale, scaled = member.press, member.magnitude, numba_scaled_rate()
-
-    def right_side(t: float, z: np.ndarray, dz: np.ndarray, gate: float) -> None:
-        dz[:] = scaled(t, z, n, gate, scale)
-
-    state = member.start / scale
-    rows = []
-    for a, b, gate, inside in member.pieces:
-        solver = cvode.CVODE(right_side, rtol=tolerance, atol=tolerance, userdata=gate, max_num_steps=10_000_000)
-        wanted = np.concatenate([[a], inside, [] if inside.size and inside[-1] == b else [b]])
-        found = solver.solve(wanted, state)
-        if not found.success:
-            return np.full((len(member.times), 8), np.nan)
-        rows.append(found.y[1 : len(inside) + 1])
-        state = np.array(found.y[-1])
-    return np.asarray(np.concatenate(rows) * scale)
-
-
 @cache
-def _cvode_library() -> ctypes.CDLL:
+def cvode_library() -> ctypes.CDLL:
     package = imported("sksundae")
     libraries = Path(package.__file__).parent.parent / "scikit_sundae.libs"
     wanted = ("core", "cvode", "nvecserial", "sunlinsoldense", "sunmatrixdense")
     found = [next(iter(sorted(libraries.glob(f"libsundials_{name}-*.so*"))), None) for name in wanted]
     compiler = find_compiler()
     if compiler is None or any(path is None for path in found):
-        raise Unavailable("needs a C compiler and scikit-sundae's wheel for Linux")
+        raise UnavailableError("needs a C compiler and scikit-sundae's wheel for Linux")
     for path in found:
         ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL)
     folder = ROOT / "benchmarks"
@@ -252,41 +229,33 @@ def _cvode_library() -> ctypes.CDLL:
         (folder / "cvode.c",),
         compiler,
         label="cvode",
-        headers=(folder / "hand_written.c",),
-        flags=HAND_FLAGS,
+        flags=("-O3", "-ffast-math", "-march=native"),
     )
     return ctypes.CDLL(str(library.path))
 
 
 _cvode_data = Kept(
     lambda member: (
-        c_numbers(member),
+        np.array([*member.press, *member.magnitude]),
         np.array(member.gates),
         np.array([len(inside) for *_, inside in member.pieces], dtype=ctypes.c_long),
     )
 )
 
 
-#: Methods of cvode.c by the end of their keys: words, CVODE's number, and whether iteration is fixed-point.
-_CVODE_METHODS = {
-    "bdf": ("BDF, C", 2, 0),
-    "adams": ("Adams, fixed point, C", 1, 1),
-    "adams-newton": ("Adams, Newton, C", 1, 0),
-}
+#: Methods of cvode.c: words, and CVODE's number.
+_CVODE_METHODS = {"BDF": 2, "Adams": 1}
 
 
-def _cvode(key: str) -> Contender:
-    words, method, fixed_point = _CVODE_METHODS[key]
-
+def _cvode(words: str) -> Contender:
     def solve(member: Member, tolerance: float) -> np.ndarray:
         numbers, gates, counts = _cvode_data(member)
         states = np.empty((len(member.times), 8))
         pointer = ctypes.c_void_p
-        status = _cvode_library().cvode_cycle(
-            method,
-            fixed_point,
+        status = cvode_library().cvode_cycle(
+            _CVODE_METHODS[words],
             ctypes.c_double(tolerance),
-            ctypes.byref(numbers),
+            pointer(numbers.ctypes.data),
             pointer(member.start.ctypes.data),
             len(gates),
             pointer(member.edges.ctypes.data),
@@ -300,9 +269,8 @@ def _cvode(key: str) -> Contender:
         return states
 
     return Contender(
-        key=f"cvode-{key}",
-        label=f"SUNDIALS CVODE {words}",
-        group="SUNDIALS in C",
+        label=f"SUNDIALS CVODE {words}, C",
+        group="SUNDIALS",
         solve=solve,
         tolerances=HALVES,
         ready=_cvode_ready,
@@ -311,9 +279,9 @@ def _cvode(key: str) -> Contender:
 
 def _cvode_ready() -> None:
     try:
-        _cvode_library()
+        cvode_library()
     except (OSError, subprocess.SubprocessError) as fault:
-        raise Unavailable(f"cannot be built ({fault})") from fault
+        raise UnavailableError(f"cannot be built ({fault})") from fault
 
 
 # ------------------------------------------------------------------------------------------------------------ diffrax
@@ -387,7 +355,6 @@ def _diffrax(solver: str) -> Contender:
         return np.asarray(found)
 
     return Contender(
-        key=f"diffrax-{solver.lower()}",
         label=f"diffrax {solver}",
         group="diffrax",
         solve=solve,
@@ -399,15 +366,9 @@ def peers() -> list[Contender]:
     """All of them, in the order of tables."""
     return [
         *(_numbalsoda(method) for method in ("lsoda", "dop853")),
-        *(_cvode(key) for key in _CVODE_METHODS),
-        Contender(
-            key="sundae",
-            label="scikit-sundae CVODE, numba",
-            group="scikit-sundae",
-            solve=_sundae,
-            ready=_needs("numba", "sksundae"),
-        ),
+        *(_cvode(words) for words in _CVODE_METHODS),
         _diffrax("Tsit5"),
         _diffrax("Kvaerno5"),
-        *(_scipy(method, how) for how in ("numba", "numpy") for method in ("LSODA", "DOP853", "Radau")),
+        *(_scipy(method, "numba") for method in ("LSODA", "DOP853", "Radau")),
+        _scipy("LSODA", "NumPy"),
     ]

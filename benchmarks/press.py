@@ -1,10 +1,8 @@
 """The press written by hand, once, for every contender that does not come with the project.
 
-In: numbers of a model.  Out: dx/dt in NumPy, numba, JAX.  The formulas are those of `hand_written.c`: a
-crank-slider on its
-centre line with a balanced crank, balls of one kind, an elastic outer ring, one-sided or tangent damping.  They
-were derived
-apart from the project's generated equations, and `check` holds both against each other.
+In: numbers of a model.  Out: dx/dt in NumPy, numba, JAX; cvode.c has the same in C.  A crank-slider on its centre line
+with a balanced crank, balls of one kind, an elastic outer ring, one-sided or tangent damping.  The formulas were
+derived apart from the project's generated equations, and `disagreement` holds both against each other.
 """
 
 from __future__ import annotations
@@ -20,7 +18,7 @@ from ballpass.runtime.model import Model
 
 
 class Press(NamedTuple):
-    """Numbers of the press, SI; the order is that of the struct in hand_written.c."""
+    """Numbers of the press, SI; the order is that of the struct in cvode.c."""
 
     speed: float
     cage_speed: float

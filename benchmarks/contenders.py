@@ -1,0 +1,98 @@
+"""Contenders that need no more than the project's own packages: its stepper, and CasADi's integrators."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ballpass.runtime.native.stepper import METHODS, End, Family
+from ballpass.runtime.run.locating import choose_kinks, stepper_for
+from benchmarks.problem import POINTS, Member
+
+DECADES = tuple(10.0**-k for k in range(2, 11))
+HALVES = tuple(10.0**-k for k in np.arange(1.5, 11.1, 0.5))
+
+Solve = Callable[[Member, float], np.ndarray]
+
+
+class UnavailableError(Exception):
+    """A contender cannot run here; the message says why."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contender:
+    """Something that integrates the cycle.
+
+    Attributes
+    ----------
+    label, group : names for people, of itself and of the curve of the figure that it belongs to
+    solve : member and tolerance to states at the output points, shape (POINTS, 8)
+    tolerances : that are swept
+    ready : raises `UnavailableError` where it cannot run
+    """
+
+    label: str
+    group: str
+    solve: Solve
+    tolerances: tuple[float, ...] = DECADES
+    ready: Callable[[], object] = lambda: None
+
+
+class Kept:
+    """What a contender prepares once per member."""
+
+    def __init__(self, make: Callable[[Member], Any]) -> None:
+        self._make = make
+        self._made: dict[int, tuple[Member, Any]] = {}
+
+    def __call__(self, member: Member) -> Any:
+        if id(member) not in self._made:
+            self._made[id(member)] = (member, self._make(member))
+        return self._made[id(member)][1]
+
+
+def _stepper(name: str, family: Family) -> Contender:
+    def solve(member: Member, tolerance: float) -> np.ndarray:
+        """One raw call on prepared arrays."""
+        stepper = stepper_for(member.model, choose_kinks(None, name, member.model.manifest, tolerance))
+        states = np.empty((POINTS, len(member.start)))
+        outcome = stepper.run(
+            family=family,
+            tolerance=tolerance * member.magnitude,
+            p=member.numbers.p,
+            c=member.numbers.c,
+            x=member.start.copy(),
+            segments=member.segments,
+            output_times=member.times,
+            output_states=states,
+        )
+        if outcome.end is not End.DONE:
+            states[outcome.written :] = np.nan
+        return states
+
+    return Contender(label=name, group="ballpass", solve=solve, tolerances=HALVES)
+
+
+def _simulated(method: str, outputs: list[str] | None) -> Solve:
+    def solve(member: Member, tolerance: float) -> np.ndarray:
+        solution = member.model.simulate(
+            cycles=1, parameters=member.parameters, method=method, rtol=tolerance, samples_per_cycle=POINTS,
+            initial=member.start, outputs=outputs, transient=0,
+        )  # fmt: skip
+        return np.asarray(solution.x[1:])
+
+    return solve
+
+
+def own_contenders() -> list[Contender]:
+    """All of them, in the order of tables; plain `stepper`, to which ratios are, first."""
+    return [
+        *(_stepper(name, family) for name, family in METHODS.items()),
+        Contender(label="model.simulate, outputs included", group="model.simulate", solve=_simulated("stepper", None),
+                  tolerances=HALVES),
+        *(Contender(label=f"CasADi {name}, virtual machine", group="CasADi", solve=_simulated(name, []))
+          for name in ("erk", "rosenbrock", "cvodes")),
+    ]  # fmt: skip
