@@ -11,8 +11,8 @@ from artefact import DEFAULTS, write_folder
 
 from ballpass.runtime import IntegrationError, Model, RequestError, Status, load, load_solution
 from ballpass.runtime.native import compile
+from ballpass.runtime.native.casadi_integrators import METHODS, Frozen, OneStepIntegrator
 from ballpass.runtime.native.kernel import EvaluationError
-from ballpass.runtime.run.casadi_integrators import METHODS, Frozen, OneStepIntegrator
 
 TURN = 2.0 * math.pi
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         SimulationError,
     )
     from ballpass.runtime.contract.parameters import Parameters
-    from ballpass.runtime.contract.status import IntegrationError, Status
+    from ballpass.runtime.contract.status import Status
     from ballpass.runtime.many.chunks import MemberFailure
     from ballpass.runtime.many.ensemble import EnsembleResult, EnsembleStatistics
     from ballpass.runtime.model import Model, load
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.point.explain import Explanation
     from ballpass.runtime.point.jacobian_function import JacobianFunction
     from ballpass.runtime.point.linearize import KinkWarning, Linearization, Mode
+    from ballpass.runtime.run.integration_error import IntegrationError
     from ballpass.runtime.run.reductions import Reduction, Reductions
     from ballpass.runtime.run.sensitivity import Sensitivities
     from ballpass.runtime.run.solution import Solution, Statistics, load_solution
@@ -90,7 +91,6 @@ _HOME = {
     "RequestError": "contract.errors",
     "SimulationError": "contract.errors",
     "Parameters": "contract.parameters",
-    "IntegrationError": "contract.status",
     "Status": "contract.status",
     "MemberFailure": "many.chunks",
     "EnsembleResult": "many.ensemble",
@@ -106,6 +106,7 @@ _HOME = {
     "KinkWarning": "point.linearize",
     "Linearization": "point.linearize",
     "Mode": "point.linearize",
+    "IntegrationError": "run.integration_error",
     "Reduction": "run.reductions",
     "Reductions": "run.reductions",
     "Sensitivities": "run.sensitivity",

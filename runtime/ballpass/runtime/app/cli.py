@@ -265,8 +265,8 @@ def _check_request(
     """Refuse options that no model can follow, before anything is derived or written."""
     from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
     from ballpass.runtime.contract.parameters import unknown_name
+    from ballpass.runtime.native.casadi_integrators import METHODS
     from ballpass.runtime.native.stepper import METHODS as STEPPERS
-    from ballpass.runtime.run.casadi_integrators import METHODS
     from ballpass.runtime.run.request import TOLERANCES
 
     faults = []

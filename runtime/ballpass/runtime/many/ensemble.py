@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ballpass.runtime.app.printed import printed
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import real, unknown_name
@@ -29,6 +28,7 @@ from ballpass.runtime.native.ensemble_driver import LANE_FAMILIES
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
+from ballpass.runtime.run.printed import printed
 from ballpass.runtime.run.reduced_run import check_rtol, check_span, choose_family
 from ballpass.runtime.run.reductions import channel_names, observable_aliases, observe
 from ballpass.runtime.run.request import check_memory

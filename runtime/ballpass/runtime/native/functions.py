@@ -18,11 +18,11 @@ import casadi
 from ballpass.runtime.contract import MODEL, Manifest, check_unchanged
 from ballpass.runtime.contract.errors import ArtefactError, CompileError, RequestError
 from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.native.casadi_integrators import make_integrator
 from ballpass.runtime.native.compile import CompiledLibrary, compile_sources, digests_of
 from ballpass.runtime.native.compilers import Compiler, find_compiler
 from ballpass.runtime.native.kernel import Array, Kernel, Loop
 from ballpass.runtime.native.loops import CompiledLoop, LoopDriver, PointLoop
-from ballpass.runtime.run.casadi_integrators import make_integrator
 
 #: Arguments of a function of outputs that change from sample to sample.
 _MOVING = ("t", "x", "u")

@@ -22,13 +22,13 @@ from rich import box
 from rich.table import Table
 from scipy.optimize import brentq
 
-from ballpass.runtime.app.printed import printed
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import RHS, Rows, contract, directions_of, rows_of
 from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.printed import printed
 
 Array = NDArray[np.float64]
 

@@ -24,12 +24,12 @@ from rich import box
 from rich.console import Group
 from rich.table import Table
 
-from ballpass.runtime.app.printed import printed
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import rows_of
+from ballpass.runtime.run.printed import printed
 
 Array = NDArray[np.float64]
 

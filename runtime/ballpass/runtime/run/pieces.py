@@ -11,8 +11,8 @@ import numpy as np
 
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
+from ballpass.runtime.native.casadi_integrators import Frozen, Integrator
 from ballpass.runtime.native.kernel import EvaluationError
-from ballpass.runtime.run.casadi_integrators import Frozen, Integrator
 from ballpass.runtime.run.trajectory import Interrupted, Trajectory
 
 

@@ -22,12 +22,13 @@ import numpy as np
 from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
-from ballpass.runtime.contract.status import IntegrationError, Status
+from ballpass.runtime.contract.status import Status
+from ballpass.runtime.native.casadi_integrators import METHODS, available_methods
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
-from ballpass.runtime.run.casadi_integrators import METHODS, available_methods
 from ballpass.runtime.run.failure_location import whereabouts
+from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.limits import refuse_crawl
 from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, choose_kinks
 from ballpass.runtime.run.magnitudes import model_scales, stepper_magnitudes
