@@ -18,7 +18,7 @@ from ballpass.runtime.native.driver_library import DRIVER, FLAGS
 #: The driver's factorization and what it makes of a right-hand side, as it uses them in a stage.
 HARNESS = """
 #include <math.h>
-#include "rosenbrock.h"
+#include "single.h"
 int size(void) { return BP_NQ; }
 int solve(const double *A, const double *B, double s, const double *R, double *kv)
 {

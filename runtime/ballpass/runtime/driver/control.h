@@ -5,8 +5,7 @@
 
 #include <string.h>
 
-#include "explicit.h"
-#include "rosenbrock.h"
+#include "single.h"
 
 enum {
     BP_STIFF_STEPS = 12, /* steps at the stability limit before an explicit method gives up */
@@ -45,7 +44,7 @@ static inline double bp_first_step(const bp_numbers *n, double t, const double *
 {
     double dx[BP_NX], moved[BP_NX], change[BP_NX];
     bp_explicit_rate(n, t, x, dx);
-    const double slope = bp_norm(dx, weight), size = bp_norm(x, weight);
+    const double slope = bp_size(dx, weight), size = bp_size(x, weight);
     double h = size > 1e-5 && slope > 1e-5 ? 0.01 * size / slope : 1e-6 * longest;
     /* from rest the size says nothing: the step of a tolerance's motion does */
     if (slope > 0.0 && h < 1.0 / slope) h = 1.0 / slope;
@@ -53,7 +52,7 @@ static inline double bp_first_step(const bp_numbers *n, double t, const double *
     for (int k = 0; k < BP_NX; k++) moved[k] = x[k] + h * dx[k];
     bp_explicit_rate(n, t + h, moved, change);
     for (int k = 0; k < BP_NX; k++) change[k] = (change[k] - dx[k]) / h;
-    const double curvature = bp_norm(change, weight), larger = curvature > slope ? curvature : slope;
+    const double curvature = bp_size(change, weight), larger = curvature > slope ? curvature : slope;
     const double second = larger > 1e-15 ? pow(0.01 / larger, 1.0 / error_exponent) : h * 1e-3;
     h = 100.0 * h < second ? 100.0 * h : second;
     return h < longest ? h : longest;

@@ -15,36 +15,17 @@ static void tangent_start(bp_run *run, double t)
 static double tangent_step(bp_run *run, double t, double h, double error)
 {
     const ballpass_tangents *tangents = run->tangents;
+    const bp_explicit_method *plain = explicit_method(run->method);
+    const bp_rosenbrock_method *linear = rosenbrock_method(run->method);
     const long segment = run->result->segment;
     if (!tangents) return error;
-    switch (run->method) {
-    case BALLPASS_DP54:
-        bp_explicit_tangent_step(&bp_dp54, BP_DP54_STAGES, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h,
-                                 run->next);
-        break;
-    case BALLPASS_DOP853:
-        bp_explicit_tangent_step(&bp_dop853, BP_DOP853_STAGES, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h,
-                                 run->next);
-        break;
-    case BALLPASS_RODAS4:
-        bp_rosenbrock_tangent_step(&bp_rodas4, BP_RODAS4_STAGES, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers, segment,
-                                   t, run->x, h);
-        break;
-    default:
-        bp_rosenbrock_tangent_step(&bp_rodas5p, BP_RODAS5P_STAGES, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers,
-                                   segment, t, run->x, h);
-    }
+    if (plain)
+        bp_explicit_tangent_step(plain, plain->stages, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h, run->next);
+    else
+        bp_rosenbrock_tangent_step(linear, linear->stages, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers, segment, t,
+                                   run->x, h);
     if (!tangents->weight) return error;
-    double theirs;
-    if (is_explicit(run->method)) {
-        const bp_explicit_method *method = run->method == BALLPASS_DP54 ? &bp_dp54 : &bp_dop853;
-        const double *weights[2] = {method->error[0], method->error[1]};
-        theirs = bp_tangent_error(tangents, run->blocks, weights, method->estimates, method->error_share, method->stages + 1, h);
-    } else {
-        const bp_rosenbrock_method *method = run->method == BALLPASS_RODAS4 ? &bp_rodas4 : &bp_rodas5p;
-        const double *weights[1] = {method->error_weights}, none[1] = {0.0};
-        theirs = bp_tangent_error(tangents, run->blocks, weights, 1, none, method->stages, 1.0);
-    }
+    const double theirs = bp_tangent_error(tangents, run->blocks, plain, linear, h);
     return theirs <= error ? error : theirs;
 }
 
@@ -52,10 +33,10 @@ static double tangent_step(bp_run *run, double t, double h, double error)
 static void tangent_accept(bp_run *run)
 {
     if (!run->tangents) return;
-    const int end = run->method == BALLPASS_DP54 ? BP_DP54_STAGES : BP_DOP853_STAGES;
+    const bp_explicit_method *plain = explicit_method(run->method);
     for (long b = 0; b < run->tangents->blocks; b++) {
         memcpy(bp_tangent_state(run->tangents, b), run->blocks[b].next, sizeof run->blocks[b].next);
-        if (is_explicit(run->method)) memcpy(run->blocks[b].k[0], run->blocks[b].k[end], sizeof run->blocks[b].k[0]);
+        if (plain) memcpy(run->blocks[b].k[0], run->blocks[b].k[plain->stages], sizeof run->blocks[b].k[0]);
     }
 }
 
@@ -63,24 +44,24 @@ static void tangent_output(bp_run *run, double t, double h, double theta, int pr
 {
     const ballpass_tangents *tangents = run->tangents;
     if (!tangents || !tangents->outputs) return;
+    const bp_explicit_method *plain = explicit_method(run->method);
+    const bp_rosenbrock_method *linear = rosenbrock_method(run->method);
     double *out = tangents->outputs + run->result->written * tangents->blocks * (BP_NX * BP_LANES);
-    if (theta >= 1.0) {
-        for (long b = 0; b < tangents->blocks; b++)
-            memcpy(out + b * (BP_NX * BP_LANES), run->blocks[b].next, sizeof run->blocks[b].next);
-        return;
+    if (!prepared && theta < 1.0 && plain)
+        bp_explicit_tangent_dense(plain, tangents, run->blocks, &run->plain, &run->numbers, run->result->segment, t, run->x, h);
+    for (long b = 0; b < tangents->blocks; b++, out += BP_NX * BP_LANES) {
+        bp_tangent_block *own = &run->blocks[b];
+        const double *from = bp_tangent_state(tangents, b);
+        const double(*dense)[BP_NX * BP_LANES] = (const double(*)[BP_NX * BP_LANES])own->dense;
+        if (theta >= 1.0) {
+            memcpy(out, own->next, sizeof own->next);
+        } else if (plain) {
+            bp_tangent_explicit_at(plain, dense, from, own->next, theta, out);
+        } else {
+            if (!prepared) bp_tangent_rosenbrock_dense(linear, (const double(*)[BP_NX * BP_LANES])own->k, own->dense);
+            bp_tangent_rosenbrock_at(linear, dense, from, own->next, theta, out);
+        }
     }
-    const long segment = run->result->segment;
-    if (!prepared) {
-        if (run->method == BALLPASS_DP54)
-            bp_explicit_tangent_dense(&bp_dp54, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h);
-        else if (run->method == BALLPASS_DOP853)
-            bp_explicit_tangent_dense(&bp_dop853, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h);
-        else
-            bp_rosenbrock_tangent_dense(run->method == BALLPASS_RODAS4 ? &bp_rodas4 : &bp_rodas5p, tangents, run->blocks);
-    }
-    if (run->method == BALLPASS_DP54) bp_explicit_tangent_at(&bp_dp54, tangents, run->blocks, theta, out);
-    else if (run->method == BALLPASS_DOP853) bp_explicit_tangent_at(&bp_dop853, tangents, run->blocks, theta, out);
-    else bp_rosenbrock_tangent_at(run->method == BALLPASS_RODAS4 ? &bp_rodas4 : &bp_rodas5p, tangents, run->blocks, theta, out);
 }
 
 /* Where a load switches at a time that moves with a parameter, the derivative at fixed time jumps. */

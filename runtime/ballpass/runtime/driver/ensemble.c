@@ -103,8 +103,8 @@ static void choose_start(const bp_job *job, long m)
     if (!job->restarts[job->first[m] + result->segment] && at->step > 0.0) return;
     int method = job->options->method;
     if (method == BALLPASS_AUTO) {
-        bp_rosenbrock work;
-        bp_rosenbrock_start(&work, &n, 0.0, x, 1);
+        bp_linear work;
+        bp_linear_start(&work, &n, 0.0, x, 1);
         result->evaluations++;
         method = bp_starts_linear(&at->seen, work.A, work.B) ? BALLPASS_RODAS5P : BALLPASS_DP54;
         result->switches += at->method != method && at->method != BALLPASS_AUTO;
@@ -224,25 +224,35 @@ static void leave_lane(const bp_job *job, bp_lane_block *b, int lane, int status
     b->who[lane] = -1;
 }
 
-/* A channel of the member in a lane within the step just taken, for bp_extreme. */
+/* A member within the step just taken, for bp_extreme. */
 typedef struct {
-    const bp_lane_block *b;
     bp_numbers n;
-    int lane;
+    double t, h, x[BP_NX], next[BP_NX], dense[BP_DENSE_ROWS][BP_NX];
+    int linearly;
 } bp_lane_source;
+
+static bp_lane_source lane_source(const bp_job *job, const bp_lane_block *b, int lane)
+{
+    bp_lane_source source;
+    source.n = member_numbers(job, b->who[lane]);
+    source.t = b->t[lane];
+    source.h = b->h[lane];
+    source.linearly = b->linearly;
+    get(b->x, lane, source.x, BP_NX);
+    get(b->next, lane, source.next, BP_NX);
+    const int rows = b->linearly ? bp_rodas5p.dense_rows : 2 + bp_dp54.dense_rows;
+    for (int row = 0; row < rows; row++) get(b->dense[row], lane, source.dense[row], BP_NX);
+    return source;
+}
 
 static double lane_channel(const void *from, int channel, double theta, int *ball)
 {
     const bp_lane_source *source = from;
-    const bp_lane_block *b = source->b;
+    const double(*dense)[BP_NX] = (const double(*)[BP_NX])source->dense;
     double y[BP_NX];
-    for (int k = 0; k < BP_NX; k++) {
-        const int i = k * BP_L + source->lane;
-        if (channel < BP_NX && k != channel) continue;
-        if (b->linearly) y[k] = bp_linear_entry(b->dense[0] + i, BP_NX * BP_L, b->x[i], b->next[i], theta);
-        else y[k] = bp_explicit_entry(b->dense[0] + i, BP_NX * BP_L, b->x[i], b->next[i], theta);
-    }
-    return bp_channel(&source->n, b->t[source->lane] + theta * b->h[source->lane], y, channel, ball);
+    if (source->linearly) bp_rosenbrock_at(&bp_rodas5p, dense, source->x, source->next, theta, y);
+    else bp_explicit_at(&bp_dp54, dense, source->x, source->next, theta, y);
+    return bp_channel(&source->n, source->t + theta * source->h, y, channel, ball);
 }
 
 /* Reductions of the lanes whose step was accepted; the same rules as bp_reduce. */
@@ -250,22 +260,15 @@ static void reduce(const bp_job *job, bp_lane_block *b)
 {
     double add[BP_L] BP_ALIGNED;
     BP_EACH_LANE add[lane] = b->accepted[lane] * b->reducing[lane];
-    if (b->linearly) bp_lane_linear_dense(&b->linear, b->dense);
-    else bp_lane_explicit_dense(&b->plain, b->x, b->h, b->next, b->dense);
+    const double(*dense)[BP_NX * BP_L] = (const double(*)[BP_NX * BP_L])b->dense;
+    if (b->linearly) bp_lane_rosenbrock_dense(&bp_rodas5p, (const double(*)[BP_NX * BP_L])b->linear.u, b->dense);
+    else bp_lane_explicit_dense(&bp_dp54, NULL, b->plain.k, b->x, b->h, b->next, b->dense);
     for (int q = 1; q < BP_POINTS; q++) {
         const double theta = (double)q / (BP_POINTS - 1);
         double *restrict y = b->sampled[q];
-        for (int k = 0; k < BP_NX; k++) {
-            if (!b->balls && !(b->wanted >> k & 1)) continue;
-            const int row = k * BP_L;
-            if (q == BP_POINTS - 1) {
-                BP_EACH_LANE y[row + lane] = b->next[row + lane];
-            } else if (b->linearly) {
-                BP_EACH_LANE y[row + lane] = bp_linear_entry(b->dense[0] + row + lane, BP_NX * BP_L, b->x[row + lane], b->next[row + lane], theta);
-            } else {
-                BP_EACH_LANE y[row + lane] = bp_explicit_entry(b->dense[0] + row + lane, BP_NX * BP_L, b->x[row + lane], b->next[row + lane], theta);
-            }
-        }
+        if (q == BP_POINTS - 1) memcpy(y, b->next, sizeof b->next);
+        else if (b->linearly) bp_lane_rosenbrock_at(&bp_rodas5p, dense, b->x, b->next, theta, y);
+        else bp_lane_explicit_at(&bp_dp54, dense, b->x, b->next, theta, y);
         if (!b->balls) continue;
         bp_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, y + BP_NX * BP_L);
     }
@@ -293,7 +296,7 @@ static void reduce(const bp_job *job, bp_lane_block *b)
             if (news[lane] == 0.0) continue;
             const long m = b->who[lane];
             double *reduction = job->reductions + m * BP_REDUCTION;
-            const bp_lane_source source = {b, member_numbers(job, m), lane};
+            const bp_lane_source source = lane_source(job, b, lane);
             const double time = b->start[lane] + b->t[lane], *v = b->sampled[0] + row + lane;
             if (news[lane] != 2.0) bp_extreme(reduction, BP_MAX, k, 1.0, v, BP_CHANNELS * BP_L, time, b->h[lane], lane_channel, &source);
             if (news[lane] != 1.0) bp_extreme(reduction, BP_MIN, k, -1.0, v, BP_CHANNELS * BP_L, time, b->h[lane], lane_channel, &source);
@@ -332,9 +335,9 @@ static int after_explicit(const bp_job *job, const bp_lane_block *b, int lane, d
     if (wanted == BP_ASK) {
         const bp_numbers n = member_numbers(job, m);
         double x[BP_NX];
-        bp_rosenbrock work;
+        bp_linear work;
         get(b->x, lane, x, BP_NX);
-        bp_rosenbrock_start(&work, &n, b->t[lane], x, 1);
+        bp_linear_start(&work, &n, b->t[lane], x, 1);
         job->results[m].evaluations++;
         stable = bp_stable_step(work.A, work.B, 1);
     }
@@ -345,7 +348,8 @@ static int after_explicit(const bp_job *job, const bp_lane_block *b, int lane, d
 static void look(const bp_job *job, bp_lane_block *b, const double *looking)
 {
     double reach[BP_L] BP_ALIGNED;
-    if (!b->linearly) bp_lane_stiffness(&b->plain, b->h, b->next, b->weight, reach);
+    const double(*k)[BP_NX * BP_L] = (const double(*)[BP_NX * BP_L])b->plain.k;
+    if (!b->linearly) bp_lane_explicit_reach(BP_DP54_STAGES, k, b->plain.y, b->h, b->next, b->weight, reach);
     for (int lane = 0; lane < BP_L; lane++) {
         if (looking[lane] == 0.0) continue;
         bp_member *at = job->member + b->who[lane];

@@ -1,150 +1,166 @@
-/* Explicit Runge-Kutta step (Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, sections II.4 to II.6). */
-#ifndef BALLPASS_EXPLICIT_H
-#define BALLPASS_EXPLICIT_H
+/* Explicit Runge-Kutta step (Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, sections II.4 to II.6).
 
-#include "methods.h"
-#include "model.h"
-#include "pace.h"
+   A body without a guard: single.h, lanes.h and sensitivity.h include it for one run, a member in each lane and directions of derivatives.
+   A state is BP_NX coordinates of BP_W numbers each, next to each other.  Defined where it is included:
 
-typedef struct {
-    double k[BP_METHOD_STAGES][BP_NX]; /* slopes; the first is known when a step starts */
-    double y[BP_NX];                   /* argument of the last stage: stiffness shows in it */
-} bp_explicit;
+   BP_NAME(f)   name of a function there
+   BP_W, BP_N   numbers of a coordinate, and their type
+   BP_V, BP_VS  type that sums run in, and how many make up the positions (as many the velocities)
+   BP_H         type of a step size: one for all, or one for each lane
+   BP_NAME(times), BP_NAME(slope)(at, i, time, y, k)
+                what the slopes of a step need of its times; the slope k of stage i (from 1 on) with argument y at the time number `time`
 
-static inline void bp_explicit_rate(const bp_numbers *n, double t, const double *restrict x, double *restrict dx)
+   Step sizes are handed over by their addresses. */
+
+#define BP_AT(type, x, i) (((type *)(x))[i])
+
+/* Vectors that a sum runs in at once: they stay in registers. */
+#undef BP_TOGETHER
+#define BP_TOGETHER (2 * BP_VS % 4 == 0 ? 4 : 2)
+
+/* y = x + sum of scale row[j] k[j], without x where it is NULL. */
+BP_INLINE void BP_NAME(add)(const double *restrict row, const int count, const double k[][BP_NX * BP_W], const BP_H *scale,
+                            const double *restrict x, double *restrict y)
 {
-    double w[BP_NW];
-    bp_stage(t, n->u, n->p, n->c, w);
-    bp_rate(n, w, x, dx);
+#pragma GCC unroll 16
+    for (int first = 0; first < 2 * BP_VS; first += BP_TOGETHER) {
+        BP_V sum[BP_TOGETHER];
+#pragma GCC unroll 16
+        for (int e = 0; e < BP_TOGETHER; e++) sum[e] = x ? BP_AT(const BP_V, x, first + e) : (BP_V){0.0};
+        for (int j = 0; j < count; j++) {
+            if (row[j] == 0.0) continue;
+            const BP_H a = *scale * row[j];
+#pragma GCC unroll 16
+            for (int e = 0; e < BP_TOGETHER; e++) sum[e] += a * BP_AT(const BP_V, k[j], first + e);
+        }
+#pragma GCC unroll 16
+        for (int e = 0; e < BP_TOGETHER; e++) BP_AT(BP_V, y, first + e) = sum[e];
+    }
 }
 
-static inline __attribute__((always_inline)) void bp_combine(const double *restrict row, int count, const double k[][BP_NX], double h,
-                                                             const double *restrict x, double *restrict y)
+/* y = x + h sum of row[j] k[j]. */
+BP_INLINE void BP_NAME(combine)(const double *restrict row, const int count, const double k[][BP_NX * BP_W], const double *restrict h,
+                                const double *restrict x, double *restrict y)
 {
-    bp_state sum = {0.0};
-    for (int j = 0; j < count; j++) {
-        const double a = row[j];
-        if (a == 0.0) continue;
-        sum += a * BP_STATE(k[j]);
-    }
-    *(bp_state *)y = BP_STATE(x) + h * sum;
+    const BP_H one = 1.0 - (BP_H){0.0};
+    double sum[BP_NX * BP_W] BP_ALIGNED;
+    BP_NAME(add)(row, count, k, &one, NULL, sum);
+#pragma GCC unroll 16
+    for (int e = 0; e < 2 * BP_VS; e++) BP_AT(BP_V, y, e) = BP_AT(const BP_V, x, e) + *(const BP_H *)h * BP_AT(BP_V, sum, e);
 }
 
-/* One step of size h from (t, x) to `next`, the end slope included; returns the scaled error.  Where `lead` is given the step has an
-   uneven pace (pace.h), and all its slopes are by theta h, the first as well. */
-static inline __attribute__((always_inline)) double bp_explicit_step(const bp_explicit_method *restrict method, const int stages,
-                                                                      bp_explicit *restrict work, const bp_numbers *n, double t,
-                                                                      const double *restrict x, double h, const double *restrict lead,
-                                                                      const double *restrict weight, double *restrict next)
+/* Root mean square of an error over its tolerance; not a number where the error is none. */
+BP_INLINE void BP_NAME(norm)(const double *restrict error, const double *restrict weight, double *restrict norm)
 {
-    /* all times of the step at once; the last stage and the end slope are both at its end */
-    double w[BP_METHOD_STAGES][BP_NW], passed[BP_METHOD_STAGES];
-    const double *nodes = method->nodes;
-    if (lead) {
-        for (int i = 1; i < stages; i++) passed[i] = bp_passed(*lead, method->nodes[i]);
-        nodes = passed;
+    BP_N square[BP_NX];
+    for (int k = 0; k < BP_NX; k++) {
+        const BP_N e = BP_AT(const BP_N, error, k) * BP_AT(const BP_N, weight, k);
+        square[k] = e * e;
     }
-    bp_stages(n, t, h, nodes + 1, stages - 1, w);
+    /* in pairs: the step size waits for this sum */
+#pragma GCC unroll 16
+    for (int left = BP_NX; left > 1; left = (left + 1) / 2)
+#pragma GCC unroll 16
+        for (int k = 0; k < left / 2; k++) square[k] += square[k + (left + 1) / 2];
+    BP_AT(BP_N, norm, 0) = square[0] / (double)BP_NX;
+#pragma omp simd
+    for (int l = 0; l < BP_W; l++) norm[l] = sqrt(norm[l]);
+}
+
+/* Slopes k of a step of size h from x to `next`, that at its end included; the first is known.  `argument`: of the last stage. */
+BP_INLINE void BP_NAME(explicit_stages)(const bp_explicit_method *restrict method, const int stages, const BP_NAME(times) *at,
+                                        double k[][BP_NX * BP_W], double *restrict argument, const double *restrict x,
+                                        const double *restrict h, double *restrict next)
+{
     /* the latest slope stays in registers and is added last: all else is ready before it is */
-    double last[BP_NX], y[BP_NX];
-    for (int k = 0; k < BP_NX; k++) last[k] = work->k[0][k];
+    double last[BP_NX * BP_W] BP_ALIGNED, y[BP_NX * BP_W] BP_ALIGNED;
+    for (int c = 0; c < BP_NX; c++) BP_AT(BP_N, last, c) = BP_AT(BP_N, k[0], c);
     for (int i = 1; i <= stages; i++) {
         const double *restrict row = i < stages ? method->a[i] : method->weights;
-        const double latest = h * row[i - 1];
-        double base[BP_NX];
-        bp_combine(row, i - 1, (const double(*)[BP_NX])work->k, h, x, base);
+        const BP_H latest = *(const BP_H *)h * row[i - 1];
+        double base[BP_NX * BP_W] BP_ALIGNED;
+        BP_NAME(combine)(row, i - 1, (const double(*)[BP_NX * BP_W])k, h, x, base);
 #pragma GCC unroll 16
-        for (int k = 0; k < BP_NX; k++) y[k] = base[k] + latest * last[k];
-        bp_rate(n, w[i < stages ? i - 1 : stages - 2], y, last);
-        if (lead) {
-            const double pace = bp_pace(*lead, i < stages ? method->nodes[i] : 1.0);
-            for (int k = 0; k < BP_NX; k++) last[k] *= pace;
-        }
+        for (int c = 0; c < BP_NX; c++) BP_AT(BP_N, y, c) = BP_AT(BP_N, base, c) + latest * BP_AT(BP_N, last, c);
+        /* the last stage and the end slope are both at the step's end */
+        BP_NAME(slope)(at, i, i < stages ? i - 1 : stages - 2, y, last);
 #pragma GCC unroll 16
-        for (int k = 0; k < BP_NX; k++) work->k[i][k] = last[k];
-        if (i == stages - 1)
-            for (int k = 0; k < BP_NX; k++) work->y[k] = y[k];
+        for (int c = 0; c < BP_NX; c++) BP_AT(BP_N, k[i], c) = BP_AT(BP_N, last, c);
+        if (i < stages - 1) continue;
+        double *restrict kept = i < stages ? argument : next;
+        for (int c = 0; c < BP_NX; c++) BP_AT(BP_N, kept, c) = BP_AT(BP_N, y, c);
     }
-    for (int k = 0; k < BP_NX; k++) next[k] = y[k];
-    double first = 0.0, below = 0.0;
+}
+
+/* Scaled error of that step. */
+BP_INLINE void BP_NAME(explicit_error)(const bp_explicit_method *restrict method, const int stages, const double k[][BP_NX * BP_W],
+                                       const double *restrict h, const double *restrict weight, double *restrict error)
+{
+    double first[BP_W] BP_ALIGNED = {0.0}, below[BP_W] BP_ALIGNED = {0.0};
     for (int m = 0; m < method->estimates; m++) {
-        double error[BP_NX];
-        bp_state sum = {0.0};
-        for (int j = 0; j <= stages; j++) {
-            const double e = h * method->error[m][j];
-            if (e == 0.0) continue;
-            sum += e * BP_STATE(work->k[j]);
+        double estimate[BP_NX * BP_W] BP_ALIGNED, norm[BP_W] BP_ALIGNED;
+        BP_NAME(add)(method->error[m], stages + 1, k, (const BP_H *)h, NULL, estimate);
+        BP_NAME(norm)(estimate, weight, norm);
+#pragma omp simd
+        for (int l = 0; l < BP_W; l++) {
+            if (m == 0) first[l] = norm[l];
+            below[l] += method->error_share[m] * norm[l] * norm[l];
         }
-        *(bp_state *)error = sum;
-        const double norm = bp_norm(error, weight);
-        if (m == 0) first = norm;
-        below += method->error_share[m] * norm * norm;
     }
-    return below > 0.0 ? first * first / sqrt(below) : first;
+#pragma omp simd
+    for (int l = 0; l < BP_W; l++) error[l] = below[l] > 0.0 ? first[l] * first[l] / sqrt(below[l]) : first[l];
 }
 
 /* Product of step size and dominant eigenvalue, from the last two slopes at the step's end (section IV.2 of volume II). */
-static inline double bp_explicit_stiffness(const bp_explicit *restrict work, int stages, double h, const double *restrict next,
-                                           const double *restrict weight)
+BP_INLINE void BP_NAME(explicit_reach)(const int stages, const double k[][BP_NX * BP_W], const double *restrict argument,
+                                       const double *restrict h, const double *restrict next, const double *restrict weight,
+                                       double *restrict reach)
 {
-    double slopes[BP_NX], states[BP_NX];
-    for (int i = 0; i < BP_NX; i++) {
-        slopes[i] = work->k[stages][i] - work->k[stages - 1][i];
-        states[i] = next[i] - work->y[i];
+    double slopes[BP_NX * BP_W] BP_ALIGNED, states[BP_NX * BP_W] BP_ALIGNED, below[BP_W] BP_ALIGNED;
+#pragma omp simd
+    for (int i = 0; i < BP_NX * BP_W; i++) {
+        slopes[i] = k[stages][i] - k[stages - 1][i];
+        states[i] = next[i] - argument[i];
     }
-    const double below = bp_norm(states, weight);
-    return below > 0.0 ? h * bp_norm(slopes, weight) / below : 0.0;
+    BP_NAME(norm)(states, weight, below);
+    BP_NAME(norm)(slopes, weight, reach);
+#pragma omp simd
+    for (int l = 0; l < BP_W; l++) reach[l] = below[l] > 0.0 ? h[sizeof(BP_H) > sizeof *h ? l : 0] * reach[l] / below[l] : 0.0;
 }
 
-/* Terms F1, F2, ... of the dense output of an accepted step; may take further slopes.  `lead` is the step's. */
-static inline __attribute__((always_inline)) void bp_explicit_dense(const bp_explicit_method *restrict method, bp_explicit *restrict work,
-                                                                     const bp_numbers *n, double t, const double *restrict x, double h,
-                                                                     const double *restrict lead, const double *restrict next,
-                                                                     double dense[BP_DENSE_ROWS][BP_NX])
+/* Terms F1, F2, ... of the dense output of an accepted step; may take further slopes, at the times `at`. */
+BP_INLINE void BP_NAME(explicit_dense)(const bp_explicit_method *restrict method, const BP_NAME(times) *at, double k[][BP_NX * BP_W],
+                                       const double *restrict x, const double *restrict step, const double *restrict next,
+                                       double dense[][BP_NX * BP_W])
 {
     const int end = method->stages;
-    if (method->dense_stages > 0) {
-        double w[BP_METHOD_STAGES][BP_NW], passed[BP_METHOD_STAGES];
-        const double *nodes = method->dense_nodes;
-        if (lead) {
-            for (int r = 0; r < method->dense_stages; r++) passed[r] = bp_passed(*lead, method->dense_nodes[r]);
-            nodes = passed;
-        }
-        bp_stages(n, t, h, nodes, method->dense_stages, w);
-        for (int r = 0; r < method->dense_stages; r++) {
-            double y[BP_NX];
-            bp_combine(method->dense_a[r], end + 1 + r, (const double(*)[BP_NX])work->k, h, x, y);
-            bp_rate(n, w[r], y, work->k[end + 1 + r]);
-            if (lead) {
-                const double pace = bp_pace(*lead, method->dense_nodes[r]);
-                for (int k = 0; k < BP_NX; k++) work->k[end + 1 + r][k] *= pace;
-            }
-        }
+    const double(*slopes)[BP_NX * BP_W] = (const double(*)[BP_NX * BP_W])k;
+    const BP_H h = *(const BP_H *)step;
+    for (int r = 0; r < method->dense_stages; r++) {
+        double y[BP_NX * BP_W] BP_ALIGNED;
+        BP_NAME(combine)(method->dense_a[r], end + 1 + r, slopes, step, x, y);
+        BP_NAME(slope)(at, r + 1, r, y, k[end + 1 + r]);
     }
-    const bp_state delta = BP_STATE(next) - BP_STATE(x), first = h * BP_STATE(work->k[0]);
-    *(bp_state *)dense[0] = first - delta;
-    *(bp_state *)dense[1] = 2.0 * delta - (first + h * BP_STATE(work->k[end]));
-    for (int row = 0; row < method->dense_rows; row++) {
-        bp_state sum = {0.0};
-        for (int j = 0; j < end + 1 + method->dense_stages; j++) {
-            const double d = h * method->dense[row][j];
-            if (d == 0.0) continue;
-            sum += d * BP_STATE(work->k[j]);
-        }
-        *(bp_state *)dense[2 + row] = sum;
+#pragma GCC unroll 16
+    for (int e = 0; e < 2 * BP_VS; e++) {
+        const BP_V delta = BP_AT(const BP_V, next, e) - BP_AT(const BP_V, x, e), first = h * BP_AT(BP_V, k[0], e);
+        BP_AT(BP_V, dense[0], e) = first - delta;
+        BP_AT(BP_V, dense[1], e) = 2.0 * delta - (first + h * BP_AT(BP_V, k[end], e));
     }
+    for (int row = 0; row < method->dense_rows; row++)
+        BP_NAME(add)(method->dense[row], end + 1 + method->dense_stages, slopes, &h, NULL, dense[2 + row]);
 }
 
 /* y = x + theta (D + (1 - theta) (F1 + theta (F2 + (1 - theta) (F3 + ...)))). */
-static inline __attribute__((always_inline)) void bp_explicit_at(const bp_explicit_method *restrict method,
-                                                                  const double dense[BP_DENSE_ROWS][BP_NX], const double *restrict x,
-                                                                  const double *restrict next, double theta, double *restrict y)
+BP_INLINE void BP_NAME(explicit_at)(const bp_explicit_method *restrict method, const double dense[][BP_NX * BP_W], const double *restrict x,
+                                    const double *restrict next, double theta, double *restrict y)
 {
-    bp_state inner = {0.0};
 #pragma GCC unroll 16
-    for (int row = 1 + method->dense_rows; row >= 0; row--)
-        inner = (BP_STATE(dense[row]) + inner) * (row % 2 == 0 ? 1.0 - theta : theta);
-    *(bp_state *)y = BP_STATE(x) + theta * (BP_STATE(next) - BP_STATE(x) + inner);
+    for (int e = 0; e < 2 * BP_VS; e++) {
+        BP_V inner = {0.0};
+#pragma GCC unroll 16
+        for (int row = 1 + method->dense_rows; row >= 0; row--)
+            inner = (BP_AT(const BP_V, dense[row], e) + inner) * (row % 2 == 0 ? 1.0 - theta : theta);
+        BP_AT(BP_V, y, e) = BP_AT(const BP_V, x, e) + theta * (BP_AT(const BP_V, next, e) - BP_AT(const BP_V, x, e) + inner);
+    }
 }
-
-#endif

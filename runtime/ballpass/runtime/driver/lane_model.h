@@ -165,6 +165,19 @@ static inline void bp_lane_rate(const bp_lane_numbers *n, const double *restrict
     bp_member_acceleration_lanes(x, S, n->u, n->p, n->c, w, dx + BP_NQ * BP_L);
 }
 
+/* dx/dt, the blocks A = da/dq and B = da/dv of its Jacobian, and the partial time derivative of a. */
+static inline void bp_lane_linearize(const bp_lane_numbers *n, const double *restrict w, const double *restrict wt, const double *restrict x,
+                                     double *restrict dx, double *restrict A, double *restrict B, double *restrict at)
+{
+    double r[5 * BP_L] BP_ALIGNED, S[2 * BP_L] BP_ALIGNED, G[6 * BP_L] BP_ALIGNED;
+    bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
+    bp_lane_sums_and_slopes(n, w, r, S, G);
+    for (int k = 0; k < BP_NQ; k++) BP_EACH_LANE dx[k * BP_L + lane] = x[(BP_NQ + k) * BP_L + lane];
+    bp_member_acceleration_lanes(x, S, n->u, n->p, n->c, w, dx + BP_NQ * BP_L);
+    bp_member_acceleration_jacobian_lanes(x, S, G, n->u, n->p, n->c, w, A, B);
+    bp_member_acceleration_rate_lanes(x, S, G, r, n->u, n->p, n->c, w, wt, at);
+}
+
 /* Channels of the reductions (see reductions.h) in lanes. */
 static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane_angles *restrict angles, double theta,
                                          const double *restrict t, const double *restrict h, const double *restrict x,

@@ -1,4 +1,4 @@
-/* The methods for a member of an ensemble in each SIMD lane; see explicit.h and rosenbrock.h for one member, lane_model.h for the model. */
+/* The methods for a member of an ensemble in each SIMD lane; bodies in explicit.h and rosenbrock.h, the model in lane_model.h. */
 #ifndef BALLPASS_LANES_H
 #define BALLPASS_LANES_H
 
@@ -48,30 +48,8 @@ static inline void bp_lane_exp(const double *restrict x, double *restrict y)
     BP_EACH_LANE y[lane] = series[lane] * power.value[lane];
 }
 
-/* Root mean square of an error over its tolerance. */
-BP_INLINE void bp_lane_norm(const double *restrict error, const double *restrict weight, double *restrict norm)
-{
-    BP_EACH_LANE norm[lane] = 0.0;
-    for (int k = 0; k < BP_NX; k++)
-        BP_EACH_LANE {
-            const double e = error[k * BP_L + lane] * weight[k * BP_L + lane];
-            norm[lane] += e * e;
-        }
-    BP_EACH_LANE norm[lane] = sqrt(norm[lane] / (double)BP_NX);
-}
-
-/* y = x + h sum of row[j] k[j]; the latest slope is added last.  Entry by entry: the sum stays in a register. */
-BP_INLINE void bp_lane_combine(const double *restrict row, const int count, const double k[][BP_NX * BP_L], const double *restrict h,
-                               const double *restrict x, double *restrict y)
-{
-    for (int i = 0; i < BP_NX; i++)
-        BP_EACH_LANE {
-            double sum = 0.0;
-#pragma GCC unroll 16
-            for (int j = 0; j < count; j++) sum += row[j] != 0.0 ? row[j] * k[j][i * BP_L + lane] : 0.0;
-            y[i * BP_L + lane] = x[i * BP_L + lane] + h[lane] * sum;
-        }
-}
+/* A number of each member. */
+typedef double bp_lane __attribute__((vector_size(BP_L * sizeof(double)), aligned(8), may_alias));
 
 typedef struct {
     double k[BP_DP54_STAGES + 1][BP_NX * BP_L] BP_ALIGNED; /* slopes; the first is known when a step starts */
@@ -79,90 +57,83 @@ typedef struct {
 } bp_lane_explicit;
 
 typedef struct {
+    const bp_lane_numbers *n;
+    double w[BP_DP54_STAGES][BP_NW * BP_L] BP_ALIGNED;
+} bp_lane_times;
+
+typedef struct {
+    const bp_lane_numbers *n;
     double w[BP_NW * BP_L] BP_ALIGNED, wt[BP_NW * BP_L] BP_ALIGNED;         /* stage variables at the start */
     double end_w[BP_NW * BP_L] BP_ALIGNED, end_wt[BP_NW * BP_L] BP_ALIGNED; /* and at the end of the step tried */
+    double inner_w[BP_RODAS5P_STAGES][BP_NW * BP_L] BP_ALIGNED;
     double u[BP_RODAS5P_STAGES][BP_NX * BP_L] BP_ALIGNED;                   /* stages */
     double A[BP_NQ * BP_NQ * BP_L] BP_ALIGNED, B[BP_NQ * BP_NQ * BP_L] BP_ALIGNED; /* of the step tried */
+    double dx[BP_NX * BP_L] BP_ALIGNED, at[BP_NQ * BP_L] BP_ALIGNED;
     double pivoted[BP_L] BP_ALIGNED; /* whether its system was solved with pivoting */
 } bp_lane_linear;
+
+BP_INLINE void bp_lane_slope(const bp_lane_times *at, int i, int time, const double *restrict y, double *restrict k)
+{
+    (void)i;
+    bp_lane_rate(at->n, at->w[time], y, k);
+}
+
+BP_INLINE void bp_lane_linear_slope(const bp_lane_linear *at, int i, const double *restrict y, double *restrict dx)
+{
+    if (i == 0) memcpy(dx, at->dx, sizeof at->dx);
+    else bp_lane_rate(at->n, i <= bp_rodas5p.inner ? at->inner_w[i - 1] : at->end_w, y, dx);
+}
+
+BP_INLINE bp_lane bp_lane_time_term(const bp_lane_linear *at, int i, int c, bp_lane d)
+{
+    (void)i;
+    return d * ((const bp_lane *)at->at)[c];
+}
+
+#define BP_NAME(f) bp_lane_##f
+#define BP_W BP_L
+#define BP_N bp_lane
+#define BP_V bp_lane
+#define BP_VS BP_NQ
+#define BP_H bp_lane
+#define BP_S bp_lane
+#include "explicit.h"
+#include "rosenbrock.h"
+#include "iteration_matrix.h"
+#undef BP_NAME
+#undef BP_W
+#undef BP_N
+#undef BP_V
+#undef BP_VS
+#undef BP_H
+#undef BP_S
 
 /* One step of Dormand and Prince from (t, x) to `next`, the end slope included. */
 static inline void bp_lane_explicit_step(bp_lane_explicit *restrict work, const bp_lane_numbers *n, bp_lane_angles *restrict angles,
                                          const double *restrict t, const double *restrict x, const double *restrict h,
-                                         const double *restrict weight, double *restrict next, double *restrict norm)
+                                         const double *restrict weight, double *restrict next, double *restrict error)
 {
-    const bp_explicit_method *method = &bp_dp54;
-    double w[BP_DP54_STAGES][BP_NW * BP_L] BP_ALIGNED;
+    bp_lane_times at;
+    at.n = n;
     bp_lane_angles_start(angles, n, t, h);
-    /* all times of the step first: nothing in them waits for a slope.  The last stage and the end slope are both at its end */
-#pragma GCC unroll 16
-    for (int i = 1; i <= BP_DP54_STAGES; i++) {
-        if (i < BP_DP54_STAGES) bp_lane_stage(n, angles, method->nodes[i], t, h, w[i]);
-        const double *row = i < BP_DP54_STAGES ? method->a[i] : method->weights;
-        double *restrict y = i < BP_DP54_STAGES ? work->y : next;
-        bp_lane_combine(row, i, (const double(*)[BP_NX * BP_L])work->k, h, x, y);
-        bp_lane_rate(n, w[i < BP_DP54_STAGES ? i : BP_DP54_STAGES - 1], y, work->k[i]);
-    }
-    double error[BP_NX * BP_L] BP_ALIGNED;
-    for (int i = 0; i < BP_NX; i++)
-        BP_EACH_LANE {
-            double sum = 0.0;
-#pragma GCC unroll 16
-            for (int j = 0; j <= BP_DP54_STAGES; j++)
-                sum += method->error[0][j] != 0.0 ? method->error[0][j] * work->k[j][i * BP_L + lane] : 0.0;
-            error[i * BP_L + lane] = h[lane] * sum;
-        }
-    bp_lane_norm(error, weight, norm);
+    /* all times of the step first: nothing in them waits for a slope */
+    for (int i = 1; i < BP_DP54_STAGES; i++) bp_lane_stage(n, angles, bp_dp54.nodes[i], t, h, at.w[i - 1]);
+    bp_lane_explicit_stages(&bp_dp54, BP_DP54_STAGES, &at, work->k, work->y, x, h, next);
+    bp_lane_explicit_error(&bp_dp54, BP_DP54_STAGES, (const double(*)[BP_NX * BP_L])work->k, h, weight, error);
 }
 
-/* Product of step size and dominant eigenvalue, from the last two slopes at the step's end. */
-static inline void bp_lane_stiffness(const bp_lane_explicit *restrict work, const double *restrict h, const double *restrict next,
-                                     const double *restrict weight, double *restrict reach)
+/* Columns of [W^-1 A/s | W^-1] for every lane, without pivoting; a lane whose W is not dominated by its diagonal is done anew by itself,
+   with pivoting.  A singular W makes its lane's step not a number. */
+static inline void bp_lane_factorize(double solve[BP_NX][BP_NQ * BP_L], double *restrict pivoted, const double *restrict A,
+                                     const double *restrict B, const double *restrict s)
 {
-    double slopes[BP_NX * BP_L] BP_ALIGNED, states[BP_NX * BP_L] BP_ALIGNED, below[BP_L] BP_ALIGNED;
-    for (int i = 0; i < BP_NX * BP_L; i++) {
-        slopes[i] = work->k[BP_DP54_STAGES][i] - work->k[BP_DP54_STAGES - 1][i];
-        states[i] = next[i] - work->y[i];
-    }
-    bp_lane_norm(states, weight, below);
-    bp_lane_norm(slopes, weight, reach);
-    BP_EACH_LANE reach[lane] = below[lane] > 0.0 ? h[lane] * reach[lane] / below[lane] : 0.0;
-}
-
-/* Columns of [W^-1 A/s | W^-1] for every lane, by Gauss-Jordan elimination without pivoting; a lane whose W is not dominated by its
-   diagonal is done anew by itself, with pivoting.  A singular W makes its lane's step not a number. */
-static inline void bp_lane_factorize(double solve[BP_NX][BP_NQ * BP_L], double *restrict pivoted, const double *restrict A, const double *restrict B,
-                                     const double *restrict s)
-{
-    double rows[BP_NQ][3 * BP_NQ][BP_L] BP_ALIGNED, dominance[BP_L] BP_ALIGNED, inverse[BP_L] BP_ALIGNED;
-    BP_EACH_LANE inverse[lane] = 1.0 / s[lane];
-    BP_EACH_LANE dominance[lane] = 1.0;
-    for (int i = 0; i < BP_NQ; i++) {
-        double rest[BP_L] BP_ALIGNED = {0.0};
-        for (int j = 0; j < BP_NQ; j++)
-            BP_EACH_LANE {
-                const double scaled = A[(i * BP_NQ + j) * BP_L + lane] * inverse[lane];
-                const double entry = (i == j ? s[lane] : 0.0) - B[(i * BP_NQ + j) * BP_L + lane] - scaled;
-                rows[i][j][lane] = entry;
-                rows[i][BP_NQ + j][lane] = scaled;
-                rows[i][2 * BP_NQ + j][lane] = i == j ? 1.0 : 0.0;
-                rest[lane] += i != j ? fabs(entry) : 0.0;
-            }
-        BP_EACH_LANE dominance[lane] = fabs(rows[i][i][lane]) >= rest[lane] ? dominance[lane] : 0.0;
-    }
-    for (int k = 0; k < BP_NQ; k++) {
-        double pivot[BP_L] BP_ALIGNED;
-        BP_EACH_LANE pivot[lane] = 1.0 / rows[k][k][lane];
-        for (int j = k + 1; j < 3 * BP_NQ; j++) BP_EACH_LANE rows[k][j][lane] *= pivot[lane];
-        for (int i = 0; i < BP_NQ; i++) {
-            if (i == k) continue;
-            double factor[BP_L] BP_ALIGNED;
-            BP_EACH_LANE factor[lane] = rows[i][k][lane];
-            for (int j = k + 1; j < 3 * BP_NQ; j++) BP_EACH_LANE rows[i][j][lane] -= factor[lane] * rows[k][j][lane];
-        }
-    }
+    bp_lane rows[BP_NQ][3 * BP_NQ];
+    double dominance[BP_L] BP_ALIGNED;
+    bp_lane_matrix_rows(rows, dominance, A, B, (const bp_lane *)s);
+#pragma GCC unroll 16
+    for (int k = 0; k < BP_NQ; k++) bp_lane_clear_column(rows, k);
     for (int j = 0; j < BP_NX; j++)
-        for (int i = 0; i < BP_NQ; i++) BP_EACH_LANE solve[j][i * BP_L + lane] = rows[i][BP_NQ + j][lane];
+        for (int i = 0; i < BP_NQ; i++) ((bp_lane *)solve[j])[i] = rows[i][BP_NQ + j];
     BP_EACH_LANE pivoted[lane] = 1.0 - dominance[lane];
     for (int lane = 0; lane < BP_L; lane++) {
         if (dominance[lane] != 0.0) continue;
@@ -181,127 +152,24 @@ static inline void bp_lane_factorize(double solve[BP_NX][BP_NQ * BP_L], double *
 /* One step of Rodas5P from (t, x) to `next`; linearizes at its start, where w and wt hold. */
 static inline void bp_lane_linear_step(bp_lane_linear *restrict work, const bp_lane_numbers *n, bp_lane_angles *restrict angles,
                                        const double *restrict t, const double *restrict x, const double *restrict h,
-                                       const double *restrict weight, double *restrict next, double *restrict norm)
+                                       const double *restrict weight, double *restrict next, double *restrict error)
 {
     const bp_rosenbrock_method *method = &bp_rodas5p;
-    double dx0[BP_NX * BP_L] BP_ALIGNED, at[BP_NQ * BP_L] BP_ALIGNED, solve[BP_NX][BP_NQ * BP_L] BP_ALIGNED;
-    double s[BP_L] BP_ALIGNED, inverse_s[BP_L] BP_ALIGNED, inverse_h[BP_L] BP_ALIGNED, w[BP_RODAS5P_STAGES][BP_NW * BP_L] BP_ALIGNED;
+    const double(*stages)[BP_NX * BP_L] = (const double(*)[BP_NX * BP_L])work->u;
+    double solve[BP_NX][BP_NQ * BP_L] BP_ALIGNED, s[BP_L] BP_ALIGNED;
+    double C[BP_NA * BP_L] BP_ALIGNED, S[BP_NA * BP_L] BP_ALIGNED, time[BP_L] BP_ALIGNED;
+    work->n = n;
+    BP_EACH_LANE s[lane] = 1.0 / (h[lane] * method->gamma);
+    bp_lane_linearize(n, work->w, work->wt, x, work->dx, work->A, work->B, work->at);
+    bp_lane_factorize(solve, work->pivoted, work->A, work->B, s);
     bp_lane_angles_start(angles, n, t, h);
-    BP_EACH_LANE {
-        s[lane] = 1.0 / (h[lane] * method->gamma);
-        inverse_s[lane] = h[lane] * method->gamma;
-        inverse_h[lane] = 1.0 / h[lane];
-    }
-    {
-        double r[5 * BP_L] BP_ALIGNED, S[2 * BP_L] BP_ALIGNED, G[6 * BP_L] BP_ALIGNED;
-        bp_member_relative_lanes(x, n->u, n->p, n->c, work->w, r);
-        bp_lane_sums_and_slopes(n, work->w, r, S, G);
-        for (int k = 0; k < BP_NQ; k++) BP_EACH_LANE dx0[k * BP_L + lane] = x[(BP_NQ + k) * BP_L + lane];
-        bp_member_acceleration_lanes(x, S, n->u, n->p, n->c, work->w, dx0 + BP_NQ * BP_L);
-        bp_member_acceleration_jacobian_lanes(x, S, G, n->u, n->p, n->c, work->w, work->A, work->B);
-        bp_member_acceleration_rate_lanes(x, S, G, r, n->u, n->p, n->c, work->w, work->wt, at);
-        bp_lane_factorize(solve, work->pivoted, work->A, work->B, s);
-    }
-    /* the times inside the step, and its end, which serves several stages and the next step, with the time derivative */
-    {
-        double C[BP_NA * BP_L] BP_ALIGNED, S[BP_NA * BP_L] BP_ALIGNED, time[BP_L] BP_ALIGNED;
-        bp_lane_turn(angles, 1.0, t, h, C, S, time);
-        bp_member_stage_rate_turned_lanes(C, S, angles->rate, time, n->u, n->p, n->c, work->end_w, work->end_wt);
-    }
-#pragma GCC unroll 16
-    for (int i = 0; i < BP_RODAS5P_STAGES; i++) {
-        double y[BP_NX * BP_L] BP_ALIGNED, dx[BP_NX * BP_L] BP_ALIGNED, R[BP_NX * BP_L] BP_ALIGNED;
-        for (int k = 0; k < BP_NX; k++)
-            BP_EACH_LANE {
-                double reached = x[k * BP_L + lane], coupled = 0.0;
-#pragma GCC unroll 16
-                for (int j = 0; j < i; j++) {
-                    const double stage = work->u[j][k * BP_L + lane];
-                    reached += method->a[i][j] * stage;
-                    coupled += method->coupling[i][j] * stage;
-                }
-                y[k * BP_L + lane] = reached;
-                R[k * BP_L + lane] = coupled * inverse_h[lane];
-            }
-        if (i>0 && i <= method->inner) bp_lane_stage(n, angles, method->nodes[i], t, h, w[i]);
-        if (i > 0) bp_lane_rate(n, i <= method->inner ? w[i] : work->end_w, y, dx);
-        const double *slope = i > 0 ? dx : dx0;
-        const double d = method->time_weights[i];
-        for (int k = 0; k < BP_NX; k++)
-            BP_EACH_LANE R[k * BP_L + lane] += k < BP_NQ ? slope[k * BP_L + lane]
-                                                         : slope[k * BP_L + lane] + h[lane] * d * at[(k - BP_NQ) * BP_L + lane];
-        for (int k = 0; k < BP_NQ; k++)
-            BP_EACH_LANE {
-                double kv = 0.0;
-#pragma GCC unroll 16
-                for (int j = 0; j < BP_NX; j++) kv += solve[j][k * BP_L + lane] * R[j * BP_L + lane];
-                work->u[i][(BP_NQ + k) * BP_L + lane] = kv;
-                work->u[i][k * BP_L + lane] = (R[k * BP_L + lane] + kv) * inverse_s[lane];
-            }
-    }
-    double error[BP_NX * BP_L] BP_ALIGNED;
-    for (int k = 0; k < BP_NX; k++)
-        BP_EACH_LANE {
-            double end = x[k * BP_L + lane], estimate = 0.0;
-#pragma GCC unroll 16
-            for (int i = 0; i < BP_RODAS5P_STAGES; i++) {
-                end += method->weights[i] * work->u[i][k * BP_L + lane];
-                estimate += method->error_weights[i] != 0.0 ? method->error_weights[i] * work->u[i][k * BP_L + lane] : 0.0;
-            }
-            next[k * BP_L + lane] = end;
-            error[k * BP_L + lane] = estimate;
-        }
-    bp_lane_norm(error, weight, norm);
-}
-
-/* Terms of the dense output, as in bp_explicit_dense. */
-static inline void bp_lane_explicit_dense(const bp_lane_explicit *restrict work, const double *restrict x, const double *restrict h,
-                                          const double *restrict next, double dense[BP_DENSE_ROWS][BP_NX * BP_L])
-{
-    for (int k = 0; k < BP_NX; k++)
-        BP_EACH_LANE {
-            const int i = k * BP_L + lane;
-            const double delta = next[i] - x[i];
-            dense[0][i] = h[lane] * work->k[0][i] - delta;
-            dense[1][i] = 2.0 * delta - h[lane] * (work->k[0][i] + work->k[BP_DP54_STAGES][i]);
-        }
-    for (int row = 0; row < bp_dp54.dense_rows; row++) {
-        double *restrict sum = dense[2 + row];
-        for (int i = 0; i < BP_NX * BP_L; i++) sum[i] = 0.0;
-        for (int j = 0; j <= BP_DP54_STAGES; j++) {
-            const double d = bp_dp54.dense[row][j];
-            if (d == 0.0) continue;
-            for (int i = 0; i < BP_NX * BP_L; i++) sum[i] += d * work->k[j][i];
-        }
-        for (int k = 0; k < BP_NX; k++) BP_EACH_LANE sum[k * BP_L + lane] *= h[lane];
-    }
-}
-
-static inline void bp_lane_linear_dense(const bp_lane_linear *restrict work, double dense[BP_DENSE_ROWS][BP_NX * BP_L])
-{
-    for (int row = 0; row < bp_rodas5p.dense_rows; row++) {
-        double *restrict sum = dense[row];
-        for (int i = 0; i < BP_NX * BP_L; i++) sum[i] = 0.0;
-        for (int j = 0; j < BP_RODAS5P_STAGES; j++) {
-            const double d = bp_rodas5p.dense[row][j];
-            for (int i = 0; i < BP_NX * BP_L; i++) sum[i] += d * work->u[j][i];
-        }
-    }
-}
-
-/* Entry of the state at theta, from its terms of the dense output `stride` apart; see bp_explicit_at and bp_rosenbrock_at. */
-BP_INLINE double bp_explicit_entry(const double *restrict dense, int stride, double x, double next, double theta)
-{
-    double inner = 0.0;
-    for (int row = 1 + bp_dp54.dense_rows; row >= 0; row--) inner = (dense[row * stride] + inner) * (row % 2 == 0 ? 1.0 - theta : theta);
-    return x + theta * (next - x + inner);
-}
-
-BP_INLINE double bp_linear_entry(const double *restrict dense, int stride, double x, double next, double theta)
-{
-    double inner = 0.0;
-    for (int row = bp_rodas5p.dense_rows - 1; row >= 0; row--) inner = dense[row * stride] + (row < bp_rodas5p.dense_rows - 1 ? theta * inner : 0.0);
-    return x + theta * (next - x + (1.0 - theta) * inner);
+    for (int i = 1; i <= method->inner; i++) bp_lane_stage(n, angles, method->nodes[i], t, h, work->inner_w[i - 1]);
+    /* the end serves several stages and the next step, with the time derivative */
+    bp_lane_turn(angles, 1.0, t, h, C, S, time);
+    bp_member_stage_rate_turned_lanes(C, S, angles->rate, time, n->u, n->p, n->c, work->end_w, work->end_wt);
+    bp_lane_rosenbrock_stages(method, BP_RODAS5P_STAGES, work, solve[0], work->u, x, h);
+    bp_lane_rosenbrock_end(method, BP_RODAS5P_STAGES, stages, x, next);
+    bp_lane_rosenbrock_error(method, BP_RODAS5P_STAGES, stages, weight, error);
 }
 
 #endif

@@ -13,8 +13,11 @@ static void glance_at(const bp_run *run, double part, double *y)
 {
     if (is_explicit(run->method)) {
         const double theta = place_of(run, part);
-        const bp_state inner = BP_STATE(run->dense[0]) + theta * BP_STATE(run->dense[1]);
-        *(bp_state *)y = BP_STATE(run->x) + theta * (BP_STATE(run->next) - BP_STATE(run->x) + (1.0 - theta) * inner);
+#pragma omp simd
+        for (int k = 0; k < BP_NX; k++) {
+            const double inner = run->dense[0][k] + theta * run->dense[1][k];
+            y[k] = run->x[k] + theta * (run->next[k] - run->x[k] + (1.0 - theta) * inner);
+        }
     } else {
         state_at(run, part, y);
     }
@@ -23,10 +26,13 @@ static void glance_at(const bp_run *run, double part, double *y)
 static void prepare_glance(bp_run *run, double t, double h)
 {
     if (is_explicit(run->method)) {
-        const int end = run->method == BALLPASS_DP54 ? BP_DP54_STAGES : BP_DOP853_STAGES;
-        const bp_state delta = BP_STATE(run->next) - BP_STATE(run->x), first = h * BP_STATE(run->plain.k[0]);
-        *(bp_state *)run->dense[0] = first - delta;
-        *(bp_state *)run->dense[1] = 2.0 * delta - (first + h * BP_STATE(run->plain.k[end]));
+        const int end = explicit_method(run->method)->stages;
+#pragma omp simd
+        for (int k = 0; k < BP_NX; k++) {
+            const double delta = run->next[k] - run->x[k], first = h * run->plain.k[0][k];
+            run->dense[0][k] = first - delta;
+            run->dense[1][k] = 2.0 * delta - (first + h * run->plain.k[end][k]);
+        }
     } else {
         prepare_dense(run, t, h);
     }

@@ -12,13 +12,6 @@
 #include "switches.h"
 #endif
 
-/* All states, and positions or velocities alone, as vectors of the compiler: short loops it would write out one number after another.
-   There are two or four coordinates. */
-typedef double bp_state __attribute__((vector_size(BP_NX * sizeof(double)), aligned(8), may_alias));
-typedef double bp_half __attribute__((vector_size(BP_NQ * sizeof(double)), aligned(8), may_alias));
-#define BP_STATE(x) (*(const bp_state *)(x))
-#define BP_HALF(x) (*(const bp_half *)(x))
-
 /* Numbers of a run and of its present segment. */
 typedef struct {
     const double *u;
@@ -120,7 +113,7 @@ static inline double bp_total(double *restrict terms)
 }
 
 /* Sums over the balls of F cos, F sin.  One ball a lane. */
-static inline void bp_sums(const bp_numbers *n, const double *restrict w, const double *restrict r, double *restrict S)
+static inline __attribute__((always_inline)) void bp_sums(const bp_numbers *n, const double *restrict w, const double *restrict r, double *restrict S)
 {
     double k[BP_NK], sx[BP_TERMS], sy[BP_TERMS];
     bp_law_numbers(n->p, n->c, k);
@@ -171,7 +164,7 @@ static inline void bp_sums_and_slopes(const bp_numbers *n, const double *restric
 }
 
 /* dx/dt at a state, for stage variables w that hold for its time. */
-static inline void bp_rate(const bp_numbers *n, const double *restrict w, const double *restrict x, double *restrict dx)
+static inline __attribute__((always_inline)) void bp_rate(const bp_numbers *n, const double *restrict w, const double *restrict x, double *restrict dx)
 {
     double r[5], S[2];
     bp_relative(x, n->u, n->p, n->c, w, r);
@@ -191,20 +184,6 @@ static inline void bp_linearize(const bp_numbers *n, const double *restrict w, c
     bp_acceleration(x, S, n->u, n->p, n->c, w, dx + BP_NQ);
     bp_acceleration_jacobian(x, S, G, n->u, n->p, n->c, w, A, B);
     bp_acceleration_rate(x, S, G, r, n->u, n->p, n->c, w, wt, at);
-}
-
-/* Root mean square of an error over its tolerance; not a number where the error is none. */
-static inline double bp_norm(const double *restrict error, const double *restrict weight)
-{
-    double square[BP_NX];
-    for (int k = 0; k < BP_NX; k++) {
-        const double e = error[k] * weight[k];
-        square[k] = e * e;
-    }
-    /* in pairs: the step size waits for this sum */
-    for (int half = BP_NX / 2; half > 0; half /= 2)
-        for (int k = 0; k < half; k++) square[k] += square[k + half];
-    return sqrt(square[0] / (double)BP_NX);
 }
 
 #endif

@@ -9,9 +9,7 @@
 #include <string.h>
 
 #include "control.h"
-#include "explicit.h"
 #include "family.h"
-#include "rosenbrock.h"
 #include "stepper.h"
 #ifdef BALLPASS_LOCATED
 #include "kinks.h"
@@ -37,7 +35,7 @@ typedef struct {
     bp_numbers numbers;
     double weight[BP_NX]; /* 1 / tolerance */
     double *x;
-    double next[BP_NX];
+    double next[BP_NX] BP_ALIGNED;
     double step;           /* proposal for the next step; 0 where it has to be estimated */
     bp_seen seen;
     double last_error;     /* logarithm of that of the last accepted step, for the PI controller */
@@ -50,10 +48,10 @@ typedef struct {
     const double *output_times;
     double *output_states;
     /* work of the methods */
-    bp_rosenbrock linear;
+    bp_linear linear;
     bp_matrix matrix;
     bp_explicit plain;
-    double dense[BP_DENSE_ROWS][BP_NX];
+    double dense[BP_DENSE_ROWS][BP_NX] BP_ALIGNED;
 #ifdef BALLPASS_SENSITIVITIES
     const ballpass_tangents *tangents; /* or NULL */
     bp_tangent_block *blocks;
@@ -83,7 +81,17 @@ static double place_of(const bp_run *run, double part) { return is_paced(run) ? 
 #define place_of(run, part) (part)
 #endif
 
-static int is_explicit(int method) { return method == BALLPASS_DP54 || method == BALLPASS_DOP853; }
+static const bp_explicit_method *explicit_method(int method)
+{
+    return method == BALLPASS_DP54 ? &bp_dp54 : method == BALLPASS_DOP853 ? &bp_dop853 : NULL;
+}
+
+static const bp_rosenbrock_method *rosenbrock_method(int method)
+{
+    return method == BALLPASS_RODAS4 ? &bp_rodas4 : method == BALLPASS_RODAS5P ? &bp_rodas5p : NULL;
+}
+
+static int is_explicit(int method) { return explicit_method(method) != NULL; }
 
 static int is_finite(const double *x)
 {
@@ -103,29 +111,44 @@ static int within_reach(const bp_run *run)
 
 static double error_exponent(int method)
 {
-    switch (method) {
-    case BALLPASS_RODAS4: return bp_rodas4.error_exponent;
-    case BALLPASS_RODAS5P: return bp_rodas5p.error_exponent;
-    case BALLPASS_DP54: return bp_dp54.error_exponent;
-    default: return bp_dop853.error_exponent;
-    }
+    return is_explicit(method) ? explicit_method(method)->error_exponent : rosenbrock_method(method)->error_exponent;
+}
+
+/* The same for all methods, written out for each: its numbers are then constants. */
+BP_INLINE void prepare_explicit(bp_run *run, const bp_explicit_method *method, double t, double h, const double *lead)
+{
+    bp_times at;
+    bp_times_of(&at, &run->numbers, t, h, method->dense_nodes, method->dense_stages, lead);
+    bp_explicit_dense(method, &at, run->plain.k, run->x, &h, run->next, run->dense);
+}
+
+BP_INLINE double try_explicit(bp_run *run, const bp_explicit_method *method, const int stages, double t, double h)
+{
+    run->result->evaluations += stages;
+    if (is_paced(run))
+        return bp_explicit_step(method, stages, &run->plain, &run->numbers, t, run->x, h, lead_of(run), run->weight, run->next);
+    return bp_explicit_step(method, stages, &run->plain, &run->numbers, t, run->x, h, NULL, run->weight, run->next);
+}
+
+BP_INLINE double try_linear(bp_run *run, const bp_rosenbrock_method *method, const int stages, double t, double h)
+{
+    const double error = bp_rosenbrock_step(method, stages, &run->linear, &run->matrix, &run->numbers, t, run->x, h, run->weight, run->next);
+    run->result->evaluations += stages - 1;
+    run->result->factorizations++;
+    run->result->pivoted += run->matrix.pivoted;
+    return error;
 }
 
 /* Prepare the dense output of the step from (t, x) to (t + h, next). */
 static void prepare_dense(bp_run *run, double t, double h)
 {
-    const bp_numbers *n = &run->numbers;
+    const double *lead = is_paced(run) ? lead_of(run) : NULL;
+    const double(*u)[BP_NX] = (const double(*)[BP_NX])run->linear.u;
     switch (run->method) {
-    case BALLPASS_DP54:
-        if (is_paced(run)) bp_explicit_dense(&bp_dp54, &run->plain, n, t, run->x, h, lead_of(run), run->next, run->dense);
-        else bp_explicit_dense(&bp_dp54, &run->plain, n, t, run->x, h, NULL, run->next, run->dense);
-        break;
-    case BALLPASS_DOP853:
-        if (is_paced(run)) bp_explicit_dense(&bp_dop853, &run->plain, n, t, run->x, h, lead_of(run), run->next, run->dense);
-        else bp_explicit_dense(&bp_dop853, &run->plain, n, t, run->x, h, NULL, run->next, run->dense);
-        break;
-    case BALLPASS_RODAS4: bp_rosenbrock_dense(&bp_rodas4, &run->linear, run->dense); break;
-    default: bp_rosenbrock_dense(&bp_rodas5p, &run->linear, run->dense);
+    case BALLPASS_DP54: prepare_explicit(run, &bp_dp54, t, h, lead); break;
+    case BALLPASS_DOP853: prepare_explicit(run, &bp_dop853, t, h, lead); break;
+    case BALLPASS_RODAS4: bp_rosenbrock_dense(&bp_rodas4, u, run->dense); break;
+    default: bp_rosenbrock_dense(&bp_rodas5p, u, run->dense);
     }
 }
 
@@ -145,35 +168,11 @@ static void state_at(const bp_run *run, double part, double *y)
 /* Try one step; returns its scaled error. */
 static double try_step(bp_run *run, double t, double h)
 {
-    ballpass_result *result = run->result;
     switch (run->method) {
-    case BALLPASS_DP54:
-        result->evaluations += bp_dp54.stages;
-        if (is_paced(run))
-            return bp_explicit_step(&bp_dp54, BP_DP54_STAGES, &run->plain, &run->numbers, t, run->x, h, lead_of(run), run->weight, run->next);
-        return bp_explicit_step(&bp_dp54, BP_DP54_STAGES, &run->plain, &run->numbers, t, run->x, h, NULL, run->weight, run->next);
-    case BALLPASS_DOP853:
-        result->evaluations += bp_dop853.stages;
-        if (is_paced(run))
-            return bp_explicit_step(&bp_dop853, BP_DOP853_STAGES, &run->plain, &run->numbers, t, run->x, h, lead_of(run), run->weight,
-                                    run->next);
-        return bp_explicit_step(&bp_dop853, BP_DOP853_STAGES, &run->plain, &run->numbers, t, run->x, h, NULL, run->weight, run->next);
-    case BALLPASS_RODAS4: {
-        result->evaluations += bp_rodas4.stages - 1;
-        const double error = bp_rosenbrock_step(&bp_rodas4, BP_RODAS4_STAGES, &run->linear, &run->matrix, &run->numbers, t, run->x, h,
-                                                run->weight, run->next);
-        result->factorizations++;
-        result->pivoted += run->matrix.pivoted;
-        return error;
-    }
-    default: {
-        result->evaluations += bp_rodas5p.stages - 1;
-        const double error = bp_rosenbrock_step(&bp_rodas5p, BP_RODAS5P_STAGES, &run->linear, &run->matrix, &run->numbers, t, run->x, h,
-                                                run->weight, run->next);
-        result->factorizations++;
-        result->pivoted += run->matrix.pivoted;
-        return error;
-    }
+    case BALLPASS_DP54: return try_explicit(run, &bp_dp54, BP_DP54_STAGES, t, h);
+    case BALLPASS_DOP853: return try_explicit(run, &bp_dop853, BP_DOP853_STAGES, t, h);
+    case BALLPASS_RODAS4: return try_linear(run, &bp_rodas4, BP_RODAS4_STAGES, t, h);
+    default: return try_linear(run, &bp_rodas5p, BP_RODAS5P_STAGES, t, h);
     }
 }
 
@@ -205,7 +204,7 @@ static void first_slope(bp_run *run, double t)
 /* That behind an accepted step which ended at (t, x): most end with the slope of the next. */
 static void next_slope(bp_run *run, double t)
 {
-    const int end = run->method == BALLPASS_DP54 ? BP_DP54_STAGES : BP_DOP853_STAGES;
+    const int end = explicit_method(run->method)->stages;
 #ifdef BALLPASS_LOCATED
     const double pace = bp_pace(run->lead, 1.0);
     if (pace < BP_LEAST_PACE) {
@@ -222,7 +221,7 @@ static void next_slope(bp_run *run, double t)
 
 static void linearize(bp_run *run, double t, int fresh)
 {
-    bp_rosenbrock_start(&run->linear, &run->numbers, t, run->x, fresh);
+    bp_linear_start(&run->linear, &run->numbers, t, run->x, fresh);
     run->result->evaluations++;
 }
 

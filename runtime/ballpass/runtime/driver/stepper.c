@@ -23,7 +23,7 @@ static double estimate_step(bp_run *run, double t, double longest)
 /* The family for the coming segment. */
 static int choose_method(bp_run *run, double t)
 {
-    bp_rosenbrock_start(&run->linear, &run->numbers, t, run->x, 1);
+    bp_linear_start(&run->linear, &run->numbers, t, run->x, 1);
     run->result->evaluations++;
     return bp_starts_linear(&run->seen, run->linear.A, run->linear.B) ? BALLPASS_RODAS5P : BALLPASS_DP54;
 }
@@ -36,8 +36,10 @@ static int judge_family(bp_run *run, bp_family *family, double t, double h)
         if (!bp_look_at_linear(family, h)) return run->method;
         return bp_after_linear(family, &run->seen, run->method, bp_stable_step(run->linear.A, run->linear.B, 1));
     }
-    const int dp54 = run->method == BALLPASS_DP54, stages = dp54 ? BP_DP54_STAGES : BP_DOP853_STAGES;
-    const int wanted = bp_look_at_explicit(family, run->method, bp_explicit_stiffness(&run->plain, stages, h, run->next, run->weight), h);
+    const int dp54 = run->method == BALLPASS_DP54, stages = explicit_method(run->method)->stages;
+    double reach;
+    bp_explicit_reach(stages, (const double(*)[BP_NX])run->plain.k, run->plain.y, &h, run->next, run->weight, &reach);
+    const int wanted = bp_look_at_explicit(family, run->method, reach, h);
     if (wanted == BP_GO_ON) return run->method;
     if (wanted == BP_GIVE_UP) return bp_try_linear(family, &run->seen, dp54 ? h : 0.5 * h);
     double stable = INFINITY;
