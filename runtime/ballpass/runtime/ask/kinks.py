@@ -1,16 +1,17 @@
 """Moments at which an output has a kink, so that integrals over it are taken piece by piece.
 
-In: deflections of the balls and other signals along a run.  Out: `Kink` records; and how they move with parameters.
+In: deflections of the balls and other signals along a run.  Out: times.
 
 Where a ball comes into contact, its force starts like a power of time, under the tangent law with infinite slope; where
 a law damps one way only, it has a corner; where two balls change rank, the force of the most loaded one has.  At such a
 moment the derivative of the force by a parameter jumps or is unbounded.  A quadrature that runs across it converges
-slowly; one whose panels end there, and move with it, does not notice.
+slowly; one whose panels end there, and get finer towards it, does not notice.  What is integrated does not jump, so
+that the panels need not move with the kink.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,25 +26,6 @@ APART = 1e-9
 
 #: Halvings that locate a kink on the cubic through four nodes.
 HALVINGS = 45
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Kink:
-    """A zero of a signal.
-
-    Attributes
-    ----------
-    time : [s]
-    kind : "contact" (deflection), "rate" (its rate) or "rank" (difference of two balls' values)
-    channel : of which two balls change rank
-    ball, other : columns, counted from 0
-    """
-
-    time: float
-    kind: str
-    channel: str = ""
-    ball: int = 0
-    other: int = 0
 
 
 def crossings(t: Array, segment: NDArray[np.int_], signal: Array) -> Array:
@@ -105,45 +87,37 @@ def rate_of(t: Array, segment: NDArray[np.int_], signal: Array) -> Array:
 def find_kinks(
     t: Array,
     segment: NDArray[np.int_],
-    deflection: Array,
-    ranked: dict[str, Array],
+    deflections: Sequence[Array],
+    ranked: Sequence[Array],
     *,
     one_sided: bool,
     length: float,
     edges: Array,
-) -> tuple[Kink, ...]:
-    """Kinks of outputs of the balls, in order of time, apart from each other and from the edges.
+) -> list[float]:
+    """Times of kinks of outputs of the balls, increasing, apart from each other and from the edges [s].
 
     Parameters
     ----------
-    t, segment : nodes in order, shape (n,)
-    deflection : shape (n, balls); no columns where the scene does not compute it
-    ranked : channels of which the most loaded ball is followed, each of shape (n, balls)
-    one_sided : whether the damping law has a corner at rate zero
+    t, segment : nodes, shape (n,)
+    deflections : of the balls of each bearing, shape (n, balls) [m]
+    ranked : channels of which only the most loaded ball's value counts, shape (n, balls)
+    one_sided : whether a damping law has a corner at rate zero
     length : of the time that counts [s]
     edges : times that are edges already [s]
     """
-    found: list[Kink] = []
-    for ball in range(deflection.shape[1]):
-        times = crossings(t, segment, deflection[:, ball])
-        found += [Kink(time=float(time), kind="contact", ball=ball) for time in times]
-    if one_sided and deflection.shape[1]:
-        rate = rate_of(t, segment, deflection)
-        for ball in range(deflection.shape[1]):
-            times = crossings(t, segment, rate[:, ball])
-            found += [Kink(time=float(time), kind="rate", ball=ball) for time in times]
-    for channel, values in ranked.items():
-        best = np.argmax(values, axis=1)
-        for k in np.flatnonzero((np.diff(best) != 0) & (np.diff(segment) == 0)).tolist():
-            a, b = int(best[k]), int(best[k + 1])
-            part = slice(max(k - 2, 0), k + 4)
-            times = crossings(t[part], segment[part], values[part, a] - values[part, b])
-            near = times[(times >= t[k]) & (times <= t[k + 1])]
-            found += [Kink(time=float(time), kind="rank", channel=channel, ball=a, other=b) for time in near]
-    found.sort(key=lambda kink: (kink.time, kink.kind, kink.ball))
-    kept: list[Kink] = []
-    for kink in found:
-        last = kept[-1].time if kept else -np.inf
-        if kink.time - last > APART * length and np.min(np.abs(edges - kink.time)) > APART * length:
-            kept.append(kink)
-    return tuple(kept)
+    signals = [column for table in deflections for column in table.T]
+    if one_sided:
+        signals += [column for table in deflections for column in rate_of(t, segment, table).T]
+    for table in ranked:
+        best = np.argmax(table, axis=1)
+        pairs = {
+            (int(best[k]), int(best[k + 1])) for k in np.flatnonzero((np.diff(best) != 0) & (np.diff(segment) == 0))
+        }
+        # a crossing of two balls that carry less is a kink of nothing, and does no harm
+        signals += [table[:, a] - table[:, b] for a, b in sorted({(min(pair), max(pair)) for pair in pairs})]
+    kept: list[float] = []
+    for time in np.sort(np.concatenate([np.zeros(0), *(crossings(t, segment, signal) for signal in signals)])).tolist():
+        last = kept[-1] if kept else -np.inf
+        if time - last > APART * length and np.min(np.abs(edges - time)) > APART * length:
+            kept.append(time)
+    return kept

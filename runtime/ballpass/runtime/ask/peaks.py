@@ -18,6 +18,7 @@ from typing import Literal
 
 import numpy as np
 
+from ballpass.runtime.ask.track import depends
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -92,7 +93,7 @@ def refine_peaks(
     of_time = {
         name
         for (name, _), peak in zip(wanted, found, strict=True)
-        if peak.searched == "samples" and name not in model.states and not _depends(model, name, "x")
+        if peak.searched == "samples" and name not in model.states and not depends(model, name, "x")
     }
     if of_time and len(solution) > 1:
         grid = _TimeGrid(model, numbers, solution, sorted(of_time))
@@ -190,19 +191,9 @@ class _TimeGrid:
 
 def _comes_back(model: LoadedModel, numbers: Numbers, names: Sequence[str], turn: float) -> bool:
     """Whether what these outputs depend on comes back with each turn."""
-    places = dict.fromkeys(k for name in names for k in _depends(model, name, "u"))
+    places = dict.fromkeys(k for name in names for k in depends(model, name, "u"))
     inputs = [model.manifest.inputs[k] for k in places]
     if not math.isfinite(turn) or not all(item.kind in ("phase", "gate") for item in inputs):
         return False
     turns = np.array([numbers.values[item.rate] * turn / clock.TURN for item in inputs])
     return bool(np.all(np.abs(turns - np.rint(turns)) <= ALIKE))
-
-
-def _depends(model: LoadedModel, output: str, argument: str) -> list[int]:
-    """Entries of an argument of the outputs that one of them depends on."""
-    graph = model.symbolic("outputs")
-    if argument not in graph.name_in():
-        return []
-    known = [info.name for info in model.manifest.outputs]
-    sparsity = graph.jac_sparsity(known.index(output), graph.name_in().index(argument))
-    return list(dict.fromkeys(sparsity.get_col()))

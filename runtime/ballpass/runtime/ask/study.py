@@ -2,8 +2,8 @@
 
 In: a model, quantities, run settings (`Study`).  Out: `Estimate` for each quantity.
 
-`measure` runs once and gives values: what difference quotients are made of.  `differentiate` runs twice: first plainly,
-to see where the extremes lie, then with derivatives along parameters and nodes at the extremes.
+A plain run with reductions shows where the extremes and the kinks lie; the run that counts has nodes there, and with
+`differentiate` derivatives along parameters.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.ask.between_nodes import Extreme, find_extreme
+from ballpass.runtime.ask.between_nodes import Extreme, Wanted, find_extremes
 from ballpass.runtime.ask.kinds import KINDS
-from ballpass.runtime.ask.kinks import DEFLECTION, Kink, find_kinks
-from ballpass.runtime.ask.moving_kinks import released
+from ballpass.runtime.ask.kinks import DEFLECTION, find_kinks
 from ballpass.runtime.ask.nodes import (
     Edges,
     Nodes,
@@ -33,10 +32,11 @@ from ballpass.runtime.ask.nodes import (
 from ballpass.runtime.ask.quantity_location import Place, place_of, place_slope
 from ballpass.runtime.ask.quantity_records import Estimate, Mark, Quantity, View
 from ballpass.runtime.ask.static import at_rest
-from ballpass.runtime.ask.track import Outlook, Signal, Stepping, Track, follow
+from ballpass.runtime.ask.track import Outlook, Signal, Stepping, Track, depends, follow
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.reduced_run import check_span
 from ballpass.runtime.run.request import check_memory
@@ -78,26 +78,6 @@ class Course:
     estimates: tuple[Estimate, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Prepared:
-    """A run laid out, ready to be followed by any integrator.
-
-    Attributes
-    ----------
-    numbers, chain : of the run, and the derivatives of its numbers
-    edges, nodes : where it is looked at, and how that moves
-    marks : moments of extremes and places
-    track : where the stepper has followed it already, for it had to find how kinks move
-    """
-
-    numbers: Numbers
-    chain: Chain
-    edges: Edges
-    nodes: Nodes
-    marks: dict[tuple[str, str], Mark]
-    track: Track | None
-
-
 class Study:
     """Quantities along runs of one model.
 
@@ -115,7 +95,10 @@ class Study:
         self.span = span
         self.per_turn = per_turn
         self._moving = [quantity for quantity in quantities if not KINDS[quantity.kind].static]
-        self._outlook = Outlook(model, [quantity.channel for quantity in self._moving])
+        channels = [quantity.channel for quantity in self._moving]
+        self._outlook = Outlook(model, channels)
+        # outputs that follow from time alone need no integration
+        self._still = all(name in model.outputs and not depends(model, name, "x") for name in channels)
 
     def window(self, numbers: Numbers) -> Window:
         """The time that counts.
@@ -133,18 +116,6 @@ class Study:
         start = check_span(duration, turn, span.transient)
         return Window(duration=duration, start=start, turn=turn, cycles=span.cycles, transient=span.transient)
 
-    def _check_memory(self, window: Window, directions: int = 0) -> None:
-        """Refuse nodes that would not fit into memory, before any is laid."""
-        length = window.duration - window.start
-        nodes = self.per_turn * (length / window.turn if np.isfinite(window.turn) else length / window.duration)
-        derivatives = f" and derivatives by {directions} parameters" if directions else ""
-        check_memory(
-            f"{nodes:.10g} nodes, with states{derivatives}, of",
-            nodes,
-            max(len(self.model.states), 1) * (VALUES + SLOPES * directions),
-            f"Take a shorter run, samples_per_cycle below {self.per_turn}, or fewer parameters at a time.",
-        )
-
     def measure(self, numbers: Numbers, stepping: Stepping) -> Course:
         """Values of all quantities.
 
@@ -155,44 +126,7 @@ class Study:
         SimulationError
             The computation failed.
         """
-        if not self._moving:
-            return self._all_at_rest(numbers, None)
-        window = self.window(numbers)
-        self._check_memory(window)
-        edges = make_edges(self.model, numbers, window)
-        track, places = self._follow(numbers, edges, uniform_plan(edges, self.per_turn), stepping, None)
-        regular = self._regular(track)
-        extremes = self._extremes(numbers, regular, stepping)
-        if self._kinked:
-            edges = with_kinks(edges, [kink.time for kink in self._kinks(numbers, regular)])
-            track, places = self._follow(numbers, edges, uniform_plan(edges, self.per_turn), stepping, None)
-        # extremes are values already: they need no node
-        view = View(
-            manifest=self.model.manifest,
-            numbers=numbers,
-            window=edges.window,
-            nodes=track.nodes,
-            signals=self._outlook.look(track, numbers),
-            marks=places,
-            slopes=lambda _: np.zeros(0),
-            directions=0,
-        )
-        return Course(track=track, estimates=tuple(self._value(view, item, extremes) for item in self.quantities))
-
-    def _value(self, view: View, quantity: Quantity, extremes: dict[tuple[str, str], Extreme]) -> Estimate:
-        kinds = KINDS[quantity.kind].extremes
-        if not kinds:
-            return self._estimate(view, quantity, None)
-        found = [extremes[quantity.name, kind] for kind in kinds]
-        value = found[0].value - (found[1].value if len(found) > 1 else 0.0)
-        several = view.signals[quantity.channel].value.shape[1] > 1
-        single = len(found) == 1
-        return Estimate(
-            value=value,
-            slope=np.zeros(0),
-            time=found[0].time if single else None,
-            ball=found[0].column + 1 if several and single else None,
-        )
+        return self._course(numbers, None, stepping)
 
     def differentiate(self, numbers: Numbers, names: Sequence[str], stepping: Stepping) -> Course:
         """Values of all quantities and their derivatives along parameters.
@@ -204,40 +138,33 @@ class Study:
         SimulationError
             The computation failed.
         """
-        chain = Chain(self.model, numbers, names)
-        prepared = self.prepare(numbers, chain, stepping)
-        if prepared is None:
-            return self._all_at_rest(numbers, chain)
-        track = prepared.track or follow(self.model, numbers, prepared.edges, prepared.nodes, stepping, chain)
-        return self.finish(prepared, track)
+        return self._course(numbers, Chain(self.model, numbers, names), stepping)
 
-    def prepare(self, numbers: Numbers, chain: Chain, stepping: Stepping) -> Prepared | None:
-        """Find extremes and kinks, and lay nodes accordingly; None where nothing needs to be run."""
+    def _course(self, numbers: Numbers, chain: Chain | None, stepping: Stepping) -> Course:
+        """Find extremes and kinks in a plain run, lay nodes accordingly, and run along them."""
+        directions = 0 if chain is None else len(chain.names)
         if not self._moving:
-            return None
-        directions, window = len(chain.names), self.window(numbers)
+            estimates = tuple(at_rest(self.model, numbers, item, chain) for item in self.quantities)
+            return Course(track=None, estimates=estimates)
+        window = self.window(numbers)
         self._check_memory(window, directions)
-        edges = make_edges(self.model, numbers, window, chain.derivative, directions)
+        edges = make_edges(self.model, numbers, window, None if chain is None else chain.derivative, directions)
         extremes: dict[tuple[str, str], Extreme] = {}
-        kinks: tuple[Kink, ...] = ()
-        if self._kinked or any(KINDS[item.kind].extremes for item in self._moving):
-            plainly, _ = self._follow(numbers, edges, uniform_plan(edges, self.per_turn), stepping, None)
-            regular = self._regular(plainly)
-            extremes = self._extremes(numbers, regular, stepping)
-            kinks = self._kinks(numbers, regular) if self._kinked else ()
-        broken = with_kinks(edges, [kink.time for kink in kinks])
-        extremes = {key: _moved(item, edges, broken) for key, item in extremes.items()}
-        edges = broken
+        asked = [(item, kind) for item in self._moving for kind in KINDS[item.kind].extremes]
+        if asked or (chain is not None and self._kinked):
+            row = None if self._still else self._row(window)
+            nodes = place(uniform_plan(edges, self.per_turn), edges)
+            track = follow(self.model, numbers, edges, nodes, stepping, reduction=row, still=self._still)
+            extremes = self._extremes(numbers, asked, track, row, stepping)
+            if chain is not None and self._kinked:
+                broken = with_kinks(edges, self._kinks(numbers, track))
+                extremes = {key: _moved(item, edges, broken) for key, item in extremes.items()}
+                edges = broken
         points = list(dict.fromkeys((item.segment, item.fraction) for item in extremes.values()))
-        full = with_points(uniform_plan(edges, self.per_turn), points)
-        nodes, marks = self._nodes(numbers, edges, full, chain)
-        track = None
-        if kinks:
-            track = follow(self.model, numbers, edges, nodes, stepping, chain)
-            track = released(self.model, numbers, track, self._regular(track), full, kinks, chain)
-            nodes, edges = track.nodes, track.edges
+        plan = with_points(uniform_plan(edges, self.per_turn), points)
+        nodes, marks = self._nodes(numbers, edges, plan, chain)
         for key, item in extremes.items():
-            here = np.flatnonzero((full.segment == item.segment) & (full.fraction == item.fraction))
+            here = np.flatnonzero((plan.segment == item.segment) & (plan.fraction == item.fraction))
             marks[key] = Mark(
                 node=int(here[0]),
                 time=item.time,
@@ -248,30 +175,36 @@ class Study:
                 runner_up=item.runner_up,
                 at_edge=min(item.fraction, 1.0 - item.fraction) < AT_EDGE,
             )
-        return Prepared(numbers=numbers, chain=chain, edges=edges, nodes=nodes, marks=marks, track=track)
-
-    def finish(self, prepared: Prepared, track: Track) -> Course:
-        """Quantities and their derivatives from a track along the nodes that were prepared."""
-        view = self._view(prepared, self._outlook.look(track, prepared.numbers, prepared.chain))
-        estimates = tuple(self._estimate(view, item, prepared.chain) for item in self.quantities)
-        return Course(track=track, estimates=estimates)
-
-    def _view(self, prepared: Prepared, signals: Mapping[str, Signal]) -> View:
-        return View(
+        track = follow(self.model, numbers, edges, nodes, stepping, chain, still=self._still)
+        view = View(
             manifest=self.model.manifest,
-            numbers=prepared.numbers,
-            window=prepared.edges.window,
-            nodes=prepared.nodes,
-            signals=signals,
-            marks=prepared.marks,
-            slopes=prepared.chain.derivative,
-            directions=len(prepared.chain.names),
+            numbers=numbers,
+            window=edges.window,
+            nodes=nodes,
+            signals=self._outlook.look(track, numbers, chain),
+            marks=marks,
+            slopes=chain.derivative if chain is not None else lambda _: np.zeros(0),
+            directions=directions,
+        )
+        return Course(track=track, estimates=tuple(self._estimate(view, item, chain) for item in self.quantities))
+
+    def _check_memory(self, window: Window, directions: int) -> None:
+        """Refuse nodes that would not fit into memory, before any is laid."""
+        length = window.duration - window.start
+        nodes = self.per_turn * (length / window.turn if np.isfinite(window.turn) else length / window.duration)
+        derivatives = f" and derivatives by {directions} parameters" if directions else ""
+        check_memory(
+            f"{nodes:.10g} nodes, with states{derivatives}, of",
+            nodes,
+            max(len(self.model.states), 1) * (VALUES + SLOPES * directions),
+            f"Take a shorter run, samples_per_cycle below {self.per_turn}, or fewer parameters at a time.",
         )
 
-    def _all_at_rest(self, numbers: Numbers, chain: Chain | None) -> Course:
-        """The quantities where all are static."""
-        estimates = tuple(at_rest(self.model, numbers, item, chain) for item in self.quantities)
-        return Course(track=None, estimates=estimates)
+    def _row(self, window: Window) -> Array:
+        """An empty row of reductions from the end of the transient on, which may lie a rounding beside its edge."""
+        channels = [item.channel for item in self._moving]
+        start = window.start * (1.0 - AT_EDGE)
+        return np.asarray(reduction_rows(self.model.manifest).empty(1, start, channels)[0])
 
     def _estimate(self, view: View, quantity: Quantity, chain: Chain | None) -> Estimate:
         evaluate = KINDS[quantity.kind].evaluate
@@ -295,68 +228,60 @@ class Study:
             nodes = _appended(nodes, edges, time, slope, kind)
         return nodes, marks
 
-    def _follow(
-        self, numbers: Numbers, edges: Edges, plan: Plan, stepping: Stepping, chain: Chain | None
-    ) -> tuple[Track, dict[tuple[str, str], Mark]]:
-        """The run along a plan and the places asked for."""
-        nodes, marks = self._nodes(numbers, edges, plan, chain)
-        return follow(self.model, numbers, edges, nodes, stepping, chain), marks
-
     @property
     def _kinked(self) -> bool:
         """Whether an integral over an output of the balls is asked for."""
+        broken = tuple(bearing.prefix + name for bearing in self.model.manifest.bearings for name in BROKEN)
         return any(
-            not KINDS[item.kind].extremes and item.kind != "value" and item.channel.startswith(BROKEN)
+            not KINDS[item.kind].extremes and item.kind != "value" and item.channel.startswith(broken)
             for item in self._moving
         )
 
-    def _regular(self, track: Track) -> Track:
-        """The track without the places asked for: nodes in order of time."""
-        places = sum(item.kind in ("value", "end") for item in self._moving)
-        return track.part(np.arange(len(track.nodes) - places))
-
-    def _kinks(self, numbers: Numbers, track: Track) -> tuple[Kink, ...]:
-        """Kinks of the outputs of the balls."""
-        manifest, nodes, edges = self.model.manifest, track.nodes, track.edges
-        ranked = [item.channel for item in self._moving if item.channel.startswith("ball.") and item.ball is None]
-        ranked = list(dict.fromkeys(ranked))
+    def _kinks(self, numbers: Numbers, track: Track) -> list[float]:
+        """Times of kinks of the outputs of the balls."""
+        nodes, edges, bearings = track.nodes, track.edges, self.model.manifest.bearings
+        ranked = {item.channel for item in self._moving if ".ball." in f".{item.channel}" and item.ball is None}
         # among the quantities of every bearing, whether or not the scene's outputs name it
-        deflections = [DEFLECTION] if manifest.bearing is not None else []
-        signals = Outlook(self.model, [*ranked, *deflections]).look(track, numbers)
-        deflection = signals[DEFLECTION].value if deflections else np.zeros((len(nodes), 0))
+        deflections = [bearing.prefix + DEFLECTION for bearing in bearings]
+        signals = Outlook(self.model, [*sorted(ranked), *deflections]).look(track, numbers)
         return find_kinks(
             nodes.t,
             nodes.segment,
-            deflection,
-            {name: signals[name].value for name in ranked},
-            one_sided=manifest.bearing is not None and manifest.bearing.damping_law == "one-sided",
+            [signals[name].value for name in deflections],
+            [signals[name].value for name in sorted(ranked)],
+            one_sided=any(bearing.damping_law == "one-sided" for bearing in bearings),
             length=edges.window.duration,
             edges=edges.times,
         )
 
-    def _extremes(self, numbers: Numbers, regular: Track, stepping: Stepping) -> dict[tuple[str, str], Extreme]:
+    def _extremes(
+        self,
+        numbers: Numbers,
+        asked: Sequence[tuple[Quantity, str]],
+        track: Track,
+        row: Array | None,
+        stepping: Stepping,
+    ) -> dict[tuple[str, str], Extreme]:
         """Extremes of all quantities that need some."""
-        wanted = [(item, kind) for item in self._moving for kind in KINDS[item.kind].extremes]
-        if not wanted:
+        rows = reduction_rows(self.model.manifest)
+
+        def wanted(item: Quantity, kind: str) -> Wanted:
+            held = row is not None and item.ball is None and item.channel in rows.channels
+            seen = float(row[rows.column(f"{kind}_time", item.channel)]) if row is not None and held else None
+            ball = None if item.ball is None else item.ball - 1
+            return Wanted(channel=item.channel, ball=ball, sign=1.0 if kind == "max" else -1.0, seen=seen)
+
+        def look(nodes: Nodes) -> Mapping[str, Signal]:
+            seen = follow(self.model, numbers, track.edges, nodes, stepping, still=self._still)
+            return self._outlook.look(seen, numbers)
+
+        if not asked:
             return {}
-        signals = self._outlook.look(regular, numbers)
-        found: dict[tuple[str, str], Extreme] = {}
-        done: dict[tuple[str, int | None, str], Extreme] = {}
-        for item, kind in wanted:
-            key = (item.channel, item.ball, kind)
-            if key not in done:
-                done[key] = find_extreme(
-                    self.model,
-                    numbers,
-                    regular,
-                    signals[item.channel].value,
-                    item.channel,
-                    sign=1.0 if kind == "max" else -1.0,
-                    ball=None if item.ball is None else item.ball - 1,
-                    stepping=stepping,
-                )
-            found[item.name, kind] = done[key]
-        return found
+        each = [wanted(item, kind) for item, kind in asked]
+        distinct = list(dict.fromkeys(each))
+        signals = self._outlook.look(track, numbers)
+        found = dict(zip(distinct, find_extremes(distinct, track, signals, look), strict=True))
+        return {(item.name, kind): found[one] for (item, kind), one in zip(asked, each, strict=True)}
 
 
 def _appended(nodes: Nodes, edges: Edges, time: float, slope: Array, kind: Place) -> Nodes:

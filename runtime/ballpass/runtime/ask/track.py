@@ -10,7 +10,7 @@ not: it is one number for both sides of the edge.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import casadi
@@ -47,14 +47,12 @@ class Stepping:
     family : method of the driver
     rtol, magnitude : error allowed in a step: relative, and the states' magnitudes, shape (states,)
     sensitivity_rtol : tolerance of the derivatives in the choice of step sizes [1]
-    largest_step : bound of the step size [s]
     """
 
     family: Family
     rtol: float
     magnitude: Array
     sensitivity_rtol: float | None = None
-    largest_step: float = np.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,8 +64,6 @@ class Track:
     nodes, edges : where
     x : states, shape (nodes, states)
     slope : their derivatives along the moving nodes, shape (nodes, states, directions)
-    fixed, rate : derivatives at fixed time, and rate of change in time, of which `slope` is made; shapes (nodes,
-        states, directions), (nodes, states); empty in a run without derivatives
     local : time since the segment's start, shape (nodes,) [s]
     u : inputs, shape (nodes, inputs)
     steps : accepted steps
@@ -77,29 +73,9 @@ class Track:
     edges: Edges
     x: Array
     slope: Array
-    fixed: Array
-    rate: Array
     local: Array
     u: Array
     steps: int
-
-    def along(self, nodes: Nodes, edges: Edges) -> Track:
-        """The same run along the same nodes when they move otherwise."""
-        slope = self.fixed + self.rate[:, :, None] * nodes.slope[:, None, :]
-        return replace(self, nodes=nodes, edges=edges, slope=slope)
-
-    def part(self, rows: NDArray[np.int_]) -> Track:
-        """The track at some of its nodes."""
-        nodes = self.nodes
-        kept = Nodes(
-            t=nodes.t[rows],
-            weight=nodes.weight[rows],
-            segment=nodes.segment[rows],
-            slope=nodes.slope[rows],
-            weight_slope=nodes.weight_slope[rows],
-        )
-        names = ("x", "slope", "fixed", "rate", "local", "u")
-        return replace(self, nodes=kept, **{name: getattr(self, name)[rows] for name in names})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -123,8 +99,16 @@ def follow(
     nodes: Nodes,
     stepping: Stepping,
     chain: Chain | None = None,
+    *,
+    reduction: Array | None = None,
+    still: bool = False,
 ) -> Track:
     """States at the nodes; with derivatives along the directions of `chain`.
+
+    Parameters
+    ----------
+    reduction : row that the run is reduced to; not with derivatives
+    still : nothing that is looked at depends on the states, which stay zero
 
     Raises
     ------
@@ -136,12 +120,10 @@ def follow(
     segments = make_segments(inputs, numbers, edges.times)
     u = segments.inputs
     local, held = nodes.t - edges.times[nodes.segment], u[nodes.segment]
-    if not count:
-        empty = np.zeros((len(nodes), 0))
-        slope = np.zeros((len(nodes), 0, directions))
-        return Track(
-            nodes=nodes, edges=edges, x=empty, slope=slope, fixed=slope, rate=empty, local=local, u=held, steps=0
-        )
+    if still:
+        empty = np.zeros((len(nodes), count))
+        slope = np.zeros((len(nodes), count, directions))
+        return Track(nodes=nodes, edges=edges, x=empty, slope=slope, local=local, u=held, steps=0)
     times, back = np.unique(nodes.t, return_inverse=True)
     states = np.empty((len(times), count))
     start = np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
@@ -159,30 +141,36 @@ def follow(
         output_times=times,
         output_states=states,
         tangents=None if made is None else made.tangents(segments, 0, len(times)),
-        largest_step=stepping.largest_step,
+        reduction=reduction,
     )
     if outcome.end is not End.DONE:
         raise RunFailed(outcome.end, outcome.time, outcome.step)
-    slope = fixed = np.zeros((len(nodes), count, directions))
-    rates = np.zeros((len(nodes), count))
+    slope = np.zeros((len(nodes), count, directions))
     if made is not None:
         # the driver gives an edge's derivative as it is before the edge
         before = np.clip(np.searchsorted(edges.times, times, side="left") - 1, 0, None)
         given = {"t": times - edges.times[before], "x": states, "u": u[before], "p": numbers.p, "c": numbers.c}
         rate = next(iter(model.loop("rhs", ("t", "x", "u"))(len(times), given).values()))
-        fixed, rates = made.states(len(times))[back], rate[back]
-        slope = fixed + rates[:, :, None] * nodes.slope[:, None, :]
+        slope = made.states(len(times))[back] + rate[back][:, :, None] * nodes.slope[:, None, :]
     return Track(
         nodes=nodes,
         edges=edges,
         x=states[back],
         slope=slope,
-        fixed=fixed,
-        rate=rates,
         local=local,
         u=held,
         steps=outcome.steps,
     )
+
+
+def depends(model: LoadedModel, output: str, argument: str) -> list[int]:
+    """Entries of an argument of the outputs that one of them depends on."""
+    graph = model.symbolic("outputs")
+    if argument not in graph.name_in():
+        return []
+    known = [info.name for info in model.manifest.outputs]
+    sparsity = graph.jac_sparsity(known.index(output), graph.name_in().index(argument))
+    return list(dict.fromkeys(sparsity.get_col()))
 
 
 class Outlook:

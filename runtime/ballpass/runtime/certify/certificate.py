@@ -11,15 +11,14 @@ not checked   the user turned the check off, or the uncertainties are too large 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.certify.differences import richardson
-from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.certify.differences import extrapolated
 
 Array = NDArray[np.float64]
 
@@ -37,10 +36,13 @@ CAUTION = 4.0
 FIRST_STEP, LARGER, SMALLER = 1e-3, 10.0, 0.1
 
 #: Most triangles of a parameter, and steps of each.
-TRIANGLES, HALVINGS = 3, 5
+TRIANGLES, HALVINGS = 3, 4
 
 #: Relative change of parameters that shows the noise of a run: what step sizes that are chosen anew do to its values.
-JITTER = 1e-7
+JITTER, JITTERED = 1e-7, 5
+
+#: Parameters that differ from those of a run, and what it measures of all quantities, shape (runs, quantities).
+Measure = Callable[[Sequence[Mapping[str, float]]], Array]
 
 
 class Verdict(Enum):
@@ -170,68 +172,70 @@ class Second:
     uncertainty: Array
 
 
-def noise_of(measure: Callable[[Mapping[str, float]], Array], at: Mapping[str, float], scales: Array) -> Array:
-    """Noise of values that a run gives, shape (quantities,): half the largest second difference over tiny changes.
-
-    Parameters
-    ----------
-    measure : values of all quantities for parameters that differ from the run's
-    at : values of the parameters to change
-    scales : change of each that is a large one, shape (parameters,)
-    """
-    rows = [
-        measure({name: value + k * JITTER * scale for (name, value), scale in zip(at.items(), scales, strict=True)})
-        for k in range(-2, 3)
-    ]
-    return np.asarray(np.max(np.abs(np.diff(rows, n=2, axis=0)), axis=0) / 2.0)
-
-
 def by_differences(
-    measure: Callable[[Mapping[str, float]], Array],
+    measure: Measure,
     at: Mapping[str, float],
     scales: Array,
     *,
     quantum: Array,
     agreement: float = AGREEMENT,
-    progress: Callable[[float], None] | None = None,
 ) -> Second:
     """Derivatives of quantities by Richardson-extrapolated central differences, with step control.
 
     Parameters
     ----------
-    measure : values of all quantities for parameters that differ from the run's, shape (quantities,)
+    measure : values of all quantities for many changes at once; NaN where one cannot be simulated
     at : values of the parameters to differentiate by
     scales : change of each that is a large one, shape (parameters,)
     quantum : derivatives that count as nothing, shape (quantities, parameters)
     agreement : relative disagreement that will be allowed [1]
-    progress : called with the finished fraction
     """
-    noise = noise_of(measure, at, scales)
-    count = len(noise)
-    value, error = np.full((count, len(at)), np.nan), np.full((count, len(at)), np.inf)
-    for k, (name, number) in enumerate(at.items()):
-
-        def shifted(moved: float, name: str = name) -> Array:
-            try:
-                return measure({name: moved})
-            except (RequestError, SimulationError):
-                # beyond what can be simulated: this difference does not count
-                return np.full(count, np.nan)
-
-        step, tried = FIRST_STEP, 0
-        while tried < TRIANGLES:
-            found = richardson(shifted, number, step * scales[k], steps=HALVINGS, resolution=noise)
-            tried += 1
-            better = found.error < error[:, k]
-            value[:, k] = np.where(better, found.value, value[:, k])
-            error[:, k] = np.where(better, found.error, error[:, k])
-            poor = error[:, k] > 0.3 * (agreement * np.abs(value[:, k]) + quantum[:, k])
-            if not np.any(poor):
-                break
-            # noise over the width of the smallest difference, twice as `richardson` counts it
-            share = 2.0 * noise[poor] / (2.0 * step * scales[k] * 0.5 ** (HALVINGS - 1))
-            noisy = bool(np.any(share > 0.2 * error[poor, k]))
-            step = FIRST_STEP * (LARGER if noisy and tried == 1 else SMALLER ** (tried if not noisy else tried - 1))
-        if progress is not None:
-            progress((k + 1) / len(at))
+    names, centre = list(at), np.array(list(at.values()))
+    step, left = np.full(len(names), FIRST_STEP), np.arange(len(names))
+    noise = np.zeros(len(quantum))
+    value, error = np.full(quantum.shape, np.nan), np.full(quantum.shape, np.inf)
+    for tried in range(1, TRIANGLES + 1):
+        halves = 0.5 ** np.arange(HALVINGS)
+        reach = (step * scales)[left, None] * halves
+        upper, lower = centre[left, None] + reach, centre[left, None] - reach
+        changes = [
+            {names[k]: moved}
+            for side in (upper, lower)
+            for k, row in zip(left, side.tolist(), strict=True)
+            for moved in row
+        ]
+        jitter = _jittered(at, scales) if tried == 1 else []
+        found = measure([*jitter, *changes])
+        if jitter:
+            noise = _noise(found[: len(jitter)])
+        table = found[len(jitter) :].reshape(2, len(left), HALVINGS, len(noise))
+        poor = np.zeros(len(left), dtype=bool)
+        for place, k in enumerate(left.tolist()):
+            triangle = extrapolated(table[0, place], table[1, place], (upper - lower)[place], noise)
+            better = triangle.error < error[:, k]
+            value[:, k] = np.where(better, triangle.value, value[:, k])
+            error[:, k] = np.where(better, triangle.error, error[:, k])
+            wanting = error[:, k] > 0.3 * (agreement * np.abs(value[:, k]) + quantum[:, k])
+            poor[place] = np.any(wanting)
+            # noise over the width of the smallest difference, twice as `extrapolated` counts it
+            share = 2.0 * noise[wanting] / (upper - lower)[place, -1]
+            noisy = bool(np.any(share > 0.2 * error[wanting, k]))
+            step[k] = FIRST_STEP * (LARGER if noisy and tried == 1 else SMALLER ** (tried if not noisy else tried - 1))
+        left = left[poor]
+        if not len(left):
+            break
     return Second(route="differences", value=value, uncertainty=error)
+
+
+def _jittered(at: Mapping[str, float], scales: Array) -> list[dict[str, float]]:
+    """Tiny changes of all parameters together."""
+    moves = JITTER * np.arange(-(JITTERED // 2), JITTERED // 2 + 1)
+    return [
+        {name: value + move * scale for (name, value), scale in zip(at.items(), scales.tolist(), strict=True)}
+        for move in moves.tolist()
+    ]
+
+
+def _noise(values: Array) -> Array:
+    """Noise of the quantities: half the largest second difference over tiny changes, shape (quantities,)."""
+    return np.asarray(np.max(np.abs(np.diff(values, n=2, axis=0)), axis=0) / 2.0)

@@ -5,7 +5,8 @@ function's result.
 
 Central differences at steps that halve are extrapolated to step zero (Richardson), and for each entry the element of
 the triangle with the smallest estimated error is taken: large steps suffer from curvature and from kinks between the
-two points, small ones from rounding, and the estimate sees both.  (C. J. F. Ridders, Adv. Eng. Software 4 (1982) 75,
+two points, small ones from rounding, and the estimate sees both.  An element counts only with one of the same order
+from larger steps beside it.  (C. J. F. Ridders, Adv. Eng. Software 4 (1982) 75,
 doi:10.1016/S0141-1195(82)80057-0.)
 """
 
@@ -68,41 +69,52 @@ def richardson(
     Raises
     ------
     RequestError
-        A point or step that is no finite number, a step of zero or less, fewer than two steps.
+        A point or step that is no finite number, a step of zero or less, fewer than three steps.
     """
-    if not (math.isfinite(at) and math.isfinite(scale) and scale > 0.0 and steps >= 2):
+    if not (math.isfinite(at) and math.isfinite(scale) and scale > 0.0 and steps >= 3):
         raise RequestError(
-            f"richardson: a finite point, a finite step above 0 and at least 2 steps are expected, not {at!r}, "
+            f"richardson: a finite point, a finite step above 0 and at least 3 steps are expected, not {at!r}, "
             f"{scale!r} and {steps!r}."
         )
-    best: Array | None = None
-    error = chosen = np.zeros(0)
-    row: list[Array] = []
+    upper, lower, width = [], [], []
     for k in range(steps):
         h = scale * 0.5**k
         above, below = at + h, at - h
-        width = above - below  # the steps as they are after rounding
-        if width == 0.0:
+        if above - below == 0.0:
             break
-        upper, lower = np.asarray(function(above), dtype=float), np.asarray(function(below), dtype=float)
-        with np.errstate(invalid="ignore", over="ignore"):
-            fresh = [(upper - lower) / width]
-            noise = (np.finfo(float).eps * np.maximum(np.abs(upper), np.abs(lower)) + resolution) / width
-            for j in range(1, min(k, ORDERS - 1) + 1):
-                fresh.append(fresh[j - 1] + (fresh[j - 1] - row[j - 1]) / (4.0**j - 1.0))
-        if best is None:
-            best, error, chosen = fresh[0].copy(), np.full(fresh[0].shape, np.inf), np.full(fresh[0].shape, h)
-        for j in range(1, len(fresh)):
-            with np.errstate(invalid="ignore", over="ignore"):
-                # neighbours in the triangle; extrapolation magnifies rounding by less than two
-                spread = np.maximum(np.abs(fresh[j] - fresh[j - 1]), np.abs(fresh[j] - row[j - 1])) + 2.0 * noise
-            better = np.isfinite(spread) & (spread < error)
-            best, error, chosen = (
-                np.where(better, fresh[j], best),
-                np.where(better, spread, error),
-                np.where(better, h, chosen),
-            )
-        row = fresh
-    if best is None:
+        upper.append(np.asarray(function(above), dtype=float))
+        lower.append(np.asarray(function(below), dtype=float))
+        width.append(above - below)  # the steps as they are after rounding
+    if not width:
         raise RequestError(f"richardson: the step {scale!r} vanishes beside the point {at!r}. Give a larger step.")
-    return Difference(value=best, error=error, step=chosen, evaluations=2 * (k + 1))
+    return extrapolated(np.array(upper), np.array(lower), np.array(width), resolution)
+
+
+def extrapolated(upper: Array, lower: Array, width: Array, resolution: float | Array = 0.0) -> Difference:
+    """Derivative from values on both sides of a point.
+
+    Parameters
+    ----------
+    upper, lower : values of a function above and below, at steps that halve, shape (steps, ...)
+    width : distances between both, shape (steps,)
+    resolution : error of the values besides rounding
+    """
+    wide = width.reshape(-1, *[1] * (upper.ndim - 1))
+    with np.errstate(invalid="ignore", over="ignore"):
+        column = (upper - lower) / wide
+        noise = (np.finfo(float).eps * np.maximum(np.abs(upper), np.abs(lower)) + resolution) / wide
+        best, error = column[0].copy(), np.full(column[0].shape, np.inf)
+        step = np.full(column[0].shape, 0.5 * width[0])
+        for order in range(1, min(len(width), ORDERS)):
+            fresh = column[1:] + (column[1:] - column[:-1]) / (4.0**order - 1.0)
+            for row, value in enumerate(fresh[1:], start=1):
+                k = row + order
+                # neighbours in the triangle, and the same order of larger steps: one sequence may agree by chance;
+                # extrapolation magnifies rounding by less than two
+                neighbours = np.abs(value - np.stack([column[row + 1], column[row], fresh[row - 1]]))
+                spread = np.max(neighbours, axis=0) + 2.0 * noise[k]
+                better = np.isfinite(spread) & (spread < error)
+                best, error = np.where(better, value, best), np.where(better, spread, error)
+                step = np.where(better, 0.5 * width[k], step)
+            column = fresh
+    return Difference(value=best, error=error, step=step, evaluations=2 * len(width))

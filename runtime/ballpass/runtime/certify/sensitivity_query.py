@@ -23,6 +23,7 @@ from ballpass.runtime.ask.study import Course, Span, Study
 from ballpass.runtime.ask.track import Outlook, Stepping
 from ballpass.runtime.certify.certificate import AGREEMENT, FLOOR, UNCHECKED, by_differences, compare
 from ballpass.runtime.certify.grazing import TOLERANCE, Grazing, find_grazing
+from ballpass.runtime.certify.member_runs import MemberRuns
 from ballpass.runtime.certify.sensitivity_report import QuantityValue, Sensitivity, SensitivityReport, ratio_unit
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError, SimulationError
@@ -30,7 +31,6 @@ from ballpass.runtime.contract.parameters import Numbers, real, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS, Family
 from ballpass.runtime.point.assembly import check_assembly
-from ballpass.runtime.point.evaluate import neighbour
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.direction_scales import ANGLE
 from ballpass.runtime.run.magnitudes import model_scales
@@ -47,15 +47,9 @@ RTOL, SENSITIVITY_RTOL = 1e-11, 1e-10
 #: under laws whose slope is infinite at contact onset derivatives have singular rates there.
 LOOSEST = 1e-6
 
-#: Tolerance of the states in runs for difference quotients.
-DIFFERENCE_RTOL = 1e-13
-
-#: Nodes in a turn per sample of an ordinary run: where a law has a kink, derivatives of outputs jump, and their
-#: quadrature is of first order there.
-FINER = 4
-
-#: Nodes for each radian of the fastest vibration, and the most of them, in `FINER` runs' samples.
-NODES_A_RADIAN, MOST = 3, 4
+#: Nodes of quadratures: the fewest and the most in a turn, and those for each radian of the fastest vibration.  They
+#: have nothing to do with the samples of a run.
+FEWEST, MOST, NODES_A_RADIAN = 8192, 32768, 3
 
 #: A change of the start by this share of the motion is a large one: it stays near, so that its effect is linear.
 START_SHARE = 1e-2
@@ -177,7 +171,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
         scales = model_scales(model, numbers, start, window.duration, window.turn)
         magnitude = scales.magnitude
         family, fine = _families(query.method, scales)
-    study.per_turn = query.samples_per_cycle or _nodes_a_turn(manifest, window, scales)
+    study.per_turn = query.samples_per_cycle or _nodes_a_turn(window, scales)
     tell = query.progress or (lambda _words, _fraction: None)
     stepping = Stepping(family=family, rtol=query.rtol, magnitude=magnitude, sensitivity_rtol=query.sensitivity_rtol)
 
@@ -195,19 +189,15 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
         quantum = FLOOR * np.abs(values)[:, None] / difference_scales[None, :]
     second = None
     if query.check:
-        plain = Stepping(family=fine, rtol=DIFFERENCE_RTOL, magnitude=magnitude)
-
-        def measure(change: Mapping[str, float]) -> Array:
-            course = study.measure(neighbour(model, numbers, change), plain)
-            return np.array([item.value for item in course.estimates])
-
+        tell("checking", 0.0)
         second = by_differences(
-            measure,
+            MemberRuns(
+                model, numbers, quantities, query.span, family=fine, per_turn=study.per_turn, magnitude=magnitude
+            ),
             {name: numbers.parameters[name] for name in names},
             difference_scales,
             quantum=quantum,
             agreement=query.agreement,
-            progress=lambda fraction: tell("checking", fraction),
         )
     pairs = []
     units = {info.name: info.unit for info in manifest.parameters}
@@ -274,11 +264,10 @@ def _refuse_jumps(manifest: Manifest) -> None:
         )
 
 
-def _nodes_a_turn(manifest: Manifest, window: Window, scales: Scales) -> int:
-    """Nodes that quadratures need: more than a run's samples, and some in each period of the fastest vibration."""
-    ordinary = FINER * manifest.run.samples_per_cycle
+def _nodes_a_turn(window: Window, scales: Scales) -> int:
+    """Nodes that quadratures need: some in each period of the fastest vibration."""
     span = window.turn if math.isfinite(window.turn) else window.duration
-    return max(ordinary, min(math.ceil(NODES_A_RADIAN * scales.frequency * span), MOST * ordinary))
+    return max(FEWEST, min(math.ceil(NODES_A_RADIAN * scales.frequency * span), MOST))
 
 
 def _listed(option: str, given: Sequence[str] | None, default: Sequence[str]) -> list[str]:
@@ -310,7 +299,7 @@ def _families(method: str, scales: Scales) -> tuple[Family, Family]:
     family = METHODS.get(method, Family.AUTO)
     if family is Family.AUTO:
         family = Family.RODAS5P if stiff else Family.DP54
-    return family, Family.RODAS5P if stiff else Family.DOP853
+    return family, Family.RODAS5P if stiff else Family.DP54
 
 
 def _differentiate(study: Study, numbers: Numbers, names: Sequence[str], stepping: Stepping) -> tuple[Course, float]:

@@ -144,8 +144,14 @@ def simulate_many(
     threads: int | None,
     lanes: bool,
     progress: Callable[[float], None] | None,
+    bounded: bool = True,
 ) -> EnsembleResult:
-    """Run an ensemble; see `ballpass.runtime.Model.simulate_many`."""
+    """Run an ensemble; see `ballpass.runtime.Model.simulate_many`.
+
+    Parameters
+    ----------
+    bounded : hold the numbers to their bounds
+    """
     started = clocks.perf_counter()
     manifest = model.manifest
     aliases = observable_aliases(channel_names(manifest))
@@ -168,7 +174,7 @@ def simulate_many(
     driver = model.ensemble_driver
     if at_kinks == LOCATED and has_kinks(manifest):
         driver = driver.with_stepper(model.locating_stepper)
-    members = make_members(model, columns)
+    members = make_members(model, columns, bounded=bounded)
     skipped = manifest.run.transient_cycles if transient is None else real(transient)
     span = _span(model, members, cycles, duration, skipped)
     in_lanes = lanes and at_kinks != LOCATED and family in LANE_FAMILIES

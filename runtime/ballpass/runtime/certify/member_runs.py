@@ -1,0 +1,107 @@
+"""Values of quantities for many changed parameter sets at once: what difference quotients are made of.
+
+In: changes of parameters.  Out: values, shape (runs, quantities).  Extremes, means and rms of the channels that the
+driver reduces are observables of an ensemble, in lanes and threads.  All others, as values at an angle, amplitudes and
+outputs that are no channels, are taken along nodes, one run at a time in each thread.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.ask.quantity_records import Quantity
+from ballpass.runtime.ask.study import Span, Study
+from ballpass.runtime.ask.track import Stepping
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.many.ensemble import simulate_many
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.stepper import METHODS, Family
+from ballpass.runtime.point.evaluate import neighbour
+from ballpass.runtime.run.locating import STEPPED_OVER
+from ballpass.runtime.run.reductions import channel_names
+
+Array = NDArray[np.float64]
+
+#: Tolerance of the states: of ensembles, and of runs along nodes.
+RTOL, RTOL_ALONG_NODES = 1e-11, 1e-12
+
+#: Kinds of quantities that are observables of an ensemble as well.
+REDUCED = ("max", "min", "range", "mean", "rms")
+
+#: Nodes in a turn, relative to those of the derivatives' own run, which are not to be shared.
+NODES = 1.3
+
+
+class MemberRuns:
+    """Quantities of runs beside a run.
+
+    Parameters
+    ----------
+    model, numbers : the model and the run's numbers
+    quantities, span : what is asked for, and how long to run
+    family : of the stepper
+    per_turn, magnitude : nodes in a turn and magnitudes of the states in the run itself
+    """
+
+    def __init__(
+        self,
+        model: LoadedModel,
+        numbers: Numbers,
+        quantities: Sequence[Quantity],
+        span: Span,
+        *,
+        family: Family,
+        per_turn: int,
+        magnitude: Array,
+    ) -> None:
+        self._model, self._numbers, self._span, self._family = model, numbers, span, family
+        self._per_turn = int(NODES * per_turn)
+        self._stepping = Stepping(family=family, rtol=RTOL_ALONG_NODES, magnitude=magnitude)
+        channels = channel_names(model.manifest) if model.states else ()
+        self._count = len(quantities)
+        self._reduced = {
+            k: f"{item.kind}:{item.channel}"
+            for k, item in enumerate(quantities)
+            if item.kind in REDUCED and item.ball is None and item.channel in channels
+        }
+        self._others = {k: item for k, item in enumerate(quantities) if k not in self._reduced}
+
+    def __call__(self, changes: Sequence[Mapping[str, float]]) -> Array:
+        """Values of all quantities for each change; NaN beyond what can be simulated."""
+        found = np.full((len(changes), self._count), np.nan)
+        if self._reduced:
+            values = simulate_many(
+                self._model,
+                [{**self._numbers.parameters, **change} for change in changes],
+                list(dict.fromkeys(self._reduced.values())),
+                cycles=self._span.cycles,
+                duration=self._span.duration,
+                transient=self._span.transient,
+                rtol=RTOL,
+                method=next(name for name, family in METHODS.items() if family is self._family),
+                kinks=STEPPED_OVER,
+                threads=None,
+                lanes=True,
+                progress=None,
+                bounded=False,
+            )
+            for k, name in self._reduced.items():
+                found[:, k] = values[name]
+        if self._others:
+            with ThreadPoolExecutor(os.cpu_count()) as threads:
+                found[:, list(self._others)] = list(threads.map(self._along_nodes, changes))
+        return found
+
+    def _along_nodes(self, change: Mapping[str, float]) -> list[float]:
+        study = Study(self._model, list(self._others.values()), self._span, self._per_turn)
+        try:
+            course = study.measure(neighbour(self._model, self._numbers, change), self._stepping)
+        except (RequestError, SimulationError):
+            return [np.nan] * len(self._others)
+        return [item.value for item in course.estimates]
