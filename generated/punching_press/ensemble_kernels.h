@@ -5,55 +5,7 @@
 
 #include "kernels.h"
 
-enum { BP_MEMBERS = 8, BP_NCONTACT = 2 }; /* lanes; numbers of a contact */
-
-/* Stage variables that deflections need. 4 operations. */
-static inline void bp_cage(double t, const double *restrict u, const double *restrict p, const double *restrict c, double *restrict w)
-{
-    (void)p;
-    double w0 = u[2];
-    double w1 = c[12];
-    double w2 = t;
-    w1 = w1 * w2;
-    w0 = w0 + w1;
-    w1 = bp_cos1(w0);
-    w[0] = w1;
-    w0 = bp_sin1(w0);
-    w[1] = w0;
-    w0 = 0.0;
-    w[2] = w0;
-    w[3] = w0;
-}
-
-/* Numbers that elastic and damping force of a ball depend on. 0 operations. */
-static inline void bp_contact_numbers(const double *restrict p, const double *restrict c, double *restrict k)
-{
-    (void)p;
-    double w0 = c[10];
-    k[0] = w0;
-    w0 = c[14];
-    k[1] = w0;
-}
-
-/* Elastic and damping force of one ball [N]. 8 operations. */
-static inline void bp_ball_contact(double delta, double rate, const double *restrict k, double *restrict elastic_force, double *restrict damping_force)
-{
-    double w0 = 0.0;
-    double w1 = delta;
-    double w2 = (double)(w0 < w1);
-    double w3 = k[0];
-    double w4 = sqrt(w1);
-    w1 = w1 * w4;
-    w3 = w3 * w1;
-    w2 = (w2 != 0.0 ? w3 : 0.0);
-    elastic_force[0] = w2;
-    w2 = rate;
-    w0 = (double)(w0 < w2);
-    w3 = k[1];
-    w2 = w2 * w3;
-    w0 = (w0 != 0.0 ? w2 : 0.0);
-    damping_force[0] = w0;
-}
+enum { BP_MEMBERS = 8 }; /* lanes */
 
 /* Angles of a stage and their rates, of a member in each lane. */
 static inline void bp_member_angles_lanes(const double *restrict t, const double *restrict u, const double *restrict p, const double *restrict c, double *restrict a, double *restrict at)
@@ -509,7 +461,7 @@ static inline void bp_member_stage_rate_turned_lanes(const double *restrict C, c
     }
 }
 
-/* delta = r0 + r1 cos + r2 sin, rate = r3 cos + r4 sin, of a member in each lane. */
+/* Of each bearing: delta = r0 + r1 cos + r2 sin, rate = r3 cos + r4 sin, of a member in each lane. */
 static inline void bp_member_relative_lanes(const double *restrict x, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, double *restrict r)
 {
     (void)u;
@@ -544,60 +496,6 @@ static inline void bp_member_relative_lanes(const double *restrict x, const doub
         w5 = w5 * w0;
         w4 = w4 - w5;
         r[4 * BP_MEMBERS + lane] = w4;
-    }
-}
-
-/* Force of one ball [N], of a member in each lane. */
-static inline void bp_member_law_lanes(const double *restrict delta, const double *restrict rate, const double *restrict p, const double *restrict c, double *restrict F)
-{
-    (void)p;
-#pragma omp simd
-    for (int lane = 0; lane < BP_MEMBERS; lane++) {
-        double w0 = 0.0;
-        double w1 = rate[0 * BP_MEMBERS + lane];
-        double w2 = (double)(w0 < w1);
-        double w3 = c[14 * BP_MEMBERS + lane];
-        w1 = w1 * w3;
-        w2 = (w2 != 0.0 ? w1 : 0.0);
-        w1 = delta[0 * BP_MEMBERS + lane];
-        w0 = (double)(w0 < w1);
-        w3 = c[10 * BP_MEMBERS + lane];
-        double w4 = sqrt(w1);
-        w1 = w1 * w4;
-        w3 = w3 * w1;
-        w0 = (w0 != 0.0 ? w3 : 0.0);
-        w2 = w2 + w0;
-        F[0 * BP_MEMBERS + lane] = w2;
-    }
-}
-
-/* Force of one ball [N] and its slopes, of a member in each lane. */
-static inline void bp_member_law_slopes_lanes(const double *restrict delta, const double *restrict rate, const double *restrict p, const double *restrict c, double *restrict F, double *restrict Fd, double *restrict Fv)
-{
-    (void)p;
-#pragma omp simd
-    for (int lane = 0; lane < BP_MEMBERS; lane++) {
-        double w0 = 0.0;
-        double w1 = rate[0 * BP_MEMBERS + lane];
-        double w2 = (double)(w0 < w1);
-        double w3 = c[14 * BP_MEMBERS + lane];
-        w1 = w1 * w3;
-        w1 = (w2 != 0.0 ? w1 : 0.0);
-        double w4 = delta[0 * BP_MEMBERS + lane];
-        w0 = (double)(w0 < w4);
-        double w5 = c[10 * BP_MEMBERS + lane];
-        double w6 = sqrt(w4);
-        w4 = w4 * w6;
-        w5 = w5 * w4;
-        w5 = (w0 != 0.0 ? w5 : 0.0);
-        w1 = w1 + w5;
-        F[0 * BP_MEMBERS + lane] = w1;
-        w1 = c[38 * BP_MEMBERS + lane];
-        w1 = w1 * w6;
-        w0 = (w0 != 0.0 ? w1 : 0.0);
-        Fd[0 * BP_MEMBERS + lane] = w0;
-        w2 = (w2 != 0.0 ? w3 : 0.0);
-        Fv[0 * BP_MEMBERS + lane] = w2;
     }
 }
 
@@ -770,10 +668,10 @@ static inline void bp_member_acceleration_rate_lanes(const double *restrict x, c
         w3 = w3 + w9;
         w9 = S[1 * BP_MEMBERS + lane];
         w3 = w3 - w9;
-        w9 = w0 * w3;
-        double w10 = c[12 * BP_MEMBERS + lane];
-        w9 = w9 * w10;
-        w1 = w1 - w9;
+        w9 = c[12 * BP_MEMBERS + lane];
+        w3 = w3 * w9;
+        double w10 = w0 * w3;
+        w1 = w1 - w10;
         at[0 * BP_MEMBERS + lane] = w1;
         w1 = wt[3 * BP_MEMBERS + lane];
         w1 = w0 * w1;
@@ -788,21 +686,19 @@ static inline void bp_member_acceleration_rate_lanes(const double *restrict x, c
         w2 = w2 + w8;
         w8 = S[0 * BP_MEMBERS + lane];
         w2 = w2 + w8;
+        w2 = w2 * w9;
         w0 = w0 * w2;
-        w0 = w0 * w10;
         w1 = w1 - w0;
         at[1 * BP_MEMBERS + lane] = w1;
         w1 = c[31 * BP_MEMBERS + lane];
         w3 = w1 * w3;
-        w3 = w3 * w10;
         at[2 * BP_MEMBERS + lane] = w3;
         w1 = w1 * w2;
-        w1 = w1 * w10;
         at[3 * BP_MEMBERS + lane] = w1;
     }
 }
 
-/* Stage variables that deflections need from cosines and sines, of a member in each lane. */
+/* Stage of deflections from cosines and sines, of a member in each lane. */
 static inline void bp_member_cage_turned_lanes(const double *restrict C, const double *restrict S, const double *restrict t, const double *restrict u, const double *restrict p, const double *restrict c, double *restrict w)
 {
     (void)t;
@@ -821,27 +717,173 @@ static inline void bp_member_cage_turned_lanes(const double *restrict C, const d
     }
 }
 
-/* Elastic and damping force of one ball [N], of a member in each lane. */
-static inline void bp_member_contact_lanes(const double *restrict delta, const double *restrict delta_rate, const double *restrict p, const double *restrict c, double *restrict elastic_force, double *restrict damping_force)
+enum { BP_0_DIRECTIONS = 4 };
+
+/* Summands of the forces of a ball and the one opposite, of a member in each lane. */
+static inline void bp_member_0_forces_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict p, const double *restrict c, const double *restrict w, double *restrict rows)
 {
     (void)p;
+    (void)w;
 #pragma omp simd
     for (int lane = 0; lane < BP_MEMBERS; lane++) {
         double w0 = 0.0;
-        double w1 = delta[0 * BP_MEMBERS + lane];
-        double w2 = (double)(w0 < w1);
-        double w3 = c[10 * BP_MEMBERS + lane];
-        double w4 = sqrt(w1);
+        double w1 = r[3 * BP_MEMBERS + lane];
+        double w2 = co[0 * BP_MEMBERS + lane];
+        w1 = w1 * w2;
+        double w3 = r[4 * BP_MEMBERS + lane];
+        double w4 = si[0 * BP_MEMBERS + lane];
+        w3 = w3 * w4;
+        w1 = w1 + w3;
+        w3 = (double)(w0 < w1);
+        double w5 = c[14 * BP_MEMBERS + lane];
+        w5 = w5 * w1;
+        w3 = (w3 != 0.0 ? w5 : 0.0);
+        double w6 = r[0 * BP_MEMBERS + lane];
+        double w7 = r[1 * BP_MEMBERS + lane];
+        w7 = w7 * w2;
+        double w8 = r[2 * BP_MEMBERS + lane];
+        w8 = w8 * w4;
+        w7 = w7 + w8;
+        w8 = w6 + w7;
+        double w9 = (double)(w0 < w8);
+        double w10 = c[10 * BP_MEMBERS + lane];
+        double w11 = sqrt(w8);
+        w8 = w8 * w11;
+        w8 = w10 * w8;
+        w9 = (w9 != 0.0 ? w8 : 0.0);
+        w3 = w3 + w9;
+        w1 = -w1;
+        w1 = (double)(w0 < w1);
+        w5 = -w5;
+        w1 = (w1 != 0.0 ? w5 : 0.0);
+        w6 = w6 - w7;
+        w0 = (double)(w0 < w6);
+        w7 = sqrt(w6);
+        w6 = w6 * w7;
+        w10 = w10 * w6;
+        w0 = (w0 != 0.0 ? w10 : 0.0);
+        w1 = w1 + w0;
+        w3 = w3 - w1;
+        w2 = w3 * w2;
+        rows[0 * BP_MEMBERS + lane] = w2;
+        w3 = w3 * w4;
+        rows[1 * BP_MEMBERS + lane] = w3;
+    }
+}
+
+/* The same, and of their slopes, of a member in each lane. */
+static inline void bp_member_0_slopes_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict p, const double *restrict c, const double *restrict w, double *restrict rows)
+{
+    (void)p;
+    (void)w;
+#pragma omp simd
+    for (int lane = 0; lane < BP_MEMBERS; lane++) {
+        double w0 = 0.0;
+        double w1 = r[3 * BP_MEMBERS + lane];
+        double w2 = co[0 * BP_MEMBERS + lane];
+        w1 = w1 * w2;
+        double w3 = r[4 * BP_MEMBERS + lane];
+        double w4 = si[0 * BP_MEMBERS + lane];
+        w3 = w3 * w4;
+        w1 = w1 + w3;
+        w3 = (double)(w0 < w1);
+        double w5 = c[14 * BP_MEMBERS + lane];
+        double w6 = w5 * w1;
+        double w7 = (w3 != 0.0 ? w6 : 0.0);
+        double w8 = r[0 * BP_MEMBERS + lane];
+        double w9 = r[1 * BP_MEMBERS + lane];
+        w9 = w9 * w2;
+        double w10 = r[2 * BP_MEMBERS + lane];
+        w10 = w10 * w4;
+        w9 = w9 + w10;
+        w10 = w8 + w9;
+        double w11 = (double)(w0 < w10);
+        double w12 = c[10 * BP_MEMBERS + lane];
+        double w13 = sqrt(w10);
+        w10 = w10 * w13;
+        w10 = w12 * w10;
+        w10 = (w11 != 0.0 ? w10 : 0.0);
+        w7 = w7 + w10;
+        w1 = -w1;
+        w1 = (double)(w0 < w1);
+        w6 = -w6;
+        w6 = (w1 != 0.0 ? w6 : 0.0);
+        w8 = w8 - w9;
+        w0 = (double)(w0 < w8);
+        w9 = sqrt(w8);
+        w8 = w8 * w9;
+        w12 = w12 * w8;
+        w12 = (w0 != 0.0 ? w12 : 0.0);
+        w6 = w6 + w12;
+        w7 = w7 - w6;
+        w6 = w7 * w2;
+        rows[0 * BP_MEMBERS + lane] = w6;
+        w7 = w7 * w4;
+        rows[1 * BP_MEMBERS + lane] = w7;
+        w7 = c[38 * BP_MEMBERS + lane];
+        w13 = w7 * w13;
+        w11 = (w11 != 0.0 ? w13 : 0.0);
+        w7 = w7 * w9;
+        w0 = (w0 != 0.0 ? w7 : 0.0);
+        w11 = w11 + w0;
+        w0 = w2 * w2;
+        w7 = w11 * w0;
+        rows[2 * BP_MEMBERS + lane] = w7;
+        w2 = w2 * w4;
+        w7 = w11 * w2;
+        rows[3 * BP_MEMBERS + lane] = w7;
+        w4 = w4 * w4;
+        w11 = w11 * w4;
+        rows[4 * BP_MEMBERS + lane] = w11;
+        w3 = (w3 != 0.0 ? w5 : 0.0);
+        w1 = (w1 != 0.0 ? w5 : 0.0);
+        w3 = w3 + w1;
+        w0 = w3 * w0;
+        rows[5 * BP_MEMBERS + lane] = w0;
+        w2 = w3 * w2;
+        rows[6 * BP_MEMBERS + lane] = w2;
+        w3 = w3 * w4;
+        rows[7 * BP_MEMBERS + lane] = w3;
+    }
+}
+
+/* force, elastic force, damping force, deflection of a ball, of a member in each lane. */
+static inline void bp_member_0_contact_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict p, const double *restrict c, const double *restrict w, double *restrict rows)
+{
+    (void)p;
+    (void)w;
+#pragma omp simd
+    for (int lane = 0; lane < BP_MEMBERS; lane++) {
+        double w0 = 0.0;
+        double w1 = r[3 * BP_MEMBERS + lane];
+        double w2 = co[0 * BP_MEMBERS + lane];
+        w1 = w1 * w2;
+        double w3 = r[4 * BP_MEMBERS + lane];
+        double w4 = si[0 * BP_MEMBERS + lane];
+        w3 = w3 * w4;
+        w1 = w1 + w3;
+        w3 = (double)(w0 < w1);
+        double w5 = c[14 * BP_MEMBERS + lane];
+        w5 = w5 * w1;
+        w3 = (w3 != 0.0 ? w5 : 0.0);
+        w5 = r[0 * BP_MEMBERS + lane];
+        w1 = r[1 * BP_MEMBERS + lane];
+        w1 = w1 * w2;
+        w5 = w5 + w1;
+        w1 = r[2 * BP_MEMBERS + lane];
         w1 = w1 * w4;
-        w3 = w3 * w1;
-        w2 = (w2 != 0.0 ? w3 : 0.0);
-        elastic_force[0 * BP_MEMBERS + lane] = w2;
-        w2 = delta_rate[0 * BP_MEMBERS + lane];
-        w0 = (double)(w0 < w2);
-        w3 = c[14 * BP_MEMBERS + lane];
-        w2 = w2 * w3;
-        w0 = (w0 != 0.0 ? w2 : 0.0);
-        damping_force[0 * BP_MEMBERS + lane] = w0;
+        w5 = w5 + w1;
+        w0 = (double)(w0 < w5);
+        w1 = c[10 * BP_MEMBERS + lane];
+        w4 = sqrt(w5);
+        w4 = w5 * w4;
+        w1 = w1 * w4;
+        w0 = (w0 != 0.0 ? w1 : 0.0);
+        w1 = w3 + w0;
+        rows[0 * BP_MEMBERS + lane] = w1;
+        rows[1 * BP_MEMBERS + lane] = w0;
+        rows[2 * BP_MEMBERS + lane] = w3;
+        rows[3 * BP_MEMBERS + lane] = w5;
     }
 }
 

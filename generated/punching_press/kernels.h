@@ -7,13 +7,171 @@
 
 #include "trig.h"
 
-enum { BP_NQ = 4, BP_NX = 8, BP_NU = 3, BP_NP = 41, BP_NC = 39, BP_NW = 4, BP_NA = 2, BP_NK = 3, BP_NJ = 57, BP_NB = 8, BP_LANES = 8 };
+enum { BP_NQ = 4, BP_NX = 8, BP_NU = 3, BP_NP = 41, BP_NC = 39, BP_NW = 4, BP_NA = 2, BP_NJ = 57, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_NR = 5, BP_NG = 6, BP_LANES = 8 };
 
-static const double bp_cos[8] = {1.0, 0.7071067811865476, 0.0, -0.7071067811865476, -1.0, -0.7071067811865476, 0.0, 0.7071067811865476};
+/* Coordinates of one group share a magnitude; where a coordinate has a partner, their difference counts. */
+static const int bp_group[4] = {0.0, 0.0, 0.0, 0.0};
+static const double bp_partner[4] = {2.0, 3.0, 0.0, 1.0};
 
-static const double bp_sin[8] = {0.0, 0.7071067811865476, 1.0, 0.7071067811865476, 0.0, -0.7071067811865476, -1.0, -0.7071067811865476};
+#define BP_EACH_BEARING(DO) DO(0)
 
-/* Once per stage time: cage direction, loads, all else without the state. 109 operations. */
+enum { BP_0_BALLS = 8, BP_0_FIRST_BALL = 0, BP_0_NK = 3, BP_0_SLOPES = 6, BP_0_FIRST_SLOPE = 0, BP_0_PARTIALS = 16 };
+
+static const double bp_0_cos[8] = {1.0, 0.7071067811865476, 0.0, -0.7071067811865476, -1.0, -0.7071067811865476, 0.0, 0.7071067811865476};
+
+static const double bp_0_sin[8] = {0.0, 0.7071067811865476, 1.0, 0.7071067811865476, 0.0, -0.7071067811865476, -1.0, -0.7071067811865476};
+
+/* Numbers that the balls depend on. */
+static inline void bp_0_numbers(const double *restrict p, const double *restrict c, const double *restrict w, double *restrict k)
+{
+    (void)p;
+    (void)w;
+    double w0 = c[10];
+    k[0] = w0;
+    w0 = c[14];
+    k[1] = w0;
+    w0 = c[38];
+    k[2] = w0;
+}
+
+/* Summands of the forces of the balls. 18 operations a ball. */
+static inline void bp_0_forces_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, double *restrict rows)
+{
+#pragma omp simd
+    for (int lane = 0; lane < BP_0_BALLS; lane++) {
+        double w0 = 0.0;
+        double w1 = r[3];
+        double w2 = co[0 * BP_0_BALLS + lane];
+        w1 = w1 * w2;
+        double w3 = r[4];
+        double w4 = si[0 * BP_0_BALLS + lane];
+        w3 = w3 * w4;
+        w1 = w1 + w3;
+        w3 = (double)(w0 < w1);
+        double w5 = k[1];
+        w5 = w5 * w1;
+        w3 = (w3 != 0.0 ? w5 : 0.0);
+        w5 = r[0];
+        w1 = r[1];
+        w1 = w1 * w2;
+        w5 = w5 + w1;
+        w1 = r[2];
+        w1 = w1 * w4;
+        w5 = w5 + w1;
+        w0 = (double)(w0 < w5);
+        w1 = k[0];
+        double w6 = sqrt(w5);
+        w5 = w5 * w6;
+        w1 = w1 * w5;
+        w0 = (w0 != 0.0 ? w1 : 0.0);
+        w3 = w3 + w0;
+        w2 = w3 * w2;
+        rows[0 * BP_0_BALLS + lane] = w2;
+        w3 = w3 * w4;
+        rows[1 * BP_0_BALLS + lane] = w3;
+    }
+}
+
+/* The same, and of their slopes. 34 operations a ball. */
+static inline void bp_0_slopes_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, double *restrict rows)
+{
+#pragma omp simd
+    for (int lane = 0; lane < BP_0_BALLS; lane++) {
+        double w0 = 0.0;
+        double w1 = r[3];
+        double w2 = co[0 * BP_0_BALLS + lane];
+        w1 = w1 * w2;
+        double w3 = r[4];
+        double w4 = si[0 * BP_0_BALLS + lane];
+        w3 = w3 * w4;
+        w1 = w1 + w3;
+        w3 = (double)(w0 < w1);
+        double w5 = k[1];
+        w1 = w5 * w1;
+        w1 = (w3 != 0.0 ? w1 : 0.0);
+        double w6 = r[0];
+        double w7 = r[1];
+        w7 = w7 * w2;
+        w6 = w6 + w7;
+        w7 = r[2];
+        w7 = w7 * w4;
+        w6 = w6 + w7;
+        w0 = (double)(w0 < w6);
+        w7 = k[0];
+        double w8 = sqrt(w6);
+        w6 = w6 * w8;
+        w7 = w7 * w6;
+        w7 = (w0 != 0.0 ? w7 : 0.0);
+        w1 = w1 + w7;
+        w7 = w1 * w2;
+        rows[0 * BP_0_BALLS + lane] = w7;
+        w1 = w1 * w4;
+        rows[1 * BP_0_BALLS + lane] = w1;
+        w1 = k[2];
+        w1 = w1 * w8;
+        w8 = w2 * w2;
+        w7 = w1 * w8;
+        w7 = (w0 != 0.0 ? w7 : 0.0);
+        rows[2 * BP_0_BALLS + lane] = w7;
+        w2 = w2 * w4;
+        w7 = w1 * w2;
+        w7 = (w0 != 0.0 ? w7 : 0.0);
+        rows[3 * BP_0_BALLS + lane] = w7;
+        w4 = w4 * w4;
+        w1 = w1 * w4;
+        w0 = (w0 != 0.0 ? w1 : 0.0);
+        rows[4 * BP_0_BALLS + lane] = w0;
+        w8 = w5 * w8;
+        w8 = (w3 != 0.0 ? w8 : 0.0);
+        rows[5 * BP_0_BALLS + lane] = w8;
+        w2 = w5 * w2;
+        w2 = (w3 != 0.0 ? w2 : 0.0);
+        rows[6 * BP_0_BALLS + lane] = w2;
+        w5 = w5 * w4;
+        w3 = (w3 != 0.0 ? w5 : 0.0);
+        rows[7 * BP_0_BALLS + lane] = w3;
+    }
+}
+
+/* force, elastic force, damping force, deflection of each ball. 16 operations a ball. */
+static inline void bp_0_contact_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, double *restrict rows)
+{
+#pragma omp simd
+    for (int lane = 0; lane < BP_0_BALLS; lane++) {
+        double w0 = 0.0;
+        double w1 = r[3];
+        double w2 = co[0 * BP_0_BALLS + lane];
+        w1 = w1 * w2;
+        double w3 = r[4];
+        double w4 = si[0 * BP_0_BALLS + lane];
+        w3 = w3 * w4;
+        w1 = w1 + w3;
+        w3 = (double)(w0 < w1);
+        double w5 = k[1];
+        w5 = w5 * w1;
+        w3 = (w3 != 0.0 ? w5 : 0.0);
+        w5 = r[0];
+        w1 = r[1];
+        w1 = w1 * w2;
+        w5 = w5 + w1;
+        w1 = r[2];
+        w1 = w1 * w4;
+        w5 = w5 + w1;
+        w0 = (double)(w0 < w5);
+        w1 = k[0];
+        w4 = sqrt(w5);
+        w4 = w5 * w4;
+        w1 = w1 * w4;
+        w0 = (w0 != 0.0 ? w1 : 0.0);
+        w1 = w3 + w0;
+        rows[0 * BP_0_BALLS + lane] = w1;
+        rows[1 * BP_0_BALLS + lane] = w0;
+        rows[2 * BP_0_BALLS + lane] = w3;
+        rows[3 * BP_0_BALLS + lane] = w5;
+    }
+}
+
+/* Once per stage time: cages' directions, loads, all else without the state. 109 operations. */
 static inline void bp_stage(double t, const double *restrict u, const double *restrict p, const double *restrict c, double *restrict w)
 {
     double w0 = u[2];
@@ -454,7 +612,7 @@ static inline void bp_stage_rate(double t, const double *restrict u, const doubl
     wt[3] = w4;
 }
 
-/* delta = r0 + r1 cos + r2 sin, rate = r3 cos + r4 sin. 12 operations. */
+/* Of each bearing: delta = r0 + r1 cos + r2 sin, rate = r3 cos + r4 sin. 12 operations. */
 static inline void bp_relative(const double *restrict x, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, double *restrict r)
 {
     (void)u;
@@ -487,54 +645,6 @@ static inline void bp_relative(const double *restrict x, const double *restrict 
     w5 = w5 * w0;
     w4 = w4 - w5;
     r[4] = w4;
-}
-
-/* Force of one ball [N]. 9 operations. */
-static inline void bp_law(double delta, double rate, const double *restrict p, const double *restrict c, double *restrict F)
-{
-    (void)p;
-    double w0 = 0.0;
-    double w1 = rate;
-    double w2 = (double)(w0 < w1);
-    double w3 = c[14];
-    w1 = w1 * w3;
-    w2 = (w2 != 0.0 ? w1 : 0.0);
-    w1 = delta;
-    w0 = (double)(w0 < w1);
-    w3 = c[10];
-    double w4 = sqrt(w1);
-    w1 = w1 * w4;
-    w3 = w3 * w1;
-    w0 = (w0 != 0.0 ? w3 : 0.0);
-    w2 = w2 + w0;
-    F[0] = w2;
-}
-
-/* Force of one ball [N] and its slopes. 12 operations. */
-static inline void bp_law_slopes(double delta, double rate, const double *restrict p, const double *restrict c, double *restrict F, double *restrict Fd, double *restrict Fv)
-{
-    (void)p;
-    double w0 = 0.0;
-    double w1 = rate;
-    double w2 = (double)(w0 < w1);
-    double w3 = c[14];
-    w1 = w1 * w3;
-    w1 = (w2 != 0.0 ? w1 : 0.0);
-    double w4 = delta;
-    w0 = (double)(w0 < w4);
-    double w5 = c[10];
-    double w6 = sqrt(w4);
-    w4 = w4 * w6;
-    w5 = w5 * w4;
-    w5 = (w0 != 0.0 ? w5 : 0.0);
-    w1 = w1 + w5;
-    F[0] = w1;
-    w1 = c[38];
-    w1 = w1 * w6;
-    w0 = (w0 != 0.0 ? w1 : 0.0);
-    Fd[0] = w0;
-    w2 = (w2 != 0.0 ? w3 : 0.0);
-    Fv[0] = w2;
 }
 
 /* Accelerations from the sums over the balls. 14 operations. */
@@ -671,7 +781,7 @@ static inline void bp_acceleration_jacobian(const double *restrict x, const doub
     B[15] = w0;
 }
 
-/* Partial time derivative of the accelerations at fixed state. 28 operations. */
+/* Partial time derivative of the accelerations at fixed state. 26 operations. */
 static inline void bp_acceleration_rate(const double *restrict x, const double *restrict S, const double *restrict G, const double *restrict r, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, const double *restrict wt, double *restrict at)
 {
     (void)x;
@@ -698,10 +808,10 @@ static inline void bp_acceleration_rate(const double *restrict x, const double *
     w3 = w3 + w9;
     w9 = S[1];
     w3 = w3 - w9;
-    w9 = w0 * w3;
-    double w10 = c[12];
-    w9 = w9 * w10;
-    w1 = w1 - w9;
+    w9 = c[12];
+    w3 = w3 * w9;
+    double w10 = w0 * w3;
+    w1 = w1 - w10;
     at[0] = w1;
     w1 = wt[3];
     w1 = w0 * w1;
@@ -716,75 +826,15 @@ static inline void bp_acceleration_rate(const double *restrict x, const double *
     w2 = w2 + w8;
     w8 = S[0];
     w2 = w2 + w8;
+    w2 = w2 * w9;
     w0 = w0 * w2;
-    w0 = w0 * w10;
     w1 = w1 - w0;
     at[1] = w1;
     w1 = c[31];
     w3 = w1 * w3;
-    w3 = w3 * w10;
     at[2] = w3;
     w1 = w1 * w2;
-    w1 = w1 * w10;
     at[3] = w1;
-}
-
-/* Numbers that the force of a ball depends on. 0 operations. */
-static inline void bp_law_numbers(const double *restrict p, const double *restrict c, double *restrict k)
-{
-    (void)p;
-    double w0 = c[10];
-    k[0] = w0;
-    w0 = c[14];
-    k[1] = w0;
-    w0 = c[38];
-    k[2] = w0;
-}
-
-/* Force of one ball [N]. 9 operations. */
-static inline void bp_ball_force(double delta, double rate, const double *restrict k, double *restrict F)
-{
-    double w0 = 0.0;
-    double w1 = rate;
-    double w2 = (double)(w0 < w1);
-    double w3 = k[1];
-    w1 = w1 * w3;
-    w2 = (w2 != 0.0 ? w1 : 0.0);
-    w1 = delta;
-    w0 = (double)(w0 < w1);
-    w3 = k[0];
-    double w4 = sqrt(w1);
-    w1 = w1 * w4;
-    w3 = w3 * w1;
-    w0 = (w0 != 0.0 ? w3 : 0.0);
-    w2 = w2 + w0;
-    F[0] = w2;
-}
-
-/* Force of one ball [N] and its slopes. 12 operations. */
-static inline void bp_ball_slopes(double delta, double rate, const double *restrict k, double *restrict F, double *restrict Fd, double *restrict Fv)
-{
-    double w0 = 0.0;
-    double w1 = rate;
-    double w2 = (double)(w0 < w1);
-    double w3 = k[1];
-    w1 = w1 * w3;
-    w1 = (w2 != 0.0 ? w1 : 0.0);
-    double w4 = delta;
-    w0 = (double)(w0 < w4);
-    double w5 = k[0];
-    double w6 = sqrt(w4);
-    w4 = w4 * w6;
-    w5 = w5 * w4;
-    w5 = (w0 != 0.0 ? w5 : 0.0);
-    w1 = w1 + w5;
-    F[0] = w1;
-    w1 = k[2];
-    w1 = w1 * w6;
-    w0 = (w0 != 0.0 ? w1 : 0.0);
-    Fd[0] = w0;
-    w2 = (w2 != 0.0 ? w3 : 0.0);
-    Fv[0] = w2;
 }
 
 /* Angles of a stage and their rates. 4 operations. */
@@ -803,6 +853,24 @@ static inline void bp_angles(double t, const double *restrict u, const double *r
     a[1] = w0;
     at[0] = w1;
     at[1] = w3;
+}
+
+/* Stage of deflections. 4 operations. */
+static inline void bp_cage(double t, const double *restrict u, const double *restrict p, const double *restrict c, double *restrict w)
+{
+    (void)p;
+    double w0 = u[2];
+    double w1 = c[12];
+    double w2 = t;
+    w1 = w1 * w2;
+    w0 = w0 + w1;
+    w1 = bp_cos1(w0);
+    w[0] = w1;
+    w0 = bp_sin1(w0);
+    w[1] = w0;
+    w0 = 0.0;
+    w[2] = w0;
+    w[3] = w0;
 }
 
 /* Stage variables from cosines and sines of its angles, for BP_LANES times at once. */

@@ -3,75 +3,145 @@
 #ifndef BALLPASS_SWITCHES_H
 #define BALLPASS_SWITCHES_H
 
-enum { BP_NSWITCHES = 1 };
+#include "kernels.h"
 
-/* Whether rates of deflection are computed; a force that has no use for them has none. */
-enum { BP_RATES = 1 };
+enum { BP_EVENTS = 8, BP_0_FIRST_EVENT = 0, BP_0_SWITCHES = 1 };
 
-/* Where the force above a kink, or below it, ends at a branch point; where a kink is one of the rate. */
-static const double bp_ends_above[1] = {1.0};
-static const double bp_ends_below[1] = {0.0};
-static const double bp_switch_of_rate[1] = {0.0};
+/* Where the force above a kink, or below it, ends at a branch point; where it is one of the rate; where
+   a rate comes with the switching function. */
+static const double bp_ends_above[8] = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
+static const double bp_ends_below[8] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+static const double bp_of_rate[8] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+static const double bp_has_rate[8] = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
 
-/* Switching functions of one ball [m, or m/s]. */
-static inline void bp_ball_switches(double delta, double rate, const double *restrict k, double *restrict g)
+/* Switching functions [m, or m/s], and the rates of those of deflections. 7 operations a ball. */
+static inline void bp_0_switches_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, double *restrict rows)
 {
-    (void)rate;
     (void)k;
-    double w0 = delta;
-    g[0] = w0;
+#pragma omp simd
+    for (int lane = 0; lane < BP_0_BALLS; lane++) {
+        double w0 = r[0];
+        double w1 = r[1];
+        double w2 = co[0 * BP_0_BALLS + lane];
+        w1 = w1 * w2;
+        w0 = w0 + w1;
+        w1 = r[2];
+        double w3 = si[0 * BP_0_BALLS + lane];
+        w1 = w1 * w3;
+        w0 = w0 + w1;
+        rows[0 * BP_0_BALLS + lane] = w0;
+        w0 = r[3];
+        w0 = w0 * w2;
+        w2 = r[4];
+        w2 = w2 * w3;
+        w0 = w0 + w2;
+        rows[1 * BP_0_BALLS + lane] = w0;
+    }
 }
 
-/* Force of one ball with its sides held [N]. */
-static inline void bp_ball_held_force(double delta, double rate, const double *restrict k, const double *restrict b, double *restrict F)
+/* Summands of the forces, sides held. 20 operations a ball. */
+static inline void bp_0_held_forces_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, const double *restrict b, double *restrict rows)
 {
-    double w0 = 0.0;
-    double w1 = rate;
-    double w2 = (double)(w0 < w1);
-    double w3 = k[1];
-    w1 = w1 * w3;
-    w2 = (w2 != 0.0 ? w1 : 0.0);
-    w1 = delta;
-    w0 = (double)(w0 < w1);
-    w3 = b[0];
-    w3 = (double)(w3 < w1);
-    w0 = (double)(w0 != 0.0 && w3 != 0.0);
-    w3 = k[0];
-    double w4 = sqrt(w1);
-    w1 = w1 * w4;
-    w3 = w3 * w1;
-    w0 = (w0 != 0.0 ? w3 : 0.0);
-    w2 = w2 + w0;
-    F[0] = w2;
+#pragma omp simd
+    for (int lane = 0; lane < BP_0_BALLS; lane++) {
+        double w0 = 0.0;
+        double w1 = r[3];
+        double w2 = co[0 * BP_0_BALLS + lane];
+        w1 = w1 * w2;
+        double w3 = r[4];
+        double w4 = si[0 * BP_0_BALLS + lane];
+        w3 = w3 * w4;
+        w1 = w1 + w3;
+        w3 = (double)(w0 < w1);
+        double w5 = k[1];
+        w5 = w5 * w1;
+        w3 = (w3 != 0.0 ? w5 : 0.0);
+        w5 = r[0];
+        w1 = r[1];
+        w1 = w1 * w2;
+        w5 = w5 + w1;
+        w1 = r[2];
+        w1 = w1 * w4;
+        w5 = w5 + w1;
+        w0 = (double)(w0 < w5);
+        w1 = b[0 * BP_0_BALLS + lane];
+        w1 = (double)(w1 < w5);
+        w0 = (double)(w0 != 0.0 && w1 != 0.0);
+        w1 = k[0];
+        double w6 = sqrt(w5);
+        w5 = w5 * w6;
+        w1 = w1 * w5;
+        w0 = (w0 != 0.0 ? w1 : 0.0);
+        w3 = w3 + w0;
+        w2 = w3 * w2;
+        rows[0 * BP_0_BALLS + lane] = w2;
+        w3 = w3 * w4;
+        rows[1 * BP_0_BALLS + lane] = w3;
+    }
 }
 
-/* Force of one ball with its sides held [N] and its slopes. */
-static inline void bp_ball_held_slopes(double delta, double rate, const double *restrict k, const double *restrict b, double *restrict F, double *restrict Fd, double *restrict Fv)
+/* The same, and of their slopes. 36 operations a ball. */
+static inline void bp_0_held_slopes_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, const double *restrict b, double *restrict rows)
 {
-    double w0 = 0.0;
-    double w1 = rate;
-    double w2 = (double)(w0 < w1);
-    double w3 = k[1];
-    w1 = w1 * w3;
-    w1 = (w2 != 0.0 ? w1 : 0.0);
-    double w4 = delta;
-    w0 = (double)(w0 < w4);
-    double w5 = b[0];
-    w5 = (double)(w5 < w4);
-    w0 = (double)(w0 != 0.0 && w5 != 0.0);
-    w5 = k[0];
-    double w6 = sqrt(w4);
-    w4 = w4 * w6;
-    w5 = w5 * w4;
-    w5 = (w0 != 0.0 ? w5 : 0.0);
-    w1 = w1 + w5;
-    F[0] = w1;
-    w1 = k[2];
-    w1 = w1 * w6;
-    w0 = (w0 != 0.0 ? w1 : 0.0);
-    Fd[0] = w0;
-    w2 = (w2 != 0.0 ? w3 : 0.0);
-    Fv[0] = w2;
+#pragma omp simd
+    for (int lane = 0; lane < BP_0_BALLS; lane++) {
+        double w0 = 0.0;
+        double w1 = r[3];
+        double w2 = co[0 * BP_0_BALLS + lane];
+        w1 = w1 * w2;
+        double w3 = r[4];
+        double w4 = si[0 * BP_0_BALLS + lane];
+        w3 = w3 * w4;
+        w1 = w1 + w3;
+        w3 = (double)(w0 < w1);
+        double w5 = k[1];
+        w1 = w5 * w1;
+        w1 = (w3 != 0.0 ? w1 : 0.0);
+        double w6 = r[0];
+        double w7 = r[1];
+        w7 = w7 * w2;
+        w6 = w6 + w7;
+        w7 = r[2];
+        w7 = w7 * w4;
+        w6 = w6 + w7;
+        w0 = (double)(w0 < w6);
+        w7 = b[0 * BP_0_BALLS + lane];
+        w7 = (double)(w7 < w6);
+        w0 = (double)(w0 != 0.0 && w7 != 0.0);
+        w7 = k[0];
+        double w8 = sqrt(w6);
+        w6 = w6 * w8;
+        w7 = w7 * w6;
+        w7 = (w0 != 0.0 ? w7 : 0.0);
+        w1 = w1 + w7;
+        w7 = w1 * w2;
+        rows[0 * BP_0_BALLS + lane] = w7;
+        w1 = w1 * w4;
+        rows[1 * BP_0_BALLS + lane] = w1;
+        w1 = k[2];
+        w1 = w1 * w8;
+        w8 = w2 * w2;
+        w7 = w1 * w8;
+        w7 = (w0 != 0.0 ? w7 : 0.0);
+        rows[2 * BP_0_BALLS + lane] = w7;
+        w2 = w2 * w4;
+        w7 = w1 * w2;
+        w7 = (w0 != 0.0 ? w7 : 0.0);
+        rows[3 * BP_0_BALLS + lane] = w7;
+        w4 = w4 * w4;
+        w1 = w1 * w4;
+        w0 = (w0 != 0.0 ? w1 : 0.0);
+        rows[4 * BP_0_BALLS + lane] = w0;
+        w8 = w5 * w8;
+        w8 = (w3 != 0.0 ? w8 : 0.0);
+        rows[5 * BP_0_BALLS + lane] = w8;
+        w2 = w5 * w2;
+        w2 = (w3 != 0.0 ? w2 : 0.0);
+        rows[6 * BP_0_BALLS + lane] = w2;
+        w5 = w5 * w4;
+        w3 = (w3 != 0.0 ? w5 : 0.0);
+        rows[7 * BP_0_BALLS + lane] = w3;
+    }
 }
 
 #endif

@@ -5,40 +5,6 @@
 
 #include "kernels.h"
 
-/* Force of one ball [N], its slopes, and those by its numbers, for all balls at once. */
-static inline void bp_ball_partials_lanes(const double *restrict delta, const double *restrict rate, const double *restrict k, double *restrict F, double *restrict Fd, double *restrict Fv, double *restrict Fk)
-{
-#pragma omp simd
-    for (int lane = 0; lane < BP_NB; lane++) {
-        double w0 = 0.0;
-        double w1 = rate[0 * BP_NB + lane];
-        double w2 = (double)(w0 < w1);
-        double w3 = k[1];
-        double w4 = w1 * w3;
-        w4 = (w2 != 0.0 ? w4 : 0.0);
-        double w5 = delta[0 * BP_NB + lane];
-        double w6 = (double)(w0 < w5);
-        double w7 = k[0];
-        double w8 = sqrt(w5);
-        w5 = w5 * w8;
-        w7 = w7 * w5;
-        w7 = (w6 != 0.0 ? w7 : 0.0);
-        w4 = w4 + w7;
-        F[0 * BP_NB + lane] = w4;
-        w4 = k[2];
-        w4 = w4 * w8;
-        w4 = (w6 != 0.0 ? w4 : 0.0);
-        Fd[0 * BP_NB + lane] = w4;
-        w3 = (w2 != 0.0 ? w3 : 0.0);
-        Fv[0 * BP_NB + lane] = w3;
-        w6 = (w6 != 0.0 ? w5 : 0.0);
-        Fk[0 * BP_NB + lane] = w6;
-        w2 = (w2 != 0.0 ? w1 : 0.0);
-        Fk[1 * BP_NB + lane] = w2;
-        Fk[2 * BP_NB + lane] = w0;
-    }
-}
-
 /* Stage variables from cosines and sines of its angles, and their derivatives by u, p, c, for BP_LANES times at once. */
 static inline void bp_stage_slopes_lanes(const double *restrict C, const double *restrict S, const double *restrict t, const double *restrict u, const double *restrict p, const double *restrict c, double *restrict w, double *restrict J)
 {
@@ -785,10 +751,123 @@ static inline void bp_stage_slopes_lanes(const double *restrict C, const double 
     }
 }
 
-/* The numbers of the law out of BP_LANES directions of p and c. */
-static inline void bp_law_numbers_lanes(const double *restrict p, const double *restrict c, double *restrict k)
+/* Derivatives by the ball's angle, by r0 and by k, behind those of `slopes`. 74 operations a ball. */
+static inline void bp_0_partials_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, double *restrict rows)
+{
+#pragma omp simd
+    for (int lane = 0; lane < BP_0_BALLS; lane++) {
+        double w0 = 0.0;
+        double w1 = r[3];
+        double w2 = co[0 * BP_0_BALLS + lane];
+        double w3 = w1 * w2;
+        double w4 = r[4];
+        double w5 = si[0 * BP_0_BALLS + lane];
+        double w6 = w4 * w5;
+        w3 = w3 + w6;
+        w6 = (double)(w0 < w3);
+        double w7 = k[1];
+        double w8 = w7 * w3;
+        w8 = (w6 != 0.0 ? w8 : 0.0);
+        double w9 = r[0];
+        double w10 = r[1];
+        double w11 = w10 * w2;
+        w9 = w9 + w11;
+        w11 = r[2];
+        double w12 = w11 * w5;
+        w9 = w9 + w12;
+        w12 = (double)(w0 < w9);
+        double w13 = k[0];
+        double w14 = sqrt(w9);
+        double w15 = w9 * w14;
+        double w16 = w13 * w15;
+        w16 = (w12 != 0.0 ? w16 : 0.0);
+        w8 = w8 + w16;
+        w16 = w8 * w2;
+        rows[0 * BP_0_BALLS + lane] = w16;
+        w8 = w8 * w5;
+        rows[1 * BP_0_BALLS + lane] = w8;
+        double w17 = k[2];
+        w17 = w17 * w14;
+        double w18 = w2 * w2;
+        double w19 = w17 * w18;
+        w19 = (w12 != 0.0 ? w19 : 0.0);
+        rows[2 * BP_0_BALLS + lane] = w19;
+        w19 = w2 * w5;
+        double w20 = w17 * w19;
+        w20 = (w12 != 0.0 ? w20 : 0.0);
+        rows[3 * BP_0_BALLS + lane] = w20;
+        w20 = w5 * w5;
+        w17 = w17 * w20;
+        w17 = (w12 != 0.0 ? w17 : 0.0);
+        rows[4 * BP_0_BALLS + lane] = w17;
+        w18 = w7 * w18;
+        w18 = (w6 != 0.0 ? w18 : 0.0);
+        rows[5 * BP_0_BALLS + lane] = w18;
+        w19 = w7 * w19;
+        w19 = (w6 != 0.0 ? w19 : 0.0);
+        rows[6 * BP_0_BALLS + lane] = w19;
+        w20 = w7 * w20;
+        w20 = (w6 != 0.0 ? w20 : 0.0);
+        rows[7 * BP_0_BALLS + lane] = w20;
+        w4 = w4 * w2;
+        w1 = w1 * w5;
+        w4 = w4 - w1;
+        w7 = w7 * w4;
+        w7 = (w6 != 0.0 ? w7 : 0.0);
+        w11 = w11 * w2;
+        w10 = w10 * w5;
+        w11 = w11 - w10;
+        w10 = w14 * w11;
+        w4 = 2.0 * w14;
+        const double i0 = 1.0 / w4;
+        w11 = w11 * i0;
+        w11 = w9 * w11;
+        w10 = w10 + w11;
+        w10 = w13 * w10;
+        w10 = (w12 != 0.0 ? w10 : 0.0);
+        w7 = w7 + w10;
+        w10 = w2 * w7;
+        w10 = w10 - w8;
+        rows[8 * BP_0_BALLS + lane] = w10;
+        w7 = w5 * w7;
+        w7 = w7 + w16;
+        rows[9 * BP_0_BALLS + lane] = w7;
+        w7 = w13 * w2;
+        w16 = w14 * w7;
+        w7 = w9 * w7;
+        w7 = w7 * i0;
+        w16 = w16 + w7;
+        w16 = (w12 != 0.0 ? w16 : 0.0);
+        rows[10 * BP_0_BALLS + lane] = w16;
+        w13 = w13 * w5;
+        w14 = w14 * w13;
+        w9 = w9 * w13;
+        w9 = w9 * i0;
+        w14 = w14 + w9;
+        w14 = (w12 != 0.0 ? w14 : 0.0);
+        rows[11 * BP_0_BALLS + lane] = w14;
+        w14 = w2 * w15;
+        w14 = (w12 != 0.0 ? w14 : 0.0);
+        rows[12 * BP_0_BALLS + lane] = w14;
+        w15 = w5 * w15;
+        w12 = (w12 != 0.0 ? w15 : 0.0);
+        rows[13 * BP_0_BALLS + lane] = w12;
+        w2 = w2 * w3;
+        w2 = (w6 != 0.0 ? w2 : 0.0);
+        rows[14 * BP_0_BALLS + lane] = w2;
+        w5 = w5 * w3;
+        w6 = (w6 != 0.0 ? w5 : 0.0);
+        rows[15 * BP_0_BALLS + lane] = w6;
+        rows[16 * BP_0_BALLS + lane] = w0;
+        rows[17 * BP_0_BALLS + lane] = w0;
+    }
+}
+
+/* The numbers out of BP_LANES directions of p, c and w. */
+static inline void bp_0_numbers_lanes(const double *restrict p, const double *restrict c, const double *restrict w, double *restrict k)
 {
     (void)p;
+    (void)w;
 #pragma omp simd
     for (int lane = 0; lane < BP_LANES; lane++) {
         double w0 = c[10 * BP_LANES + lane];
@@ -797,6 +876,164 @@ static inline void bp_law_numbers_lanes(const double *restrict p, const double *
         k[1 * BP_LANES + lane] = w0;
         w0 = c[38 * BP_LANES + lane];
         k[2 * BP_LANES + lane] = w0;
+    }
+}
+
+/* Derivative of the slopes' summands of a ball along BP_LANES directions. */
+static inline void bp_0_moved_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, const double *restrict co_d, const double *restrict si_d, const double *restrict r_d, const double *restrict k_d, double *restrict G_d)
+{
+#pragma omp simd
+    for (int lane = 0; lane < BP_LANES; lane++) {
+        double w0 = 0.0;
+        double w1 = r[0];
+        double w2 = r[1];
+        double w3 = co[0];
+        double w4 = w2 * w3;
+        w1 = w1 + w4;
+        w4 = r[2];
+        double w5 = si[0];
+        double w6 = w4 * w5;
+        w1 = w1 + w6;
+        w6 = (double)(w0 < w1);
+        double w7 = w3 * w3;
+        w1 = sqrt(w1);
+        double w8 = k_d[2 * BP_LANES + lane];
+        w8 = w1 * w8;
+        double w9 = k[2];
+        double w10 = r_d[0 * BP_LANES + lane];
+        double w11 = r_d[1 * BP_LANES + lane];
+        w11 = w3 * w11;
+        double w12 = co_d[0 * BP_LANES + lane];
+        w2 = w2 * w12;
+        w11 = w11 + w2;
+        w10 = w10 + w11;
+        w11 = r_d[2 * BP_LANES + lane];
+        w11 = w5 * w11;
+        w2 = si_d[0 * BP_LANES + lane];
+        w4 = w4 * w2;
+        w11 = w11 + w4;
+        w10 = w10 + w11;
+        w11 = 2.0 * w1;
+        w10 = w10 / w11;
+        w10 = w9 * w10;
+        w8 = w8 + w10;
+        w10 = w7 * w8;
+        w9 = w9 * w1;
+        w1 = 2.0 * w3;
+        w1 = w1 * w12;
+        w11 = w9 * w1;
+        w10 = w10 + w11;
+        w10 = (w6 != 0.0 ? w10 : 0.0);
+        G_d[0 * BP_LANES + lane] = w10;
+        w10 = w3 * w5;
+        w11 = w10 * w8;
+        w12 = w5 * w12;
+        w4 = w3 * w2;
+        w12 = w12 + w4;
+        w4 = w9 * w12;
+        w11 = w11 + w4;
+        w11 = (w6 != 0.0 ? w11 : 0.0);
+        G_d[1 * BP_LANES + lane] = w11;
+        w11 = w5 * w5;
+        w8 = w11 * w8;
+        w4 = 2.0 * w5;
+        w4 = w4 * w2;
+        w9 = w9 * w4;
+        w8 = w8 + w9;
+        w6 = (w6 != 0.0 ? w8 : 0.0);
+        G_d[2 * BP_LANES + lane] = w6;
+        w6 = r[3];
+        w6 = w6 * w3;
+        w3 = r[4];
+        w3 = w3 * w5;
+        w6 = w6 + w3;
+        w0 = (double)(w0 < w6);
+        w6 = k_d[1 * BP_LANES + lane];
+        w7 = w7 * w6;
+        w3 = k[1];
+        w1 = w3 * w1;
+        w7 = w7 + w1;
+        w7 = (w0 != 0.0 ? w7 : 0.0);
+        G_d[3 * BP_LANES + lane] = w7;
+        w10 = w10 * w6;
+        w12 = w3 * w12;
+        w10 = w10 + w12;
+        w10 = (w0 != 0.0 ? w10 : 0.0);
+        G_d[4 * BP_LANES + lane] = w10;
+        w11 = w11 * w6;
+        w3 = w3 * w4;
+        w11 = w11 + w3;
+        w0 = (w0 != 0.0 ? w11 : 0.0);
+        G_d[5 * BP_LANES + lane] = w0;
+    }
+}
+
+/* Derivative of the sums over the balls along BP_LANES directions. */
+static inline void bp_0_sums_moved_lanes(const double *restrict T, const double *restrict r_d, const double *restrict a_d, const double *restrict k_d, double *restrict S_d)
+{
+#pragma omp simd
+    for (int lane = 0; lane < BP_LANES; lane++) {
+        double w0 = T[2];
+        double w1 = r_d[1 * BP_LANES + lane];
+        w0 = w0 * w1;
+        double w2 = T[3];
+        double w3 = r_d[2 * BP_LANES + lane];
+        double w4 = w2 * w3;
+        w0 = w0 + w4;
+        w4 = T[5];
+        double w5 = r_d[3 * BP_LANES + lane];
+        w4 = w4 * w5;
+        w0 = w0 + w4;
+        w4 = T[6];
+        double w6 = r_d[4 * BP_LANES + lane];
+        double w7 = w4 * w6;
+        w0 = w0 + w7;
+        w7 = T[10];
+        double w8 = r_d[0 * BP_LANES + lane];
+        w7 = w7 * w8;
+        w0 = w0 + w7;
+        w7 = T[8];
+        double w9 = a_d[0 * BP_LANES + lane];
+        w7 = w7 * w9;
+        w0 = w0 + w7;
+        w7 = T[12];
+        double w10 = k_d[0 * BP_LANES + lane];
+        w7 = w7 * w10;
+        double w11 = T[14];
+        double w12 = k_d[1 * BP_LANES + lane];
+        w11 = w11 * w12;
+        w7 = w7 + w11;
+        w11 = T[16];
+        double w13 = k_d[2 * BP_LANES + lane];
+        w11 = w11 * w13;
+        w7 = w7 + w11;
+        w0 = w0 + w7;
+        S_d[0 * BP_LANES + lane] = w0;
+        w2 = w2 * w1;
+        w1 = T[4];
+        w1 = w1 * w3;
+        w2 = w2 + w1;
+        w4 = w4 * w5;
+        w2 = w2 + w4;
+        w4 = T[7];
+        w4 = w4 * w6;
+        w2 = w2 + w4;
+        w4 = T[11];
+        w4 = w4 * w8;
+        w2 = w2 + w4;
+        w4 = T[9];
+        w4 = w4 * w9;
+        w2 = w2 + w4;
+        w4 = T[13];
+        w4 = w4 * w10;
+        w10 = T[15];
+        w10 = w10 * w12;
+        w4 = w4 + w10;
+        w10 = T[17];
+        w10 = w10 * w13;
+        w4 = w4 + w10;
+        w2 = w2 + w4;
+        S_d[1 * BP_LANES + lane] = w2;
     }
 }
 
@@ -1750,36 +1987,6 @@ static inline void bp_relative_tangent_lanes(const double *restrict x, const dou
     }
 }
 
-/* Directional derivative of law_slopes along BP_LANES directions. */
-static inline void bp_law_slopes_tangent_lanes(double delta, double rate, const double *restrict p, const double *restrict c, const double *restrict delta_d, const double *restrict rate_d, const double *restrict p_d, const double *restrict c_d, double *restrict Fd_d, double *restrict Fv_d)
-{
-    (void)p;
-    (void)rate_d;
-    (void)p_d;
-#pragma omp simd
-    for (int lane = 0; lane < BP_LANES; lane++) {
-        double w0 = 0.0;
-        double w1 = delta;
-        double w2 = (double)(w0 < w1);
-        w1 = sqrt(w1);
-        double w3 = c_d[38 * BP_LANES + lane];
-        w3 = w1 * w3;
-        double w4 = c[38];
-        double w5 = delta_d[0 * BP_LANES + lane];
-        w1 = 2.0 * w1;
-        w5 = w5 / w1;
-        w4 = w4 * w5;
-        w3 = w3 + w4;
-        w2 = (w2 != 0.0 ? w3 : 0.0);
-        Fd_d[0 * BP_LANES + lane] = w2;
-        w2 = rate;
-        w0 = (double)(w0 < w2);
-        w2 = c_d[14 * BP_LANES + lane];
-        w0 = (w0 != 0.0 ? w2 : 0.0);
-        Fv_d[0 * BP_LANES + lane] = w0;
-    }
-}
-
 /* Directional derivative of acceleration along BP_LANES directions. */
 static inline void bp_acceleration_tangent_lanes(const double *restrict x, const double *restrict S, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, const double *restrict x_d, const double *restrict S_d, const double *restrict u_d, const double *restrict p_d, const double *restrict c_d, const double *restrict w_d, double *restrict a_d)
 {
@@ -2040,121 +2247,113 @@ static inline void bp_acceleration_rate_tangent_lanes(const double *restrict x, 
         double w3 = wt_d[2 * BP_LANES + lane];
         w3 = w2 * w3;
         w0 = w0 + w3;
-        w3 = c[12];
-        double w4 = r[2];
-        double w5 = G[0];
-        double w6 = w4 * w5;
-        double w7 = r[1];
-        double w8 = G[1];
-        double w9 = w7 * w8;
-        w6 = w6 - w9;
-        w9 = r[3];
-        double w10 = G[4];
-        double w11 = w9 * w10;
-        w6 = w6 - w11;
-        w11 = r[4];
-        double w12 = G[3];
-        double w13 = w11 * w12;
-        w6 = w6 + w13;
-        w13 = S[1];
-        w6 = w6 - w13;
-        w13 = w6 * w1;
-        double w14 = r_d[2 * BP_LANES + lane];
-        w5 = w5 * w14;
-        double w15 = G_d[0 * BP_LANES + lane];
-        w15 = w4 * w15;
-        w5 = w5 + w15;
-        w15 = r_d[1 * BP_LANES + lane];
-        double w16 = w8 * w15;
-        double w17 = G_d[1 * BP_LANES + lane];
-        double w18 = w7 * w17;
-        w16 = w16 + w18;
-        w5 = w5 - w16;
-        w16 = r_d[3 * BP_LANES + lane];
-        w18 = w10 * w16;
-        double w19 = G_d[4 * BP_LANES + lane];
-        double w20 = w9 * w19;
-        w18 = w18 + w20;
-        w5 = w5 - w18;
-        w18 = r_d[4 * BP_LANES + lane];
-        w12 = w12 * w18;
-        w20 = G_d[3 * BP_LANES + lane];
-        w20 = w11 * w20;
-        w12 = w12 + w20;
+        w3 = r[2];
+        double w4 = G[0];
+        double w5 = w3 * w4;
+        double w6 = r[1];
+        double w7 = G[1];
+        double w8 = w6 * w7;
+        w5 = w5 - w8;
+        w8 = r[3];
+        double w9 = G[4];
+        double w10 = w8 * w9;
+        w5 = w5 - w10;
+        w10 = r[4];
+        double w11 = G[3];
+        double w12 = w10 * w11;
         w5 = w5 + w12;
-        w12 = S_d[1 * BP_LANES + lane];
+        w12 = S[1];
         w5 = w5 - w12;
-        w12 = w2 * w5;
-        w13 = w13 + w12;
-        w13 = w3 * w13;
-        w12 = w2 * w6;
-        w20 = c_d[12 * BP_LANES + lane];
-        w12 = w12 * w20;
-        w13 = w13 + w12;
-        w0 = w0 - w13;
+        w12 = c[12];
+        double w13 = w5 * w12;
+        double w14 = w13 * w1;
+        double w15 = r_d[2 * BP_LANES + lane];
+        w4 = w4 * w15;
+        double w16 = G_d[0 * BP_LANES + lane];
+        w16 = w3 * w16;
+        w4 = w4 + w16;
+        w16 = r_d[1 * BP_LANES + lane];
+        double w17 = w7 * w16;
+        double w18 = G_d[1 * BP_LANES + lane];
+        double w19 = w6 * w18;
+        w17 = w17 + w19;
+        w4 = w4 - w17;
+        w17 = r_d[3 * BP_LANES + lane];
+        w19 = w9 * w17;
+        double w20 = G_d[4 * BP_LANES + lane];
+        double w21 = w8 * w20;
+        w19 = w19 + w21;
+        w4 = w4 - w19;
+        w19 = r_d[4 * BP_LANES + lane];
+        w11 = w11 * w19;
+        w21 = G_d[3 * BP_LANES + lane];
+        w21 = w10 * w21;
+        w11 = w11 + w21;
+        w4 = w4 + w11;
+        w11 = S_d[1 * BP_LANES + lane];
+        w4 = w4 - w11;
+        w4 = w12 * w4;
+        w11 = c_d[12 * BP_LANES + lane];
+        w5 = w5 * w11;
+        w4 = w4 + w5;
+        w5 = w2 * w4;
+        w14 = w14 + w5;
+        w0 = w0 - w14;
         at_d[0 * BP_LANES + lane] = w0;
         w0 = wt[3];
         w0 = w0 * w1;
-        w13 = wt_d[3 * BP_LANES + lane];
-        w13 = w2 * w13;
-        w0 = w0 + w13;
-        w13 = w4 * w8;
-        w12 = G[2];
-        double w21 = w7 * w12;
-        w13 = w13 - w21;
+        w14 = wt_d[3 * BP_LANES + lane];
+        w14 = w2 * w14;
+        w0 = w0 + w14;
+        w14 = w3 * w7;
+        w5 = G[2];
+        w21 = w6 * w5;
+        w14 = w14 - w21;
         w21 = G[5];
-        double w22 = w9 * w21;
-        w13 = w13 - w22;
-        w22 = w11 * w10;
-        w13 = w13 + w22;
+        double w22 = w8 * w21;
+        w14 = w14 - w22;
+        w22 = w10 * w9;
+        w14 = w14 + w22;
         w22 = S[0];
-        w13 = w13 + w22;
-        w1 = w13 * w1;
-        w8 = w8 * w14;
-        w4 = w4 * w17;
-        w8 = w8 + w4;
-        w12 = w12 * w15;
-        w15 = G_d[2 * BP_LANES + lane];
+        w14 = w14 + w22;
+        w22 = w14 * w12;
+        w1 = w22 * w1;
         w7 = w7 * w15;
-        w12 = w12 + w7;
-        w8 = w8 - w12;
-        w21 = w21 * w16;
-        w16 = G_d[5 * BP_LANES + lane];
-        w9 = w9 * w16;
-        w21 = w21 + w9;
-        w8 = w8 - w21;
-        w10 = w10 * w18;
-        w11 = w11 * w19;
-        w10 = w10 + w11;
-        w8 = w8 + w10;
-        w10 = S_d[0 * BP_LANES + lane];
-        w8 = w8 + w10;
-        w10 = w2 * w8;
-        w1 = w1 + w10;
-        w1 = w3 * w1;
-        w2 = w2 * w13;
-        w2 = w2 * w20;
+        w3 = w3 * w18;
+        w7 = w7 + w3;
+        w5 = w5 * w16;
+        w16 = G_d[2 * BP_LANES + lane];
+        w6 = w6 * w16;
+        w5 = w5 + w6;
+        w7 = w7 - w5;
+        w21 = w21 * w17;
+        w17 = G_d[5 * BP_LANES + lane];
+        w8 = w8 * w17;
+        w21 = w21 + w8;
+        w7 = w7 - w21;
+        w9 = w9 * w19;
+        w10 = w10 * w20;
+        w9 = w9 + w10;
+        w7 = w7 + w9;
+        w9 = S_d[0 * BP_LANES + lane];
+        w7 = w7 + w9;
+        w12 = w12 * w7;
+        w14 = w14 * w11;
+        w12 = w12 + w14;
+        w2 = w2 * w12;
         w1 = w1 + w2;
         w0 = w0 - w1;
         at_d[1 * BP_LANES + lane] = w0;
         w0 = c_d[31 * BP_LANES + lane];
-        w1 = w6 * w0;
-        w2 = c[31];
-        w5 = w2 * w5;
-        w1 = w1 + w5;
-        w1 = w3 * w1;
-        w6 = w2 * w6;
-        w6 = w6 * w20;
-        w1 = w1 + w6;
-        at_d[2 * BP_LANES + lane] = w1;
-        w0 = w13 * w0;
-        w8 = w2 * w8;
-        w0 = w0 + w8;
-        w3 = w3 * w0;
-        w2 = w2 * w13;
-        w2 = w2 * w20;
-        w3 = w3 + w2;
-        at_d[3 * BP_LANES + lane] = w3;
+        w13 = w13 * w0;
+        w1 = c[31];
+        w4 = w1 * w4;
+        w13 = w13 + w4;
+        at_d[2 * BP_LANES + lane] = w13;
+        w22 = w22 * w0;
+        w1 = w1 * w12;
+        w22 = w22 + w1;
+        at_d[3 * BP_LANES + lane] = w22;
     }
 }
 

@@ -58,7 +58,7 @@ def test_equations_of_motion_equal_printed_eq_2(system: System) -> None:
 def test_ball_geometry_equals_printed_eqs_6_and_11(system: System) -> None:
     xi, yi, xo, yo = (symbol(n) for n in ("inner.x", "inner.y", "outer.x", "outer.y"))
     vxi, vyi, vxo, vyo = (symbol(n) for n in ("inner.vx", "inner.vy", "outer.vx", "outer.vy"))
-    ball = system.bearing.ball
+    ball = system.bearings[0].ball
     definitions = {d.symbol: d.expression for d in ball.definitions}
     c, s, omega_c = ball.cos, ball.sin, symbol("bearing.cage_speed")
     deflection = (xi - xo) * c + (yi - yo) * s - symbol("bearing.clearance") / 2
@@ -68,7 +68,7 @@ def test_ball_geometry_equals_printed_eqs_6_and_11(system: System) -> None:
 
 
 def test_sums_over_balls_equal_printed_eqs_8_and_9(system: System) -> None:
-    ball = system.bearing.ball
+    ball = system.bearings[0].ball
     definitions = {d.symbol: d.expression for d in ball.definitions}
     for total, direction in zip(ball.sums, (ball.cos, ball.sin), strict=True):
         summand = total.expression.subs(ball.force, definitions[ball.force])

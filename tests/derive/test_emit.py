@@ -132,7 +132,7 @@ def test_equations_show_the_definitions_the_matrix_and_the_motion(name: str) -> 
     text = equations(system)
     assert text.count("$$") % 2 == 0
     assert ("Eq. (1)" in text) == (system.reactions is not None)
-    for state in system.states[: system.coordinates]:
+    for state in system.states[: len(system.coordinates)]:
         assert rf"\ddot {state.latex}" in text
     # every symbol has a LaTeX name: no dotted path is left inside the formulas
     formulas = "".join(text.split("$$")[1::2])

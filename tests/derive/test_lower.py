@@ -34,8 +34,7 @@ def by_sympy(
         known |= {n.symbol: number(v) for n, v in zip(named, values, strict=True)}
     for definition in (*system.constants, *system.definitions):
         known[definition.symbol] = sp.sympify(definition.expression).xreplace(known).evalf(digits)
-    bearing = system.bearing
-    assert bearing is not None
+    (bearing,) = system.bearings
     ball = bearing.ball
     cage = ball.cage_angle.xreplace(known).evalf(digits)
     totals = {s.symbol: sp.Float(0, digits) for s in ball.sums}
@@ -47,14 +46,14 @@ def by_sympy(
         for s in ball.sums:
             totals[s.symbol] += s.expression.xreplace(one).evalf(digits)
     known |= totals
-    n = system.coordinates
+    n = len(system.coordinates)
     acceleration = [(system.forcing[k] / system.mass[k, k]).xreplace(known).evalf(digits) for k in range(n)]
     return np.array([*x[n:], *(float(a) for a in acceleration)]), known
 
 
 def random_point(system: System, seed: int) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
-    n = system.coordinates
+    n = len(system.coordinates)
     x = np.concatenate([rng.uniform(-2e-5, 2e-5, n), rng.uniform(-0.05, 0.05, n)])
     u = np.array([rng.integers(0, 2) if i.kind == "gate" else rng.uniform(0, 6.28) for i in system.inputs], dtype=float)
     p = np.array([q.default for q in system.parameters]) * rng.uniform(0.98, 1.02, len(system.parameters))

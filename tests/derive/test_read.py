@@ -221,7 +221,7 @@ def test_an_override_is_what_the_file_would_have_said() -> None:
     changed = with_values(scene, {path: value})
     assert changed == scene_from_text(edited(PRESS, 'clearance = "10 um"', 'clearance = "20 um"'), "press")
     assert changed.structure() == scene.structure()
-    assert [id(q) for q in quantities_in((changed.mechanism, changed.bearing))] == [id(q) for q in changed.quantities]
+    assert [id(q) for q in quantities_in((changed.mechanism, changed.bearings))] == [id(q) for q in changed.quantities]
     assert with_values(scene, {}) == scene
 
 

@@ -154,8 +154,8 @@ def test_scenes_without_the_key_know_nothing_of_it(scene_text: Callable[..., str
     system = derive(scene_from_text(scene_text(name), name))
     assert not any("smoothing" in p.name for p in system.parameters)
     text = (folder / "kernels.h").read_text(encoding="utf-8")
-    law = text[text.index("bp_law(") :]
-    law = law[: law.index("\n}")]
+    law = text[text.index("bp_0_forces_lanes(") :]
+    law = law[: law.index("\n}")].replace("lane < BP_0_BALLS", "")
     damping = system.scene.bearing.damping.law if system.scene.bearing else "none"
     assert law.count("<") + law.count(">") <= {"none": 1, "one-sided": 2, "tangent": 2}[damping]
 

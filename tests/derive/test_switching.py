@@ -9,29 +9,17 @@ import pytest
 import sympy as sp
 
 from ballpass.derive import generate
-from ballpass.derive.bearing import laws
-from ballpass.derive.lower.switching import Switching, find_switching
+from ballpass.derive.bearing.laws import LAWS, Contact, Rest
+from ballpass.derive.bearing.switching import Switching, find_switching
 from ballpass.derive.scene.read import scene_from_text
 
 DELTA, RATE, STIFFNESS, COEFFICIENT, WIDTH, RATE_WIDTH = sp.symbols("delta rate k c w w_v", real=True)
 
 
 def switching(law: str, *, contact: bool = False, rate: bool = False, pairs: bool = False) -> Switching:
-    width = WIDTH if contact else None
-    elastic = laws.smoothed_elastic_force(DELTA, STIFFNESS, WIDTH) if contact else laws.elastic_force(DELTA, STIFFNESS)
-    parts = [elastic]
-    if law != "none":
-        smoothed = laws.smoothed_damping(
-            law,  # type: ignore[arg-type]
-            DELTA,
-            RATE,
-            STIFFNESS,
-            COEFFICIENT,
-            width=width,
-            rate_width=RATE_WIDTH if rate else None,
-        )
-        parts.append(smoothed.force)
-    return find_switching(parts, DELTA, RATE, pairs=pairs)
+    touch = Contact(stiffness=STIFFNESS, width=WIDTH if contact else None)
+    force = LAWS[law].force(DELTA, RATE, COEFFICIENT, touch, Rest(width=RATE_WIDTH if rate else None))
+    return find_switching([touch.force(DELTA), force], DELTA, RATE, pairs=pairs)
 
 
 @pytest.mark.parametrize(
@@ -51,9 +39,9 @@ def test_laws_switch_where_their_formulas_do(law: str, expected: list[tuple[sp.S
     assert not any(s.ends_below for s in found.switches)
 
 
-@pytest.mark.parametrize("law", ["none", "one-sided", "one-sided-gated", "two-sided-gated", "tangent"])
+@pytest.mark.parametrize("law", LAWS)
 def test_smoothed_laws_switch_nowhere(law: str) -> None:
-    assert switching(law, contact=True, rate=law.startswith("one-sided")).switches == ()
+    assert switching(law, contact=True, rate=True).switches == ()
 
 
 def test_what_is_left_unsmoothed_still_switches() -> None:

@@ -117,7 +117,7 @@ def points(made: Made, count: int) -> list[Point]:
         values = {p.name: float(p.default) for p in system.parameters}
         values["bearing.clearance"] = (1e-5, -4e-6)[number % 2]
         p = np.array([*values.values()])
-        n = system.coordinates
+        n = len(system.coordinates)
         u = [float(random.integers(0, 2)) if i.kind == "gate" else random.uniform(0.0, 6.28) for i in system.inputs]
         found.append(
             Point(
@@ -138,7 +138,7 @@ def close(found: np.ndarray, expected: np.ndarray, rtol: float) -> None:
 
 @pytest.mark.parametrize("h", [1e-5, 3e-3], ids=["a step of the stepper", "a step across a large angle"])
 def test_kernels_are_the_right_hand_side(made: Made, h: float) -> None:
-    n = made.system.coordinates
+    n = len(made.system.coordinates)
     for point in points(made, 60):
         dx = np.empty((3, 2 * n))
         made.kernels.at_stage(
@@ -152,7 +152,7 @@ def test_kernels_are_the_right_hand_side(made: Made, h: float) -> None:
 
 @pytest.mark.parametrize("h", [1e-5, 3e-3], ids=["a step of the stepper", "a step across a large angle"])
 def test_linearized_kernels_are_the_jacobian_of_the_right_hand_side(made: Made, h: float) -> None:
-    n = made.system.coordinates
+    n = len(made.system.coordinates)
     for point in points(made, 60):
         dx, a, b, at = np.empty(2 * n), np.empty((n, n)), np.empty((n, n)), np.empty(n)
         made.kernels.at_end(

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
+from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.lower.functions import lower, operations
 from ballpass.derive.scene.records import (
     Bearing,
@@ -99,7 +100,7 @@ def cost(scene: Scene, progress: Callable[[str], None] | None = None) -> Cost:
 
 
 def _features(scene: Scene) -> Iterator[Feature]:
-    mechanism, bearing = scene.mechanism, scene.bearing
+    mechanism = scene.mechanism
     if mechanism is not None:
         yield from _of_mechanism(scene, mechanism)
     if scene.load is not None:
@@ -109,7 +110,7 @@ def _features(scene: Scene) -> Iterator[Feature]:
             modelled=f"{type(scene.load).__name__.removesuffix('Load').lower()} force on the inner ring",
             without=replace(scene, load=_no_load()) if not _is_free(scene) else None,
         )
-    if bearing is not None:
+    for bearing in scene.bearings:
         yield from _of_bearing(scene, bearing)
 
 
@@ -140,50 +141,44 @@ def _of_mechanism(scene: Scene, mechanism: Mechanism) -> Iterator[Feature]:
 
 
 def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
-    if bearing.load_harmonics is not None:
-        yield Feature(
-            name="load harmonics",
-            path="bearing.load_harmonics",
-            modelled=f"the joint's reaction as its mean and {bearing.load_harmonics} harmonics of the driver's angle",
-            without=replace(scene, bearing=replace(bearing, load_harmonics=None)),
-        )
+    of = f" of {bearing.name}" if bearing.name else ""
     yield Feature(
-        name="ball contacts",
-        path="bearing.contact",
+        name=f"ball contacts{of}",
+        path=f"{bearing.path}.contact",
         modelled=f"{bearing.balls} balls at the cage's angles, Hertz force of each",
         without=None,
     )
     if bearing.contact.smoothing is not None:
         sharp = replace(bearing, contact=replace(bearing.contact, smoothing=None))
         yield Feature(
-            name="contact smoothing",
-            path="bearing.contact.smoothing",
+            name=f"contact smoothing{of}",
+            path=f"{bearing.path}.contact.smoothing",
             modelled="contact onset smoothed over a given width: second derivatives exist",
-            without=_without_smoothing(scene, sharp, "bearing.contact.smoothing"),
+            without=_without_smoothing(scene, sharp, f"{bearing.path}.contact.smoothing"),
         )
-    if bearing.damping.law != "none":
-        undamped = replace(bearing, damping=Damping(law="none", coefficient=None, ratio=None))
+    if bearing.damping.numbers:
+        undamped = replace(bearing, damping=Damping(law="none", numbers=()))
         yield Feature(
-            name="contact damping",
-            path="bearing.damping",
+            name=f"contact damping{of}",
+            path=f"{bearing.path}.damping",
             modelled=f"law {bearing.damping.law} at each ball",
-            without=_keep(scene, "ball.damping_force", bearing=undamped),
+            without=_keep(scene, f"{bearing.prefix}ball.damping_force", bearing=undamped),
         )
     if bearing.damping.smoothing is not None:
         kinked = replace(bearing, damping=replace(bearing.damping, smoothing=None))
         yield Feature(
-            name="damping smoothing",
-            path="bearing.damping.smoothing",
+            name=f"damping smoothing{of}",
+            path=f"{bearing.path}.damping.smoothing",
             modelled="kink of the one-sided law at rest smoothed over a given speed",
-            without=_without_smoothing(scene, kinked, "bearing.damping.smoothing"),
+            without=_without_smoothing(scene, kinked, f"{bearing.path}.damping.smoothing"),
         )
     if bearing.inner.damping is not None:
         free = replace(bearing, inner=InnerRing(mass=bearing.inner.mass, damping=None))
         yield Feature(
-            name="inner ring damping",
-            path="bearing.inner_ring.damping",
+            name=f"inner ring damping{of}",
+            path=f"{bearing.path}.inner_ring.damping",
             modelled="viscous damping of the inner ring to the frame",
-            without=replace(scene, bearing=free),
+            without=_with(scene, free),
         )
     if bearing.outer is not None:
         start = bearing.initial
@@ -191,15 +186,27 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
             bearing, outer=None, initial=InitialState(position=start.position[:2], velocity=start.velocity[:2])
         )
         yield Feature(
-            name="outer ring",
-            path="bearing.outer_ring",
+            name=f"outer ring{of}",
+            path=f"{bearing.path}.outer_ring",
             modelled="outer ring on an elastic, damped housing: two coordinates more",
-            without=_keep(scene, "outer", bearing=fixed),
+            without=_keep(scene, f"{bearing.prefix}outer", bearing=fixed),
+        )
+    for effect in bearing.effects:
+        rest = tuple(e for e in bearing.effects if e is not effect)
+        gone = {q.path for q in effect.numbers}
+        yield Feature(
+            name=f"{effect.kind}{of}",
+            path=f"{bearing.path}.{effect.kind}",
+            modelled=EFFECTS[effect.kind].describe(effect),
+            without=replace(
+                _with(scene, replace(bearing, effects=rest)),
+                quantities=tuple(q for q in scene.quantities if q.path not in gone),
+            ),
         )
 
 
 def _without_smoothing(scene: Scene, bearing: Bearing, path: str) -> Scene:
-    return replace(scene, bearing=bearing, quantities=tuple(q for q in scene.quantities if q.path != path))
+    return replace(_with(scene, bearing), quantities=tuple(q for q in scene.quantities if q.path != path))
 
 
 def _no_load() -> ConstantLoad:
@@ -211,33 +218,41 @@ def _is_free(scene: Scene) -> bool:
 
 
 def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
-    """The bearing alone on its shaft, unloaded; None where there is no bearing."""
-    bearing = scene.bearing
-    if bearing is None:
+    """The bearings alone on their shaft, unloaded; None where there is none."""
+    if not scene.bearings:
         return None
-    mass = bearing.inner.mass
-    quantities = scene.quantities
-    if isinstance(mass, EquivalentMass):
-        number = Quantity(
-            path="bearing.inner_ring.mass", value=1.0, unit="kg", description="Mass of the inner ring", latex="m_i"
-        )
-        quantities = (*quantities, number)
-        bearing = replace(bearing, inner=InnerRing(mass=number, damping=bearing.inner.damping))
+    quantities = list(scene.quantities)
+    bearings = []
+    for bearing in scene.bearings:
+        inner = bearing.inner
+        if isinstance(inner.mass, EquivalentMass):
+            path = f"{bearing.path}.inner_ring.mass"
+            number = Quantity(path=path, value=1.0, unit="kg", description="Mass of the inner ring", latex="m_i")
+            quantities.append(number)
+            inner = InnerRing(mass=number, damping=inner.damping)
+        bearings.append(replace(bearing, inner=inner, joint=None, share=None))
     return replace(
         scene,
         mechanism=None,
         shaft=Shaft(speed=mechanism.driver.speed),
         load=_no_load(),
-        bearing=replace(bearing, joint=None, share=None),
-        quantities=quantities,
+        bearings=tuple(bearings),
+        quantities=tuple(quantities),
         outputs=_patterns(scene, "reaction", "drive", "body"),
     )
 
 
 def _keep(scene: Scene, *vanished: str, bearing: Bearing) -> Scene:
-    return replace(scene, bearing=bearing, outputs=_patterns(scene, *vanished))
+    return replace(_with(scene, bearing), outputs=_patterns(scene, *vanished))
+
+
+def _with(scene: Scene, bearing: Bearing) -> Scene:
+    """The scene with another bearing of that name."""
+    return replace(scene, bearings=tuple(bearing if b.name == bearing.name else b for b in scene.bearings))
 
 
 def _patterns(scene: Scene, *vanished: str) -> tuple[str, ...]:
     """Output patterns without those of a feature that is left out."""
-    return tuple(p for p in scene.outputs if not p.startswith(vanished)) or ("inner.*",)
+    return tuple(p for p in scene.outputs if not p.startswith(vanished)) or (
+        f"{scene.bearings[0].prefix if scene.bearings else ''}inner.*",
+    )

@@ -17,42 +17,36 @@ from ballpass.derive.scene.records import Mechanism
 from ballpass.derive.variables import DRIVER_ANGLE, Output
 
 
-def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr]) -> list[Output]:
+def bearing_outputs(bearing: BearingModel) -> list[Output]:
     """What a bearing reports, in the order it is listed: rings, balls, sums over the balls, load."""
+    prefix = bearing.names.prefix
+    of = f" of {prefix[:-1]}" if prefix else ""
     out: list[Output] = []
     for c in bearing.coordinates:
-        out.append(Output(name=c.name, expression=c.position, unit="m", description=f"Position {c.description}"))
+        out.append(Output(name=c.name, expression=c.position, unit=c.unit, description=f"Position {c.description}"))
     for c in bearing.coordinates:
+        name = c.velocity.name
         out.append(
-            Output(name=str(c.velocity), expression=c.velocity, unit="m/s", description=f"Velocity {c.description}")
+            Output(name=name, expression=c.velocity, unit=f"{c.unit}/s", description=f"Velocity {c.description}")
         )
     ball = bearing.ball
     per_ball = [
-        ("ball.deflection", ball.deflection, "m", "Deflection of each ball, Eq. (6)"),
-        ("ball.elastic_force", ball.elastic_force, "N", "Elastic force of each ball, Eq. (4)"),
+        (ball.deflection, "m", "Deflection of each ball, Eq. (6)"),
+        (ball.elastic_force, "N", "Elastic force of each ball, Eq. (4)"),
     ]
     if ball.damping_force is not None:
-        per_ball.append(("ball.damping_force", ball.damping_force, "N", "Damping force of each ball, Eq. (10)"))
-    per_ball.append(("ball.force", ball.force, "N", "Elastic and damping force of each ball"))
-    out += [Output(name=n, expression=e, unit=u, description=d, per_ball=True) for n, e, u, d in per_ball]
+        per_ball.append((ball.damping_force, "N", "Damping force of each ball, Eq. (10)"))
+    per_ball.append((ball.force, "N", "Elastic and damping force of each ball"))
+    out += [
+        Output(name=s.name, expression=s, unit=u, description=d + of, balls_of=prefix, per_ball=True)
+        for s, u, d in per_ball
+    ]
     for axis, total in zip("xy", ball.sums, strict=True):
-        out.append(
-            Output(
-                name=f"ring_force.{axis}",
-                expression=total.symbol,
-                unit="N",
-                description=f"Force of the inner ring on the balls along {axis}, Eqs. (8) and (9)",
-            )
-        )
-    for axis, force in zip("xy", load, strict=True):
-        out.append(
-            Output(
-                name=f"load.{axis}",
-                expression=force,
-                unit="N",
-                description=f"External load on the inner ring along {axis}",
-            )
-        )
+        words = f"Force of the inner ring on the balls{of} along {axis}, Eqs. (8) and (9)"
+        out.append(Output(name=f"{prefix}ring_force.{axis}", expression=total.symbol, unit="N", description=words))
+    for axis, force in zip("xy", bearing.load, strict=True):
+        words = f"External load on the inner ring{of} along {axis}"
+        out.append(Output(name=f"{prefix}load.{axis}", expression=force, unit="N", description=words))
     return out
 
 

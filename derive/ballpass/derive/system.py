@@ -12,18 +12,17 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.bearing.equations import BearingModel, derive_bearing, equivalent_mass
-from ballpass.derive.bearing.load_harmonics import LoadSeries
-from ballpass.derive.bearing.ring_load import ring_load
+from ballpass.derive.bearing.equations import BearingModel, derive_bearing
+from ballpass.derive.bearing.equivalent_mass import inner_mass
+from ballpass.derive.bearing.ring_load import RingLoad, own_load, reaction_share
 from ballpass.derive.drive import constant_speed
 from ballpass.derive.mechanism.forces import Forces, derive_forces
 from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
-from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.records import FRAME, Bearing, EquivalentMass, Mechanism, Scene
-from ballpass.derive.terms import Definition, Smoothness, symbol_of
-from ballpass.derive.variables import Input, Output, Parameter, State, phase
+from ballpass.derive.scene.records import Bearing, Scene
+from ballpass.derive.terms import Definition, Names, Smoothness, symbol_of
+from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, phase
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,14 +31,13 @@ class System:
 
     `constants` are the derived constants (functions of the parameters only).  `definitions` is the ordered rest.
     `mass * d(velocities)/dt = forcing`; both empty without a bearing.  `quantities` is all that the model can report,
-    `outputs` what the scene asks for.  `load_series` is there where harmonics take the load's place; its coefficients
-    are constants, too.
+    `outputs` what the scene asks for.
     """
 
     scene: Scene
     parameters: tuple[Parameter, ...]
     inputs: tuple[Input, ...]
-    states: tuple[State, ...]
+    coordinates: tuple[Coordinate, ...]
     initial: tuple[str, ...]
     constants: tuple[Definition, ...]
     definitions: tuple[Definition, ...]
@@ -47,16 +45,29 @@ class System:
     forcing: sp.ImmutableMatrix
     linkage: Linkage | None
     reactions: Reactions | None
-    bearing: BearingModel | None
+    bearings: tuple[BearingModel, ...]
     quantities: tuple[Output, ...]
     outputs: tuple[Output, ...]
     smoothness: tuple[tuple[str, Smoothness], ...]
-    load_series: LoadSeries | None = None
 
     @property
-    def coordinates(self) -> int:
-        """Number of generalized coordinates."""
-        return len(self.states) // 2
+    def states(self) -> tuple[State, ...]:
+        """Positions, then velocities."""
+        positions = (
+            State(name=c.name, symbol=c.position, unit=c.unit, description=f"Position {c.description}", latex=c.latex)
+            for c in self.coordinates
+        )
+        velocities = (
+            State(
+                name=c.velocity.name,
+                symbol=c.velocity,
+                unit=f"{c.unit}/s",
+                description=f"Velocity {c.description}",
+                latex=rf"\dot {c.latex}",
+            )
+            for c in self.coordinates
+        )
+        return (*positions, *velocities)
 
 
 def derive(scene: Scene) -> System:
@@ -86,31 +97,16 @@ def derive(scene: Scene) -> System:
         inputs += [drive.phase, *forces.inputs]
         definitions += [*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions]
 
-    bearing: BearingModel | None = None
-    constants: tuple[Definition, ...] = ()
-    load: tuple[sp.Expr, sp.Expr] = (sp.S.Zero, sp.S.Zero)
-    series: LoadSeries | None = None
-    if scene.bearing is not None:
-        inner_load = ring_load(scene, reactions)
-        load, series = inner_load.force, inner_load.series
-        inputs += inner_load.inputs
-        definitions += inner_load.definitions
-        shaft = mechanism.driver.speed if mechanism is not None else scene.shaft.speed if scene.shaft else None
-        assert shaft is not None  # the reader requires it
-        words = "Angle of ball 1 at the reference time"
-        start = scene.bearing.ball_angle.path
-        cage = phase("cage", words, r"\psi_0", offset=start, rate="bearing.cage_speed")
+    own = own_load(scene) if scene.bearings and reactions is None else RingLoad(force=(sp.S.Zero, sp.S.Zero))
+    inputs += own.inputs
+    definitions += own.definitions
+    bearings = []
+    for bearing in scene.bearings:
+        load = reaction_share(scene, bearing, reactions).force if reactions is not None else own.force
+        model, cage = _bearing(scene, bearing, load)
+        bearings.append(model)
         inputs.append(cage)
-        bearing = derive_bearing(
-            scene.bearing,
-            shaft_speed=symbol_of(shaft),
-            cage_phase=cage.symbol,
-            load=load,
-            inner_mass=_inner_mass(scene.bearing, mechanism),
-        )
-        constants = bearing.constants + inner_load.constants
-
-    quantities = bearing_outputs(bearing, load) if bearing is not None else []
+    quantities = [output for bearing in bearings for output in bearing_outputs(bearing)]
     if mechanism is not None and linkage is not None and reactions is not None and forces is not None:
         quantities += [*mechanism_outputs(mechanism, linkage, reactions), *forces.outputs]
     return System(
@@ -122,72 +118,44 @@ def derive(scene: Scene) -> System:
             for q in scene.quantities
         ),
         inputs=tuple(inputs),
-        states=_states(bearing),
-        initial=_initial(scene.bearing),
-        constants=constants,
+        coordinates=tuple(c for bearing in bearings for c in bearing.coordinates),
+        initial=_initial(scene.bearings),
+        constants=(*(c for bearing in bearings for c in bearing.constants), *own.constants),
         definitions=tuple(definitions),
-        mass=bearing.mass if bearing else sp.ImmutableMatrix(0, 0, []),
-        forcing=bearing.forcing if bearing else sp.ImmutableMatrix(0, 1, []),
+        mass=sp.ImmutableMatrix(sp.diag(*(bearing.mass for bearing in bearings))),
+        forcing=sp.ImmutableMatrix(sum(len(b.forcing) for b in bearings), 1, [e for b in bearings for e in b.forcing]),
         linkage=linkage,
         reactions=reactions,
-        bearing=bearing,
+        bearings=tuple(bearings),
         quantities=tuple(quantities),
         outputs=select_outputs(quantities, scene.outputs),
-        smoothness=bearing.smoothness if bearing else (),
-        load_series=series,
+        smoothness=tuple(pair for bearing in bearings for pair in bearing.smoothness),
     )
 
 
-def _inner_mass(bearing: Bearing, mechanism: Mechanism | None) -> sp.Expr:
-    mass = bearing.inner.mass
-    if not isinstance(mass, EquivalentMass):
-        return symbol_of(mass)
-    assert mechanism is not None  # the reader refuses Eq. (3) without a mechanism
-    assert bearing.joint is not None
-    joint = mechanism.joint(bearing.joint)
-    side = 1 if joint.bodies[0] == FRAME else 0
-    crank = mechanism.body(joint.bodies[side])
-    far = [
-        j.points[j.bodies.index(crank.name)]
-        for j in mechanism.joints
-        if j.name != joint.name and crank.name in j.bodies
-    ]
-    if len(far) != 1:
-        raise SceneError(
-            [
-                Fault(
-                    key="bearing.inner_ring.equivalent_mass",
-                    problem=f"Eq. (3) needs one far joint of the body {crank.name!r}",
-                    given=f"{len(far)} further joints",
-                    allowed="a crank with exactly two joints",
-                    remedy='give the mass itself: [bearing.inner_ring] mass = "0.4 kg"',
-                )
-            ]
-        )
-    return equivalent_mass(mass, crank, crank.point(joint.points[side]), crank.point(far[0]))
-
-
-def _states(bearing: BearingModel | None) -> tuple[State, ...]:
-    if bearing is None:
-        return ()
-    positions = tuple(
-        State(name=c.name, symbol=c.position, unit="m", description=f"Position {c.description}", latex=c.latex)
-        for c in bearing.coordinates
+def _bearing(scene: Scene, bearing: Bearing, load: tuple[sp.Expr, sp.Expr]) -> tuple[BearingModel, Input]:
+    """A bearing on the driven body or the shaft, and the phase of its cage."""
+    shaft = scene.mechanism.driver.speed if scene.mechanism is not None else scene.shaft.speed if scene.shaft else None
+    assert shaft is not None  # the reader requires it
+    cage = phase(
+        f"{bearing.prefix}cage",
+        f"Angle of ball 1{f' of {bearing.name}' if bearing.name else ''} at the reference time",
+        Names(prefix=bearing.prefix, path=bearing.path).latex(r"\psi_0"),
+        offset=bearing.ball_angle.path,
+        rate=f"{bearing.path}.cage_speed",
     )
-    velocities = tuple(
-        State(
-            name=str(c.velocity),
-            symbol=c.velocity,
-            unit="m/s",
-            description=f"Velocity {c.description}",
-            latex=rf"\dot {c.latex}",
-        )
-        for c in bearing.coordinates
+    model = derive_bearing(
+        bearing,
+        shaft_speed=symbol_of(shaft),
+        cage_phase=cage.symbol,
+        load=load,
+        inner_mass=inner_mass(bearing, scene.mechanism),
     )
-    return positions + velocities
+    return model, cage
 
 
-def _initial(bearing: Bearing | None) -> tuple[str, ...]:
-    if bearing is None:
-        return ()
-    return tuple(q.path for q in (*bearing.initial.position, *bearing.initial.velocity))
+def _initial(bearings: tuple[Bearing, ...]) -> tuple[str, ...]:
+    """Parameters that hold the initial states: positions of all, then velocities."""
+    return tuple(
+        q.path for which in ("position", "velocity") for bearing in bearings for q in getattr(bearing.initial, which)
+    )

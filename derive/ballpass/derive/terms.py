@@ -38,6 +38,35 @@ class Definition:
     latex: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Names:
+    """Names of a part's symbols: variables begin with `prefix`, constants and parameters with `path`.
+
+    The only bearing has the prefix ``""`` and the path ``bearing``; others ``<name>.`` and ``bearings.<name>``.
+    """
+
+    prefix: str
+    path: str
+
+    def variable(self, name: str) -> sp.Symbol:
+        """Symbol of a variable."""
+        return sp.Symbol(f"{self.prefix}{name}", real=True)
+
+    def constant(self, name: str) -> sp.Symbol:
+        """Symbol of a derived constant."""
+        return sp.Symbol(f"{self.path}.{name}", real=True)
+
+    def latex(self, text: str) -> str:
+        """What people read, marked with the part's name where there are several."""
+        return text if not self.prefix else rf"{{{text}}}^{{(\mathrm{{{self.prefix[:-1]}}})}}"
+
+    def define(self, symbol: sp.Symbol, expression: sp.Expr, unit: str, description: str, latex: str) -> Definition:
+        """``symbol := expression``."""
+        return Definition(
+            symbol=symbol, expression=expression, unit=unit, description=description, latex=self.latex(latex)
+        )
+
+
 def symbol_of(quantity: Quantity) -> sp.Symbol:
     """Symbol of a scene quantity: its path, so that two quantities can never share one."""
     return sp.Symbol(quantity.path, real=True)

@@ -55,6 +55,31 @@ def phase(name: str, description: str, latex: str, *, offset: str, rate: str) ->
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Coordinate:
+    """A generalized coordinate and its velocity.
+
+    Attributes
+    ----------
+    name : of the position
+    kind : what is measured
+    unit : of the position; that of the velocity is the same per second
+    position, velocity : symbols
+    group : coordinates of one group share a magnitude, which tolerances are relative to
+    partner : coordinate of the other end of the contact, "" where that end is fixed: what counts is the difference
+    """
+
+    name: str
+    kind: Literal["displacement", "angle"]
+    unit: str
+    position: sp.Symbol
+    velocity: sp.Symbol
+    latex: str
+    description: str
+    group: str
+    partner: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class State:
     """A state variable: a position [m] or a velocity [m/s]."""
 
@@ -67,10 +92,15 @@ class State:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Output:
-    """Something a run can report; `per_ball` outputs have one value per ball and use the generic ball's symbols."""
+    """Something a run can report.
+
+    `per_ball` outputs have one value for each ball of the bearing with the prefix `balls_of` and use the symbols of its
+    generic ball.
+    """
 
     name: str
     expression: sp.Expr
     unit: str
     description: str
     per_ball: bool = False
+    balls_of: str = ""

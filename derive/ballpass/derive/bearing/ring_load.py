@@ -1,7 +1,7 @@
-"""Force on the inner ring: share of a joint's reaction, or the scene's own load.
+"""Force on an inner ring: share of a joint's reaction, or the scene's own load.
 
-In: a scene and the reactions of its mechanism.  Out: a `RingLoad`, the force and the inputs, constants and definitions
-it is made of.
+In: a scene, one of its bearings and the reactions of its mechanism.  Out: a `RingLoad`, the force and the inputs,
+constants and definitions it is made of.
 """
 
 from __future__ import annotations
@@ -10,20 +10,10 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.bearing.load_harmonics import GatedPart, LoadSeries, load_series
-from ballpass.derive.mechanism.forces import Windows
 from ballpass.derive.mechanism.reactions import Reactions
-from ballpass.derive.scene.records import (
-    FRAME,
-    ConstantLoad,
-    HarmonicLoad,
-    Mechanism,
-    Quantity,
-    Scene,
-    TableLoad,
-)
+from ballpass.derive.scene.records import FRAME, Bearing, ConstantLoad, HarmonicLoad, Quantity, Scene, TableLoad
 from ballpass.derive.terms import TIME, Definition, components, symbol_of
-from ballpass.derive.variables import DRIVER_ANGLE, Input, phase
+from ballpass.derive.variables import Input, phase
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,43 +24,28 @@ class RingLoad:
     inputs: tuple[Input, ...] = ()
     constants: tuple[Definition, ...] = ()
     definitions: tuple[Definition, ...] = ()
-    series: LoadSeries | None = None
 
 
-def ring_load(scene: Scene, reactions: Reactions | None) -> RingLoad:
-    """Share of the joint's reaction where there is a mechanism, else the scene's own load."""
-    bearing, mechanism, load = scene.bearing, scene.mechanism, scene.load
-    assert bearing is not None
-    if reactions is not None:
-        assert mechanism is not None
-        assert bearing.joint is not None
-        assert bearing.share is not None
-        # what presses the inner ring into the bearing is the force of the driven body on the frame
-        fx, fy = reactions.joint_force[bearing.joint]
-        share = symbol_of(bearing.share)
-        sign = 1 if mechanism.joint(bearing.joint).bodies[0] == FRAME else -1
-        force = (sign * share * fx, sign * share * fy)
-        if bearing.load_harmonics is None:
-            return RingLoad(force=force)
-        series = load_series(bearing.load_harmonics, DRIVER_ANGLE, force, _gated_parts(mechanism))
-        return RingLoad(force=series.force, definitions=series.waves, series=series)
+def reaction_share(scene: Scene, bearing: Bearing, reactions: Reactions) -> RingLoad:
+    """Share of the reaction of the bearing's joint: the force of the body it carries on the frame."""
+    assert scene.mechanism is not None
+    assert bearing.joint is not None
+    assert bearing.share is not None
+    fx, fy = reactions.joint_force[bearing.joint]
+    share = symbol_of(bearing.share)
+    sign = 1 if scene.mechanism.joint(bearing.joint).bodies[0] == FRAME else -1
+    return RingLoad(force=(sign * share * fx, sign * share * fy))
+
+
+def own_load(scene: Scene) -> RingLoad:
+    """The load of a scene without mechanism; every bearing of the scene carries it."""
+    load = scene.load
     assert load is not None  # the reader requires a load where there is no mechanism
     if isinstance(load, ConstantLoad):
         return RingLoad(force=components(load.force))
     if isinstance(load, HarmonicLoad):
         return _harmonic(load)
     return _table(load)
-
-
-def _gated_parts(mechanism: Mechanism) -> tuple[GatedPart, ...]:
-    return tuple(
-        GatedPart(
-            gate=sp.Symbol(f"gate.{force.name}", real=True),
-            windows=tuple((symbol_of(w.start), symbol_of(w.end)) for w in force.law.windows),
-        )
-        for force in mechanism.forces
-        if isinstance(force.law, Windows)
-    )
 
 
 def _harmonic(load: HarmonicLoad) -> RingLoad:

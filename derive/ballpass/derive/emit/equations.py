@@ -9,9 +9,8 @@ from collections.abc import Iterable
 
 import sympy as sp
 
-from ballpass.derive.bearing.equations import COS, SIN, Ball
+from ballpass.derive.bearing.equations import BearingModel
 from ballpass.derive.bearing.hertz import ellipticity
-from ballpass.derive.bearing.load_harmonics import LoadSeries
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME, Definition
 from ballpass.derive.variables import Input, Parameter, State
@@ -23,14 +22,14 @@ class _Printer:
     """LaTeX of expressions in the model's symbols."""
 
     def __init__(self, system: System) -> None:
-        names: dict[sp.Symbol, str] = {TIME: "t", COS: r"\cos\theta_j", SIN: r"\sin\theta_j"}
+        names: dict[sp.Symbol, str] = {TIME: "t"}
         named: tuple[Parameter | Input | State, ...] = (*system.parameters, *system.inputs, *system.states)
         names |= {n.symbol: n.latex for n in named}
-        series = system.load_series
-        names |= {k.symbol: k.latex for k in (series.coefficients if series else ())}
         definitions = [*system.constants, *system.definitions]
-        if system.bearing is not None:
-            definitions += [*system.bearing.ball.definitions, *system.bearing.ball.sums]
+        for bearing in system.bearings:
+            ball = bearing.ball
+            names |= {ball.cos: bearing.names.latex(r"\cos\theta_j"), ball.sin: bearing.names.latex(r"\sin\theta_j")}
+            definitions += [*ball.definitions, *ball.sums]
         for definition in definitions:
             names[definition.symbol] = definition.latex
         self._names = names
@@ -67,8 +66,6 @@ def equations(system: System) -> str:
         )
     if system.constants:
         parts += ["## Derived constants", "Evaluated once a run.", *_definitions(tex, system.constants)]
-    if system.load_series is not None:
-        parts += _series(tex, system.load_series)
     if system.linkage is not None and system.reactions is not None:
         parts += [
             "## Linkage",
@@ -85,45 +82,39 @@ def equations(system: System) -> str:
         ]
     elif system.definitions:
         parts += ["## Load", *_definitions(tex, system.definitions)]
-    if system.bearing is not None:
-        parts += _bearing(tex, system, system.bearing.ball)
+    for model in system.bearings:
+        parts += _contact(tex, model)
+    if system.coordinates:
+        parts += _motion(tex, system)
     return "\n\n".join(parts) + "\n"
 
 
-def _series(tex: _Printer, series: LoadSeries) -> list[str]:
-    angle = tex(series.angle)
+def _contact(tex: _Printer, model: BearingModel) -> list[str]:
+    ball, name = model.ball, model.names.prefix[:-1]
+    angle = model.names.latex(r"\theta_j")
     return [
-        "## Load by its harmonics",
-        f"Mean and {series.count} harmonics of the load over a turn take its place; their coefficients are evaluated "
-        "once a run, each window of a load apart, so that no integral meets a jump.",
-        *(
-            _equation(rf"F_{axis} \approx {tex(force)},\qquad F_{axis} = {tex(load)}")
-            for axis, force, load in zip("xy", series.force, series.load, strict=True)
-        ),
-        _equation(
-            rf"\bar F = \frac{{1}}{{2\pi}} \oint F\,\mathrm{{d}}{angle},\quad "
-            rf"a_k = \frac{{1}}{{\pi}} \oint F \cos k{angle}\,\mathrm{{d}}{angle},\quad "
-            rf"b_k = \frac{{1}}{{\pi}} \oint F \sin k{angle}\,\mathrm{{d}}{angle}"
-        ),
-    ]
-
-
-def _bearing(tex: _Printer, system: System, ball: Ball) -> list[str]:
-    parts = [
-        "## Contact",
+        f"## Contact{f' of {name}' if name else ''}",
         rf"Ball $j = 1 \dots {ball.count}$ at the angle",
-        _equation(rf"\theta_j = \frac{{2\pi (j - 1)}}{{{ball.count}}} + {tex(ball.cage_angle)}"),
+        _equation(rf"{angle} = \frac{{2\pi (j - 1)}}{{{ball.count}}} + {tex(ball.cage_angle)}"),
         *_definitions(tex, ball.definitions),
         "Sums over the balls:",
         *(_line(tex, s, rf"\sum_{{j=1}}^{{{ball.count}}} {tex(s.expression)}") for s in ball.sums),
-        "## Equations of motion, Eq. (2)",
     ]
-    n = system.coordinates
-    for k, state in enumerate(system.states[:n]):
-        parts.append(_equation(rf"{tex(system.mass[k, k])}\,\ddot {state.latex} = {tex(system.forcing[k])}"))
+
+
+def _motion(tex: _Printer, system: System) -> list[str]:
+    parts = ["## Equations of motion, Eq. (2)"]
+    if system.mass.is_diagonal():
+        parts += [
+            _equation(rf"{tex(system.mass[k, k])}\,\ddot {c.latex} = {tex(system.forcing[k])}")
+            for k, c in enumerate(system.coordinates)
+        ]
+    else:
+        accelerations = r" \\ ".join(rf"\ddot {c.latex}" for c in system.coordinates)
+        column = rf"\begin{{pmatrix}} {accelerations} \end{{pmatrix}}"
+        parts.append(_equation(rf"{tex(system.mass)}\,{column} = {tex(system.forcing)}"))
     laws = ", ".join(f"{name}: {smoothness.value}" for name, smoothness in system.smoothness)
-    parts += ["## Smoothness of the laws", laws]
-    return parts
+    return [*parts, "## Smoothness of the laws", laws]
 
 
 def _definitions(tex: _Printer, definitions: Iterable[Definition]) -> list[str]:

@@ -26,26 +26,23 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
 import casadi as ca
 
-from ballpass.derive.emit.ensemble_header import ensemble_header
+from ballpass.derive.emit.describe import describe, run_info
 from ballpass.derive.emit.equations import equations
+from ballpass.derive.emit.kernel_headers import ensemble_header, kernels_header, switches_header, tangents_header
+from ballpass.derive.emit.methods_header import methods_header
 from ballpass.derive.emit.replace_folder import refuse_foreign, replace_folder
-from ballpass.derive.emit.stepper_headers import kernels_header, methods_header, tangents_header
-from ballpass.derive.lower.functions import Functions, lower, operations
+from ballpass.derive.lower.functions import Functions, lower
 from ballpass.derive.lower.jacobians import DERIVATIVES, Described
-from ballpass.derive.lower.switch_kernels import switches_header
-from ballpass.derive.mechanism.forces import drawn_forces
 from ballpass.derive.mechanism.linkage import check_assembly
 from ballpass.derive.scene.read import read_scene
 from ballpass.derive.scene.records import Scene
-from ballpass.derive.scene.values import value_bounds, value_relations
 from ballpass.derive.system import System, derive
-from ballpass.derive.variables import Output
 from ballpass.runtime import contract as mf
 from ballpass.runtime.contract.errors import ArtefactError
 
@@ -167,7 +164,7 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene) -> None:
         present,
         title=scene.title,
         parameters=tuple(replace(p, default=values[p.name]) for p in present.parameters),
-        run=_run(scene),
+        run=run_info(scene),
     )
     if updated == present:
         return
@@ -180,23 +177,31 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene) -> None:
 def _write(folder: Path, system: System, functions: Functions) -> None:
     _write_c(folder, "model", functions.functions)
     _write_c(folder, "jacobians", functions.jacobians)
-    if functions.kernels is not None:
-        header = kernels_header(system, functions, functions.kernels)
-        (folder / "kernels.h").write_text(header, encoding="utf-8", newline="\n")
-        (folder / "methods.h").write_text(methods_header(), encoding="utf-8", newline="\n")
-        lanes = ensemble_header(functions, functions.kernels)
-        (folder / "ensemble_kernels.h").write_text(lanes, encoding="utf-8", newline="\n")
-        tangents = tangents_header(functions.kernels)
-        (folder / "tangents.h").write_text(tangents, encoding="utf-8", newline="\n")
-    if functions.switches is not None:
-        (folder / "switches.h").write_text(switches_header(functions.switches), encoding="utf-8", newline="\n")
+    for name, text in _headers(system, functions).items():
+        (folder / name).write_text(text, encoding="utf-8", newline="\n")
     _pack(folder / "model.casadi", functions.functions)
     # values only: where there is no compiler, the runtime makes their derivatives when they are asked for
     values = [entry for entry in functions.jacobians if not entry[0].name().endswith(DERIVATIVES)]
     _pack(folder / "jacobians.casadi", values)
     (folder / "EQUATIONS.md").write_text(equations(system), encoding="utf-8", newline="\n")
     files = tuple((p.name, _digest(p)) for p in sorted(folder.iterdir()))
-    mf.write(folder, _manifest(system, functions, files))
+    manifest = describe(system, functions, signature=signature(system.scene), versions=_versions(), files=files)
+    mf.write(folder, manifest)
+
+
+def _headers(system: System, functions: Functions) -> dict[str, str]:
+    """Texts of the headers for the project's own stepper, by name; none where it does not take the model."""
+    kernels = functions.kernels
+    if kernels is None:
+        return {}
+    headers = {
+        "kernels.h": kernels_header(system, functions, kernels),
+        "methods.h": methods_header(),
+        "ensemble_kernels.h": ensemble_header(kernels),
+        "tangents.h": tangents_header(kernels),
+    }
+    switches = switches_header(system, kernels)
+    return {**headers, "switches.h": switches} if switches is not None else headers
 
 
 def _pack(path: Path, functions: Sequence[Described]) -> None:
@@ -212,128 +217,3 @@ def _write_c(folder: Path, name: str, functions: Sequence[Described]) -> None:
     for function, _ in functions:
         generator.add(function)
     generator.generate(f"{folder}{os.sep}")
-
-
-def _run(scene: Scene) -> mf.RunInfo:
-    run = scene.run
-    return mf.RunInfo(
-        cycles=run.cycles,
-        duration=run.duration,
-        transient_cycles=run.transient_cycles,
-        samples_per_cycle=run.samples_per_cycle,
-        method=run.method,
-        rtol=run.rtol,
-    )
-
-
-def _manifest(system: System, functions: Functions, files: tuple[tuple[str, str], ...]) -> mf.Manifest:
-    scene = system.scene
-    bounds = value_bounds(scene)
-    return mf.Manifest(
-        scene=scene.name,
-        title=scene.title,
-        signature=signature(scene),
-        versions=_versions(),
-        parameters=tuple(
-            mf.ParameterInfo(
-                name=p.name,
-                unit=p.unit,
-                description=p.description,
-                latex=p.latex,
-                default=p.default,
-                **(asdict(bounds[p.name]) if p.name in bounds else {}),
-            )
-            for p in system.parameters
-        ),
-        relations=value_relations(scene),
-        constants=tuple(
-            mf.VariableInfo(name=c.name, unit=c.unit, description=c.description, latex=c.latex)
-            for c in functions.constants
-        ),
-        states=tuple(
-            mf.VariableInfo(name=s.name, unit=s.unit, description=s.description, latex=s.latex) for s in system.states
-        ),
-        initial=system.initial,
-        inputs=tuple(
-            mf.InputInfo(
-                name=i.name,
-                kind=i.kind,
-                offset=i.offset,
-                rate=i.rate,
-                windows=i.windows,
-                times=i.times,
-                values=i.values,
-            )
-            for i in system.inputs
-        ),
-        outputs=tuple(
-            mf.VariableInfo(
-                name=o.name,
-                unit=o.unit,
-                description=o.description,
-                size=_size(system, o),
-            )
-            for o in system.outputs
-        ),
-        quantities=tuple(
-            mf.QuantityInfo(name=o.name, unit=o.unit, description=o.description, size=_size(system, o), group=g.name)
-            for g in functions.groups
-            for o in g.outputs
-        ),
-        functions=tuple(
-            mf.FunctionInfo(
-                name=f.name(),
-                inputs=tuple((f.name_in(k), f.size1_in(k)) for k in range(f.n_in())),
-                outputs=tuple((f.name_out(k), f.size1_out(k)) for k in range(f.n_out())),
-                operations=operations(f) if f.is_a("SXFunction") else 0,
-                description=words,
-                library=library,
-            )
-            for library, group in ((mf.MODEL, functions.functions), (mf.JACOBIANS, functions.jacobians))
-            for f, words in group
-        ),
-        smoothness=tuple((name, s.value) for name, s in system.smoothness),
-        mechanism=_mechanism(system),
-        bearings=_bearings(system),
-        run=_run(scene),
-        files=files,
-    )
-
-
-def _size(system: System, output: Output) -> int:
-    return system.bearing.ball.count if output.per_ball and system.bearing else 1
-
-
-def _mechanism(system: System) -> mf.MechanismInfo | None:
-    mechanism, linkage = system.scene.mechanism, system.linkage
-    if mechanism is None or linkage is None:
-        return None
-    return mf.MechanismInfo(
-        driver_joint=mechanism.driver.joint,
-        speed=mechanism.driver.speed.path,
-        start_angle=mechanism.driver.start_angle.path,
-        joints=tuple((j.name, j.kind, j.bodies[0], j.points[0], j.bodies[1], j.points[1]) for j in mechanism.joints),
-        points=tuple(mf.PointInfo(body=p.body, point=p.point) for p in linkage.points),
-        margins=tuple(mf.MarginInfo(joint=m.joint, description=m.description) for m in linkage.margins),
-        forces=drawn_forces(mechanism),
-    )
-
-
-def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
-    bearing, scene = system.scene.bearing, system.scene
-    if bearing is None:
-        return ()
-    speed = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
-    assert speed is not None
-    return (
-        mf.BearingInfo(
-            name="",
-            prefix="",
-            path="bearing",
-            balls=bearing.balls,
-            joint=bearing.joint or "",
-            shaft_speed=speed.path,
-            outer_ring=bearing.outer is not None,
-            damping_law=bearing.damping.law,
-        ),
-    )

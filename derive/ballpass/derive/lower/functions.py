@@ -12,19 +12,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import casadi as ca
 import sympy as sp
 
-from ballpass.derive.bearing.equations import Ball
-from ballpass.derive.bearing.load_harmonics import coefficients_of
+from ballpass.derive.bearing.equations import BearingModel
+from ballpass.derive.lower.ball_kernels import UnfitError
 from ballpass.derive.lower.jacobians import Described, Group, group_functions, partials, tangent
 from ballpass.derive.lower.kernels import KernelBuilder, Kernels
-from ballpass.derive.lower.switch_kernels import SwitchKernels, switch_kernels
+from ballpass.derive.lower.mass_matrix import accelerations
 from ballpass.derive.lower.visitor import Visitor
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
 from ballpass.derive.variables import Output
+
+#: A visitor for each ball of each bearing, by the bearing's prefix.
+Balls = dict[str, list[Visitor]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +48,7 @@ class Functions:
     """Named functions in the order they are written, with a line for people each.
 
     `jacobians` go to files of their own, read and compiled when a derivative is first asked for; `groups` says which
-    quantities they differentiate.  `switches` are None where the laws have no kinks.
+    quantities they differentiate.
     """
 
     constants: tuple[Constant, ...]
@@ -51,7 +56,7 @@ class Functions:
     jacobians: tuple[Described, ...]
     groups: tuple[Group, ...]
     kernels: Kernels | None
-    switches: SwitchKernels | None
+    unfit: str
 
     def __getitem__(self, name: str) -> ca.Function:
         for function, _ in (*self.functions, *self.jacobians):
@@ -93,14 +98,10 @@ class _Lowering:
         self._named = [ca.SX.sym(d.symbol.name) for d in system.constants]
         self._hoisted: dict[sp.Basic, ca.SX] = {}
         parameters = {p.symbol: self.p[k] for k, p in enumerate(system.parameters)}
-        series = system.load_series
-        self._coefficients = {k.symbol: ca.SX.sym(k.symbol.name) for k in series.coefficients} if series else {}
-        constants = dict(zip((d.symbol for d in system.constants), self._named, strict=True)) | self._coefficients
+        constants = dict(zip((d.symbol for d in system.constants), self._named, strict=True))
         definitions = {d.symbol: d.expression for d in system.definitions}
         # evaluates constants: parameters are free, constants are definitions, nothing is hoisted
-        self.once = Visitor(
-            parameters | self._coefficients, definitions | {d.symbol: d.expression for d in system.constants}
-        )
+        self.once = Visitor(parameters, definitions | {d.symbol: d.expression for d in system.constants})
         self._values = (
             {TIME: self.t}
             | {s.symbol: self.x[k] for k, s in enumerate(system.states)}
@@ -122,8 +123,8 @@ class _Lowering:
     def functions(self, extra: Mapping[str, Mapping[str, sp.Expr]]) -> Functions:
         system = self.system
         bodies: list[tuple[str, dict[str, ca.SX], str]] = []
-        balls = self._balls(system.bearing.ball, self.visit) if system.bearing else None
-        if system.states:
+        balls = self._balls(self.visit)
+        if system.coordinates:
             bodies.append(("rhs", {"xdot": self._rhs(balls)}, "time derivative of the states"))
         if system.outputs:
             bodies.append(("outputs", self._outputs(balls), "outputs of the scene"))
@@ -148,44 +149,47 @@ class _Lowering:
         for name, outputs in extra.items():
             bodies.append((name, {k: self.visit(e) for k, e in outputs.items()}, "asked for on the side"))
 
-        builder = self._kernel_builder() if system.states else None
+        builder, unfit = self._kernel_builder()
+        # whatever is hoisted must be known before the vector of constants is closed
+        contacts = [self._contact(bearing) for bearing in system.bearings]
         c, once = self._constants()
         arguments = {"t": self.t, "x": self.x, "u": self.u, "p": self.p, "c": c}
         made: list[Described] = [
-            (self._function_of_p("constants", once, "c"), "derived constants, once a run"),
+            (ca.Function("constants", [self.p], [once], ["p"], ["c"]), "derived constants, once a run"),
             (
-                self._function_of_p("constants_jac", once, "c_p", differentiated=True),
+                ca.Function("constants_jac", [self.p], [ca.jacobian(once, self.p)], ["p"], ["c_p"]),
                 "derivative of the constants by the parameters",
             ),
         ]
-        if system.bearing is not None:
-            made.append((self._contact(c), "elastic and damping force of one ball [N]"))
+        for name, (delta, rate, forces) in zip((b.names.prefix for b in system.bearings), contacts, strict=True):
+            function = ca.Function(
+                output_field(f"{name}contact"),
+                [delta, rate, self.p, c],
+                forces,
+                ["delta", "delta_rate", "p", "c"],
+                ["elastic_force", "damping_force"],
+            )
+            made.append((function, "elastic and damping force of one ball [N]"))
         for name, results, words in bodies:
             takes = {k: v for k, v in arguments.items() if k in ("u", "p", "c") or _uses(results, v)}
             made.append((ca.Function(name, [*takes.values()], [*results.values()], [*takes], [*results]), words))
             if name == "rhs":  # the choice of a method needs these two
                 made += partials(name, "xdot", results["xdot"], arguments, "xt")
-        rhs = bodies[0][1]["xdot"] if system.states else None
+        rhs = bodies[0][1]["xdot"] if system.coordinates else None
         groups, jacobians = self._jacobians(rhs, arguments)
         named = [
             Constant(name=d.symbol.name, unit=d.unit, description=d.description, latex=d.latex)
             for d in system.constants
         ]
         found = [Constant(name=f"h{k + 1}", unit="", description=str(e), latex="") for k, e in enumerate(self._hoisted)]
-        kernels = builder.kernels(c) if builder else None
         return Functions(
-            constants=(*named, *found, *self._series_constants()),
+            constants=(*named, *found),
             functions=tuple(made),
             jacobians=tuple(jacobians),
             groups=tuple(groups),
-            kernels=kernels,
-            switches=self._switches(c, kernels) if kernels is not None else None,
+            kernels=builder.kernels(c) if builder else None,
+            unfit=unfit,
         )
-
-    def _switches(self, c: ca.SX, kernels: Kernels) -> SwitchKernels | None:
-        assert self.system.bearing is not None
-        numbers = next(k.function for k in kernels.functions if k.function.name() == "law_numbers")
-        return switch_kernels(self.system.bearing.ball, self._adding_nothing(), self.p, c, numbers)
 
     def _adding_nothing(self) -> Visitor:
         """A visitor that uses the constants there are and adds none: what it alone would hoist is computed in place."""
@@ -197,51 +201,30 @@ class _Lowering:
             hoist=lambda e: self._hoisted[e] if e in self._hoisted else plain(e),
         )
 
-    def _kernel_builder(self) -> KernelBuilder:
-        return KernelBuilder(
-            self.system,
-            self.visit,
-            values=self._values,
-            definitions=self._definitions,
-            constant=self._fixed,
-            arguments={"t": self.t, "x": self.x, "u": self.u, "p": self.p, "c": ca.SX(0, 1)},
-        )
+    def _kernel_builder(self) -> tuple[KernelBuilder | None, str]:
+        """The kernels of the stepper; None, and why, where they do not take this model."""
+        if not self.system.coordinates:
+            return None, ""
+        try:
+            builder = KernelBuilder(
+                self.system,
+                self.visit,
+                values=self._values,
+                definitions=self._definitions,
+                constant=self._fixed,
+                arguments={"t": self.t, "x": self.x, "u": self.u, "p": self.p},
+            )
+        except UnfitError as fault:
+            return None, str(fault)
+        return builder, ""
 
     def _constants(self) -> tuple[ca.SX, ca.SX]:
         """The vector c of symbols, and its value as an expression of p."""
-        symbols = ca.vertcat(*self._named, *self._hoisted.values(), *self._coefficients.values())
+        symbols = ca.vertcat(*self._named, *self._hoisted.values())
         values = ca.vertcat(
-            *(self.once(d.symbol) for d in self.system.constants),
-            *(self.once(e) for e in self._hoisted),
-            *self._coefficients.values(),
+            *(self.once(d.symbol) for d in self.system.constants), *(self.once(e) for e in self._hoisted)
         )
         return ca.SX(symbols), ca.SX(values)
-
-    def _function_of_p(self, name: str, once: ca.SX, result: str, *, differentiated: bool = False) -> ca.Function:
-        """The constants, or their derivative, by the parameters; a load series' coefficients by loops of their own."""
-        series = self.system.load_series
-        if series is None:
-            value = ca.jacobian(once, self.p) if differentiated else once
-            return ca.Function(name, [self.p], [value], ["p"], [result])
-        parameters = {p.symbol: self.p[k] for k, p in enumerate(self.system.parameters)}
-        given = self._definitions | {d.symbol: d.expression for d in self.system.constants}
-        del given[series.angle]
-        coefficients = coefficients_of(series, parameters, self.p, given, differentiated=False)
-        k, p = ca.vertcat(*self._coefficients.values()), ca.MX.sym("p", self.p.numel())
-        if not differentiated:
-            rest = ca.Function("constants_of", [self.p, k], [once])
-            return ca.Function(name, [p], [rest(p, coefficients(p))], ["p"], [result])
-        slopes = coefficients_of(series, parameters, self.p, given, differentiated=True)
-        parts = ca.Function("constants_by", [self.p, k], [ca.jacobian(once, self.p), ca.jacobian(once, k)])
-        by_p, by_k = parts(p, coefficients(p))
-        return ca.Function(name, [p], [by_p + ca.mtimes(by_k, slopes(p))], ["p"], [result])
-
-    def _series_constants(self) -> list[Constant]:
-        series = self.system.load_series
-        return [
-            Constant(name=k.symbol.name, unit="N", description=k.description, latex=k.latex)
-            for k in (series.coefficients if series else ())
-        ]
 
     def _jacobians(self, rhs: ca.SX | None, arguments: Mapping[str, ca.SX]) -> tuple[list[Group], list[Described]]:
         """Derivatives of the right-hand side and of every quantity, also of those that no run reports.
@@ -250,7 +233,7 @@ class _Lowering:
         """
         system = self.system
         visit = self._adding_nothing()
-        balls = self._balls(system.bearing.ball, visit) if system.bearing else None
+        balls = self._balls(visit)
         made: list[Described] = []
         if rhs is not None:
             made += [*partials("rhs", "xdot", rhs, arguments, "upc"), tangent("rhs", "xdot", rhs, arguments)]
@@ -261,88 +244,74 @@ class _Lowering:
             if chosen:
                 groups.append(Group(name=name, outputs=tuple(q for q, _ in chosen)))
                 made += group_functions(name, [v for _, v in chosen], arguments)
-        if system.bearing is not None:
-            made += group_functions("static_forces", self._static_forces(system.bearing.ball, visit), arguments)
+        if system.bearings:
+            made += group_functions("static_forces", self._static_forces(visit), arguments)
         return groups, made
 
-    def _static_forces(self, ball: Ball, visit: Visitor) -> list[ca.SX]:
+    def _static_forces(self, visit: Visitor) -> list[ca.SX]:
         """Net force along each coordinate with everything at rest: no damping force, no velocities."""
-        balls = self._balls(ball, visit, {ball.force: ball.elastic_force})
-        net = visit.child(self._sums(balls), {})
-        at_rest = {state.symbol: sp.S.Zero for state in self.system.states[self.system.coordinates :]}
+        at_rest = {c.velocity: sp.S.Zero for c in self.system.coordinates}
+        undamped = {b.ball.force: b.ball.elastic_force for b in self.system.bearings}
+        net = visit.child(self._sums(self._balls(visit, undamped)), {})
         return [net(force.subs(at_rest)) for force in self.system.forcing]
 
-    def _balls(self, ball: Ball, visit: Visitor, instead: Mapping[sp.Symbol, sp.Expr] | None = None) -> list[Visitor]:
-        """A visitor for each ball: one sine and cosine of the cage's angle, angle addition for the rest.
+    def _balls(self, visit: Visitor, instead: Mapping[sp.Symbol, sp.Expr] | None = None) -> Balls:
+        """A visitor for each ball, by its bearing's prefix: one sine and cosine of the cage's angle, angle addition for
+        the rest.
 
-        `instead` replaces definitions of the ball.
+        `instead` replaces definitions of the balls.
         """
-        cage = visit(ball.cage_angle)
-        sine, cosine = ca.sin(cage), ca.cos(cage)
-        definitions = {d.symbol: d.expression for d in ball.definitions} | dict(instead or {})
-        out = []
-        for j in range(ball.count):
-            spacing = sp.Rational(2 * j, ball.count) * sp.pi
-            c, s = float(sp.cos(spacing)), float(sp.sin(spacing))
-            out.append(visit.child({ball.cos: c * cosine - s * sine, ball.sin: s * cosine + c * sine}, definitions))
+        out: Balls = {}
+        for bearing in self.system.bearings:
+            ball = bearing.ball
+            cage = visit(ball.cage_angle)
+            sine, cosine = ca.sin(cage), ca.cos(cage)
+            definitions = {d.symbol: d.expression for d in ball.definitions} | dict(instead or {})
+            out[bearing.names.prefix] = []
+            for j in range(ball.count):
+                spacing = sp.Rational(2 * j, ball.count) * sp.pi
+                c, s = float(sp.cos(spacing)), float(sp.sin(spacing))
+                direction = {ball.cos: c * cosine - s * sine, ball.sin: s * cosine + c * sine}
+                out[bearing.names.prefix].append(visit.child(direction, definitions))
         return out
 
-    def _sums(self, balls: list[Visitor]) -> dict[sp.Symbol, ca.SX]:
+    def _sums(self, balls: Balls) -> dict[sp.Symbol, ca.SX]:
         """Sums over the balls, Eqs. (8) and (9)."""
-        assert self.system.bearing is not None
         totals = {}
-        for total in self.system.bearing.ball.sums:
-            terms = [ball(total.expression) for ball in balls]
-            value = terms[0]
-            for term in terms[1:]:
-                value = value + term
-            totals[total.symbol] = value
+        for bearing in self.system.bearings:
+            for total in bearing.ball.sums:
+                terms = [ball(total.expression) for ball in balls[bearing.names.prefix]]
+                totals[total.symbol] = reduce(add, terms)
         return totals
 
-    def _rhs(self, balls: list[Visitor] | None) -> ca.SX:
+    def _rhs(self, balls: Balls) -> ca.SX:
         """Velocities, then mass^-1 forcing."""
-        system = self.system
-        assert balls is not None
         visit = self.visit.child(self._sums(balls), {})
-        if not system.mass.is_diagonal():
-            raise TypeError("the mass matrix of the rings is expected to be diagonal")
-        n = system.coordinates
-        accelerations = [visit(system.forcing[k] / system.mass[k, k]) for k in range(n)]
-        return ca.vertcat(self.x[n:], *accelerations)
+        return ca.vertcat(self.x[len(self.system.coordinates) :], *accelerations(self.system, visit))
 
-    def _outputs(self, balls: list[Visitor] | None) -> dict[str, ca.SX]:
+    def _outputs(self, balls: Balls) -> dict[str, ca.SX]:
         outputs = self.system.outputs
         names = (output_field(output.name) for output in outputs)
         return dict(zip(names, self._values_of(outputs, balls, self.visit), strict=True))
 
-    def _values_of(self, outputs: Sequence[Output], balls: list[Visitor] | None, visit: Visitor) -> list[ca.SX]:
+    def _values_of(self, outputs: Sequence[Output], balls: Balls, visit: Visitor) -> list[ca.SX]:
         """A number or a column with a row for each ball, for each output."""
-        visit = visit.child(self._sums(balls), {}) if balls else visit
-        out = []
-        for output in outputs:
-            if output.per_ball:
-                assert balls is not None
-                out.append(ca.vertcat(*(ball(output.expression) for ball in balls)))
-            else:
-                out.append(visit(output.expression))
-        return out
+        visit = visit.child(self._sums(balls), {})
+        return [
+            ca.vertcat(*(ball(output.expression) for ball in balls[output.balls_of]))
+            if output.per_ball
+            else visit(output.expression)
+            for output in outputs
+        ]
 
-    def _contact(self, c: ca.SX) -> ca.Function:
-        """Elastic and damping force of one ball as functions of deflection [m] and its rate [m/s]."""
-        assert self.system.bearing is not None
-        ball = self.system.bearing.ball
+    def _contact(self, bearing: BearingModel) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
+        """Elastic and damping force of one ball over deflection [m] and its rate [m/s]."""
+        ball = bearing.ball
         delta, rate = ca.SX.sym("delta"), ca.SX.sym("delta_rate")
         definitions = {d.symbol: d.expression for d in ball.definitions}
         visit = self.visit.child({ball.deflection: delta, ball.deflection_rate: rate}, definitions)
-        elastic = visit(ball.elastic_force)
         damping = visit(ball.damping_force) if ball.damping_force is not None else ca.SX(0.0)
-        return ca.Function(
-            "contact",
-            [delta, rate, self.p, c],
-            [elastic, damping],
-            ["delta", "delta_rate", "p", "c"],
-            ["elastic_force", "damping_force"],
-        )
+        return delta, rate, [visit(ball.elastic_force), damping]
 
 
 def _uses(results: Mapping[str, ca.SX], argument: ca.SX) -> bool:

@@ -2,38 +2,39 @@
 
 In: the visitors of a lowering.  Out: small SX functions that `c_printer` writes as inline C, called by the C driver:
 
-stage          (t, u, p, c) -> w            all that depends on time but not on the state: cage direction, load
+stage          (t, u, p, c) -> w            all that depends on time but not on the state: cages' directions, loads
 stage_rate     (t, u, p, c) -> w, wt        the same with its time derivative
-relative       (x, u, p, c, w) -> r         delta = r0 + r1 cos + r2 sin, delta_rate = r3 cos + r4 sin of a ball's angle
-law            (delta, rate, p, c) -> F     force of one ball
-law_slopes     (delta, rate, p, c) -> F, Fd, Fv      and its slopes by deflection and rate
-law_numbers    (p, c) -> k                  the entries of p and c that the law of a ball needs
-ball_force     (delta, rate, k) -> F        the law over these
-ball_slopes    (delta, rate, k) -> F, Fd, Fv
+relative       (x, u, p, c, w) -> r         of every bearing, see `ball_kernels`
 angles         (t, u, p, c) -> a, at        arguments of sines and cosines in w, linear in time, and their rates
 stage_turned   (C, S, t, u, p, c) -> w      w from cosines C and sines S of the angles
 stage_rate_turned  (C, S, at, t, u, p, c) -> w, wt     the same with its time derivative
 stage_slopes   (C, S, t, u, p, c) -> w, J    w and its derivatives by u, p, c, those that are not always zero
 stage_moved    (J, u_d, p_d, c_d) -> w_d       w along a direction of u, p, c
-ball_partials  (delta, rate, k) -> F, Fd, Fv, Fk      ball_slopes and the slopes by k
-acceleration   (x, S, u, p, c, w) -> a      from the sums S = (sum F cos, sum F sin) over the balls
-acceleration_jacobian  (x, S, G, u, p, c, w) -> A, B     da/dq, da/dv (row-major); G: sums of slopes times cos², cos
-sin, sin²
+acceleration   (x, S, u, p, c, w) -> a      from the sums S over the balls of every bearing
+acceleration_jacobian  (x, S, G, u, p, c, w) -> A, B     da/dq, da/dv (row-major); G: sums of the slopes' rows
 acceleration_rate      (x, S, G, r, u, p, c, w, wt) -> at    partial time derivative at fixed state
 
-The balls enter by one law: the driver loops over them, and the compiler makes SIMD lanes of the loop.  Text and compile
-time do not depend on their number.
+The balls enter by the kernels of `ball_kernels`, one set for each bearing: the driver loops over them, and the compiler
+makes SIMD lanes of the loop.  Text and compile time do not depend on their number.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 import sympy as sp
 
-from ballpass.derive.bearing.equations import CAGE_SPEED, Ball
+from ballpass.derive.lower.ball_kernels import (
+    RELATIVE,
+    SUMS,
+    BallBuilder,
+    BallKernels,
+    UnfitError,
+    sums_by_relative,
+    sums_by_time,
+)
+from ballpass.derive.lower.mass_matrix import accelerations
 from ballpass.derive.lower.visitor import Visitor
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
@@ -51,24 +52,36 @@ class Kernel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kernels:
-    """Kernels of a model; `stage_size` entries of w, the first two of which are cosine and sine of the cage's angle.
+    """Kernels of a model.
 
-    `law_numbers` counts the entries of k.  `angles` counts those of the functions `turned`, which evaluate w for many
-    times close to each other: an angle that grows by little needs no sine of its own.  `tangents` are directional
-    derivatives of the functions, for sensitivities; what is the same for all directions is in `shared_tangents` and
-    `stage_slopes`, the latter of `stage_slopes_size` entries.
+    Attributes
+    ----------
+    stage_size : entries of w, which begins with cosine and sine of each cage's angle
+    angles : entries of the angles of `turned`, which evaluate w for many times close to each other: an angle that
+        grows by little needs no sine of its own
+    slopes : entries of G
+    functions : of a single time, and of a single state
+    turned : stages from the cosines and sines of their angles
+    tangents : directional derivatives of the functions, for sensitivities
+    stage_slopes : what these share for the stages, of `stage_slopes_size` entries
+    bearings : kernels of the balls
     """
 
     stage_size: int
-    balls: int
     angles: int
-    law_numbers: int
+    slopes: int
     stage_slopes_size: int
     functions: tuple[Kernel, ...]
     turned: tuple[Kernel, ...]
     tangents: tuple[Kernel, ...]
-    shared_tangents: tuple[Kernel, ...]
     stage_slopes: Kernel
+    bearings: tuple[BallKernels, ...]
+
+    def __getitem__(self, name: str) -> Kernel:
+        for kernel in (*self.functions, *self.turned, *self.tangents):
+            if kernel.function.name() == name:
+                return kernel
+        raise KeyError(name)
 
 
 class KernelBuilder:
@@ -76,8 +89,14 @@ class KernelBuilder:
 
     Parameters
     ----------
-    system, visit : the system and the visitor of its run-time functions
-    once_a_run : whether an expression depends on parameters only, and its SX among the derived constants
+    visit : visitor of run-time functions
+    constant : symbols that do not change during a run
+    arguments : symbols of t, x, u, p, by name
+
+    Raises
+    ------
+    UnfitError
+        The model has something that these kernels do not take.
     """
 
     def __init__(
@@ -90,78 +109,69 @@ class KernelBuilder:
         constant: frozenset[sp.Symbol],
         arguments: dict[str, ca.SX],
     ) -> None:
-        assert system.bearing is not None
         self._system = system
         self._visit = visit
         self._arguments = arguments
         self._stage: dict[sp.Basic, ca.SX] = {}
-        self._fixed: Callable[[sp.Basic], bool] = visit.is_constant
         timed = constant | {TIME} | {i.symbol for i in system.inputs}
         self._of_state = Visitor(values, definitions, constant=timed, hoist=self._hoist)
-        self._bodies = self._build(system.bearing.ball)
+        for bearing in system.bearings:
+            for direction in (sp.cos(bearing.ball.cage_angle), sp.sin(bearing.ball.cage_angle)):
+                self._hoist(direction)
+        self._balls = [BallBuilder(bearing, visit, self._of_state) for bearing in system.bearings]
+        self._bodies = self._build()
 
     def _hoist(self, expression: sp.Basic) -> ca.SX:
         """A stage variable, unless the expression is a constant of the run."""
-        if self._fixed(expression):
+        if self._visit.is_constant(expression):
             return self._visit(expression)
         if expression not in self._stage:
             self._stage[expression] = ca.SX.sym(f"w{len(self._stage)}")
         return self._stage[expression]
 
-    def _build(self, ball: Ball) -> list[Body]:
+    def _build(self) -> list[Body]:
         system = self._system
-        n = system.coordinates
-        x = self._arguments["x"]
-        for direction in (sp.cos(ball.cage_angle), sp.sin(ball.cage_angle)):
-            self._hoist(direction)
-        definitions = {d.symbol: d.expression for d in ball.definitions}
-
-        relative = self._relative(ball, definitions)
-        r = ca.SX.sym("r", 5)
-        delta, rate = ca.SX.sym("delta"), ca.SX.sym("rate")
-        law = self._visit.child(
-            {ball.deflection: delta, ball.deflection_rate: rate},
-            {k: v for k, v in definitions.items() if k not in (ball.deflection, ball.deflection_rate)},
-        )
-        force = sp.sympify(definitions[ball.force]).xreplace(
-            {
-                k: v
-                for k, v in definitions.items()
-                if k != ball.force and k not in (ball.deflection, ball.deflection_rate)
-            }
-        )
-        slopes = [law(sp.diff(force, s)) for s in (ball.deflection, ball.deflection_rate)]
-
-        sums = ca.SX.sym("S", 2)
-        motion = self._of_state.child({s.symbol: sums[k] for k, s in enumerate(ball.sums)}, {})
-        acceleration = ca.vertcat(*(motion(system.forcing[k] / system.mass[k, k]) for k in range(n)))
-        # slopes of the sums by r: F cos and F sin by delta over cos², cos sin, sin², and by the rate likewise
-        g = ca.SX.sym("G", 6)
-        sums_r = ca.vertcat(
-            ca.horzcat(0, g[0], g[1], g[3], g[4]),
-            ca.horzcat(0, g[1], g[2], g[4], g[5]),
-        )
+        n, x, t = len(system.coordinates), self._arguments["x"], self._arguments["t"]
+        bearings = system.bearings
+        relative = ca.vertcat(*(b.relative for b in self._balls))
+        if ca.jacobian(relative[::RELATIVE], x).nnz():
+            raise UnfitError("the part of a deflection that no direction changes is expected to be constant")
+        sums = ca.SX.sym("S", SUMS * len(bearings))
+        symbols = [s.symbol for b in bearings for s in b.ball.sums]
+        motion = self._of_state.child({s: sums[k] for k, s in enumerate(symbols)}, {})
+        acceleration = ca.vertcat(*accelerations(system, motion))
+        sizes = [8 if b.ball.own is not None else 6 for b in bearings]
+        ends = [sum(sizes[: k + 1]) for k in range(len(sizes))]
+        g, r = ca.SX.sym("G", sum(sizes)), ca.SX.sym("r", RELATIVE * len(bearings))
+        slopes = [g[end - size : end] for end, size in zip(ends, sizes, strict=True)]
+        by_relative = ca.diagcat(*(sums_by_relative(own) for own in slopes))
         by_sums = ca.jacobian(acceleration, sums)
-        by_state = ca.jacobian(acceleration, x) + by_sums @ sums_r @ ca.jacobian(relative, x)
-        # the cage turns: d(cos) = -sin, d(sin) = cos for every ball at once
-        turn = ca.vertcat(
-            -r[1] * g[1] + r[2] * g[0] - r[3] * g[4] + r[4] * g[3] - sums[1],
-            -r[1] * g[2] + r[2] * g[1] - r[3] * g[5] + r[4] * g[4] + sums[0],
+        by_state = ca.jacobian(acceleration, x) + by_sums @ by_relative @ ca.jacobian(relative, x)
+        turning = ca.vertcat(
+            *(
+                sums_by_time(
+                    sums[SUMS * k : SUMS * k + SUMS],
+                    slopes[k],
+                    r[RELATIVE * k : RELATIVE * k + RELATIVE],
+                    self._of_state(b.ball.cage_speed),
+                    own=b.ball.own is not None,
+                )
+                for k, b in enumerate(bearings)
+            )
         )
         w = ca.vertcat(*self._stage.values())
         wt = ca.SX.sym("wt", w.numel())
-        cage_speed = self._visit(CAGE_SPEED)
-        by_time = ca.jtimes(acceleration, w, wt) + by_sums @ turn * cage_speed
+        moved = turning + by_relative @ ca.jtimes(relative, w, wt)
+        by_time = ca.jtimes(acceleration, w, wt) + by_sums @ moved
         stage = ca.vertcat(*(self._visit(e) for e in self._stage))
-        t = self._arguments["t"]
-        state = {k: self._arguments[k] for k in "upc"}
+        state = {k: self._arguments[k] for k in "up"} | {"c": ca.SX(0, 1)}
         tail = {**state, "w": w}
         return [
             (
                 "stage",
                 {"t": t, **state},
                 {"w": stage},
-                "Once per stage time: cage direction, loads, all else without the state",
+                "Once per stage time: cages' directions, loads, all else without the state",
             ),
             (
                 "stage_rate",
@@ -169,18 +179,11 @@ class KernelBuilder:
                 {"w": stage, "wt": ca.jacobian(stage, t)},
                 "Stage variables and their time derivatives",
             ),
-            ("relative", {"x": x, **tail}, {"r": relative}, "delta = r0 + r1 cos + r2 sin, rate = r3 cos + r4 sin"),
             (
-                "law",
-                {"delta": delta, "rate": rate, "p": state["p"], "c": state["c"]},
-                {"F": law(ball.force)},
-                "Force of one ball [N]",
-            ),
-            (
-                "law_slopes",
-                {"delta": delta, "rate": rate, "p": state["p"], "c": state["c"]},
-                {"F": law(ball.force), "Fd": slopes[0], "Fv": slopes[1]},
-                "Force of one ball [N] and its slopes",
+                "relative",
+                {"x": x, **tail},
+                {"r": relative},
+                "Of each bearing: delta = r0 + r1 cos + r2 sin, rate = r3 cos + r4 sin",
             ),
             (
                 "acceleration",
@@ -202,18 +205,6 @@ class KernelBuilder:
             ),
         ]
 
-    def _relative(self, ball: Ball, definitions: dict[sp.Symbol, sp.Expr]) -> ca.SX:
-        """Coefficients r of deflection and rate; both are linear in cosine and sine of the ball's angle."""
-        rows: list[sp.Expr] = []
-        for which, constant in ((ball.deflection, True), (ball.deflection_rate, False)):
-            expression = sp.expand(definitions.get(which, sp.S.Zero))
-            along, across = expression.coeff(ball.cos), expression.coeff(ball.sin)
-            rest = sp.expand(expression - along * ball.cos - across * ball.sin)
-            if rest.has(ball.cos, ball.sin) or (not constant and rest != 0):
-                raise TypeError(f"{which} is not linear in the direction of the ball")
-            rows += [rest, along, across] if constant else [along, across]
-        return ca.vertcat(*(self._of_state(r) for r in rows))
-
     def kernels(self, c: ca.SX) -> Kernels:
         """The functions, once the vector of derived constants is complete."""
         functions = []
@@ -222,86 +213,41 @@ class KernelBuilder:
             results = [ca.densify(v) for v in gives.values()]
             function = ca.Function(name, [*inputs.values()], ca.cse(results), [*inputs], [*gives])
             functions.append(Kernel(function=function, description=words))
-        assert self._system.bearing is not None
-        tangents = tuple(
-            _tangent(k, name, along, results)
-            for name, kernel, along, results in _TANGENTS
-            for k in functions
-            if k.function.name() == kernel
-        )
-        laws = [k.function for k in functions if k.function.name() in ("law", "law_slopes")]
-        numbers, (force, slopes) = gathered(laws, ("ball_force", "ball_slopes"), "law_numbers")
-        angles, turned, stage_slopes, stage_moved = _turned(
-            next(k.function for k in functions if k.function.name() == "stage")
-        )
+        named = {k.function.name(): k for k in functions}
+        tangents = tuple(_tangent(named[kernel], name, along, results) for name, kernel, along, results in _TANGENTS)
+        w = ca.vertcat(*self._stage.values())
+        bearings = tuple(ball.kernels(c, self._arguments["p"], w) for ball in self._balls)
+        angles, turned, stage_slopes, stage_moved = _turned(named["stage"].function)
         return Kernels(
             stage_size=len(self._stage),
-            balls=self._system.bearing.ball.count,
             angles=angles.function.size1_out(0),
-            law_numbers=numbers.size1_out(0),
+            slopes=sum(b.slopes for b in bearings),
             stage_slopes_size=stage_slopes.function.size1_out(1),
-            functions=(
-                *functions,
-                Kernel(function=numbers, description="Numbers that the force of a ball depends on"),
-                Kernel(function=force, description="Force of one ball [N]"),
-                Kernel(function=slopes, description="Force of one ball [N] and its slopes"),
-                angles,
-            ),
+            functions=(*functions, angles, _needed(named["stage"].function, named["relative"].function, bearings)),
             turned=turned,
             tangents=(*tangents, stage_moved),
-            shared_tangents=(_partials(slopes),),
             stage_slopes=stage_slopes,
+            bearings=bearings,
         )
 
 
-def gathered(
-    functions: Sequence[ca.Function], names: Sequence[str], numbers_name: str
-) -> tuple[ca.Function, tuple[ca.Function, ...]]:
-    """The entries of p and c in functions of a ball's deflection and rate, and the functions over these entries, k.
-
-    A compiler makes lanes of a loop over balls only where a selection needs no load: the numbers are gathered first.
-
-    Parameters
-    ----------
-    functions : with arguments deflection, rate, p, c
-    names : of the functions over the entries
-    numbers_name : of the function (p, c) -> k
-    """
-    used: list[tuple[int, int]] = []
-    for function in functions:
-        for k in range(function.n_instructions()):
-            if function.instruction_id(k) == ca.OP_INPUT:
-                argument, entry = function.instruction_input(k)
-                if argument > 1 and (argument, entry) not in used:
-                    used.append((argument, entry))
-    used.sort()
-    first = functions[0]
-    given = {first.name_in(k): ca.SX.sym(first.name_in(k), first.sparsity_in(k)) for k in range(2, first.n_in())}
-    vectors = [*given.values()]
-    # C has no arrays of length zero
-    chosen = ca.vertcat(*(vectors[a - 2][e] for a, e in used)) if used else ca.SX(0.0)
-    numbers = ca.Function(numbers_name, vectors, [ca.densify(chosen)], [*given], ["k"])
-    entries = ca.SX.sym("k", max(len(used), 1))
-    replaced = [ca.SX.zeros(v.numel()) for v in vectors]
-    for place, (argument, entry) in enumerate(used):
-        replaced[argument - 2][entry] = entries[place]
-    delta, rate = ca.SX.sym("delta"), ca.SX.sym("rate")
-    made = []
-    for function, name in zip(functions, names, strict=True):
-        results = ca.cse([ca.densify(r) for r in function.call([delta, rate, *replaced], True, False)])
-        made.append(ca.Function(name, [delta, rate, entries], results, ["delta", "rate", "k"], function.name_out()))
-    return numbers, tuple(made)
+def _needed(stage: ca.Function, relative: ca.Function, bearings: tuple[BallKernels, ...]) -> Kernel:
+    """``cage``: the stage variables that deflections need; the other entries of w are zero."""
+    return Kernel(function=only_deflections("cage", stage, relative, bearings), description="Stage of deflections")
 
 
-def _partials(slopes: ca.Function) -> Kernel:
-    """The force of a ball, its slopes, and its derivatives by the numbers it depends on."""
-    delta, rate, k = (ca.SX.sym(slopes.name_in(i), slopes.size1_in(i)) for i in range(3))
-    results = [*slopes.call([delta, rate, k], True, False)]
-    results.append(ca.densify(ca.jacobian(results[0], k)).T)
-    made = ca.Function(
-        "ball_partials", [delta, rate, k], ca.cse(results), ["delta", "rate", "k"], ["F", "Fd", "Fv", "Fk"]
-    )
-    return Kernel(function=made, description="Force of one ball [N], its slopes, and those by its numbers")
+def only_deflections(
+    name: str, stage: ca.Function, relative: ca.Function, bearings: tuple[BallKernels, ...]
+) -> ca.Function:
+    """A function `stage` without what deflections have no use for."""
+    arguments = [ca.SX.sym(stage.name_in(k), stage.sparsity_in(k)) for k in range(stage.n_in())]
+    w = stage(*arguments)
+    needed = {*range(2 * len(bearings)), *relative.jac_sparsity(0, relative.name_in().index("w")).get_col()}
+    for bearing in bearings:
+        numbers = bearing.over_numbers["numbers"]
+        needed |= {*numbers.jac_sparsity(0, numbers.name_in().index("w")).get_col()}
+    kept = ca.vertcat(*(w[k] if k in needed else ca.SX(0.0) for k in range(w.numel())))
+    return ca.Function(name, arguments, [ca.densify(kept)], stage.name_in(), ["w"])
 
 
 def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Kernel]:
@@ -383,7 +329,6 @@ def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Ker
 _TANGENTS: tuple[tuple[str, str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("stage_rate_tangent", "stage_rate", ("u", "p", "c"), ("w", "wt")),
     ("relative_tangent", "relative", ("x", "u", "p", "c", "w"), ("r",)),
-    ("law_slopes_tangent", "law_slopes", ("delta", "rate", "p", "c"), ("Fd", "Fv")),
     ("acceleration_tangent", "acceleration", ("x", "S", "u", "p", "c", "w"), ("a",)),
     ("acceleration_jacobian_tangent", "acceleration_jacobian", ("x", "S", "G", "u", "p", "c", "w"), ("A", "B")),
     (

@@ -18,11 +18,12 @@ from typing import Any
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.read_bearing import read_bearing, read_load, read_shaft
 from ballpass.derive.scene.read_mechanism import read_mechanism
-from ballpass.derive.scene.records import Run, Scene
+from ballpass.derive.scene.records import Bearing, Mechanism, Run, Scene
 from ballpass.derive.scene.schema import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
-from ballpass.derive.scene.values import parse_override, quantities_of, value_faults, with_values
+from ballpass.derive.scene.values import parse_override, quantities_of, replaced, value_faults, with_values
+from ballpass.derive.terms import Names
 
 __all__ = ["METHODS", "parse_override", "read_scene", "scene_from_text", "with_values"]
 
@@ -36,11 +37,10 @@ METHODS = (
     "rosenbrock",
     "erk",
     "cvodes",
-    "quasi-static",
 )
 #: Largest file that is read [bytes]; the largest sensible one is a table of loads.
 MAX_FILE_SIZE = 8_000_000
-_TABLES = ("mechanism", "shaft", "load", "bearing", "run")
+_TABLES = ("mechanism", "shaft", "load", "bearing", "bearings", "run")
 
 
 def read_scene(path: str | Path) -> Scene:
@@ -156,35 +156,58 @@ def _read(root: Table, name: str) -> Scene:
         title = _read_title(root, name)
         root.know(*_TABLES)
         mechanism, driven = read_mechanism(root.table("mechanism")) if root.has("mechanism") else (None, None)
-        has_bearing = root.has("bearing")
+        has_bearing = root.has("bearing") or root.has("bearings")
         if mechanism is None and not has_bearing:
             root.fault(
                 "",
                 "the scene has neither a mechanism nor a bearing",
-                allowed="[mechanism], [bearing] or both",
+                allowed="[mechanism], [bearing] (or [bearings.<name>]) or both",
                 remedy="add one of the two tables",
             )
-        shaft = load = bearing = None
+        shaft = load = None
         if mechanism is not None or not has_bearing:
             _refuse_loads(root, "mechanism" if mechanism is not None else "")
         else:
             shaft = read_shaft(root.table("shaft", "speed"))
             load = read_load(root.table("load", "type"))
-        if has_bearing:
-            bearing = read_bearing(root.table("bearing"), mechanism, driven)
+        bearings = _read_bearings(root, mechanism, driven) if has_bearing else ()
         run, outputs = _read_run(root.table("run", "cycles or duration, and outputs"))
-        quantities = tuple(quantities_of((mechanism, shaft, load, bearing)))
+        quantities = tuple(quantities_of((mechanism, shaft, load, bearings)))
     return Scene(
         name=name,
         title=title,
         mechanism=mechanism,
         shaft=shaft,
         load=load,
-        bearing=bearing,
+        bearings=bearings,
         outputs=outputs,
         run=run,
         quantities=quantities,
     )
+
+
+def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None) -> tuple[Bearing, ...]:
+    """``[bearing]``, or ``[bearings.<name>]`` for several."""
+    if root.has("bearing") and root.has("bearings"):
+        root.fault(
+            "bearings",
+            "bearings are given in two places",
+            given="[bearing] and [bearings]",
+            allowed="[bearing] for one, or [bearings.<name>] for several",
+            remedy="move [bearing] to [bearings.<name>], with a name of its own",
+        )
+    if root.has("bearing"):
+        root.know("bearings")
+        return (read_bearing(root.table("bearing"), mechanism, driven),)
+    bearings = []
+    with root.table("bearings") as several:
+        for name in several.names("bearing"):
+            bearing = read_bearing(several.table(name), mechanism, driven, name)
+            names = Names(prefix=bearing.prefix, path=bearing.path)
+            # several bearings have the same symbols: their name tells them apart
+            marked = {q.path: replace(q, latex=names.latex(q.latex)) for q in quantities_of(bearing)}
+            bearings.append(replaced(bearing, marked))
+    return tuple(bearings)
 
 
 def _read_title(root: Table, name: str) -> str:

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from ballpass.derive.bearing.effects import EFFECTS
+from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.scene.records import (
-    DAMPING_LAWS,
     FRAME,
+    BallEffect,
     Bearing,
     ConstantLoad,
     Damping,
@@ -32,7 +34,6 @@ from ballpass.derive.scene.units import show
 
 _HERTZ_KEYS = ("inner_groove_radius", "outer_groove_radius", "young_modulus", "poisson_ratio")
 FEWEST_BALLS, MOST_BALLS = 3, 200
-MOST_HARMONICS = 32
 
 
 def read_shaft(table: Table) -> Shaft:
@@ -103,20 +104,20 @@ def _read_column(table: Table, key: str, unit: str, description: str, latex: str
     )
 
 
-def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None) -> Bearing:
-    """The bearing; with a mechanism it must sit at the driver's joint.
+def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, name: str = "") -> Bearing:
+    """A bearing; with a mechanism it must sit at the driver's joint.
 
     `driven` is the driven body, None where there is no mechanism or the driver has a fault.
     """
     with table:
         table.know("joint", "share", "balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle", "contact")
-        table.know("damping", "inner_ring", "outer_ring", "initial", "load_harmonics")
+        table.know("damping", "inner_ring", "outer_ring", "initial", *EFFECTS)
         joint, share = _read_place(table, mechanism, driven)
         support = _read_outer_ring(table)
         return Bearing(
+            name=name,
             joint=joint,
             share=share,
-            load_harmonics=_read_load_harmonics(table, mechanism),
             balls=table.integer("balls", FEWEST_BALLS, MOST_BALLS, example="8"),
             ball_diameter=table.quantity("ball_diameter", "m", "Ball diameter", "D_w", example="7.9375 mm"),
             pitch_diameter=table.quantity(
@@ -133,26 +134,11 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None) 
             ),
             contact=_read_contact(table),
             damping=_read_damping(table),
+            effects=_read_effects(table),
             inner=_read_inner_ring(table, mechanism is not None),
             outer=support,
             initial=_read_initial(table, moving_outer=support is not None),
         )
-
-
-def _read_load_harmonics(table: Table, mechanism: Mechanism | None) -> int | None:
-    """How many harmonics of the mechanism's load are kept; None for all of it."""
-    if not table.has("load_harmonics"):
-        return None
-    if mechanism is None:
-        table.fault(
-            "load_harmonics",
-            "there is no mechanism whose load could be cut to harmonics",
-            given=show(table.data["load_harmonics"]),
-            allowed="this key beside a [mechanism] only",
-            remedy='delete it; a harmonic load is [load] with type = "harmonic"',
-        )
-        return None
-    return table.integer("load_harmonics", 1, MOST_HARMONICS, example="8")
 
 
 def _read_place(table: Table, mechanism: Mechanism | None, driven: str | None) -> tuple[str | None, Quantity | None]:
@@ -266,73 +252,29 @@ def _read_material(table: Table, part: str, young: str, poisson: str) -> Materia
 
 def _read_damping(table: Table) -> Damping:
     with table.table("damping", "law and ratio") as damping:
-        law = damping.choice("law", DAMPING_LAWS)
-        damping.know("coefficient", "ratio", "smoothing")
-        present = [key for key in ("coefficient", "ratio") if key in damping.data]
-        coefficient = ratio = smoothing = None
-        if law in ("one-sided", "one-sided-gated"):
-            smoothing = damping.optional_quantity(
-                "smoothing", "m/s", "Half width of the smoothed kink of the damping at rest", "w_v"
-            )
-        elif law is not None and "smoothing" in damping.data:
+        name = damping.choice("law", tuple(LAWS))
+        if name is None:
+            damping.know(*damping.data)
+            return Damping(law="none", numbers=())
+        law = LAWS[name]
+        smoothing = None
+        if law.kinked_at_rest:
+            words = "Half width of the smoothed kink of the damping at rest"
+            smoothing = damping.optional_quantity("smoothing", "m/s", words, "w_v")
+        elif damping.has("smoothing"):
+            kinked = [other.name for other in LAWS.values() if other.kinked_at_rest]
             damping.fault(
                 "smoothing",
-                f'the law "{law}" has no kink at rest',
+                f'the law "{name}" has no kink at rest',
                 given=show(damping.data["smoothing"]),
-                allowed='smoothing with the laws "one-sided" and "one-sided-gated"',
+                allowed=f"smoothing with the laws {listing(kinked)}",
                 remedy="delete the key; smoothing in [bearing.contact] smooths what happens at contact",
             )
-        if law == "none":
-            for key in present:
-                damping.fault(
-                    key,
-                    'the law "none" has no coefficient',
-                    given=show(damping.data[key]),
-                    remedy="delete the key, or name another law",
-                )
-        elif law == "tangent":
-            if "coefficient" in present:
-                damping.fault(
-                    "coefficient",
-                    'the law "tangent" takes its coefficient from the slope of the contact force',
-                    given=show(damping.data["coefficient"]),
-                    allowed='ratio, a time, as in "0.25e-5 s"',
-                    remedy='write ratio = "0.25e-5 s" instead, or name the law "one-sided"',
-                )
-            if "ratio" in present or not present:
-                ratio = damping.quantity(
-                    "ratio",
-                    "s",
-                    "Damping time constant: damping over tangent stiffness of the contact",
-                    r"\beta",
-                    example="0.25e-5 s",
-                    wrong_dimension='write a time, as in "0.25e-5 s": the law "tangent" multiplies the slope of the '
-                    "contact force [N/m]",
-                )
-        elif law is not None:
-            if len(present) != 1:
-                damping.fault(
-                    "",
-                    "the coefficient is given twice" if present else "the coefficient is missing",
-                    given=" and ".join(f"{key} = {show(damping.data[key])}" for key in present) or "neither",
-                    allowed='either coefficient (as in "683 N*s/m") or ratio (as in "0.25e-5 s*mm^0.5")',
-                    remedy="delete one of the two" if present else 'add coefficient = "683 N*s/m", or a ratio',
-                )
-            if "coefficient" in present:
-                coefficient = damping.quantity(
-                    "coefficient", "N*s/m", "Damping coefficient of a ball's contacts", "c_b", example="683 N*s/m"
-                )
-            if "ratio" in present:
-                ratio = damping.quantity(
-                    "ratio",
-                    "s*m^0.5",
-                    "Ratio of damping coefficient to contact stiffness of a ball",
-                    r"\beta",
-                    example="0.25e-5 s*mm^0.5",
-                    wrong_dimension=f'the law "{law}" multiplies k_b [N/m^1.5]: write the paper\'s number as '
-                    '"0.25e-5 s*mm^0.5"; for a time, as in "0.25e-5 s", name the law "tangent"',
-                )
-    return Damping(law=law or "none", coefficient=coefficient, ratio=ratio, smoothing=smoothing)
+        return Damping(law=name, numbers=law.read(damping), smoothing=smoothing)
+
+
+def _read_effects(table: Table) -> tuple[BallEffect, ...]:
+    return tuple(effect.read(table.table(kind)) for kind, effect in EFFECTS.items() if table.has(kind))
 
 
 def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:
@@ -433,7 +375,7 @@ def _refuse_outer(initial: Table, table: Table) -> None:
                 key,
                 "a fixed outer ring has no initial state",
                 given=show(initial.data[key]),
-                remedy='delete the key, or write support = "elastic" in [bearing.outer_ring]',
+                remedy='delete the key, or write support = "elastic" in the table outer_ring',
             )
 
 

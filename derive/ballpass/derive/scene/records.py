@@ -15,9 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Literal
 
-DampingLaw = Literal["none", "one-sided", "one-sided-gated", "two-sided-gated", "tangent"]
-DAMPING_LAWS: tuple[DampingLaw, ...] = ("none", "one-sided", "one-sided-gated", "two-sided-gated", "tangent")
-
 #: Name of the body that does not move.
 FRAME = "frame"
 
@@ -40,6 +37,16 @@ class Quantity:
     unit: str
     description: str
     latex: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What a value must satisfy: > above, >= least, <= most, < below; None bounds nothing."""
+
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+    below: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -233,17 +240,23 @@ class GivenContact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Damping:
-    """Damping law at the ball and its coefficient.
+    """Damping law at the ball, by name, and its numbers; the law itself says what they are.
 
-    One of `coefficient` c_b [N*s/m] and `ratio`; neither for the law ``none``.  `ratio` times k_b is c_b: [s*m^0.5] for
-    the laws with a constant coefficient; for ``tangent`` it is the time constant beta [s] and the only form allowed.
     `smoothing` is the half width [m/s] of the smoothed kink of one-sided laws at rest, or None.
     """
 
-    law: DampingLaw
-    coefficient: Quantity | None
-    ratio: Quantity | None
+    law: str
+    numbers: tuple[Quantity, ...]
     smoothing: Quantity | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BallEffect:
+    """An effect on the balls: its kind, what of it is structure, and its numbers; `kind` says what they are."""
+
+    kind: str
+    structure: tuple[int | str, ...]
+    numbers: tuple[Quantity, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -284,16 +297,15 @@ class InitialState:
 class Bearing:
     """A deep groove ball bearing.
 
-    `joint` names the revolute joint whose reaction loads it (None without mechanism), `share` the part of the
-    reaction it
-    takes; `load_harmonics` puts its mean and so many harmonics of the driver's angle in its place (None: all of it).
+    `name` is empty for the scene's only ``[bearing]``; ``[bearings.<name>]`` have one.  `joint` names the revolute
+    joint whose reaction loads it (None without mechanism), `share` the part of the reaction it takes.
     `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
     `outer` is None for a fixed outer ring.
     """
 
+    name: str
     joint: str | None
     share: Quantity | None
-    load_harmonics: int | None = None
     balls: int
     ball_diameter: Quantity
     pitch_diameter: Quantity
@@ -301,9 +313,20 @@ class Bearing:
     ball_angle: Quantity
     contact: HertzContact | GivenContact
     damping: Damping
+    effects: tuple[BallEffect, ...]
     inner: InnerRing
     outer: OuterRing | None
     initial: InitialState
+
+    @property
+    def prefix(self) -> str:
+        """What the names of its states and outputs begin with."""
+        return f"{self.name}." if self.name else ""
+
+    @property
+    def path(self) -> str:
+        """Its place in the scene file, which the names of its parameters and constants begin with."""
+        return f"bearings.{self.name}" if self.name else "bearing"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -331,10 +354,15 @@ class Scene:
     mechanism: Mechanism | None
     shaft: Shaft | None
     load: Load | None
-    bearing: Bearing | None
+    bearings: tuple[Bearing, ...]
     outputs: tuple[str, ...]
     run: Run
     quantities: tuple[Quantity, ...]
+
+    @property
+    def bearing(self) -> Bearing | None:
+        """The first bearing, None where there is none."""
+        return self.bearings[0] if self.bearings else None
 
     def structure(self) -> object:
         """Nested tuples of everything but numbers, run settings and title: what is compiled (law 1)."""
@@ -343,7 +371,7 @@ class Scene:
             _structure(self.mechanism),
             _structure(self.shaft),
             _structure(self.load),
-            _structure(self.bearing),
+            _structure(self.bearings),
             self.outputs,
         )
 

@@ -7,14 +7,17 @@ that need nothing but numbers, so that a value from ``--set`` meets the same one
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from difflib import get_close_matches
 from typing import Any, cast
 
+from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.records import (
     Bearing,
+    Bounds,
     EquivalentMass,
     HarmonicLoad,
     HertzContact,
@@ -26,25 +29,14 @@ from ballpass.derive.scene.records import (
 )
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 
-#: What stands in the file beside quantities, for the message where somebody asks to override it.
+#: Ends of keys that stand in the file beside quantities, for the message where somebody asks to override one.
 _STRUCTURE = (
-    "bearing.balls",
-    "bearing.joint",
-    "bearing.damping.law",
-    "bearing.outer_ring.support",
-    "mechanism.driver.joint",
+    "balls",
+    "joint",
+    "law",
+    "support",
 )
 _TURN = 2.0 * math.pi
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
-    """What a value must satisfy: > above, >= least, <= most, < below; None bounds nothing."""
-
-    above: float | None = None
-    least: float | None = None
-    most: float | None = None
-    below: float | None = None
 
 
 def quantities_of(record: object) -> Iterator[Quantity]:
@@ -74,8 +66,8 @@ def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
         checker.positive(scene.load.frequency)
     if isinstance(scene.load, TableLoad):
         _check_table(checker, scene.load)
-    if scene.bearing is not None:
-        _check_bearing(checker, scene.bearing)
+    for bearing in scene.bearings:
+        _check_bearing(checker, bearing)
     _check_run(checker, scene)
     return checker.faults
 
@@ -87,23 +79,22 @@ def value_bounds(scene: Scene) -> dict[str, Bounds]:
         _check_mechanism(checker, scene.mechanism)
     if isinstance(scene.load, HarmonicLoad):
         checker.positive(scene.load.frequency)
-    if scene.bearing is not None:
-        _check_bearing(checker, scene.bearing)
+    for bearing in scene.bearings:
+        _check_bearing(checker, bearing)
     return checker.bounds
 
 
 def value_relations(scene: Scene) -> tuple[tuple[str, float, str], ...]:
     """What quantities must be to each other: (path, factor, other path) for ``value > factor * other value``."""
-    bearing = scene.bearing
-    if bearing is None:
-        return ()
-    ball, pitch = bearing.ball_diameter.path, bearing.pitch_diameter.path
-    # the balls fit side by side on the pitch circle, a hair's breadth apart
-    relations = [(pitch, (1.0 - 1e-12) / math.sin(math.pi / bearing.balls) if bearing.balls > 1 else 1.0, ball)]
-    relations.append((bearing.clearance.path, -1.0, ball))  # see `_check_preload`
-    if isinstance(bearing.contact, HertzContact):
-        grooves = (bearing.contact.inner_groove_radius, bearing.contact.outer_groove_radius)
-        relations += [(radius.path, 0.5, ball) for radius in grooves]
+    relations: list[tuple[str, float, str]] = []
+    for bearing in scene.bearings:
+        ball, pitch = bearing.ball_diameter.path, bearing.pitch_diameter.path
+        # the balls fit side by side on the pitch circle, a hair's breadth apart
+        relations.append((pitch, (1.0 - 1e-12) / math.sin(math.pi / bearing.balls) if bearing.balls > 1 else 1.0, ball))
+        relations.append((bearing.clearance.path, -1.0, ball))  # see `_check_preload`
+        if isinstance(bearing.contact, HertzContact):
+            grooves = (bearing.contact.inner_groove_radius, bearing.contact.outer_groove_radius)
+            relations += [(radius.path, 0.5, ball) for radius in grooves]
     return tuple(relations)
 
 
@@ -139,7 +130,7 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
             changed[path] = replace(known[path], value=float(value))
     if faults:
         raise SceneError(faults)
-    result = cast(Scene, _replaced(scene, changed))
+    result = cast(Scene, replaced(scene, changed))
     faults = value_faults(result, {})
     if faults:
         raise SceneError(faults)
@@ -190,7 +181,7 @@ def check_path(scene: Scene, path: str) -> None:
 
 
 def _unknown_path(path: str, known: Sequence[str]) -> Fault:
-    if path in _STRUCTURE or path.startswith("run."):
+    if path.rpartition(".")[2] in _STRUCTURE or path.startswith("run."):
         return Fault(
             key=path,
             problem="this is no number of the model"
@@ -211,14 +202,15 @@ def _unknown_path(path: str, known: Sequence[str]) -> Fault:
     )
 
 
-def _replaced(record: Any, changed: Mapping[str, Quantity]) -> Any:
+def replaced(record: Any, changed: Mapping[str, Quantity]) -> Any:
+    """A record with other quantities, by their paths."""
     if isinstance(record, Quantity):
         return changed.get(record.path, record)
     if isinstance(record, tuple):
-        return tuple(_replaced(item, changed) for item in record)
+        return tuple(replaced(item, changed) for item in record)
     if is_dataclass(record) and not isinstance(record, type):
         return replace(
-            record, **{field.name: _replaced(getattr(record, field.name), changed) for field in fields(record)}
+            record, **{field.name: replaced(getattr(record, field.name), changed) for field in fields(record)}
         )
     return record
 
@@ -261,6 +253,25 @@ class Checker:
         """The amount of a vector in polar form is not negative."""
         if vector.kind == "polar":
             self.not_negative(vector.first, "give the amount, and turn the angle by 180 deg")
+
+    def within(self, quantity: Quantity, bounds: Bounds) -> None:
+        """A value within bounds that its owner gives."""
+        if bounds == Bounds(least=0.0):
+            self.not_negative(quantity)
+            return
+        self.bounds[quantity.path] = bounds
+        value = quantity.value
+        checks = (
+            (bounds.above, "above", operator.le),
+            (bounds.least, "from", operator.lt),
+            (bounds.most, "up to", operator.gt),
+            (bounds.below, "below", operator.ge),
+        )
+        given = [(bound, words, wrong) for bound, words, wrong in checks if bound is not None]
+        if any(wrong(value, bound) for bound, _, wrong in given):
+            problem = "the value is negative" if value < 0.0 else "the value is out of its bounds"
+            allowed = "a value " + " ".join(f"{words} {bound:g}" for bound, words, _ in given)
+            self.fault(quantity.path, problem, self.show(quantity), allowed, "correct the value")
 
 
 def _check_mechanism(checker: Checker, mechanism: Mechanism) -> None:
@@ -332,8 +343,9 @@ def _check_bearing(checker: Checker, bearing: Bearing) -> None:
     for width in (bearing.contact.smoothing, bearing.damping.smoothing):
         if width is not None:
             checker.positive(width, "give a small width, or delete the key for the law itself")
-    checker.not_negative(bearing.damping.coefficient)
-    checker.not_negative(bearing.damping.ratio)
+    law = LAWS[bearing.damping.law]
+    for number in bearing.damping.numbers:
+        checker.within(number, law.bounds(number.path.rpartition(".")[2]))
     if isinstance(bearing.inner.mass, EquivalentMass):
         checker.positive(bearing.inner.mass.ring)
         # Zero is a crankpin whose mass is part of the crank's.
@@ -364,7 +376,7 @@ def _check_balls(checker: Checker, bearing: Bearing) -> None:
     if room < ball.value:
         most = int(math.pi / math.asin(ball.value / pitch.value))
         checker.fault(
-            "bearing.balls",
+            f"{bearing.path}.balls",
             "the balls do not fit on the pitch circle",
             f"{bearing.balls} balls of {ball.value:.6g} m, {room:.6g} m from centre to centre",
             f"at most {most} balls of this diameter on this circle",

@@ -51,6 +51,22 @@ class VariableInfo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CoordinateInfo:
+    """A generalized coordinate: the names of its position and velocity among the states, its kind and unit.
+
+    Coordinates of one `group` share a magnitude, which tolerances are relative to; where one has a `partner`, their
+    difference counts.
+    """
+
+    name: str
+    velocity: str
+    kind: Literal["displacement", "angle"]
+    unit: str
+    group: str
+    partner: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class QuantityInfo:
     """Something the model can report and differentiate, whether a run reports it or not.
 
@@ -176,6 +192,7 @@ class Manifest:
     parameters: tuple[ParameterInfo, ...]
     constants: tuple[VariableInfo, ...]
     states: tuple[VariableInfo, ...]
+    coordinates: tuple[CoordinateInfo, ...]
     initial: tuple[str, ...]  # names of the parameters that hold the initial states
     inputs: tuple[InputInfo, ...]
     outputs: tuple[VariableInfo, ...]
@@ -185,6 +202,7 @@ class Manifest:
     bearings: tuple[BearingInfo, ...]
     run: RunInfo
     quantities: tuple[QuantityInfo, ...] = ()
+    unfit: str = ""  # why the stepper's kernels do not take the model; empty where they do
     relations: tuple[tuple[str, float, str], ...] = ()  # (name, factor, other): value > factor * value of the other
     files: tuple[tuple[str, str], ...] = field(default=())  # file name -> sha256
 

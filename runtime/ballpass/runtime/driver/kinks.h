@@ -1,4 +1,4 @@
-/* Kinks of the law, located: which side of each every ball is on, where a step changes it, and when to leave one alone.
+/* Events, located: which side of each switching function the state is on, where a step changes it, and when to leave one alone.
 
    switches.h is generated with the scene from the conditions of its laws: switching functions g of a ball's deflection and rate, zero at
    the kinks, and the law with its sides held.  A step is tried with the sides that its start has; where the law can be continued, it is
@@ -16,7 +16,6 @@
 
 #include <string.h>
 
-#include "ensemble_kernels.h"
 #include "model.h"
 
 enum { BP_LOOKS = 4, BP_REPEATS = 4, BP_TURNS = 2, BP_CHATTER = 4, BP_REST = 64, BP_ROOT_ITERATIONS = 60 };
@@ -31,75 +30,68 @@ static const double BP_BAND = 0.01, BP_BRIEF = 1.5, BP_CLOSE = 0.1;
 static const double BP_FAR = 2.0, BP_LEAST_PACE = 0.25, BP_NEAREST = 0.1, BP_ASTRAY = 1.5, BP_ARRIVED = 1e-6;
 
 typedef struct {
-    double border[BP_NB][BP_NSWITCHES]; /* in place of the zero of g in the held law: -infinity, infinity, or 0 for a ball let go */
-    double side[BP_NSWITCHES][BP_NB];   /* 1 where g > 0, else -1; 0 for a ball let go */
-    double seen[BP_LOOKS + 1][BP_NSWITCHES][BP_NB]; /* g at the start of the step and at its looks */
-    double place[BP_LOOKS + 1];         /* where these are, as parts of the step's time */
-    double slope[2][BP_NB];             /* rate of deflection at the start of the step and at its end */
-    double last[BP_NSWITCHES][BP_NB];   /* time of the last crossing [s] */
-    double band[BP_NSWITCHES];
-    unsigned char turn[BP_NSWITCHES][BP_NB]; /* sides to turn behind the step */
-    unsigned char brief[BP_NSWITCHES][BP_NB], still[BP_NSWITCHES][BP_NB]; /* brief crossings in a row, those without a step between */
-    unsigned char rest[BP_NSWITCHES][BP_NB]; /* steps for which a ball is let go */
-    int resting; /* balls let go */
+    double border[BP_EVENTS]; /* in place of the zero of g in the held law: -infinity, infinity, or 0 for an event let go */
+    double side[BP_EVENTS];   /* 1 where g > 0, else -1; 0 for an event let go */
+    double seen[BP_LOOKS + 1][BP_EVENTS]; /* g at the start of the step and at its looks */
+    double place[BP_LOOKS + 1];           /* where these are, as parts of the step's time */
+    double slope[2][BP_EVENTS];           /* rate of g at the start of the step and at its end, where there is one */
+    double last[BP_EVENTS];               /* time of the last crossing [s] */
+    double band[BP_EVENTS];
+    unsigned char turn[BP_EVENTS];  /* sides to turn behind the step */
+    unsigned char brief[BP_EVENTS], still[BP_EVENTS]; /* brief crossings in a row, those without a step between */
+    unsigned char rest[BP_EVENTS];  /* steps for which an event is let go */
+    int resting; /* events let go */
 } bp_sides;
 
-/* Switching functions of all balls at a state and time, and their rates of deflection.  One ball a lane. */
-static inline void bp_switch_values(const bp_numbers *n, double t, const double *restrict x, double g[BP_NSWITCHES][BP_NB],
-                                    double slope[BP_NB])
+/* Switching functions of all events at a state and time, and their rates.  One ball a lane. */
+static inline void bp_switch_values(const bp_numbers *n, double t, const double *restrict x, double *restrict g, double *restrict slope)
 {
-    double w[BP_NW], r[5], k[BP_NK];
+    double w[BP_NW], r[BP_NR];
     bp_cage(t, n->u, n->p, n->c, w);
     bp_relative(x, n->u, n->p, n->c, w, r);
-    bp_law_numbers(n->p, n->c, k);
-    const double cage_cos = w[0], cage_sin = w[1];
-#pragma omp simd
-    for (int j = 0; j < BP_NB; j++) {
-        const double co = bp_cos[j] * cage_cos - bp_sin[j] * cage_sin;
-        const double si = bp_sin[j] * cage_cos + bp_cos[j] * cage_sin;
-        double at[BP_NSWITCHES];
-        slope[j] = r[3] * co + r[4] * si;
-        bp_ball_switches(r[0] + r[1] * co + r[2] * si, slope[j], k, at);
-        for (int i = 0; i < BP_NSWITCHES; i++) g[i][j] = at[i];
+#define BP_SWITCH(b)                                                                                                  \
+    {                                                                                                                 \
+        enum { here = BP_##b##_SWITCHES * BP_##b##_BALLS };                                                           \
+        BP_BALLS(b, 2 * BP_##b##_SWITCHES)                                                                            \
+        bp_##b##_switches_lanes(co, si, r + 5 * (b), k, rows);                                                        \
+        memcpy(g + BP_##b##_FIRST_EVENT, rows, here * sizeof *rows);                                                  \
+        memcpy(slope + BP_##b##_FIRST_EVENT, rows + here, here * sizeof *rows);                                       \
     }
+    BP_EACH_BEARING(BP_SWITCH)
+#undef BP_SWITCH
 }
 
-static inline void bp_set_side(bp_sides *s, int i, int j, double side)
+static inline void bp_set_side(bp_sides *s, int e, double side)
 {
-    s->side[i][j] = side;
-    s->border[j][i] = side > 0.0 ? -INFINITY : side < 0.0 ? INFINITY : 0.0;
+    s->side[e] = side;
+    s->border[e] = side > 0.0 ? -INFINITY : side < 0.0 ? INFINITY : 0.0;
 }
 
 /* Sides at the start of a run; `weight` is 1 over the error allowed in a step. */
 static inline void bp_sides_start(bp_sides *restrict s, const bp_numbers *n, double t, const double *restrict x, const double *restrict weight)
 {
     memset(s, 0, sizeof *s);
-    for (int i = 0; i < BP_NSWITCHES; i++) {
+    bp_switch_values(n, t, x, s->seen[0], s->slope[0]);
+    for (int e = 0; e < BP_EVENTS; e++) {
         double least = INFINITY; /* weight: of the coarsest state */
         for (int k = 0; k < BP_NQ; k++) {
-            const double of = weight[bp_switch_of_rate[i] > 0.0 ? BP_NQ + k : k];
+            const double of = weight[bp_of_rate[e] > 0.0 ? BP_NQ + k : k];
             least = of < least ? of : least;
         }
-        s->band[i] = BP_BAND / least;
+        s->band[e] = BP_BAND / least;
+        bp_set_side(s, e, s->seen[0][e] > 0.0 ? 1.0 : -1.0);
+        s->last[e] = -INFINITY;
     }
-    bp_switch_values(n, t, x, s->seen[0], s->slope[0]);
-    for (int i = 0; i < BP_NSWITCHES; i++)
-        for (int j = 0; j < BP_NB; j++) {
-            bp_set_side(s, i, j, s->seen[0][i][j] > 0.0 ? 1.0 : -1.0);
-            s->last[i][j] = -INFINITY;
-        }
 }
 
 /* Whether the law on a side of a switch ends there at a branch point. */
-static inline int bp_ends(int i, double side) { return (side > 0.0 && bp_ends_above[i] > 0.0) || (side < 0.0 && bp_ends_below[i] > 0.0); }
+static inline int bp_ends(int e, double side) { return (side > 0.0 && bp_ends_above[e] > 0.0) || (side < 0.0 && bp_ends_below[e] > 0.0); }
 
-/* Whether slopes of a switching function come with its values: of a deflection, where rates are computed. */
-static inline int bp_has_slope(int i) { return BP_RATES && !(bp_switch_of_rate[i] > 0.0); }
-
+/* Whether the rate of every switching function comes with its value. */
 static inline int bp_has_slopes(void)
 {
     int all = 1;
-    for (int i = 0; i < BP_NSWITCHES; i++) all &= bp_has_slope(i);
+    for (int e = 0; e < BP_EVENTS; e++) all &= bp_has_rate[e] > 0.0;
     return all;
 }
 
@@ -115,107 +107,94 @@ static inline int bp_is_dip(double before, double here, double behind, double ba
    tell, at these theta of its looks.  `pace`: paces at the ends, times the step's size. */
 static inline int bp_glance(const bp_sides *restrict s, const double theta[BP_LOOKS + 1], const double pace[2])
 {
-    int found = 0;
-    for (int i = 0; i < BP_NSWITCHES; i++) {
-        const double band = -s->band[i];
-        int any = 0;
+    int any = 0;
 #pragma omp simd reduction(| : any)
-        for (int j = 0; j < BP_NB; j++) {
-            const double side = s->side[i][j], from = side * s->seen[0][i][j], to = side * s->seen[BP_LOOKS][i][j], change = to - from;
-            const double first = side * pace[0] * s->slope[0][j], last = side * pace[1] * s->slope[1][j];
-            const double level = first - change, tilt = 2.0 * change - (first + last);
-            double at[BP_LOOKS + 1];
-            at[0] = from;
-            at[BP_LOOKS] = to;
+    for (int e = 0; e < BP_EVENTS; e++) {
+        const double band = -s->band[e];
+        const double side = s->side[e], from = side * s->seen[0][e], to = side * s->seen[BP_LOOKS][e], change = to - from;
+        const double first = side * pace[0] * s->slope[0][e], last = side * pace[1] * s->slope[1][e];
+        const double level = first - change, tilt = 2.0 * change - (first + last);
+        double at[BP_LOOKS + 1];
+        at[0] = from;
+        at[BP_LOOKS] = to;
 #pragma GCC unroll 8
-            for (int k = 1; k < BP_LOOKS; k++) at[k] = from + theta[k] * (change + (1.0 - theta[k]) * (level + theta[k] * tilt));
-            any |= to < band;
+        for (int k = 1; k < BP_LOOKS; k++) at[k] = from + theta[k] * (change + (1.0 - theta[k]) * (level + theta[k] * tilt));
+        any |= to < band;
 #pragma GCC unroll 8
-            for (int k = 1; k < BP_LOOKS; k++) any |= (at[k] < band) | bp_is_dip(at[k - 1], at[k], at[k + 1], band);
-        }
-        found |= any;
+        for (int k = 1; k < BP_LOOKS; k++) any |= (at[k] < band) | bp_is_dip(at[k - 1], at[k], at[k + 1], band);
     }
-    return found;
+    return any;
 }
 
-/* Time of the last onset that has a branch point, of the balls that have not left it since. */
+/* Time of the last onset that has a branch point, of the events that have not turned back since. */
 static inline double bp_onset(const bp_sides *restrict s)
 {
     double onset = -INFINITY;
-    for (int i = 0; i < BP_NSWITCHES; i++)
-        for (int j = 0; j < BP_NB; j++)
-            if (bp_ends(i, s->side[i][j]) && s->last[i][j] > onset) onset = s->last[i][j];
+    for (int e = 0; e < BP_EVENTS; e++)
+        if (bp_ends(e, s->side[e]) && s->last[e] > onset) onset = s->last[e];
     return onset;
 }
 
-/* Where a ball that all looks find on its side has been on the other between them: the place of the vertex, to be looked at, and the look
+/* Where an event that all looks find on its side has been on the other between them: the place of the vertex, to be looked at, and the look
    that it replaces; 0 where there is none. */
 static inline int bp_dip(const bp_sides *restrict s, double *place)
 {
     for (int k = 1; k < BP_LOOKS; k++)
-        for (int i = 0; i < BP_NSWITCHES; i++)
-            for (int j = 0; j < BP_NB; j++) {
-                const double side = s->side[i][j], here = side * s->seen[k][i][j];
-                const double before = side * s->seen[k - 1][i][j], behind = side * s->seen[k + 1][i][j];
-                if (!bp_is_dip(before, here, behind, -s->band[i])) continue;
-                *place = (k - 0.5 * (behind - before) / (behind - 2.0 * here + before)) / BP_LOOKS;
-                return k;
-            }
+        for (int e = 0; e < BP_EVENTS; e++) {
+            const double side = s->side[e], here = side * s->seen[k][e];
+            const double before = side * s->seen[k - 1][e], behind = side * s->seen[k + 1][e];
+            if (!bp_is_dip(before, here, behind, -s->band[e])) continue;
+            *place = (k - 0.5 * (behind - before) / (behind - 2.0 * here + before)) / BP_LOOKS;
+            return k;
+        }
     return 0;
 }
 
-/* Whether any ball is on its other side at a look. */
+/* Whether any event is on its other side at a look. */
 static inline int bp_changed(const bp_sides *restrict s, int look)
 {
-    int changed = 0;
-    for (int i = 0; i < BP_NSWITCHES; i++) {
-        const double band = -s->band[i];
-        int any = 0;
+    int any = 0;
 #pragma omp simd reduction(| : any)
-        for (int j = 0; j < BP_NB; j++) any |= s->side[i][j] * s->seen[look][i][j] < band;
-        changed |= any;
-    }
-    return changed;
+    for (int e = 0; e < BP_EVENTS; e++) any |= s->side[e] * s->seen[look][e] < -s->band[e];
+    return any;
 }
 
-/* A ball that leaves its side alone for some time. */
-static inline void bp_let_go(bp_sides *s, int i, int j)
+/* An event that is left alone for some time. */
+static inline void bp_let_go(bp_sides *s, int e)
 {
-    if (s->side[i][j] != 0.0) s->resting++;
-    bp_set_side(s, i, j, 0.0);
-    s->rest[i][j] = BP_REST;
-    s->brief[i][j] = 0;
+    if (s->side[e] != 0.0) s->resting++;
+    bp_set_side(s, e, 0.0);
+    s->rest[e] = BP_REST;
+    s->brief[e] = 0;
 }
 
 /* Turn the sides marked, at a time; `step` is the step tried. */
 static inline void bp_turn_sides(bp_sides *s, double time, double step)
 {
-    for (int i = 0; i < BP_NSWITCHES; i++)
-        for (int j = 0; j < BP_NB; j++) {
-            if (!s->turn[i][j]) continue;
-            s->turn[i][j] = 0;
-            const double since = time - s->last[i][j];
-            s->brief[i][j] = (unsigned char)(since < BP_BRIEF * step ? s->brief[i][j] + 1 : 0);
-            s->still[i][j] = (unsigned char)(since > 0.0 ? 0 : s->still[i][j] + 1);
-            s->last[i][j] = time;
-            if (s->brief[i][j] >= BP_CHATTER || s->still[i][j] >= BP_TURNS) bp_let_go(s, i, j);
-            else bp_set_side(s, i, j, -s->side[i][j]);
-        }
+    for (int e = 0; e < BP_EVENTS; e++) {
+        if (!s->turn[e]) continue;
+        s->turn[e] = 0;
+        const double since = time - s->last[e];
+        s->brief[e] = (unsigned char)(since < BP_BRIEF * step ? s->brief[e] + 1 : 0);
+        s->still[e] = (unsigned char)(since > 0.0 ? 0 : s->still[e] + 1);
+        s->last[e] = time;
+        if (s->brief[e] >= BP_CHATTER || s->still[e] >= BP_TURNS) bp_let_go(s, e);
+        else bp_set_side(s, e, -s->side[e]);
+    }
 }
 
-/* Behind an accepted step: its end is the next start, and balls let go come back in time. */
+/* Behind an accepted step: its end is the next start, and events let go come back in time. */
 static inline void bp_sides_move_on(bp_sides *s)
 {
     memcpy(s->seen[0], s->seen[BP_LOOKS], sizeof s->seen[0]);
     memcpy(s->slope[0], s->slope[1], sizeof s->slope[0]);
     if (!s->resting) return;
-    for (int i = 0; i < BP_NSWITCHES; i++)
-        for (int j = 0; j < BP_NB; j++) {
-            if (s->side[i][j] != 0.0 || --s->rest[i][j] > 0) continue;
-            /* the side that the law takes by itself: nothing jumps */
-            bp_set_side(s, i, j, s->seen[0][i][j] > 0.0 ? 1.0 : -1.0);
-            s->resting--;
-        }
+    for (int e = 0; e < BP_EVENTS; e++) {
+        if (s->side[e] != 0.0 || --s->rest[e] > 0) continue;
+        /* the side that the law takes by itself: nothing jumps */
+        bp_set_side(s, e, s->seen[0][e] > 0.0 ? 1.0 : -1.0);
+        s->resting--;
+    }
 }
 
 #endif

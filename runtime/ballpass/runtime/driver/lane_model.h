@@ -76,89 +76,52 @@ BP_INLINE void bp_lane_stage(const bp_lane_numbers *n, const bp_lane_angles *res
     bp_member_stage_turned_lanes(C, S, time, n->u, n->p, n->c, w);
 }
 
-/* Balls come in opposite pairs where their number is even, for they are equal: one direction serves both. */
-enum { BP_OPPOSITE = BP_NB % 2 == 0, BP_DIRECTIONS = BP_OPPOSITE ? BP_NB / 2 : BP_NB };
-
-/* Direction of a ball, and what deflection and rate of it and of the one opposite are made of: along, along_rate. */
-BP_INLINE void bp_lane_direction(int j, const double *restrict w, const double *restrict r, double *restrict co, double *restrict si,
-                                 double *restrict along, double *restrict along_rate)
+/* Direction of ball j of a bearing, whose cage has the angle with the cosine and sine at w. */
+BP_INLINE void bp_lane_direction(double cage_cos, double cage_sin, const double *restrict w, double *restrict co, double *restrict si)
 {
     BP_EACH_LANE {
-        co[lane] = bp_cos[j] * w[lane] - bp_sin[j] * w[BP_L + lane];
-        si[lane] = bp_sin[j] * w[lane] + bp_cos[j] * w[BP_L + lane];
-        along[lane] = r[BP_L + lane] * co[lane] + r[2 * BP_L + lane] * si[lane];
-        along_rate[lane] = r[3 * BP_L + lane] * co[lane] + r[4 * BP_L + lane] * si[lane];
+        co[lane] = cage_cos * w[lane] - cage_sin * w[BP_L + lane];
+        si[lane] = cage_sin * w[lane] + cage_cos * w[BP_L + lane];
     }
 }
 
-/* Sums over the balls of F cos, F sin. */
+/* A kernel of bearing b for `directions` balls (of opposite pairs one), its first rows added to S and the others to G. */
+#define BP_LANE_SUM(b, kernel, slopes)                                                                                           \
+    for (int j = 0; j < BP_##b##_DIRECTIONS; j++) {                                                                              \
+        double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[(2 + (slopes)) * BP_L] BP_ALIGNED;                                 \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], w + 2 * (b) * BP_L, co, si);                                         \
+        bp_member_##b##_##kernel##_lanes(co, si, r + 5 * (b) * BP_L, n->p, n->c, w, rows);                                       \
+        for (int m = 0; m < 2; m++) BP_EACH_LANE S[(2 * (b) + m) * BP_L + lane] += rows[m * BP_L + lane];                        \
+        for (int m = 0; m < (slopes); m++)                                                                                       \
+            BP_EACH_LANE G[(BP_##b##_FIRST_SLOPE + m) * BP_L + lane] += rows[(2 + m) * BP_L + lane];                             \
+    }
+
+/* Sums over the balls of each bearing: F cos, F sin. */
 BP_INLINE void bp_lane_sums(const bp_lane_numbers *n, const double *restrict w, const double *restrict r, double *restrict S)
 {
-    BP_EACH_LANE S[lane] = S[BP_L + lane] = 0.0;
-    for (int j = 0; j < BP_DIRECTIONS; j++) {
-        double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, along[BP_L] BP_ALIGNED, along_rate[BP_L] BP_ALIGNED, force[BP_L] BP_ALIGNED;
-        double delta[BP_L] BP_ALIGNED, rate[BP_L] BP_ALIGNED, opposite[BP_L] BP_ALIGNED;
-        bp_lane_direction(j, w, r, co, si, along, along_rate);
-        BP_EACH_LANE delta[lane] = r[lane] + along[lane];
-        bp_member_law_lanes(delta, along_rate, n->p, n->c, force);
-        if (BP_OPPOSITE) {
-            BP_EACH_LANE {
-                delta[lane] = r[lane] - along[lane];
-                rate[lane] = -along_rate[lane];
-            }
-            bp_member_law_lanes(delta, rate, n->p, n->c, opposite);
-            BP_EACH_LANE force[lane] -= opposite[lane];
-        }
-        BP_EACH_LANE {
-            S[lane] += force[lane] * co[lane];
-            S[BP_L + lane] += force[lane] * si[lane];
-        }
-    }
+    double *G = NULL;
+    (void)G;
+    for (int i = 0; i < BP_NS * BP_L; i++) S[i] = 0.0;
+#define BP_SUM(b) BP_LANE_SUM(b, forces, 0)
+    BP_EACH_BEARING(BP_SUM)
+#undef BP_SUM
 }
 
-/* The same, and the sums G of the slopes times cos cos, cos sin, sin sin: by deflection, then by rate. */
+/* The same, and the sums G of the slopes. */
 BP_INLINE void bp_lane_sums_and_slopes(const bp_lane_numbers *n, const double *restrict w, const double *restrict r, double *restrict S,
                                        double *restrict G)
 {
-    for (int k = 0; k < 2; k++) BP_EACH_LANE S[k * BP_L + lane] = 0.0;
-    for (int k = 0; k < 6; k++) BP_EACH_LANE G[k * BP_L + lane] = 0.0;
-    for (int j = 0; j < BP_DIRECTIONS; j++) {
-        double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, along[BP_L] BP_ALIGNED, along_rate[BP_L] BP_ALIGNED;
-        double delta[BP_L] BP_ALIGNED, rate[BP_L] BP_ALIGNED, force[BP_L] BP_ALIGNED, by_delta[BP_L] BP_ALIGNED, by_rate[BP_L] BP_ALIGNED;
-        bp_lane_direction(j, w, r, co, si, along, along_rate);
-        BP_EACH_LANE delta[lane] = r[lane] + along[lane];
-        bp_member_law_slopes_lanes(delta, along_rate, n->p, n->c, force, by_delta, by_rate);
-        if (BP_OPPOSITE) {
-            double other[BP_L] BP_ALIGNED, other_delta[BP_L] BP_ALIGNED, other_rate[BP_L] BP_ALIGNED;
-            BP_EACH_LANE {
-                delta[lane] = r[lane] - along[lane];
-                rate[lane] = -along_rate[lane];
-            }
-            bp_member_law_slopes_lanes(delta, rate, n->p, n->c, other, other_delta, other_rate);
-            BP_EACH_LANE {
-                force[lane] -= other[lane];
-                by_delta[lane] += other_delta[lane];
-                by_rate[lane] += other_rate[lane];
-            }
-        }
-        BP_EACH_LANE {
-            const double cc = co[lane] * co[lane], cs = co[lane] * si[lane], ss = si[lane] * si[lane];
-            S[lane] += force[lane] * co[lane];
-            S[BP_L + lane] += force[lane] * si[lane];
-            G[lane] += by_delta[lane] * cc;
-            G[BP_L + lane] += by_delta[lane] * cs;
-            G[2 * BP_L + lane] += by_delta[lane] * ss;
-            G[3 * BP_L + lane] += by_rate[lane] * cc;
-            G[4 * BP_L + lane] += by_rate[lane] * cs;
-            G[5 * BP_L + lane] += by_rate[lane] * ss;
-        }
-    }
+    for (int i = 0; i < BP_NS * BP_L; i++) S[i] = 0.0;
+    for (int i = 0; i < BP_NG * BP_L; i++) G[i] = 0.0;
+#define BP_SUM(b) BP_LANE_SUM(b, slopes, BP_##b##_SLOPES)
+    BP_EACH_BEARING(BP_SUM)
+#undef BP_SUM
 }
 
 /* dx/dt at a state, for stage variables w that hold for its time. */
 static inline void bp_lane_rate(const bp_lane_numbers *n, const double *restrict w, const double *restrict x, double *restrict dx)
 {
-    double r[5 * BP_L] BP_ALIGNED, S[2 * BP_L] BP_ALIGNED;
+    double r[BP_NR * BP_L] BP_ALIGNED, S[BP_NS * BP_L] BP_ALIGNED;
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
     bp_lane_sums(n, w, r, S);
     for (int k = 0; k < BP_NQ; k++) BP_EACH_LANE dx[k * BP_L + lane] = x[(BP_NQ + k) * BP_L + lane];
@@ -169,7 +132,7 @@ static inline void bp_lane_rate(const bp_lane_numbers *n, const double *restrict
 static inline void bp_lane_linearize(const bp_lane_numbers *n, const double *restrict w, const double *restrict wt, const double *restrict x,
                                      double *restrict dx, double *restrict A, double *restrict B, double *restrict at)
 {
-    double r[5 * BP_L] BP_ALIGNED, S[2 * BP_L] BP_ALIGNED, G[6 * BP_L] BP_ALIGNED;
+    double r[BP_NR * BP_L] BP_ALIGNED, S[BP_NS * BP_L] BP_ALIGNED, G[BP_NG * BP_L] BP_ALIGNED;
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
     bp_lane_sums_and_slopes(n, w, r, S, G);
     for (int k = 0; k < BP_NQ; k++) BP_EACH_LANE dx[k * BP_L + lane] = x[(BP_NQ + k) * BP_L + lane];
@@ -178,33 +141,26 @@ static inline void bp_lane_linearize(const bp_lane_numbers *n, const double *res
     bp_member_acceleration_rate_lanes(x, S, G, r, n->u, n->p, n->c, w, wt, at);
 }
 
-/* Channels of the reductions (see reductions.h) in lanes. */
+/* Channels of the balls (see reductions.h) in lanes: for each bearing four quantities of the most loaded ball. */
 static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane_angles *restrict angles, double theta,
                                          const double *restrict t, const double *restrict h, const double *restrict x,
                                          double *restrict value)
 {
-    double w[BP_NW * BP_L] BP_ALIGNED, r[5 * BP_L] BP_ALIGNED;
+    double w[BP_NW * BP_L] BP_ALIGNED, r[BP_NR * BP_L] BP_ALIGNED;
     double C[BP_NA * BP_L] BP_ALIGNED, S[BP_NA * BP_L] BP_ALIGNED, time[BP_L] BP_ALIGNED;
     bp_lane_turn(angles, theta, t, h, C, S, time);
     bp_member_cage_turned_lanes(C, S, time, n->u, n->p, n->c, w);
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
-    for (int j = 0; j < BP_NB; j++) {
-        double delta[BP_L] BP_ALIGNED, rate[BP_L] BP_ALIGNED, elastic[BP_L] BP_ALIGNED, damping[BP_L] BP_ALIGNED;
-        BP_EACH_LANE {
-            const double co = bp_cos[j] * w[lane] - bp_sin[j] * w[BP_L + lane];
-            const double si = bp_sin[j] * w[lane] + bp_cos[j] * w[BP_L + lane];
-            delta[lane] = r[lane] + r[BP_L + lane] * co + r[2 * BP_L + lane] * si;
-            rate[lane] = r[3 * BP_L + lane] * co + r[4 * BP_L + lane] * si;
-        }
-        bp_member_contact_lanes(delta, rate, n->p, n->c, elastic, damping);
-        BP_EACH_LANE {
-            const double total = elastic[lane] + damping[lane];
-            value[lane] = j == 0 || total > value[lane] ? total : value[lane];
-            value[BP_L + lane] = j == 0 || elastic[lane] > value[BP_L + lane] ? elastic[lane] : value[BP_L + lane];
-            value[2 * BP_L + lane] = j == 0 || damping[lane] > value[2 * BP_L + lane] ? damping[lane] : value[2 * BP_L + lane];
-            value[3 * BP_L + lane] = j == 0 || delta[lane] > value[3 * BP_L + lane] ? delta[lane] : value[3 * BP_L + lane];
-        }
+#define BP_CHANNEL(b)                                                                                                            \
+    for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                                   \
+        double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[4 * BP_L] BP_ALIGNED, *to = value + 4 * (b) * BP_L;                \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], w + 2 * (b) * BP_L, co, si);                                         \
+        bp_member_##b##_contact_lanes(co, si, r + 5 * (b) * BP_L, n->p, n->c, w, rows);                                          \
+        _Pragma("omp simd")                                                                                                      \
+        for (int i = 0; i < 4 * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];                                  \
     }
+    BP_EACH_BEARING(BP_CHANNEL)
+#undef BP_CHANNEL
 }
 
 #endif

@@ -44,7 +44,7 @@ typedef void bp_view(const bp_run *, double, double *);
 static int look(bp_run *run, double t, double h, bp_view *at)
 {
     bp_sides *s = &run->sides;
-    double unused[BP_NB], y[BP_NX], place;
+    double unused[BP_EVENTS], y[BP_NX], place;
     int changed = 0;
     for (int k = 1; k <= BP_LOOKS; k++) {
         s->place[k] = (double)k / BP_LOOKS;
@@ -77,25 +77,25 @@ static int glance(bp_run *run, double t, double h)
     return bp_glance(s, theta, pace);
 }
 
-/* A switching function of a ball within the step tried. */
-static double switch_at(const bp_run *run, double t, double h, double part, bp_view *at, int i, int j)
+/* A switching function within the step tried. */
+static double switch_at(const bp_run *run, double t, double h, double part, bp_view *at, int event)
 {
-    double y[BP_NX], g[BP_NSWITCHES][BP_NB], unused[BP_NB];
+    double y[BP_NX], g[BP_EVENTS], unused[BP_EVENTS];
     if (part < 1.0) at(run, part, y);
     bp_switch_values(&run->numbers, t + part * h, part < 1.0 ? y : run->next, g, unused);
-    return g[i][j];
+    return g[event];
 }
 
 /* Where a ball changes its side that is found changed at a look: the first root in front of it, by regula falsi (Illinois). */
-static double root_before(const bp_run *run, double t, double h, bp_view *at, int before, int i, int j)
+static double root_before(const bp_run *run, double t, double h, bp_view *at, int before, int event)
 {
     const bp_sides *s = &run->sides;
-    const double side = s->side[i][j];
+    const double side = s->side[event];
     int behind = before;
-    while (before > 0 && !(side * s->seen[before - 1][i][j] > 0.0)) behind = --before;
+    while (before > 0 && !(side * s->seen[before - 1][event] > 0.0)) behind = --before;
     if (before == 0) return 0.0;
     before--;
-    double a = s->place[before], b = s->place[behind], fa = side * s->seen[before][i][j], fb = side * s->seen[behind][i][j];
+    double a = s->place[before], b = s->place[behind], fa = side * s->seen[before][event], fb = side * s->seen[behind][event];
     double root = b;
     int kept = 0; /* end that the last iteration kept: -1 the first, 1 the last */
     for (int k = 0; k < BP_ROOT_ITERATIONS && fb < 0.0; k++) {
@@ -103,8 +103,8 @@ static double root_before(const bp_run *run, double t, double h, bp_view *at, in
         if (!(next > a && next < b)) break;
         root = next;
         if (!(moved > DBL_EPSILON * root)) break;
-        const double f = side * switch_at(run, t, h, root, at, i, j);
-        if (fabs(f) <= BP_CLOSE * s->band[i]) break;
+        const double f = side * switch_at(run, t, h, root, at, event);
+        if (fabs(f) <= BP_CLOSE * s->band[event]) break;
         if (f > 0.0) {
             fb *= kept > 0 ? 0.5 : 1.0;
             a = root, fa = f, kept = 1;
@@ -117,19 +117,17 @@ static double root_before(const bp_run *run, double t, double h, bp_view *at, in
 }
 
 /* The first change of a side in the step looked at: its part of the step's time, above 1 where there is none; all that change. */
-static double first_change(const bp_run *run, double t, double h, bp_view *at, int *which, int *ball,
-                           unsigned char changed[BP_NSWITCHES][BP_NB])
+static double first_change(const bp_run *run, double t, double h, bp_view *at, int *which, unsigned char changed[BP_EVENTS])
 {
     const bp_sides *s = &run->sides;
     double first = 2.0;
-    for (int i = 0; i < BP_NSWITCHES; i++)
-        for (int j = 0; j < BP_NB; j++)
-            for (int k = 1; k <= BP_LOOKS && !changed[i][j]; k++) {
-                if (!(s->side[i][j] * s->seen[k][i][j] < -s->band[i])) continue;
-                changed[i][j] = 1;
-                const double root = root_before(run, t, h, at, k, i, j);
-                if (root < first) first = root, *which = i, *ball = j;
-            }
+    for (int e = 0; e < BP_EVENTS; e++)
+        for (int k = 1; k <= BP_LOOKS && !changed[e]; k++) {
+            if (!(s->side[e] * s->seen[k][e] < -s->band[e])) continue;
+            changed[e] = 1;
+            const double root = root_before(run, t, h, at, k, e);
+            if (root < first) first = root, *which = e;
+        }
     return first;
 }
 
@@ -167,14 +165,14 @@ static double stretched(const bp_run *run, double start, double t, double h, dou
 static void foresee(bp_run *run, double t, double h, double *next)
 {
     if (!is_explicit(run->method) || run->release.time > t) return;
-    unsigned char changed[BP_NSWITCHES][BP_NB] = {{0}};
-    int which = 0, ball = 0;
+    unsigned char changed[BP_EVENTS] = {0};
+    int which = 0;
     prepare_glance(run, t, h);
     if (!look(run, t, h, glance_at)) return;
-    const double part = first_change(run, t, h, glance_at, &which, &ball, changed);
-    if (!(part * h > BP_NEAREST * *next && part < 1.0 && bp_ends(which, run->sides.side[which][ball]))) return;
+    const double part = first_change(run, t, h, glance_at, &which, changed);
+    if (!(part * h > BP_NEAREST * *next && part < 1.0 && bp_ends(which, run->sides.side[which]))) return;
     *next = part * h;
-    run->release = (bp_release){t + *next, which, ball};
+    run->release = (bp_release){t + *next, which};
 }
 
 /* Whether the step tried changes a side.  Then it is repeated with a length that ends on the first kink, and `h` is that length; the sides
@@ -184,20 +182,21 @@ static int locate(bp_run *run, double start, double t, double *h, double *error,
     bp_sides *s = &run->sides;
     ballpass_result *result = run->result;
     const double tried = *h;
-    unsigned char changed[BP_NSWITCHES][BP_NB] = {{0}};
+    unsigned char changed[BP_EVENTS] = {0};
     const double farthest = aimed && BP_ASTRAY * tried < longest ? BP_ASTRAY * tried : aimed ? longest : tried;
     double reach = tried;
-    int which = run->release.which, ball = run->release.ball, met;
+    int which = run->release.which, met;
     met = glance(run, t, tried);
     if (met) {
         prepare_dense(run, t, tried);
         met = look(run, t, tried, state_at);
     }
     if (!met && !aimed) return NO_KINK;
-    if (met) reach = first_change(run, t, tried, state_at, &which, &ball, changed) * tried;
-    const int ends = is_explicit(run->method) && bp_ends(which, s->side[which][ball]);
+    if (met) reach = first_change(run, t, tried, state_at, &which, changed) * tried;
+    const int ends = is_explicit(run->method) && bp_ends(which, s->side[which]);
     double scale = 0.0;
-    for (int j = 0; j < BP_NB; j++) scale = fabs(s->seen[0][which][j]) > scale ? fabs(s->seen[0][which][j]) : scale;
+    for (int e = 0; e < BP_EVENTS; e++)
+        if (bp_of_rate[e] == bp_of_rate[which]) scale = fabs(s->seen[0][e]) > scale ? fabs(s->seen[0][e]) : scale;
     const double band = s->band[which], least = 1e-6 * band, rounding = 4.0 * DBL_EPSILON * scale;
     /* behind a branch point of the law its slope is unbounded: a linearly implicit step stays on the other side */
     const double clear = is_explicit(run->method) ? 0.0 : bp_ends(which, 1.0) ? -1.0 : bp_ends(which, -1.0) ? 1.0 : 0.0;
@@ -205,14 +204,14 @@ static int locate(bp_run *run, double start, double t, double *h, double *error,
     double length = tried; /* of the step at hand */
     for (int k = 0; k < BP_REPEATS; k++) {
         if (!(reach > resolution)) {
-            s->turn[which][ball] = 1;
+            s->turn[which] = 1;
             result->rejected++;
             return AT_ONCE;
         }
         if (reach != length) {
             length = reach;
             result->rejected++;
-            if (ends) run->release = (bp_release){t + reach, which, ball};
+            if (ends) run->release = (bp_release){t + reach, which};
             set_pace(run, start, t, reach);
             const double again = try_step(run, t, reach);
             *h = reach;
@@ -220,23 +219,21 @@ static int locate(bp_run *run, double start, double t, double *h, double *error,
             if (!(again >= 0.0 && again <= 1.0 && within_reach(run))) return NO_KINK;
         }
         bp_switch_values(&run->numbers, t + reach, run->next, s->seen[BP_LOOKS], s->slope[1]);
-        const double left = s->seen[BP_LOOKS][which][ball];
+        const double left = s->seen[BP_LOOKS][which];
         if (fabs(left) <= band && !(clear * left < 0.0)) break;
-        double slope = s->slope[1][ball];
-        if (!bp_has_slope(which)) {
+        double slope = s->slope[1][which];
+        if (!(bp_has_rate[which] > 0.0)) {
             const double back = 1.0 / 64.0;
             prepare_dense(run, t, reach);
-            slope = (left - switch_at(run, t, reach, 1.0 - back, state_at, which, ball)) / (back * reach);
+            slope = (left - switch_at(run, t, reach, 1.0 - back, state_at, which)) / (back * reach);
         }
         const double moved = reach - (left - goal) / slope;
-        if (aimed && !met && !(s->side[which][ball] * slope < 0.0 && moved <= farthest)) return NO_KINK; /* contact goes on */
+        if (aimed && !met && !(s->side[which] * slope < 0.0 && moved <= farthest)) return NO_KINK; /* contact goes on */
         if (!(moved > 0.0 && moved <= farthest)) break;
         if (k + 1 < BP_REPEATS) reach = moved;
     }
-    for (int i = 0; i < BP_NSWITCHES; i++)
-        for (int j = 0; j < BP_NB; j++)
-            s->turn[i][j] = changed[i][j] && s->side[i][j] * s->seen[BP_LOOKS][i][j] <= s->band[i];
-    s->turn[which][ball] = 1;
+    for (int e = 0; e < BP_EVENTS; e++) s->turn[e] = changed[e] && s->side[e] * s->seen[BP_LOOKS][e] <= s->band[e];
+    s->turn[which] = 1;
     return CUT;
 }
 
@@ -251,7 +248,7 @@ static void turn_sides(bp_run *run, double time, double step)
 }
 
 /* The numbers point into the run itself. */
-static void sides_here(bp_run *run) { run->numbers.border = (const double(*)[BP_NSWITCHES])run->sides.border; }
+static void sides_here(bp_run *run) { run->numbers.border = run->sides.border; }
 
 static void sides_start(bp_run *run, double t)
 {
@@ -270,7 +267,7 @@ static void remember_touch(bp_run *run, double h, double factor)
 }
 
 /* The coming times are those of another segment. */
-static void forget_release(bp_run *run) { run->release = (bp_release){NAN, 0, 0}; }
+static void forget_release(bp_run *run) { run->release = (bp_release){NAN, 0}; }
 
 /* Whether a step is to end where a contact is foreseen to, no farther than `longest`; `h` is the way there then. */
 static int aim(bp_run *run, double t, double longest, double resolution, double *h)

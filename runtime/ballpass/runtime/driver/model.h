@@ -1,7 +1,7 @@
 /* The model as the methods see it: accelerations, their Jacobian and time derivative, from the generated kernels.
 
    kernels.h is generated with the scene.  It brings the sizes BP_NQ (coordinates), BP_NX = 2 BP_NQ, BP_NU, BP_NP, BP_NC, BP_NW (stage
-   variables), BP_NB (balls), the directions bp_cos, bp_sin of the balls in the cage, and the inline functions called here. */
+   variables), for each bearing b the balls BP_<b>_BALLS and their directions in the cage, and the inline functions called here. */
 #ifndef BALLPASS_MODEL_H
 #define BALLPASS_MODEL_H
 
@@ -18,19 +18,9 @@ typedef struct {
     const double *p;
     const double *c;
 #ifdef BALLPASS_LOCATED
-    const double (*border)[BP_NSWITCHES]; /* sides of each ball, see kinks.h */
+    const double *border; /* sides of each event, see kinks.h */
 #endif
 } bp_numbers;
-
-/* The law of a ball, and with its slopes; where kinks are located its sides are held. */
-#ifdef BALLPASS_LOCATED
-#define BP_BALL_FORCE(n, j, delta, rate, k, force) bp_ball_held_force(delta, rate, k, (n)->border[j], force)
-#define BP_BALL_SLOPES(n, j, delta, rate, k, force, by_delta, by_rate) \
-    bp_ball_held_slopes(delta, rate, k, (n)->border[j], force, by_delta, by_rate)
-#else
-#define BP_BALL_FORCE(n, j, delta, rate, k, force) bp_ball_force(delta, rate, k, force)
-#define BP_BALL_SLOPES(n, j, delta, rate, k, force, by_delta, by_rate) bp_ball_slopes(delta, rate, k, force, by_delta, by_rate)
-#endif
 
 /* Cosines and sines of the stage's angles at the times t + nodes[i] h, i = 0 ... BP_LANES - 1, nodes within [0, 1].  An angle that turns by
    little is turned on from its value at t. */
@@ -99,74 +89,83 @@ static inline __attribute__((always_inline)) void bp_stages_and_end(const bp_num
     }
 }
 
-/* Terms of a sum over the balls, filled up with zeros.  They are added in an order that is written here, not by the compiler's choice of
-   lanes: every library made of this file, and every processor, gives the same bits. */
-enum { BP_SUMMANDS = 8, BP_TERMS = (BP_NB + BP_SUMMANDS - 1) / BP_SUMMANDS * BP_SUMMANDS };
+/* Terms of a sum over the balls are added in an order that is written here, not by the compiler's choice of lanes: every library made of
+   this file, and every processor, gives the same bits. */
+enum { BP_SUMMANDS = 8 };
 typedef double bp_summands __attribute__((vector_size(BP_SUMMANDS * sizeof(double)), aligned(8), may_alias));
 
-static inline double bp_total(double *restrict terms)
+static inline __attribute__((always_inline)) double bp_total(const double *restrict terms, const int balls)
 {
-    for (int j = BP_NB; j < BP_TERMS; j++) terms[j] = 0.0;
-    bp_summands sum = *(const bp_summands *)terms;
-    for (int j = BP_SUMMANDS; j < BP_TERMS; j += BP_SUMMANDS) sum += *(const bp_summands *)(terms + j);
+    bp_summands sum = {0.0};
+    int j = 0;
+    for (; j + BP_SUMMANDS <= balls; j += BP_SUMMANDS) sum += *(const bp_summands *)(terms + j);
+    if (j < balls) {
+        bp_summands rest = {0.0};
+        for (int i = j; i < balls; i++) rest[i - j] = terms[i];
+        sum += rest;
+    }
     return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
 }
 
-/* Sums over the balls of F cos, F sin.  One ball a lane. */
-static inline __attribute__((always_inline)) void bp_sums(const bp_numbers *n, const double *restrict w, const double *restrict r, double *restrict S)
+/* Directions of a bearing's balls: those in its cage turned by the cage's angle, whose cosine and sine begin at w.  One ball a lane. */
+static inline __attribute__((always_inline)) void bp_ball_directions(const double *restrict w, const double *restrict cage_cos,
+                                                                     const double *restrict cage_sin, const int balls, double *restrict co,
+                                                                     double *restrict si)
 {
-    double k[BP_NK], sx[BP_TERMS], sy[BP_TERMS];
-    bp_law_numbers(n->p, n->c, k);
-    const double cage_cos = w[0], cage_sin = w[1];
+    const double c = w[0], s = w[1];
 #pragma omp simd
-    for (int j = 0; j < BP_NB; j++) {
-        const double co = bp_cos[j] * cage_cos - bp_sin[j] * cage_sin;
-        const double si = bp_sin[j] * cage_cos + bp_cos[j] * cage_sin;
-        double force;
-        BP_BALL_FORCE(n, j, r[0] + r[1] * co + r[2] * si, r[3] * co + r[4] * si, k, &force);
-        sx[j] = force * co;
-        sy[j] = force * si;
+    for (int j = 0; j < balls; j++) {
+        co[j] = cage_cos[j] * c - cage_sin[j] * s;
+        si[j] = cage_sin[j] * c + cage_cos[j] * s;
     }
-    S[0] = bp_total(sx);
-    S[1] = bp_total(sy);
 }
 
-/* The same, and the sums G of the slopes times cos cos, cos sin, sin sin: by deflection, then by rate. */
+/* Directions co, si and numbers k of the balls of bearing b, at the stage variables w; room for `count` rows of summands. */
+#define BP_BALLS(b, count)                                                                                                    \
+    double co[BP_##b##_BALLS], si[BP_##b##_BALLS], k[BP_##b##_NK], rows[(count) * BP_##b##_BALLS];                            \
+    bp_ball_directions(w + 2 * (b), bp_##b##_cos, bp_##b##_sin, BP_##b##_BALLS, co, si);                                      \
+    bp_##b##_numbers(n->p, n->c, w, k);
+
+/* Rows from the `first` on, added up. */
+#define BP_TOTALS(b, first, count, to) \
+    for (int m = 0; m < (count); m++) (to)[m] = bp_total(rows + ((first) + m) * BP_##b##_BALLS, BP_##b##_BALLS);
+
+/* The law of the balls, and with its slopes; where kinks are located its sides are held. */
+#ifdef BALLPASS_LOCATED
+#define BP_FORCES(b) bp_##b##_held_forces_lanes(co, si, r + 5 * (b), k, n->border + BP_##b##_FIRST_EVENT, rows);
+#define BP_SLOPES(b) bp_##b##_held_slopes_lanes(co, si, r + 5 * (b), k, n->border + BP_##b##_FIRST_EVENT, rows);
+#else
+#define BP_FORCES(b) bp_##b##_forces_lanes(co, si, r + 5 * (b), k, rows);
+#define BP_SLOPES(b) bp_##b##_slopes_lanes(co, si, r + 5 * (b), k, rows);
+#endif
+
+/* Sums S over the balls of each bearing: F cos, F sin. */
+static inline __attribute__((always_inline)) void bp_sums(const bp_numbers *n, const double *restrict w, const double *restrict r, double *restrict S)
+{
+#define BP_SUM(b) { BP_BALLS(b, 2) BP_FORCES(b) BP_TOTALS(b, 0, 2, S + 2 * (b)) }
+    BP_EACH_BEARING(BP_SUM)
+#undef BP_SUM
+}
+
+/* The same, and the sums G of the slopes. */
 static inline void bp_sums_and_slopes(const bp_numbers *n, const double *restrict w, const double *restrict r,
                                       double *restrict S, double *restrict G)
 {
-    double k[BP_NK], sx[BP_TERMS], sy[BP_TERMS], d0[BP_TERMS], d1[BP_TERMS], d2[BP_TERMS], v0[BP_TERMS], v1[BP_TERMS], v2[BP_TERMS];
-    bp_law_numbers(n->p, n->c, k);
-    const double cage_cos = w[0], cage_sin = w[1];
-#pragma omp simd
-    for (int j = 0; j < BP_NB; j++) {
-        const double co = bp_cos[j] * cage_cos - bp_sin[j] * cage_sin;
-        const double si = bp_sin[j] * cage_cos + bp_cos[j] * cage_sin;
-        double force, by_delta, by_rate;
-        BP_BALL_SLOPES(n, j, r[0] + r[1] * co + r[2] * si, r[3] * co + r[4] * si, k, &force, &by_delta, &by_rate);
-        sx[j] = force * co;
-        sy[j] = force * si;
-        d0[j] = by_delta * co * co;
-        d1[j] = by_delta * co * si;
-        d2[j] = by_delta * si * si;
-        v0[j] = by_rate * co * co;
-        v1[j] = by_rate * co * si;
-        v2[j] = by_rate * si * si;
+#define BP_SUM(b)                              \
+    {                                          \
+        BP_BALLS(b, 2 + BP_##b##_SLOPES)       \
+        BP_SLOPES(b)                           \
+        BP_TOTALS(b, 0, 2, S + 2 * (b))        \
+        BP_TOTALS(b, 2, BP_##b##_SLOPES, G + BP_##b##_FIRST_SLOPE) \
     }
-    S[0] = bp_total(sx);
-    S[1] = bp_total(sy);
-    G[0] = bp_total(d0);
-    G[1] = bp_total(d1);
-    G[2] = bp_total(d2);
-    G[3] = bp_total(v0);
-    G[4] = bp_total(v1);
-    G[5] = bp_total(v2);
+    BP_EACH_BEARING(BP_SUM)
+#undef BP_SUM
 }
 
 /* dx/dt at a state, for stage variables w that hold for its time. */
 static inline __attribute__((always_inline)) void bp_rate(const bp_numbers *n, const double *restrict w, const double *restrict x, double *restrict dx)
 {
-    double r[5], S[2];
+    double r[BP_NR], S[BP_NS];
     bp_relative(x, n->u, n->p, n->c, w, r);
     bp_sums(n, w, r, S);
     for (int k = 0; k < BP_NQ; k++) dx[k] = x[BP_NQ + k];
@@ -177,7 +176,7 @@ static inline __attribute__((always_inline)) void bp_rate(const bp_numbers *n, c
 static inline void bp_linearize(const bp_numbers *n, const double *restrict w, const double *restrict wt, const double *restrict x,
                                 double *restrict dx, double *restrict A, double *restrict B, double *restrict at)
 {
-    double r[5], S[2], G[6];
+    double r[BP_NR], S[BP_NS], G[BP_NG];
     bp_relative(x, n->u, n->p, n->c, w, r);
     bp_sums_and_slopes(n, w, r, S, G);
     for (int k = 0; k < BP_NQ; k++) dx[k] = x[BP_NQ + k];

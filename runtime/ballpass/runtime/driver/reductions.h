@@ -1,6 +1,6 @@
 /* On-line reductions: extremes with their times, mean and mean square of channels, from the dense output of every accepted step.
 
-   Channels are the states, then four quantities of the balls, each with its value of the most loaded ball at the moment: total force,
+   Channels are the states, then for each bearing four quantities of its balls, each with its value of the most loaded ball: total force,
    elastic force, damping force, deflection.  Every step is looked at in its quarters, theta = 0, 1/4, 1/2, 3/4, 1; those of DOP853, whose
    output is of degree seven and not four, as two steps of half the size.
 
@@ -17,10 +17,11 @@
 #ifndef BALLPASS_REDUCTIONS_H
 #define BALLPASS_REDUCTIONS_H
 
-#include "ensemble_kernels.h"
+#include <string.h>
+
 #include "model.h"
 
-enum { BP_POINTS = 5, BP_BALL_CHANNELS = 4, BP_CHANNELS = BP_NX + BP_BALL_CHANNELS };
+enum { BP_POINTS = 5, BP_BALL_CHANNELS = 4, BP_CHANNELS = BP_NX + BP_BALL_CHANNELS * BP_BEARINGS };
 
 /* Places in a reduction: the head, then BP_CHANNELS entries of each kind. */
 enum {
@@ -54,26 +55,35 @@ static const double bp_boole[BP_POINTS] = {7.0 / 90.0, 32.0 / 90.0, 12.0 / 90.0,
 /* Value of a channel within a step, and the ball that has it. */
 typedef double (*bp_channel_at)(const void *source, int channel, double theta, int *ball);
 
-/* Quantities of all balls at a state and time.  One ball a lane. */
-static inline void bp_ball_quantities(const bp_numbers *n, double t, const double *restrict x, double q[BP_BALL_CHANNELS][BP_NB])
+/* Quantities of all balls at a state and time: for each bearing BP_BALL_CHANNELS rows, one entry a ball. */
+enum { BP_BALL_QUANTITIES = BP_BALL_CHANNELS * BP_NB };
+
+static inline void bp_ball_quantities(const bp_numbers *n, double t, const double *restrict x, double *restrict q)
 {
-    double w[BP_NW], r[5], k[BP_NCONTACT];
+    double w[BP_NW], r[BP_NR];
     bp_cage(t, n->u, n->p, n->c, w);
     bp_relative(x, n->u, n->p, n->c, w, r);
-    bp_contact_numbers(n->p, n->c, k);
-    const double cage_cos = w[0], cage_sin = w[1];
-#pragma omp simd
-    for (int j = 0; j < BP_NB; j++) {
-        const double co = bp_cos[j] * cage_cos - bp_sin[j] * cage_sin;
-        const double si = bp_sin[j] * cage_cos + bp_cos[j] * cage_sin;
-        const double delta = r[0] + r[1] * co + r[2] * si;
-        double elastic, damping;
-        bp_ball_contact(delta, r[3] * co + r[4] * si, k, &elastic, &damping);
-        q[0][j] = elastic + damping;
-        q[1][j] = elastic;
-        q[2][j] = damping;
-        q[3][j] = delta;
+#define BP_CONTACT(b)                                                                                  \
+    {                                                                                                  \
+        BP_BALLS(b, BP_BALL_CHANNELS)                                                                  \
+        bp_##b##_contact_lanes(co, si, r + 5 * (b), k, rows);                                          \
+        memcpy(q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, rows, sizeof rows);                         \
     }
+    BP_EACH_BEARING(BP_CONTACT)
+#undef BP_CONTACT
+}
+
+/* Row of a channel of the balls, counted behind the states, among these quantities, and its balls. */
+static inline const double *bp_ball_row(const double *q, int channel, int *balls)
+{
+    static const int first[] = {
+#define BP_FIRST(b) BP_##b##_FIRST_BALL,
+        BP_EACH_BEARING(BP_FIRST)
+#undef BP_FIRST
+            BP_NB};
+    const int bearing = channel / BP_BALL_CHANNELS;
+    *balls = first[bearing + 1] - first[bearing];
+    return q + BP_BALL_CHANNELS * first[bearing] + channel % BP_BALL_CHANNELS * *balls;
 }
 
 /* All channels at a state and time; those of the balls are zero where not wanted. */
@@ -82,14 +92,18 @@ static inline void bp_channels(const bp_numbers *n, double t, const double *rest
     for (int k = 0; k < BP_NX; k++) value[k] = x[k];
     for (int k = BP_NX; k < BP_CHANNELS; k++) value[k] = 0.0;
     if (!balls) return;
-    double q[BP_BALL_CHANNELS][BP_NB];
+    double q[BP_BALL_QUANTITIES];
     bp_ball_quantities(n, t, x, q);
-    for (int k = 0; k < BP_BALL_CHANNELS; k++) {
-        double most = -INFINITY;
-#pragma omp simd reduction(max : most)
-        for (int j = 0; j < BP_NB; j++) most = q[k][j] > most ? q[k][j] : most;
-        value[BP_NX + k] = most;
+#define BP_MOST(b)                                                                                     \
+    for (int k = 0; k < BP_BALL_CHANNELS; k++) {                                                       \
+        const double *of = q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL + k * BP_##b##_BALLS;            \
+        double most = -INFINITY;                                                                       \
+        _Pragma("omp simd reduction(max : most)")                                                      \
+        for (int j = 0; j < BP_##b##_BALLS; j++) most = of[j] > most ? of[j] : most;                   \
+        value[BP_NX + BP_BALL_CHANNELS * (b) + k] = most;                                              \
     }
+    BP_EACH_BEARING(BP_MOST)
+#undef BP_MOST
 }
 
 /* One channel at a state and time, and its ball counted from 1. */
@@ -97,11 +111,11 @@ static inline double bp_channel(const bp_numbers *n, double t, const double *res
 {
     *ball = 0;
     if (channel < BP_NX) return x[channel];
-    double q[BP_BALL_CHANNELS][BP_NB];
+    double q[BP_BALL_QUANTITIES];
     bp_ball_quantities(n, t, x, q);
-    const double *of = q[channel - BP_NX];
-    int best = 0;
-    for (int j = 1; j < BP_NB; j++)
+    int balls, best = 0;
+    const double *of = bp_ball_row(q, channel - BP_NX, &balls);
+    for (int j = 1; j < balls; j++)
         if (of[j] > of[best]) best = j;
     *ball = best + 1;
     return of[best];

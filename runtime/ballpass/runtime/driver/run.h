@@ -25,7 +25,7 @@
 /* End of a contact ahead, as foreseen: time within the segment, not a number where there is none, and what ends. */
 typedef struct {
     double time;
-    int which, ball;
+    int which;
 } bp_release;
 #endif
 

@@ -30,8 +30,10 @@ static inline double bp_largest(const double *v)
 /* Masses of the coordinates: what a force through the balls accelerates. */
 static inline void bp_masses(const bp_numbers *n, double *mass)
 {
-    const double force = 1e12, x[BP_NX] = {0.0}, none[2] = {0.0, 0.0}, both[2] = {force, force};
+    const double force = 1e12, x[BP_NX] = {0.0}, none[BP_NS] = {0.0};
+    double both[BP_NS];
     double w[BP_NW], a[BP_NQ], b[BP_NQ];
+    for (int k = 0; k < BP_NS; k++) both[k] = force;
     bp_stage(0.0, n->u, n->p, n->c, w);
     bp_acceleration(x, none, n->u, n->p, n->c, w, a);
     bp_acceleration(x, both, n->u, n->p, n->c, w, b);

@@ -2,18 +2,22 @@
 #ifndef BALLPASS_TANGENT_MODEL_H
 #define BALLPASS_TANGENT_MODEL_H
 
+#include <string.h>
+
 #include "model.h"
 #include "tangents.h"
 
 /* The same as one value (a vector of gcc and clang), for sums that should stay in registers. */
 typedef double bp_vector __attribute__((vector_size(BP_LANES * sizeof(double)), aligned(8), may_alias));
 
-/* What the directions share at one state and time.  Force and slopes of the balls enter the derivative of their sums
-   S = (sum F cos, sum F sin) by sums of their own: all that moves a ball is r, the cage's angle, and the numbers of the law. */
+/* What the directions share at one state and time: of each bearing the relative motion, the directions and numbers of its balls, and the
+   sums S, of the slopes G, and of the rows that derivatives of S are made of (partials). */
 typedef struct {
     const double *x, *w;
-    double r[5], S[2], G[6], by_r0[2], by_angle[2], by_number[2][BP_NK];
-    double co[BP_NB], si[BP_NB], delta[BP_NB], rate[BP_NB], force[BP_NB], by_delta[BP_NB], by_rate[BP_NB];
+    double r[BP_NR], S[BP_NS], G[BP_NG], co[BP_NB], si[BP_NB];
+#define BP_OF_BEARING(b) double k_##b[BP_##b##_NK], total_##b[2 + BP_##b##_PARTIALS];
+    BP_EACH_BEARING(BP_OF_BEARING)
+#undef BP_OF_BEARING
 } bp_point;
 
 /* Directions of one block: parameters, constants, inputs of the segment. */
@@ -26,96 +30,43 @@ static inline void bp_point_at(bp_point *restrict at, const bp_numbers *n, const
     at->x = x;
     at->w = w;
     bp_relative(x, n->u, n->p, n->c, w, at->r);
-    const double *restrict r = at->r, cage_cos = w[0], cage_sin = w[1];
-    double k[BP_NK], by_number[BP_NK * BP_NB];
-    double sx[BP_TERMS], sy[BP_TERMS], d[5][BP_TERMS], v[3][BP_TERMS], nx[BP_NK][BP_TERMS], ny[BP_NK][BP_TERMS];
-    bp_law_numbers(n->p, n->c, k);
-#pragma omp simd
-    for (int j = 0; j < BP_NB; j++) {
-        const double co = bp_cos[j] * cage_cos - bp_sin[j] * cage_sin;
-        const double si = bp_sin[j] * cage_cos + bp_cos[j] * cage_sin;
-        at->co[j] = co;
-        at->si[j] = si;
-        at->delta[j] = r[0] + r[1] * co + r[2] * si;
-        at->rate[j] = r[3] * co + r[4] * si;
+#define BP_POINT(b)                                                                                                              \
+    {                                                                                                                            \
+        BP_BALLS(b, 2 + BP_##b##_PARTIALS)                                                                                       \
+        bp_##b##_partials_lanes(co, si, at->r + 5 * (b), k, rows);                                                               \
+        BP_TOTALS(b, 0, 2 + BP_##b##_PARTIALS, at->total_##b)                                                                    \
+        memcpy(at->S + 2 * (b), at->total_##b, 2 * sizeof *at->S);                                                               \
+        memcpy(at->G + BP_##b##_FIRST_SLOPE, at->total_##b + 2, BP_##b##_SLOPES * sizeof *at->G);                                \
+        memcpy(at->co + BP_##b##_FIRST_BALL, co, sizeof co);                                                                     \
+        memcpy(at->si + BP_##b##_FIRST_BALL, si, sizeof si);                                                                     \
+        memcpy(at->k_##b, k, sizeof k);                                                                                          \
     }
-    bp_ball_partials_lanes(at->delta, at->rate, k, at->force, at->by_delta, at->by_rate, by_number);
-#pragma omp simd
-    for (int j = 0; j < BP_NB; j++) {
-        const double co = at->co[j], si = at->si[j], by_delta = at->by_delta[j], by_rate = at->by_rate[j];
-        sx[j] = at->force[j] * co;
-        sy[j] = at->force[j] * si;
-        d[3][j] = by_delta * co;
-        d[4][j] = by_delta * si;
-        d[0][j] = by_delta * co * co;
-        d[1][j] = by_delta * co * si;
-        d[2][j] = by_delta * si * si;
-        v[0][j] = by_rate * co * co;
-        v[1][j] = by_rate * co * si;
-        v[2][j] = by_rate * si * si;
-    }
-    for (int m = 0; m < BP_NK; m++) {
-#pragma omp simd
-        for (int j = 0; j < BP_NB; j++) {
-            nx[m][j] = by_number[m * BP_NB + j] * at->co[j];
-            ny[m][j] = by_number[m * BP_NB + j] * at->si[j];
-        }
-    }
-    at->S[0] = bp_total(sx);
-    at->S[1] = bp_total(sy);
-    for (int m = 0; m < 3; m++) {
-        at->G[m] = bp_total(d[m]);
-        at->G[3 + m] = bp_total(v[m]);
-    }
-    at->by_r0[0] = bp_total(d[3]);
-    at->by_r0[1] = bp_total(d[4]);
-    for (int m = 0; m < BP_NK; m++) {
-        at->by_number[0][m] = bp_total(nx[m]);
-        at->by_number[1][m] = bp_total(ny[m]);
-    }
-    const double *restrict G = at->G;
-    at->by_angle[0] = -r[1] * G[1] + r[2] * G[0] - r[3] * G[4] + r[4] * G[3] - at->S[1];
-    at->by_angle[1] = -r[1] * G[2] + r[2] * G[1] - r[3] * G[5] + r[4] * G[4] + at->S[0];
-}
-
-/* Derivatives of deflection and rate of ball j, and of its direction. */
-static inline void bp_ball_tangent(const bp_point *restrict at, int j, const double *restrict wd, const double *restrict rd,
-                                   double *restrict co, double *restrict si, double *restrict delta, double *restrict rate)
-{
-#pragma omp simd
-    for (int l = 0; l < BP_LANES; l++) {
-        co[l] = bp_cos[j] * wd[l] - bp_sin[j] * wd[BP_LANES + l];
-        si[l] = bp_sin[j] * wd[l] + bp_cos[j] * wd[BP_LANES + l];
-        delta[l] = rd[l] + rd[BP_LANES + l] * at->co[j] + rd[2 * BP_LANES + l] * at->si[j] + at->r[1] * co[l] + at->r[2] * si[l];
-        rate[l] = rd[3 * BP_LANES + l] * at->co[j] + rd[4 * BP_LANES + l] * at->si[j] + at->r[3] * co[l] + at->r[4] * si[l];
-    }
+    BP_EACH_BEARING(BP_POINT)
+#undef BP_POINT
 }
 
 /* Derivatives of the sums S along the block's directions, for moved coefficients rd and stage variables wd. */
 static inline void bp_sums_tangent(const bp_point *restrict at, const bp_direction *d, const double *restrict wd, const double *restrict rd,
                                    double *restrict Sd)
 {
-    const bp_vector *r = (const bp_vector *)rd, *w = (const bp_vector *)wd;
-    double numbers[BP_NK * BP_LANES];
-    bp_law_numbers_lanes(d->p, d->c, numbers);
-    const bp_vector *k = (const bp_vector *)numbers, angle = at->w[0] * w[1] - at->w[1] * w[0];
-    bp_vector x = at->by_angle[0] * angle, y = at->by_angle[1] * angle;
-    x += at->by_r0[0] * r[0] + at->G[0] * r[1] + at->G[1] * r[2] + at->G[3] * r[3] + at->G[4] * r[4];
-    y += at->by_r0[1] * r[0] + at->G[1] * r[1] + at->G[2] * r[2] + at->G[4] * r[3] + at->G[5] * r[4];
-#pragma GCC unroll 16
-    for (int m = 0; m < BP_NK; m++) {
-        x += at->by_number[0][m] * k[m];
-        y += at->by_number[1][m] * k[m];
+#define BP_MOVED(b)                                                                                                              \
+    {                                                                                                                            \
+        const double c = at->w[2 * (b)], s = at->w[2 * (b) + 1], *const cd = wd + 2 * (b) * BP_LANES, *const sd = cd + BP_LANES; \
+        double kd[BP_##b##_NK * BP_LANES], angle[BP_LANES];                                                                      \
+        bp_##b##_numbers_lanes(d->p, d->c, wd, kd);                                                                              \
+        _Pragma("omp simd")                                                                                                      \
+        for (int l = 0; l < BP_LANES; l++) angle[l] = c * sd[l] - s * cd[l];                                                     \
+        bp_##b##_sums_moved_lanes(at->total_##b, rd + 5 * (b) * BP_LANES, angle, kd, Sd + 2 * (b) * BP_LANES);                   \
     }
-    *(bp_vector *)Sd = x;
-    *(bp_vector *)(Sd + BP_LANES) = y;
+    BP_EACH_BEARING(BP_MOVED)
+#undef BP_MOVED
 }
 
 /* Derivative of dx/dt along the block's directions, for the moved state xd and stage variables wd. */
 static inline void bp_rate_tangent(const bp_point *restrict at, const bp_numbers *n, const bp_direction *d, const double *restrict wd,
                                    const double *restrict xd, double *restrict out)
 {
-    double rd[5 * BP_LANES], Sd[2 * BP_LANES];
+    double rd[BP_NR * BP_LANES], Sd[BP_NS * BP_LANES];
     bp_relative_tangent_lanes(at->x, n->u, n->p, n->c, at->w, xd, d->u, d->p, d->c, wd, rd);
     bp_sums_tangent(at, d, wd, rd, Sd);
     for (int k = 0; k < BP_NQ * BP_LANES; k++) out[k] = xd[BP_NQ * BP_LANES + k];
@@ -127,29 +78,31 @@ static inline void bp_linearize_tangent(const bp_point *restrict at, const bp_nu
                                         const double *restrict wt, const double *restrict wd, const double *restrict wtd,
                                         const double *restrict xd, double *restrict A, double *restrict B, double *restrict rate_d)
 {
-    double rd[5 * BP_LANES], Sd[2 * BP_LANES], Gd[6 * BP_LANES];
+    double rd[BP_NR * BP_LANES], Sd[BP_NS * BP_LANES], Gd[BP_NG * BP_LANES];
     bp_relative_tangent_lanes(at->x, n->u, n->p, n->c, at->w, xd, d->u, d->p, d->c, wd, rd);
     bp_sums_tangent(at, d, wd, rd, Sd);
-    bp_vector sum[6];
-#pragma GCC unroll 6
-    for (int k = 0; k < 6; k++) sum[k] = (bp_vector){0.0};
-    for (int j = 0; j < BP_NB; j++) {
-        double co[BP_LANES], si[BP_LANES], delta[BP_LANES], rate[BP_LANES], by_delta[BP_LANES], by_rate[BP_LANES];
-        bp_ball_tangent(at, j, wd, rd, co, si, delta, rate);
-        bp_law_slopes_tangent_lanes(at->delta[j], at->rate[j], n->p, n->c, delta, rate, d->p, d->c, by_delta, by_rate);
-        const double c = at->co[j], s = at->si[j], fd = at->by_delta[j], fv = at->by_rate[j];
-        const bp_vector c_d = *(const bp_vector *)co, s_d = *(const bp_vector *)si;
-        const bp_vector cc = 2.0 * c * c_d, cs = s * c_d + c * s_d, ss = 2.0 * s * s_d;
-        const bp_vector fd_d = *(const bp_vector *)by_delta, fv_d = *(const bp_vector *)by_rate;
-        sum[0] += c * c * fd_d + fd * cc;
-        sum[1] += c * s * fd_d + fd * cs;
-        sum[2] += s * s * fd_d + fd * ss;
-        sum[3] += c * c * fv_d + fv * cc;
-        sum[4] += c * s * fv_d + fv * cs;
-        sum[5] += s * s * fv_d + fv * ss;
+    for (int i = 0; i < BP_NG * BP_LANES; i++) Gd[i] = 0.0;
+#define BP_MOVED(b)                                                                                                              \
+    {                                                                                                                            \
+        const double *const cd = wd + 2 * (b) * BP_LANES, *const sd = cd + BP_LANES;                                             \
+        double kd[BP_##b##_NK * BP_LANES], *const to = Gd + BP_##b##_FIRST_SLOPE * BP_LANES;                                     \
+        bp_##b##_numbers_lanes(d->p, d->c, wd, kd);                                                                              \
+        for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                               \
+            const int i = BP_##b##_FIRST_BALL + j;                                                                               \
+            double cod[BP_LANES], sid[BP_LANES], moved[BP_##b##_SLOPES * BP_LANES];                                              \
+            _Pragma("omp simd")                                                                                                  \
+            for (int l = 0; l < BP_LANES; l++) {                                                                                 \
+                cod[l] = bp_##b##_cos[j] * cd[l] - bp_##b##_sin[j] * sd[l];                                                      \
+                sid[l] = bp_##b##_sin[j] * cd[l] + bp_##b##_cos[j] * sd[l];                                                      \
+            }                                                                                                                    \
+            bp_##b##_moved_lanes(at->co + i, at->si + i, at->r + 5 * (b), at->k_##b, cod, sid, rd + 5 * (b) * BP_LANES, kd,      \
+                                 moved);                                                                                         \
+            _Pragma("omp simd")                                                                                                  \
+            for (int m = 0; m < BP_##b##_SLOPES * BP_LANES; m++) to[m] += moved[m];                                              \
+        }                                                                                                                        \
     }
-#pragma GCC unroll 6
-    for (int k = 0; k < 6; k++) *(bp_vector *)(Gd + k * BP_LANES) = sum[k];
+    BP_EACH_BEARING(BP_MOVED)
+#undef BP_MOVED
     bp_acceleration_jacobian_tangent_lanes(at->x, at->S, at->G, n->u, n->p, n->c, at->w, xd, Sd, Gd, d->u, d->p, d->c, wd, A, B);
     bp_acceleration_rate_tangent_lanes(at->x, at->S, at->G, at->r, n->u, n->p, n->c, at->w, wt, xd, Sd, Gd, rd, d->u, d->p, d->c, wd, wtd,
                                        rate_d);

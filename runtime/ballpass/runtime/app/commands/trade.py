@@ -119,11 +119,6 @@ def models_of(scene: Scene) -> dict[str, Scene]:
     for feature in features(full):
         if feature.path == "bearing.outer_ring" and feature.without is not None:
             found["the outer ring fixed"] = feature.without
-    if scene.mechanism is not None and scene.bearing.load_harmonics is None:
-        for count in HARMONICS:
-            found[f"{count} harmonics of the load"] = replace(
-                full, bearing=replace(scene.bearing, load_harmonics=count)
-            )
     return found
 
 

@@ -27,6 +27,8 @@ import mpmath
 import sympy as sp
 from sympy.core.relational import Relational
 
+from ballpass.derive.terms import Smoothness
+
 #: A law is smooth enough where this derivative is continuous: its branches differ by a higher power of the distance.
 KINK_ORDER = 2
 
@@ -69,10 +71,27 @@ class Switching:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Place:
-    kink: bool
+    order: float  # power of the distance with which the branches differ
     ends_above: bool
     ends_below: bool
-    jumps: bool
+
+    @property
+    def kink(self) -> bool:
+        return self.order <= KINK_ORDER
+
+
+def smoothness_of(force: sp.Expr, deflection: sp.Symbol, rate: sp.Symbol) -> Smoothness:
+    """How often a force may be differentiated, found at each of its case distinctions."""
+    order = math.inf
+    for condition in sp.ordered(force.atoms(Relational)):
+        of_rate, start = _border(condition, deflection, rate)
+        decides, other = (rate, deflection) if of_rate else (deflection, rate)
+        order = min(order, _look(force, condition, decides, start, other, paired=False).order)
+    if order > KINK_ORDER:
+        return Smoothness.TWICE_SMOOTH
+    if order > 1.0:
+        return Smoothness.SMOOTH
+    return Smoothness.KINKED if order > 0.0 else Smoothness.DISCONTINUOUS
 
 
 def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Symbol, *, pairs: bool) -> Switching:
@@ -109,7 +128,7 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
             of_rate=key[0],
             ends_above=any(place.ends_above for place in found[key]),
             ends_below=any(place.ends_below for place in found[key]),
-            jumps=any(place.jumps for place in found[key]),
+            jumps=any(place.order == 0 for place in found[key]),
             border=names[key],
         )
         for key in order
@@ -157,7 +176,8 @@ def _look(
     rest = sorted((part.free_symbols | start.free_symbols) - {decides, other}, key=sp.default_sort_key)
     numbers = {symbol: sp.Rational(sp.prime(k + 10), 37) for k, symbol in enumerate(rest)}
     meets = start.xreplace(numbers)
-    kink = jumps = above = below = False
+    least = math.inf
+    above = below = False
     for elsewhere in _ELSEWHERE if other in part.free_symbols else _ELSEWHERE[:1]:
         branches = []
         for side in (sp.true, sp.false):
@@ -167,12 +187,10 @@ def _look(
         difference = sp.sympify(branches[0] - branches[1])
         if paired:
             difference += difference.xreplace({decides: -decides})
-        order = _order(difference, decides, meets)
-        kink = kink or order <= KINK_ORDER
-        jumps = jumps or order == 0
+        least = min(least, _order(difference, decides, meets))
         above = above or not _is_real(branches[0], decides, meets)
         below = below or not _is_real(branches[1], decides, meets)
-    return _Place(kink=kink, ends_above=above, ends_below=below, jumps=jumps)
+    return _Place(order=least, ends_above=above, ends_below=below)
 
 
 def _beside(expression: sp.Expr, decides: sp.Symbol, meets: sp.Expr, side: int) -> list[mpmath.mpc]:

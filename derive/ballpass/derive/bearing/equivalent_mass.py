@@ -1,0 +1,54 @@
+"""Mass that the inner ring moves: given, or Eq. (3)."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ballpass.derive.scene.errors import Fault, SceneError
+from ballpass.derive.scene.records import FRAME, Bearing, EquivalentMass, Mechanism
+from ballpass.derive.terms import components, symbol_of
+
+
+def inner_mass(bearing: Bearing, mechanism: Mechanism | None) -> sp.Expr:
+    """Mass moved by the inner ring [kg].
+
+    Eq. (3) takes the ring, half the crankpin, and the crank's mass by the lever rule.  l_1 - l_o1 is measured along the
+    crank from its centre of mass to the far joint: for theta_1p = 0, where the rule holds, this is the printed one.
+
+    Raises
+    ------
+    SceneError
+        Eq. (3) for a body without exactly one far joint.
+    """
+    given = bearing.inner.mass
+    if not isinstance(given, EquivalentMass):
+        return symbol_of(given)
+    assert mechanism is not None  # the reader refuses Eq. (3) without a mechanism
+    assert bearing.joint is not None
+    joint = mechanism.joint(bearing.joint)
+    side = 1 if joint.bodies[0] == FRAME else 0
+    crank = mechanism.body(joint.bodies[side])
+    ends = [
+        j.points[j.bodies.index(crank.name)]
+        for j in mechanism.joints
+        if j.name != joint.name and crank.name in j.bodies
+    ]
+    if len(ends) != 1:
+        raise SceneError(
+            [
+                Fault(
+                    key=f"{bearing.path}.inner_ring.equivalent_mass",
+                    problem=f"Eq. (3) needs one far joint of the body {crank.name!r}",
+                    given=f"{len(ends)} further joints",
+                    allowed="a crank with exactly two joints",
+                    remedy=f'give the mass itself: [{bearing.path}.inner_ring] mass = "0.4 kg"',
+                )
+            ]
+        )
+    near, far = components(crank.point(joint.points[side])), components(crank.point(ends[0]))
+    center = components(crank.center_of_mass)
+    arm = (far[0] - near[0], far[1] - near[1])
+    rest = (far[0] - center[0], far[1] - center[1])
+    lever = sp.cancel((rest[0] * arm[0] + rest[1] * arm[1]) / (arm[0] ** 2 + arm[1] ** 2))
+    share = sp.Rational(1, 2) if given.crank == "half" else sp.S.One
+    return symbol_of(given.ring) + share * symbol_of(crank.mass) * lever + symbol_of(given.crankpin) / 2

@@ -1,0 +1,56 @@
+"""Damping proportional to the slope of the contact force: beta dF/d(delta) d(delta)/dt.
+
+Consistent in dimension, gated by itself, continuous.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import sympy as sp
+
+from ballpass.derive.bearing.laws.contact import Contact, Rest
+from ballpass.derive.bearing.laws.law import DampingLaw
+from ballpass.derive.scene.records import Quantity
+from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.units import show
+
+
+class Tangent(DampingLaw):
+    """Resists in proportion to the contact's tangent stiffness."""
+
+    name = "tangent"
+    description = "proportional to the tangent stiffness of the contact; vanishes continuously with the load"
+    unit = "s"
+    latex = r"\beta"
+    words = "Damping time constant of the contact"
+
+    def read(self, table: Table) -> tuple[Quantity, ...]:
+        table.know("coefficient", "ratio")
+        if "coefficient" in table.data:
+            table.fault(
+                "coefficient",
+                'the law "tangent" takes its coefficient from the slope of the contact force',
+                given=show(table.data["coefficient"]),
+                allowed='ratio, a time, as in "0.25e-5 s"',
+                remedy='write ratio = "0.25e-5 s" instead, or name the law "one-sided"',
+            )
+            if "ratio" not in table.data:
+                return ()
+        return (
+            table.quantity(
+                "ratio",
+                "s",
+                "Damping time constant: damping over tangent stiffness of the contact",
+                r"\beta",
+                example="0.25e-5 s",
+                wrong_dimension='write a time, as in "0.25e-5 s": the law "tangent" multiplies the slope of the '
+                "contact force [N/m]",
+            ),
+        )
+
+    def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
+        return numbers["ratio"]
+
+    def force(self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: Rest) -> sp.Expr:
+        return coefficient * contact.slope(delta) * rate

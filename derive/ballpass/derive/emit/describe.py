@@ -1,0 +1,155 @@
+"""What the runtime is told of a model: its manifest.
+
+In: a `System` and its `Functions`.  Out: the `Manifest`; the same scene gives the same text.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from ballpass.derive.lower.functions import Functions, operations
+from ballpass.derive.mechanism.forces import drawn_forces
+from ballpass.derive.scene.records import Scene
+from ballpass.derive.scene.values import value_bounds, value_relations
+from ballpass.derive.system import System
+from ballpass.derive.variables import Output
+from ballpass.runtime import contract as mf
+
+
+def run_info(scene: Scene) -> mf.RunInfo:
+    run = scene.run
+    return mf.RunInfo(
+        cycles=run.cycles,
+        duration=run.duration,
+        transient_cycles=run.transient_cycles,
+        samples_per_cycle=run.samples_per_cycle,
+        method=run.method,
+        rtol=run.rtol,
+    )
+
+
+def describe(
+    system: System,
+    functions: Functions,
+    *,
+    signature: str,
+    versions: tuple[tuple[str, str], ...],
+    files: tuple[tuple[str, str], ...],
+) -> mf.Manifest:
+    """Manifest of a model whose files have these digests."""
+    scene = system.scene
+    bounds = value_bounds(scene)
+    return mf.Manifest(
+        scene=scene.name,
+        title=scene.title,
+        signature=signature,
+        versions=versions,
+        parameters=tuple(
+            mf.ParameterInfo(
+                name=p.name,
+                unit=p.unit,
+                description=p.description,
+                latex=p.latex,
+                default=p.default,
+                **(asdict(bounds[p.name]) if p.name in bounds else {}),
+            )
+            for p in system.parameters
+        ),
+        relations=value_relations(scene),
+        constants=tuple(
+            mf.VariableInfo(name=c.name, unit=c.unit, description=c.description, latex=c.latex)
+            for c in functions.constants
+        ),
+        states=tuple(
+            mf.VariableInfo(name=s.name, unit=s.unit, description=s.description, latex=s.latex) for s in system.states
+        ),
+        coordinates=tuple(
+            mf.CoordinateInfo(
+                name=c.name, velocity=c.velocity.name, kind=c.kind, unit=c.unit, group=c.group, partner=c.partner
+            )
+            for c in system.coordinates
+        ),
+        initial=system.initial,
+        inputs=tuple(
+            mf.InputInfo(
+                name=i.name,
+                kind=i.kind,
+                offset=i.offset,
+                rate=i.rate,
+                windows=i.windows,
+                times=i.times,
+                values=i.values,
+            )
+            for i in system.inputs
+        ),
+        outputs=tuple(
+            mf.VariableInfo(
+                name=o.name,
+                unit=o.unit,
+                description=o.description,
+                size=_size(system, o),
+            )
+            for o in system.outputs
+        ),
+        quantities=tuple(
+            mf.QuantityInfo(name=o.name, unit=o.unit, description=o.description, size=_size(system, o), group=g.name)
+            for g in functions.groups
+            for o in g.outputs
+        ),
+        functions=tuple(
+            mf.FunctionInfo(
+                name=f.name(),
+                inputs=tuple((f.name_in(k), f.size1_in(k)) for k in range(f.n_in())),
+                outputs=tuple((f.name_out(k), f.size1_out(k)) for k in range(f.n_out())),
+                operations=operations(f) if f.is_a("SXFunction") else 0,
+                description=words,
+                library=library,
+            )
+            for library, group in ((mf.MODEL, functions.functions), (mf.JACOBIANS, functions.jacobians))
+            for f, words in group
+        ),
+        smoothness=tuple((name, s.value) for name, s in system.smoothness),
+        mechanism=_mechanism(system),
+        bearings=_bearings(system),
+        run=run_info(scene),
+        unfit=functions.unfit,
+        files=files,
+    )
+
+
+def _size(system: System, output: Output) -> int:
+    balls = {bearing.names.prefix: bearing.ball.count for bearing in system.bearings}
+    return balls[output.balls_of] if output.per_ball else 1
+
+
+def _mechanism(system: System) -> mf.MechanismInfo | None:
+    mechanism, linkage = system.scene.mechanism, system.linkage
+    if mechanism is None or linkage is None:
+        return None
+    return mf.MechanismInfo(
+        driver_joint=mechanism.driver.joint,
+        speed=mechanism.driver.speed.path,
+        start_angle=mechanism.driver.start_angle.path,
+        joints=tuple((j.name, j.kind, j.bodies[0], j.points[0], j.bodies[1], j.points[1]) for j in mechanism.joints),
+        points=tuple(mf.PointInfo(body=p.body, point=p.point) for p in linkage.points),
+        margins=tuple(mf.MarginInfo(joint=m.joint, description=m.description) for m in linkage.margins),
+        forces=drawn_forces(mechanism),
+    )
+
+
+def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
+    scene = system.scene
+    speed = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
+    return tuple(
+        mf.BearingInfo(
+            name=bearing.name,
+            prefix=bearing.prefix,
+            path=bearing.path,
+            balls=bearing.balls,
+            joint=bearing.joint or "",
+            shaft_speed=speed.path if speed is not None else "",
+            outer_ring=bearing.outer is not None,
+            damping_law=bearing.damping.law,
+        )
+        for bearing in scene.bearings
+    )

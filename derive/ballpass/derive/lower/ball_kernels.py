@@ -1,0 +1,298 @@
+"""Kernels of a bearing's balls: from the rings' relative motion and a ball's direction to force, sums and slopes.
+
+In: the generic ball, and visitors of a lowering.  Out: `BallKernels`, small SX functions over
+
+    co, si   direction of the ball
+    r        delta = r0 + r1 co + r2 si - e,  d(delta)/dt = r3 co + r4 si - de/dt,  e: what effects take (own_terms)
+    k        numbers of the ball: entries of p, c and w, gathered once by ``numbers``
+
+Each gives *rows*, summands over the balls; the C driver loops over balls (lanes), adds the rows up, and knows counts
+only:
+
+numbers   (p, c, w) -> k
+forces    -> S            F co, F si
+slopes    -> S, G         and the slopes of S: Fd cc, Fd cs, Fd ss, Fv cc, Fv cs, Fv ss; with effects the rows that
+                          time alone moves
+partials  -> S, G, ...    and the derivatives of S by the ball's angle, by r0 and by k
+moved     (..., along directions of co, si, r, k) -> derivative of G
+sums_moved  (sums of the rows of partials, along directions of r, angle, k) -> derivative of S
+contact   -> force, elastic force, damping force, deflection
+switches  -> g, dg/dt     switching functions of the law; the rate where there is one
+held_forces, held_slopes  (..., b): the law with its sides held by borders b (see bearing/switching.py)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import sympy as sp
+
+from ballpass.derive.bearing.equations import BearingModel
+from ballpass.derive.lower.visitor import Visitor
+
+#: Coefficients of a ball's deflection and rate: three and two.
+RELATIVE = 5
+
+#: Rows of the sums.
+SUMS = 2
+
+#: Rows of `contact`.
+CONTACT = ("force", "elastic_force", "damping_force", "deflection")
+
+
+class UnfitError(Exception):
+    """The stepper's kernels do not take a model; it runs on CasADi's functions."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BallKernels:
+    """Kernels of one bearing.
+
+    Attributes
+    ----------
+    prefix : of the bearing's names
+    balls : their number
+    over_numbers : functions over (co, si, r, k), by name; ``numbers`` is (p, c, w) -> k
+    over_model : `forces`, `slopes` and `contact` over (co, si, r, p, c, w), for ensembles, where every member has
+        numbers of its own; of opposite balls together where `paired`
+    paired : whether the rows of `over_model`'s sums are those of a ball and of the one opposite
+    slopes, partials : rows behind S
+    """
+
+    prefix: str
+    balls: int
+    over_numbers: dict[str, ca.Function]
+    over_model: dict[str, ca.Function]
+    paired: bool
+    slopes: int
+    partials: int
+
+    @property
+    def numbers(self) -> int:
+        """Entries of k."""
+        return int(self.over_numbers["numbers"].size1_out(0))
+
+
+class BallBuilder:
+    """Builds the expressions of a bearing's balls first, so that their constants join c; functions afterwards.
+
+    Parameters
+    ----------
+    bearing : the bearing
+    visit : visitor of run-time functions, which hoists constants
+    of_state : visitor that hoists what depends on time alone into stage variables
+    """
+
+    def __init__(self, bearing: BearingModel, visit: Visitor, of_state: Visitor) -> None:
+        self.bearing, self._visit, self._of_state = bearing, visit, of_state
+        self.co, self.si, self.r = ca.SX.sym("co"), ca.SX.sym("si"), ca.SX.sym("r", RELATIVE)
+        self._definitions = {d.symbol: d.expression for d in bearing.ball.definitions}
+        self.relative = self._relative()
+        co, si, r = self.co, self.si, self.r
+        self._rows = self._ball(r[0] + r[1] * co + r[2] * si, r[3] * co + r[4] * si, co, si)
+        # opposite balls share what their deflections are made of
+        along, rate = r[1] * co + r[2] * si, r[3] * co + r[4] * si
+        self._pair = (
+            (self._ball(r[0] + along, rate, co, si), self._ball(r[0] - along, -rate, -co, -si))
+            if bearing.ball.count % 2 == 0
+            else None
+        )
+
+    def _relative(self) -> ca.SX:
+        """Coefficients r of deflection and rate, without what effects take.
+
+        Raises
+        ------
+        UnfitError
+            Deflection or rate is not linear in the direction of the ball.
+        """
+        ball = self.bearing.ball
+        own = {ball.own.deflection: 0, ball.own.rate: 0} if ball.own is not None else {}
+        rows: list[sp.Expr] = []
+        for which, constant in ((ball.deflection, True), (ball.deflection_rate, False)):
+            expression = sp.expand(sp.sympify(self._definitions.get(which, sp.S.Zero)).subs(own))
+            along, across = expression.coeff(ball.cos), expression.coeff(ball.sin)
+            rest = sp.expand(expression - along * ball.cos - across * ball.sin)
+            if rest.has(ball.cos, ball.sin) or (not constant and rest != 0):
+                raise UnfitError(f"{which} is not linear in the direction of the ball")
+            rows += [rest, along, across] if constant else [along, across]
+        return ca.vertcat(*(self._of_state(row) for row in rows))
+
+    def _ball(self, delta: ca.SX, rate: ca.SX, co: ca.SX, si: ca.SX) -> dict[str, ca.SX]:
+        """Force, slopes and all that rows are made of, for a geometric deflection and rate at a direction."""
+        ball, nothing = self.bearing.ball, ca.SX(0.0)
+        taken = [nothing] * 3
+        if ball.own is not None:
+            at = self._of_state.child({ball.cos: co, ball.sin: si}, self._definitions)
+            taken = [at(s) for s in (ball.own.deflection, ball.own.rate, ball.own.acceleration)]
+            delta, rate = delta - taken[0], rate - taken[1]
+        inner = (ball.deflection, ball.deflection_rate)
+        rest = {k: v for k, v in self._definitions.items() if k not in inner}
+        law = self._visit.child({ball.deflection: delta, ball.deflection_rate: rate}, rest)
+        force = sp.sympify(rest[ball.force]).xreplace({k: v for k, v in rest.items() if k != ball.force})
+        held = self._visit.child(
+            {ball.deflection: delta, ball.deflection_rate: rate}
+            | {s.border: ca.SX.sym(s.border.name) for s in ball.switching.switches},
+            {},
+        )
+        by = [sp.diff(force, s) for s in inner]
+        held_force = ball.switching.force
+        return {
+            "delta": delta,
+            "rate": rate,
+            "own_rate": taken[1],
+            "own_acceleration": taken[2],
+            "F": law(ball.force),
+            "Fd": law(by[0]),
+            "Fv": law(by[1]),
+            "elastic": law(ball.elastic_force),
+            "damping": law(ball.damping_force) if ball.damping_force is not None else nothing,
+            "g": ca.vertcat(*(law(s.function) for s in ball.switching.switches)),
+            "g_rate": ca.vertcat(*(nothing if s.of_rate else rate for s in ball.switching.switches)),
+            "b": ca.vertcat(*(held(s.border) for s in ball.switching.switches)),
+            "held": held(held_force),
+            "held_d": held(sp.diff(held_force, inner[0])),
+            "held_v": held(sp.diff(held_force, inner[1])),
+        }
+
+    def _slopes(self, at: dict[str, ca.SX], by_delta: ca.SX, by_rate: ca.SX) -> list[ca.SX]:
+        """Rows of G."""
+        co, si = self.co, self.si
+        squares = (co * co, co * si, si * si)
+        rows = [f * s for f in (by_delta, by_rate) for s in squares]
+        if self.bearing.ball.own is not None:
+            moved = -(by_delta * at["own_rate"] + by_rate * at["own_acceleration"])
+            rows += [moved * co, moved * si]
+        return rows
+
+    def kernels(self, c: ca.SX, p: ca.SX, w: ca.SX) -> BallKernels:
+        """The functions, once the vectors of constants and stage variables are complete."""
+        co, si, r, at = self.co, self.si, self.r, self._rows
+        sums = [at["F"] * co, at["F"] * si]
+        slopes = self._slopes(at, at["Fd"], at["Fv"])
+        takes = {"co": co, "si": si, "r": r}
+        whole = {"p": p, "c": c, "w": w}
+
+        def made(name: str, rows: Sequence[ca.SX], extra: dict[str, ca.SX] | None = None) -> ca.Function:
+            inputs = {**takes, **(extra or {}), **whole}
+            rows = ca.cse([ca.densify(ca.vertcat(*rows))])
+            return ca.Function(name, [*inputs.values()], rows, [*inputs], ["rows"])
+
+        contact = [at["F"], at["elastic"], at["damping"], at["delta"]]
+        over_model = {"forces": made("forces", sums), "slopes": made("slopes", [*sums, *slopes])}
+        own = {
+            **over_model,
+            "contact": made("contact", contact),
+        }
+        border = {"b": at["b"]}
+        if at["b"].numel():
+            held = [at["held"] * co, at["held"] * si]
+            own["switches"] = made("switches", [at["g"], at["g_rate"]])
+            own["held_forces"] = made("held_forces", held, border)
+            own["held_slopes"] = made("held_slopes", [*held, *self._slopes(at, at["held_d"], at["held_v"])], border)
+        over_numbers = _over_numbers(own, len(takes))
+        forces, numbers = over_numbers["forces"], over_numbers["numbers"].size1_out(0)
+        k = ca.SX.sym("k", numbers)
+        turn = ca.vertcat(-si, co)
+        angled = ca.jtimes(forces(co, si, r, k), ca.vertcat(co, si), turn)
+        by_r0 = ca.jacobian(forces(co, si, r, k), r)[:, 0]
+        by_k = ca.jacobian(forces(co, si, r, k), k)
+        first = over_numbers["slopes"](co, si, r, k)
+        rows = ca.cse([ca.densify(ca.vertcat(first, angled, by_r0, ca.vec(by_k)))])
+        given, names = [co, si, r, k], ["co", "si", "r", "k"]
+        over_numbers["partials"] = ca.Function("partials", given, rows, names, ["rows"])
+        along = {f"{n}_d": ca.SX.sym(f"{n}_d", v.numel()) for n, v in zip(names, given, strict=True)}
+        moved = ca.jtimes(first[SUMS:], ca.vertcat(*given), ca.vertcat(*along.values()))
+        over_numbers["moved"] = ca.Function(
+            "moved", [*given, *along.values()], ca.cse([ca.densify(moved)]), [*names, *along], ["G_d"]
+        )
+        over_numbers["sums_moved"] = _sums_moved(rows[0].numel(), numbers)
+        if self._pair is not None:
+            one, other = self._pair
+            both = [(one["F"] - other["F"]) * co, (one["F"] - other["F"]) * si]
+            joint = self._slopes_of_pair(one, other)
+            over_model = {"forces": made("forces", both), "slopes": made("slopes", [*both, *joint])}
+        return BallKernels(
+            prefix=self.bearing.names.prefix,
+            balls=self.bearing.ball.count,
+            over_numbers=over_numbers,
+            over_model={**over_model, "contact": own["contact"]},
+            paired=self._pair is not None,
+            slopes=len(slopes),
+            partials=rows[0].numel() - SUMS,
+        )
+
+    def _slopes_of_pair(self, at: dict[str, ca.SX], other: dict[str, ca.SX]) -> list[ca.SX]:
+        """Rows of G of a ball and of the one opposite, whose direction has the other sign."""
+        co, si = self.co, self.si
+        squares = (co * co, co * si, si * si)
+        rows = [(at[f] + other[f]) * s for f in ("Fd", "Fv") for s in squares]
+        if self.bearing.ball.own is not None:
+            moved = [-(b["Fd"] * b["own_rate"] + b["Fv"] * b["own_acceleration"]) for b in (at, other)]
+            rows += [(moved[0] - moved[1]) * co, (moved[0] - moved[1]) * si]
+        return rows
+
+
+def sums_by_relative(slopes: ca.SX) -> ca.SX:
+    """d(S)/d(r) from the rows of G; the column of r0 is left out: nothing that moves enters it."""
+    g = slopes
+    return ca.vertcat(ca.horzcat(0, g[0], g[1], g[3], g[4]), ca.horzcat(0, g[1], g[2], g[4], g[5]))
+
+
+def sums_by_time(sums: ca.SX, slopes: ca.SX, r: ca.SX, cage_speed: ca.SX, *, own: bool) -> ca.SX:
+    """Time derivative of S at fixed state and r: the cage turns, d(cos) = -sin, d(sin) = cos for every ball at once."""
+    g = slopes
+    turn = ca.vertcat(
+        -r[1] * g[1] + r[2] * g[0] - r[3] * g[4] + r[4] * g[3] - sums[1],
+        -r[1] * g[2] + r[2] * g[1] - r[3] * g[5] + r[4] * g[4] + sums[0],
+    )
+    return turn * cage_speed + (g[6:8] if own else 0)
+
+
+def _sums_moved(rows: int, numbers: int) -> ca.Function:
+    """Derivative of S along directions, from the sums of the rows of `partials`."""
+    total, r_d, a_d, k_d = (ca.SX.sym(n, m) for n, m in (("T", rows), ("r_d", RELATIVE), ("a_d", 1), ("k_d", numbers)))
+    by_k = ca.reshape(total[rows - SUMS * numbers :], SUMS, numbers)
+    angle = rows - SUMS * numbers - 2 * SUMS
+    by_r = sums_by_relative(total[SUMS:]) @ r_d + total[angle + SUMS : angle + 2 * SUMS] * r_d[0]
+    moved = by_r + total[angle : angle + SUMS] * a_d + by_k @ k_d
+    return ca.Function("sums_moved", [total, r_d, a_d, k_d], [ca.densify(moved)], ["T", "r_d", "a_d", "k_d"], ["S_d"])
+
+
+def _over_numbers(functions: dict[str, ca.Function], kept: int) -> dict[str, ca.Function]:
+    """The functions over k, the entries of p, c and w that any of them uses, and ``numbers``, (p, c, w) -> k.
+
+    A compiler makes lanes of a loop over balls only where a selection needs no load: the numbers are gathered first.
+
+    Parameters
+    ----------
+    kept : arguments in front that stay; borders behind them stay as well
+    """
+    used: set[tuple[str, int]] = set()
+    for function in functions.values():
+        for k in range(function.n_instructions()):
+            if function.instruction_id(k) == ca.OP_INPUT:
+                argument, entry = function.instruction_input(k)
+                if function.name_in(argument) in "pcw":
+                    used.add((function.name_in(argument), entry))
+    order = sorted(used, key=lambda pair: ("pcw".index(pair[0]), pair[1]))
+    first = next(iter(functions.values()))
+    whole = {n: ca.SX.sym(n, first.size1_in(n)) for n in "pcw"}
+    # C has no arrays of length zero
+    chosen = ca.vertcat(*(whole[n][e] for n, e in order)) if order else ca.SX(0.0)
+    numbers = ca.Function("numbers", [*whole.values()], [ca.densify(chosen)], [*whole], ["k"])
+    entries = ca.SX.sym("k", max(len(order), 1))
+    replaced = {n: ca.SX.zeros(v.numel()) for n, v in whole.items()}
+    for place, (n, e) in enumerate(order):
+        replaced[n][e] = entries[place]
+    made = {"numbers": numbers}
+    for name, function in functions.items():
+        names = [n for n in function.name_in() if n not in "pcw"]
+        given = {n: ca.SX.sym(n, function.size1_in(n)) for n in names}
+        rows = function.call([*given.values(), *replaced.values()], True, False)
+        takes = {**{n: given[n] for n in names[:kept]}, "k": entries, **{n: given[n] for n in names[kept:]}}
+        results = ca.cse([ca.densify(row) for row in rows])
+        made[name] = ca.Function(name, [*takes.values()], results, [*takes], function.name_out())
+    return made
