@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import threading
@@ -18,9 +17,6 @@ from ballpass.derive import SceneError
 from ballpass.derive.scene.read import scene_from_text
 from ballpass.runtime import Model, RequestError, load_solution
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.contract import Manifest
-from ballpass.runtime.contract.errors import ArtefactError
-from ballpass.runtime.contract.json_text import DIGEST, text_digest
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = ROOT / "scenes" / "varying_compliance.toml"
@@ -122,21 +118,7 @@ def test_an_error_that_is_none_is_refused_without_a_doubled_word(
     assert not str(caught.value).startswith("error")
 
 
-@pytest.mark.parametrize("digest", ["0" * 64, "", "12", None, 7])
-def test_a_wrong_digest_is_shown_between_whole_quotes(make_model: Callable[..., Model], digest: object) -> None:
-    manifest = make_model("varying_compliance").manifest
-    document = json.loads(manifest.to_json())
-    assert document[DIGEST] != text_digest({})
-    document[DIGEST] = digest
-    with pytest.raises(ArtefactError, match="digest in it") as caught:
-        Manifest.from_json(json.dumps(document))
-    shown = str(caught.value).split("digest in it, ")[1].split(", is not")[0]
-    assert shown.count("'") == (2 if isinstance(digest, str) else 0)
-
-
-def test_an_interrupt_within_cvodes_prints_nothing_of_its_own(
-    make_model: Callable[..., Model], capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_an_interrupt_within_cvodes_is_one(make_model: Callable[..., Model]) -> None:
     """CasADi reports it as a right-hand side that failed; the run of some minutes ends within the first seconds."""
     model = make_model("varying_compliance")
     timers: list[threading.Timer] = []
@@ -149,5 +131,3 @@ def test_an_interrupt_within_cvodes_prints_nothing_of_its_own(
     with pytest.raises(KeyboardInterrupt):
         model.simulate(cycles=3000, transient=0, method="cvodes", samples_per_cycle=20, rtol=1e-11, progress=begin)
     assert timers
-    told = capfd.readouterr()
-    assert told.out + told.err == ""

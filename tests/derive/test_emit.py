@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from ballpass.derive import SceneError, check, derive, generate, read_scene
-from ballpass.derive.emit.folder import equations, signature
+from ballpass.derive.emit.equations import equations
+from ballpass.derive.emit.signature import signature
 from ballpass.derive.scene.read import scene_from_text
 from ballpass.runtime.contract import read_manifest
 

@@ -10,6 +10,7 @@ import pytest
 
 from ballpass.derive import generate
 from ballpass.derive.scene.read import scene_from_text
+from ballpass.runtime.contract.folders import LOCK
 from ballpass.runtime.native import compile as compiling
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -61,10 +62,10 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture(scope="session")
 def kept() -> Callable[[Path], dict[str, bytes]]:
-    """Content of a folder's files by their place in it."""
+    """Content of a folder's files by their place in it, the lock aside."""
 
     def read(folder: Path) -> dict[str, bytes]:
-        found = sorted(path for path in folder.rglob("*") if path.is_file())
+        found = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != LOCK)
         return {str(path.relative_to(folder)): path.read_bytes() for path in found}
 
     return read

@@ -29,12 +29,11 @@ import pytest
 from profiles import LONG
 
 from ballpass.derive import generate
-from ballpass.derive.emit.replace_folder import replace_folder
 from ballpass.derive.scene.read import scene_from_text
 from ballpass.runtime import CacheWarning, CompileError, RequestError, load, load_solution
-from ballpass.runtime.contract import folder as folders_manifest
 from ballpass.runtime.contract import read_artefact, read_manifest
 from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.folders import NEW, replace_files
 from ballpass.runtime.native import compile as compiling
 from ballpass.runtime.native import compilers
 
@@ -77,14 +76,15 @@ def shown(folder: Path) -> list[str]:
 REPLACING = """
     import itertools, shutil, sys
     from pathlib import Path
-    from ballpass.derive.emit.replace_folder import replace_folder
+    from ballpass.runtime.contract.folders import replace_files
     target, *sources = map(Path, sys.argv[1:])
     print("ready", flush=True)
     for source in itertools.cycle(sources):
         def write(made):
             for path in sorted(source.iterdir()):
-                shutil.copy(path, made)
-        replace_folder(target, "rotor", write)
+                if not path.name.startswith("."):
+                    shutil.copy(path, made)
+        replace_files(target, write, last="manifest.json", owned=lambda: ())
 """
 
 
@@ -98,61 +98,38 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return one, other
 
 
-def test_a_killed_derivation_leaves_the_old_artefact_or_the_new_one(
-    tmp_path: Path, both: tuple[Path, Path], kept: Callable[[Path], dict[str, bytes]]
-) -> None:
-    target = tmp_path / "generated" / "rotor"
-    shutil.copytree(both[0], target)
-    whole = [kept(folder) for folder in both]
-    for _ in killed_at_random(REPLACING, target, *both, kills=6, within=0.05):
-        assert kept(target) in whole
-        read_artefact(target)
-        assert shown(target.parent) == ["rotor"]
-    generate(scene_from_text(ROTOR, "rotor"), target)
-    assert kept(target) == whole[0]
-
-
-def test_a_killed_derivation_beside_files_of_others_is_refused_by_readers_and_mended_by_the_next(
+def test_a_killed_derivation_leaves_a_whole_artefact_or_one_that_is_refused_and_mended_by_the_next(
     tmp_path: Path, both: tuple[Path, Path], kept: Callable[[Path], dict[str, bytes]]
 ) -> None:
     """Files are moved one by one there: what is between old and new does not pass for either."""
     target = tmp_path / "rotor"
     shutil.copytree(both[0], target)
     (target / "notes.txt").write_text("mine", encoding="utf-8")
-    whole = [kept(folder) for folder in both]
-    for _ in killed_at_random(REPLACING, target, *both, kills=4, within=0.03):
-        found = kept(target)
+    whole = [plain(folder) for folder in both]
+    for _ in killed_at_random(REPLACING, target, *both, kills=6, within=0.04):
+        found = plain(target)
         assert found.pop("notes.txt") == b"mine"
         if found not in whole:
             with pytest.raises(ArtefactError):
                 read_artefact(target)
     generate(scene_from_text(ROTOR, "rotor"), target)
-    assert kept(target) == {**whole[0], "notes.txt": b"mine"}
+    assert plain(target) == {**whole[0], "notes.txt": b"mine"}
 
 
-def test_a_reader_between_whose_looks_the_folder_is_replaced_reads_the_new_one(
-    tmp_path: Path, both: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The manifest of the old folder and the files of the new one were taken for files edited by hand."""
-    target = tmp_path / "rotor"
-    shutil.copytree(both[0], target)
-    real, times = folders_manifest.read_manifest, []
+def put(target: Path, source: Path) -> None:
+    """Replace the files of a generated folder by those of another."""
 
-    def read(folder: Path, **options: Any) -> object:
-        found = real(folder, **options)
-        if len(times) < 3:
-            times.append(1)
-            replace_folder(target, "rotor", lambda made: copy_files(both[len(times) % 2], made))
-        return found
+    def write(made: Path) -> None:
+        for path in sorted(source.iterdir()):
+            if not path.name.startswith("."):
+                shutil.copy(path, made)
 
-    monkeypatch.setattr(folders_manifest, "read_manifest", read)
-    assert read_artefact(target) == read_manifest(both[1])
-    assert len(times) == 3
+    replace_files(target, write, last="manifest.json", owned=lambda: ())
 
 
-def copy_files(source: Path, made: Path) -> None:
-    for path in sorted(source.iterdir()):
-        shutil.copy(path, made)
+def plain(folder: Path) -> dict[str, bytes]:
+    """Content of the files in a folder whose names begin with no dot."""
+    return {name: (folder / name).read_bytes() for name in shown(folder)}
 
 
 def test_a_reader_beside_a_process_that_derives_reads_one_folder(tmp_path: Path, both: tuple[Path, Path]) -> None:
@@ -160,7 +137,7 @@ def test_a_reader_beside_a_process_that_derives_reads_one_folder(tmp_path: Path,
     shutil.copytree(both[0], target)
     allowed = [read_manifest(folder) for folder in both]
     code = REPLACING.replace("for source in", "import time\n    for source in").replace(
-        "        replace_folder", "        time.sleep(0.02)\n        replace_folder"
+        "        replace_files", "        time.sleep(0.02)\n        replace_files"
     )
     with python(code, target, *both) as process:
         assert process.stdout is not None
@@ -182,7 +159,7 @@ def test_two_that_derive_into_one_folder_take_turns(
     target = tmp_path / "rotor"
     shutil.copytree(both[0], target)
     (target / "notes.txt").write_text("mine", encoding="utf-8")
-    second = threading.Thread(target=replace_folder, args=(target, "rotor", lambda made: copy_files(both[1], made)))
+    second = threading.Thread(target=put, args=(target, both[1]))
     real = os.replace
 
     def moving(source: Path, place: Path) -> None:
@@ -192,9 +169,9 @@ def test_two_that_derive_into_one_folder_take_turns(
         real(source, place)
 
     monkeypatch.setattr(os, "replace", moving)
-    replace_folder(target, "rotor", lambda made: copy_files(both[0], made))
+    put(target, both[0])
     second.join()
-    assert kept(target) == {**kept(both[1]), "notes.txt": b"mine"}
+    assert plain(target) == {**plain(both[1]), "notes.txt": b"mine"}
 
 
 def test_a_model_whose_folder_is_written_anew_compiles_nothing_of_the_new_one(
@@ -204,7 +181,7 @@ def test_a_model_whose_folder_is_written_anew_compiles_nothing_of_the_new_one(
     target = tmp_path / "rotor"
     shutil.copytree(both[0], target)
     model = load(target)
-    replace_folder(target, "rotor", lambda made: copy_files(both[1], made))
+    put(target, both[1])
     calls: list[Callable[[], object]] = [
         lambda: model.stepper,
         lambda: model.reduce(cycles=0.1, transient=0),
@@ -216,7 +193,7 @@ def test_a_model_whose_folder_is_written_anew_compiles_nothing_of_the_new_one(
     for call in calls:
         with pytest.raises(ArtefactError, match=r"written anew or edited since\. Load the folder again"):
             call()
-    replace_folder(target, "rotor", lambda made: copy_files(both[0], made))
+    put(target, both[0])
     again = model.simulate(cycles=0.1, transient=0)
     np.testing.assert_array_equal(again.x, load(both[0]).simulate(cycles=0.1, transient=0).x)
 
@@ -233,16 +210,6 @@ def test_what_is_compiled_is_what_gave_the_key(cache: Path, source: Path, tmp_pa
     library.twice.restype = ctypes.c_double
     library.twice.argtypes = [ctypes.c_double]
     assert library.twice(4.0) == 8.0
-
-
-def test_what_killed_derivations_left_behind_is_deleted_after_a_day(tmp_path: Path) -> None:
-    old, new, other = (tmp_path / name for name in (".rotor-a.new", ".rotor-b.new", ".rotors"))
-    for folder in (old, new, other):
-        folder.mkdir()
-    for folder in (old, other):
-        os.utime(folder, (0, 0))
-    replace_folder(tmp_path / "rotor", "rotor", lambda made: (made / "manifest.json").touch())
-    assert sorted(path.name for path in tmp_path.iterdir()) == [".rotor-b.new", ".rotors", "rotor"]
 
 
 def test_a_killed_compiler_leaves_no_library_or_a_whole_one(cache: Path, tmp_path: Path) -> None:
@@ -378,91 +345,7 @@ def test_an_interrupt_at_any_moment_ends_with_130_and_whole_files(
         assert set(found) == set(old)
         load_solution(tmp_path / "results" / "solution.nc")
         read_artefact(tmp_path / "generated" / "rotor")
-        assert not [path for path in tmp_path.rglob(".*") if path.suffix in (".tmp", ".new") or "writing" in path.name]
-
-
-def test_an_interrupt_after_the_work_is_done_takes_nothing_back() -> None:
-    """While the interpreter shuts down Python has given its handler away: the process ended by the signal, code -2."""
-    code = """
-        import os, signal
-        from ballpass.runtime.app import cli
-
-        class Last:
-            def __del__(self, kill=os.kill, me=os.getpid(), number=signal.SIGINT):
-                kill(me, number)
-
-        last = Last()  # goes when modules are taken down
-        cli.app = lambda: None
-        cli.main()
-    """
-    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
-@pytest.mark.parametrize("within", ["reported()", "contextlib.nullcontext()"])
-def test_an_interrupt_is_said_once_wherever_a_command_is(within: str) -> None:
-    """Before and behind what a command reports itself, typer ends with 130 and without a word."""
-    code = f"""
-        import contextlib, os, signal, sys
-        from ballpass.runtime.app import cli
-        from ballpass.runtime.app.commands.shared import reported
-
-        @cli.app.command()
-        def late():
-            with {within}:
-                os.kill(os.getpid(), signal.SIGINT)
-
-        sys.argv = ["ballpass", "late"]
-        cli.main()
-    """
-    with python(code) as process:
-        out, errors = process.communicate(timeout=300)
-    assert process.returncode == 130
-    assert errors.strip() == "error: interrupted. Whatever files are there are whole."
-    assert out == ""
-
-
-def test_an_interrupt_that_an_import_turns_into_something_else_is_one_still() -> None:
-    """Python 3.11 wraps what `__set_name__` raises in a RuntimeError: once a traceback and exit code 1."""
-    code = """
-        import os, signal, sys
-        from ballpass.runtime.app import cli
-        def broken():
-            class Name:
-                def __set_name__(self, owner, name):
-                    os.kill(os.getpid(), signal.SIGINT)
-            class Owner:
-                name = Name()
-        cli.app = broken
-        cli.main()
-    """
-    with python(code) as process:
-        out, errors = process.communicate(timeout=300)
-    assert process.returncode == 130
-    assert errors.strip() == "error: interrupted. Whatever files are there are whole."
-    assert out == ""
-
-
-def test_an_interrupt_where_python_ignores_exceptions_is_heard_all_the_same() -> None:
-    """In a callback of a weak reference it was printed with a traceback, and the run went on to its end."""
-    code = """
-        import os, signal, time, weakref
-        from ballpass.runtime.app import cli
-        def collecting():
-            class Thing:
-                pass
-            thing = Thing()
-            reference = weakref.ref(thing, lambda _: os.kill(os.getpid(), signal.SIGINT))
-            del thing
-            time.sleep(10)
-        cli.app = collecting
-        cli.main()
-    """
-    with python(code) as process:
-        out, errors = process.communicate(timeout=300)
-    assert process.returncode == 130
-    assert errors.strip() == "error: interrupted. Whatever files are there are whole."
-    assert out == ""
+        assert not [*tmp_path.rglob(f"{NEW}*"), *tmp_path.rglob(".*.tmp")]
 
 
 def test_an_interrupt_while_compiling_ends_the_compiler_and_its_children(
@@ -485,57 +368,6 @@ def test_an_interrupt_while_compiling_ends_the_compiler_and_its_children(
     assert gone(int(note.read_text()))
     assert not list(cache.iterdir())
     assert not (tmp_path / "results").exists()
-
-
-def test_an_interrupt_while_the_compiler_is_started_ends_it_as_well(tmp_path: Path) -> None:
-    """Between the start of a process and the moment its number is known nobody could end it: it ran on, its minutes.
-
-    Here an interrupt arrives at every line of Python between the two.
-    """
-    code = """
-        import os, signal, subprocess, sys
-        from ballpass.runtime.native import compilers
-
-        real, started = subprocess._fork_exec, []
-        def fork(*words):
-            number = real(*words)
-            started.append(number)
-            sys.settrace(trace)
-            frame = sys._getframe(1)
-            while frame is not None:  # those that run already are not traced by that
-                frame.f_trace = trace
-                frame = frame.f_back
-            return number
-        subprocess._fork_exec = fork
-
-        left = 0
-        def trace(frame, event, argument):
-            global left
-            left -= 1
-            if left == 0:
-                sys.settrace(None)
-                os.kill(os.getpid(), signal.SIGINT)
-            return trace
-
-        print("ready", flush=True)
-        for moment in range(1, 40):
-            left = moment
-            try:
-                compilers._finish(("sleep", "60"), None, 60.0)
-            except KeyboardInterrupt:
-                pass
-            sys.settrace(None)
-        print(*started)
-    """
-    with python(code) as process:
-        out, errors = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 0, errors
-    numbers = [int(word) for word in out.split()[1:]]
-    assert len(numbers) == 39
-    running = [number for number in numbers if not gone(number)]
-    for number in running:
-        os.kill(number, signal.SIGKILL)
-    assert not running
 
 
 def gone(process: int) -> bool:
@@ -719,7 +551,7 @@ def test_a_limit_of_file_size_is_told_and_the_old_solution_stays(rotor: Path, tm
     with python(code, target) as process:
         out, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors
-    assert "cannot be written (File too large); a file that was there is as it was. Free some space" in out
+    assert "cannot be written (File too large); a file that was there is as it was. Give a folder" in out
     assert target.read_bytes() == before
     assert shown(tmp_path) == ["results.nc", "rotor"]
 

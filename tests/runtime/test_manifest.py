@@ -36,63 +36,35 @@ def test_round_trip_gives_the_same_record_and_the_same_bytes(folder: Path) -> No
     assert [path.name for path in sorted(folder.iterdir())] == ["manifest.json", "model.c", "model.casadi"]
 
 
+def test_another_schema_and_an_edited_manifest_are_refused_with_a_remedy(folder: Path) -> None:
+    for change, words in (({"schema": 99}, "schema 99"), ({"schema": None}, "schema None"), ({"title": "x"}, "edited")):
+        text = json.dumps(document(folder) | change)
+        with pytest.raises(ArtefactError, match=rf"{words}.*ballpass derive"):
+            mf.Manifest.from_json(text)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda d: d.update(schema=99), ["schema 99", "reads schema 3", "ballpass derive"]),
-        (lambda d: d.pop("schema"), ["schema None"]),
-        (lambda d: d.update(colour="red"), ["colour: unknown key"]),
-        (lambda d: d.pop("inputs"), ["inputs: missing"]),
-        (lambda d: d["parameters"][2].update(default="4 kg"), ["parameters[2].default", "finite number", "text"]),
-        (lambda d: d["parameters"][2].update(default=True), ["parameters[2].default", "true/false"]),
-        (lambda d: d["inputs"][0].update(kind="wave"), ["inputs[0].kind", "'gate'", "'wave'"]),
-        (lambda d: d["inputs"][1].update(windows=[["push.window.start"]]), ["windows[0]: 2 entries"]),
-        (lambda d: d["inputs"][1].update(rate="driver.sped"), ["inputs[gate.push].rate", "'driver.sped'"]),
-        (lambda d: d["outputs"].append(d["outputs"][0]), ["outputs: the name 'body.x' occurs 2 times"]),
-        (lambda d: d.update(initial=["initial.x"]), ["initial: 2 names"]),
-        (lambda d: d["run"].update(duration=1.0), ["exactly one of cycles and duration"]),
-        (lambda d: d.update(mechanism=3), ["mechanism: an object", "number 3"]),
-        (lambda d: d["mechanism"]["forces"][0].pop(), ["mechanism.forces[0]: 4 entries"]),
-        (
-            lambda d: d["mechanism"]["forces"][0].__setitem__(2, "Q"),
-            ["mechanism.forces[push]: 'Q' of 'pin' is no point"],
-        ),
-        (lambda d: d["mechanism"]["forces"][0].__setitem__(3, "gate.pull"), ["'gate.pull' is no gate"]),
-        (
-            lambda d: d["mechanism"]["forces"][0].__setitem__(0, "pull"),
-            ["mechanism.forces.pull.force.x and", "missing"],
-        ),
+        (lambda d: d.update(colour="red"), r"unknown keys colour"),
+        (lambda d: d.pop("inputs"), r"missing .*'inputs'"),
+        (lambda d: d["parameters"][2].update(default="4 kg"), r"parameters\[2\]\.default: .*float.*'4 kg'"),
+        (lambda d: d["parameters"][2].update(default=True), r"parameters\[2\]\.default: .*True"),
+        (lambda d: d["inputs"][0].update(kind="wave"), r"inputs\[0\]\.kind: .*'gate'.*'wave'"),
+        (lambda d: d["inputs"][1].update(windows=[["push.window.start"]]), r"inputs\[1\]\.windows\[0\]: "),
+        (lambda d: d.update(mechanism=3), "mechanism: .*3"),
     ],
 )
-def test_each_fault_is_named(folder: Path, change: Any, words: list[str]) -> None:
+def test_a_fault_of_an_edit_that_is_meant_is_named(folder: Path, change: Any, words: str) -> None:
     content = document(folder)
     change(content)
-    (folder / "manifest.json").write_text(json.dumps(content))
-    with pytest.raises(ArtefactError) as caught:
-        mf.read_manifest(folder)
-    for word in words:
-        assert word in str(caught.value)
-
-
-def test_all_faults_are_reported_together(folder: Path) -> None:
-    content = document(folder)
-    content["title"] = 3
-    content["run"]["rtol"] = None
-    content["extra"] = 1
-    with pytest.raises(ArtefactError, match="3 fault") as caught:
-        mf.Manifest.from_json(json.dumps(content))
-    assert all(word in str(caught.value) for word in ("title", "run.rtol", "extra"))
+    with pytest.raises(ArtefactError, match=words):
+        mf.Manifest.from_json(json.dumps(content), verify=False)
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "3", '{"schema": NaN}'])
 def test_texts_that_are_no_manifest_are_refused(text: str) -> None:
     with pytest.raises(ArtefactError):
-        mf.Manifest.from_json(text)
-
-
-def test_not_finite_numbers_are_refused(folder: Path) -> None:
-    text = (folder / "manifest.json").read_text().replace('"default": 4.0', '"default": NaN')
-    with pytest.raises(ArtefactError, match=r"parameters\[2\]\.default: a finite number"):
         mf.Manifest.from_json(text)
 
 

@@ -6,14 +6,46 @@
     generate   -> folder       C, serialised functions, EQUATIONS.md, manifest.json
 
 Nothing flows back.  `ballpass.runtime` reads the folder and never imports this package.
+
+Names are imported when first used: whoever only reads a scene, or finds that its folder is fresh, waits for no SymPy.
 """
 
-from ballpass.derive.emit.equations import equations
-from ballpass.derive.emit.folder import check, generate
-from ballpass.derive.lower.functions import lower
-from ballpass.derive.scene.errors import SceneError
-from ballpass.derive.scene.read import read_scene
-from ballpass.derive.scene.records import Scene
-from ballpass.derive.system import System, derive
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ballpass.derive.emit.equations import equations
+    from ballpass.derive.emit.generate import check, generate
+    from ballpass.derive.lower.functions import lower
+    from ballpass.derive.scene.errors import SceneError
+    from ballpass.derive.scene.read import read_scene
+    from ballpass.derive.scene.records import Scene
+    from ballpass.derive.system import System, derive
 
 __all__ = ["Scene", "SceneError", "System", "check", "derive", "equations", "generate", "lower", "read_scene"]
+
+_HOME = {
+    "Scene": "scene.records",
+    "SceneError": "scene.errors",
+    "System": "system",
+    "check": "emit.generate",
+    "derive": "system",
+    "equations": "emit.equations",
+    "generate": "emit.generate",
+    "lower": "lower.functions",
+    "read_scene": "scene.read",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -13,7 +13,6 @@ from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.named_error import Models, simulate_to_error
 from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
-from ballpass.runtime.contract.folders import LOOKS
 from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
 from ballpass.runtime.many.members import Table
@@ -64,15 +63,12 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     """
     # absolute: functions may be read after the process has moved elsewhere
     place = Path(folder).absolute()
-    for look in range(LOOKS):
+    manifest = read_artefact(folder, verify=verify)
+    try:
+        library = compile_model(place, manifest, compiler)
+    except ArtefactError:  # another process has written the folder anew since the manifest was read
         manifest = read_artefact(folder, verify=verify)
-        try:
-            library = compile_model(place, manifest, compiler)
-            break
-        except ArtefactError:
-            # another process has put a new folder in place since the manifest was read
-            if look == LOOKS - 1:
-                raise
+        library = compile_model(place, manifest, compiler)
     return Model(place, manifest, library, compiler=compiler)
 
 

@@ -7,43 +7,24 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
+from ballpass.derive.emit.signature import run_info, signature, versions
 from ballpass.derive.lower.functions import Functions, operations
 from ballpass.derive.mechanism.forces import drawn_forces
-from ballpass.derive.scene.records import Scene
 from ballpass.derive.scene.values import value_bounds, value_relations
 from ballpass.derive.system import System
 from ballpass.derive.variables import Output
 from ballpass.runtime import contract as mf
 
 
-def run_info(scene: Scene) -> mf.RunInfo:
-    run = scene.run
-    return mf.RunInfo(
-        cycles=run.cycles,
-        duration=run.duration,
-        transient_cycles=run.transient_cycles,
-        samples_per_cycle=run.samples_per_cycle,
-        method=run.method,
-        rtol=run.rtol,
-    )
-
-
-def describe(
-    system: System,
-    functions: Functions,
-    *,
-    signature: str,
-    versions: tuple[tuple[str, str], ...],
-    files: tuple[tuple[str, str], ...],
-) -> mf.Manifest:
+def describe(system: System, functions: Functions, files: tuple[tuple[str, str], ...]) -> mf.Manifest:
     """Manifest of a model whose files have these digests."""
     scene = system.scene
     bounds = value_bounds(scene)
     return mf.Manifest(
         scene=scene.name,
         title=scene.title,
-        signature=signature,
-        versions=versions,
+        signature=signature(scene),
+        versions=versions(),
         parameters=tuple(
             mf.ParameterInfo(
                 name=p.name,

@@ -8,13 +8,8 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import signal
-import sys
-import threading
 from importlib.metadata import version
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -49,7 +44,6 @@ from ballpass.runtime.app.commands.shared import (
 )
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import read_error, trade, usable_trade
-from ballpass.runtime.app.entry import INTERRUPTED, leave_at_once
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:
@@ -145,7 +139,7 @@ def run(
         folder = out if out is not None else Path("results") / read.name
         check_folder(folder)
         with faults_of(scene):
-            model = load_model(read, stages, method or read.run.method, kinks, rtol)
+            model = load_model(read, stages, method or read.run.method, kinks, rtol, overrides=overrides)
         measured = usable_trade(folder, asked, read) if target is not None else None
         stages("simulate")
         solution = model.simulate(
@@ -323,6 +317,7 @@ def _write_results(
     -------
     The summary, and the names of the files.
     """
+    from ballpass.runtime.app.figures import NAMES as FIGURES
     from ballpass.runtime.app.results import SOLUTION, write_results
     from ballpass.runtime.app.summary import summarize
 
@@ -334,63 +329,10 @@ def _write_results(
     def write(made: Path) -> dict[str, Any]:
         solution.save(made / SOLUTION)
         if figures:
-            from ballpass.runtime.app.figures import draw_all
+            from ballpass.runtime.app.figures.gallery import draw_all
 
             stages("draw")
             draw_all(model, solution, made)
         return summary
 
-    return write_results(folder, write, figures=_figures(folder))
-
-
-def _figures(folder: Path) -> list[str]:
-    """Names of the figures that an earlier run may have left in a folder."""
-    if not any(folder.glob("*.png")):
-        return []
-    from ballpass.runtime.app.figures import FIGURES
-
-    return [f"{kind.name}.png" for kind in FIGURES]
-
-
-def main() -> None:
-    """Run the command line; `ballpass.runtime.app.entry` is where the command begins.
-
-    An interrupt (Ctrl-C) ends it with exit code 130 wherever it arrives: within a command, between two, or while a
-    module is imported, where Python may turn it into another exception.
-    """
-    heard: list[int] = []
-
-    def hear(number: int, frame: FrameType | None) -> None:
-        heard.append(number)
-        signal.default_int_handler(number, frame)
-
-    def swallowed(told: sys.UnraisableHookArgs) -> None:
-        """An interrupt that arrived where Python ignores exceptions, as in a callback of a weak reference: again."""
-        if not (heard and issubclass(told.exc_type, KeyboardInterrupt)):
-            sys.__unraisablehook__(told)
-            return
-        again = threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT))  # sent here it would be swallowed as well
-        again.daemon = True
-        again.start()
-
-    before = sys.unraisablehook
-    if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, leave_at_once):  # else somebody wants it ignored
-        signal.signal(signal.SIGINT, hear)
-        sys.unraisablehook = swallowed
-    try:
-        app()
-    except (Exception, KeyboardInterrupt):  # whatever an interrupt became; all else shows itself
-        if not heard:
-            raise
-        complain(INTERRUPTED)
-        sys.exit(130)
-    except SystemExit as ended:
-        # typer makes a silent end of an interrupt that arrives before or behind what a command reports itself
-        if heard and isinstance(getattr(ended.__context__, "__cause__", None), KeyboardInterrupt):
-            complain(INTERRUPTED)
-        raise
-    finally:
-        # what is done is done: while the interpreter shuts down it would end the process by the signal itself
-        if signal.getsignal(signal.SIGINT) is hear:
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-        sys.unraisablehook = before
+    return write_results(folder, write, figures=[f"{name}.png" for name in FIGURES])

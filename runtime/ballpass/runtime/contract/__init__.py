@@ -14,7 +14,6 @@ c   derived constants in the order of `Manifest.constants`, from ``constants(p)`
 === ======================================================================================================
 """
 
-from ballpass.runtime.contract.consistency import force_components
 from ballpass.runtime.contract.folder import (
     check_files,
     check_unchanged,
@@ -23,8 +22,8 @@ from ballpass.runtime.contract.folder import (
     read_manifest,
     write,
 )
-from ballpass.runtime.contract.json_text import DIGEST, text_digest, text_of
 from ballpass.runtime.contract.manifest import (
+    DIGEST,
     FILE_NAME,
     JACOBIANS,
     MODEL,
@@ -41,6 +40,8 @@ from ballpass.runtime.contract.manifest import (
     QuantityInfo,
     RunInfo,
     VariableInfo,
+    digest_of,
+    force_components,
 )
 
 __all__ = [
@@ -63,11 +64,10 @@ __all__ = [
     "VariableInfo",
     "check_files",
     "check_unchanged",
+    "digest_of",
     "file_digest",
     "force_components",
     "read_artefact",
     "read_manifest",
-    "text_digest",
-    "text_of",
     "write",
 ]

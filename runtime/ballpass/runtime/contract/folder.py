@@ -5,14 +5,12 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import importlib.metadata
-import os
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from ballpass.runtime.contract.errors import ArtefactError
-from ballpass.runtime.contract.folders import read_settled
+from ballpass.runtime.contract.folders import read_whole, replace_file
 from ballpass.runtime.contract.manifest import FILE_NAME, Manifest
 
 
@@ -38,7 +36,7 @@ def read_artefact(folder: str | Path, *, verify: bool = True) -> Manifest:
         check_files(folder, manifest)
         return manifest
 
-    manifest = read_settled(place, consistent, ArtefactError)
+    manifest = read_whole(place, consistent, ArtefactError)
     _check_version(folder, manifest)
     return manifest
 
@@ -90,17 +88,7 @@ def read_manifest(folder: str | Path, *, verify: bool = True) -> Manifest:
 def write(folder: str | Path, manifest: Manifest) -> Path:
     """Write ``manifest.json`` into `folder`: the old file or the new one, never half of it."""
     target = Path(folder) / FILE_NAME
-    descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=".manifest-")
-    try:
-        with os.fdopen(descriptor, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(manifest.to_json())
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)  # mkstemp's 0600 would shut out colleagues
-        os.replace(temporary, target)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    replace_file(target, manifest.to_json().encode())
     return target
 
 

@@ -1,137 +1,123 @@
-"""Put a folder in the place of another: the old files or the new ones, whenever the process is stopped.
+"""Put files in the place of others: whole files, one process at a time.
 
-What both halves need for it: an exchange of two folders in one step where the system can (Linux, macOS), permissions,
-turns of processes that write the same folder, readers beside them, and the removal of what killed processes left.
+A file is written beside its place and moved there, so that it is the old one or the new one.  A folder's files are
+moved one by one, the one with the digests of all others last: where a process is ended in between, the digests do not
+fit, and readers refuse the folder.  Files of others are not touched.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes
-import glob
 import os
 import shutil
-import sys
-import time
-from collections.abc import Callable, Iterator
+import tempfile
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from typing import TypeVar
 
-#: Folders of this age, made to be moved, were left by a process that was killed [s].
-LEFT_BEHIND = 86_400.0
+from ballpass.runtime.contract.errors import RequestError
 
-#: How often a folder is looked at again that another process replaces meanwhile.
-LOOKS = 20
+#: File that a process holds while it writes into a folder; it stays, empty.
+LOCK = ".ballpass.lock"
 
-#: A file system's clock may stand for as long [s]: two changes within it leave the same times.
-_TICK = 0.1
+#: Start of the name of the folder, within, in which new files are made.
+NEW = ".ballpass-new-"
 
-#: How long a process waits for its turn [s].  Files are put in place within milliseconds: who holds a lock for longer
-#: is another program, perhaps the one that started this process (``flock results ballpass run ...``).
-_PATIENCE = 10.0
-
-_AT_CWD, _RENAME_EXCHANGE = -100, 2  # fcntl.h, stdio.h of Linux
-_RENAME_SWAP = 2  # stdio.h of macOS
-
-try:
-    import fcntl
-except ModuleNotFoundError:  # Windows
-    fcntl = None  # type: ignore[assignment]
+#: How long a process waits for another one that writes into the same folder [s].
+PATIENCE = 300.0
 
 _Content = TypeVar("_Content")
 
 
-def state(folder: Path) -> tuple[int, int, int] | None:
-    """What changes whenever a folder is replaced, or a file is moved into it; None where there is none."""
-    try:
-        found = folder.stat()
-    except (OSError, ValueError):
-        return None
-    return found.st_ino, found.st_mtime_ns, found.st_ctime_ns
-
-
-def read_settled(folder: Path, read: Callable[[], _Content], fault: type[Exception]) -> _Content:
-    """What `read` gives of a folder; read again where another process replaced files between its looks.
-
-    Parameters
-    ----------
-    fault : what `read` raises where files do not belong together
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Let one process or thread at a time write into a folder.
 
     Raises
     ------
-    fault
-        Nobody writes there, and they do not belong together; or the folder is written anew all the time.
+    RequestError
+        Another one has been writing there for minutes.
     """
-    for _ in range(LOOKS):
-        before = state(folder)
-        try:
+    import filelock  # here: most processes write nothing
+
+    try:
+        with filelock.FileLock(folder / LOCK, timeout=PATIENCE):
+            yield
+    except filelock.Timeout:
+        raise RequestError(
+            f"{folder}: another process has been writing there for {PATIENCE:g} s. Wait for it, or give another folder."
+        ) from None
+
+
+def read_whole(folder: Path, read: Callable[[], _Content], fault: type[Exception]) -> _Content:
+    """What `read` gives of a folder; where its files do not fit together, read again when nobody writes there.
+
+    Parameters
+    ----------
+    fault : what `read` raises where files do not fit together
+    """
+    try:
+        return read()
+    except fault:
+        if not ((folder / LOCK).exists() and os.access(folder, os.W_OK)):
+            raise
+        with locked(folder):
             return read()
-        except fault:
-            if state(folder) == before:
-                if before is None or time.time() - before[1] * 1e-9 > _TICK:
-                    raise
-                time.sleep(2 * _TICK)  # it may have changed twice within a tick; nobody can once the tick is over
-                if state(folder) == before:
-                    return read()
-    raise fault(f"{folder}: is written anew all the time. Read it when no process writes there.")
 
 
-@contextlib.contextmanager
-def turn(parent: Path) -> Iterator[None]:
-    """Let one process or thread at a time put files in place below a folder.
+def replace_file(path: Path, content: bytes) -> None:
+    """Write a file: the old one or the new one, never half of it."""
+    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-")
+    try:
+        with os.fdopen(descriptor, "wb") as stream:
+            stream.write(content)
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(temporary, 0o666 & ~mask)  # mkstemp's 0600 would shut out colleagues
+        os.replace(temporary, path)
+    except BaseException:
+        os.unlink(temporary)
+        raise
 
-    Where the system or its file system has no locks, and where somebody holds one for long, nothing is waited for: the
-    files are then whole as well, but the slower of two processes may find its own gone.
+
+def replace_files(
+    folder: Path, write: Callable[[Path], _Content], *, last: str, owned: Callable[[], Collection[str]]
+) -> _Content:
+    """Replace the files in a folder by new ones; files of others stay.
+
+    Parameters
+    ----------
+    folder : made where it is missing, and deleted again where nothing comes of it
+    write : writes all files into the folder it is called with
+    last : name of the file that is put in place last
+    owned : names of files that go where the new ones have none of that name; asked when nobody else writes there
+
+    Returns
+    -------
+    What `write` returned.
     """
-    if fcntl is None:
-        yield
-        return
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
     try:
-        descriptor = os.open(parent, os.O_RDONLY)
-    except OSError:  # may be written, not read
-        yield
-        return
-    try:
-        end = time.monotonic() + _PATIENCE
-        while time.monotonic() < end:
+        with locked(folder):
+            for left in folder.glob(f"{NEW}*"):  # by processes that were killed
+                shutil.rmtree(left, ignore_errors=True)
+            made = Path(tempfile.mkdtemp(prefix=NEW, dir=folder))
             try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                time.sleep(0.01)
-            except OSError:  # no locks on this file system
-                break
-        yield
-    finally:
-        os.close(descriptor)  # and the lock with it, also where the process is killed
-
-
-def swap(first: Path, second: Path) -> bool:
-    """Exchange two folders of one file system in one step; False where the system cannot."""
-    names = (os.fsencode(first), os.fsencode(second))
-    try:
-        library = ctypes.CDLL(None, use_errno=True)
-        if sys.platform == "linux":
-            done: int = library.renameat2(_AT_CWD, names[0], _AT_CWD, names[1], ctypes.c_uint(_RENAME_EXCHANGE))
-        elif sys.platform == "darwin":
-            done = library.renamex_np(*names, ctypes.c_uint(_RENAME_SWAP))
-        else:
-            return False
-    except (AttributeError, OSError, TypeError):  # no such function in this C library
-        return False
-    return done == 0
-
-
-def permit(made: Path, place: Path) -> None:
-    """Give a new folder the permissions of the old one, or those of any new folder: mkdtemp's shut out colleagues."""
-    mask = os.umask(0)
-    os.umask(mask)
-    os.chmod(made, place.stat().st_mode & 0o7777 if place.is_dir() else 0o777 & ~mask)
-
-
-def clear(parent: Path, label: str, ending: str) -> None:
-    """Delete folders ``.<label>-*<ending>`` that processes which were killed left long ago."""
-    for path in parent.glob(f".{glob.escape(label)}-*{ending}"):
-        with contextlib.suppress(OSError):
-            if time.time() - path.stat().st_mtime > LEFT_BEHIND:
-                shutil.rmtree(path, ignore_errors=True)
+                result = write(made)
+                names = {path.name for path in made.iterdir()}
+                for name in sorted(names - {last}):
+                    os.replace(made / name, folder / name)
+                for name in sorted(set(owned()) - names):
+                    (folder / name).unlink(missing_ok=True)
+                os.replace(made / last, folder / last)
+            finally:
+                shutil.rmtree(made, ignore_errors=True)
+    except BaseException:
+        if missing:
+            with contextlib.suppress(OSError):  # somebody else wrote there meanwhile
+                (folder / LOCK).unlink(missing_ok=True)
+                for path in missing:
+                    path.rmdir()
+        raise
+    return result

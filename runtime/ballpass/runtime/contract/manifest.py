@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
-from ballpass.runtime.contract.consistency import contradictions
 from ballpass.runtime.contract.errors import ArtefactError
-from ballpass.runtime.contract.json_text import DIGEST, kind_of, read_record, text_digest, text_of
+from ballpass.runtime.contract.json_text import from_plain
 
 SCHEMA = 3
 FILE_NAME = "manifest.json"
+
+#: Last key of the file: sha256 of its text without this key.
+DIGEST = "digest"
 
 #: Where a generated function lives: ``<library>.c`` and, serialised, ``<library>.casadi``.
 MODEL, JACOBIANS = "model", "jacobians"
@@ -168,7 +171,7 @@ class MechanismInfo:
     """What observables need of the linkage: driver joint, names of its parameters, joints, points for drawing.
 
     The components of an applied force are the parameters ``mechanism.forces.<name>.force.x`` and ``.y``, or
-    ``.magnitude`` and ``.direction`` (see `consistency.force_components`).
+    ``.magnitude`` and ``.direction`` (see `force_components`).
     """
 
     driver_joint: str
@@ -224,11 +227,11 @@ class Manifest:
         The last key is the digest of the text without it: who edits a number there by hand is told.
         """
         document = asdict(self)
-        return text_of({**document, DIGEST: text_digest(document)})
+        return _text(document | {DIGEST: digest_of(document)})
 
     @classmethod
     def from_json(cls, text: str, *, source: str = FILE_NAME, verify: bool = True) -> Manifest:
-        """Manifest from its JSON text; all faults are raised together.
+        """Manifest from its JSON text.
 
         Parameters
         ----------
@@ -239,46 +242,43 @@ class Manifest:
         Raises
         ------
         ArtefactError
-            Not JSON, another schema, edited, or unknown or missing keys or values of a wrong type, each with its place.
+            Not JSON, another schema, edited, or not the records of this version.
         """
+        again = "Write the folder again with `ballpass derive`"
         try:
-            document = json.loads(text)
-        except (ValueError, RecursionError) as fault:  # no JSON, integers of thousands of digits, deep nesting
+            document = dict(json.loads(text))
+        except (ValueError, TypeError, RecursionError) as fault:
+            raise ArtefactError(f"{source}: no JSON object ({fault}). {again}.") from None
+        if document.get("schema") != SCHEMA:
             raise ArtefactError(
-                f"{source}: not JSON ({str(fault) or type(fault).__name__}). Write the folder again with "
-                "`ballpass derive`."
-            ) from None
-        if not isinstance(document, Mapping):
-            raise ArtefactError(f"{source}: a JSON object is expected, not {kind_of(document)}.")
-        schema = document.get("schema")
-        if schema != SCHEMA or isinstance(schema, bool):
-            raise ArtefactError(
-                f"{source}: schema {schema!r} was given, this version of ballpass reads schema {SCHEMA}. "
-                "Write the folder again with this version's `ballpass derive`."
+                f"{source}: schema {document.get('schema')!r:.40} was given, this version of ballpass reads schema "
+                f"{SCHEMA}. {again}."
             )
-        document = dict(document)
         digest = document.pop(DIGEST, None)
-        faults: list[str] = []
-        manifest = read_record(cls, document, "", faults)
-        if not faults:
-            faults = contradictions(manifest)
-        if faults:
+        if verify and digest != digest_of(document):
             raise ArtefactError(
-                f"{source}: {len(faults)} fault(s):\n"
-                + "\n".join(f"  - {fault}" for fault in faults)
-                + "\nThe file is generated: write the folder again with `ballpass derive` instead of editing it."
+                f"{source}: the digest in it, {digest!r:.20}, is not that of its content: edited or cut short. "
+                f"{again}, or load it with verify=False if the edit is meant."
             )
+        try:
+            manifest = from_plain(cls, document, "manifest")
+        except ValueError as fault:
+            raise ArtefactError(f"{source}: {fault}. {again} instead of editing it.") from None
         assert isinstance(manifest, cls)
-        if verify and digest != text_digest(document):
-            raise ArtefactError(
-                f"{source}: the digest in it, {_shortened(digest)}, is not that of its content: edited or cut short. "
-                "Write the folder again with `ballpass derive`, or load it with verify=False if the edit is meant."
-            )
         return manifest
 
 
-def _shortened(digest: object) -> str:
-    """A digest for a message: its first digits, or what else stands there, or nothing."""
-    if not isinstance(digest, str):
-        return repr(digest)[:40]
-    return repr(digest if len(digest) <= 16 else f"{digest[:16]}...")
+def force_components(name: str) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Names of the parameters that hold an applied force: x and y [N], or magnitude [N] and direction [rad]."""
+    path = f"mechanism.forces.{name}.force"
+    return (f"{path}.x", f"{path}.y"), (f"{path}.magnitude", f"{path}.direction")
+
+
+def digest_of(document: Mapping[str, Any]) -> str:
+    """sha256 of a manifest's text without its digest, hexadecimal."""
+    return hashlib.sha256(_text(document).encode()).hexdigest()
+
+
+def _text(document: Mapping[str, Any]) -> str:
+    """JSON, one entry a line; not finite numbers are those of an edited file."""
+    return json.dumps(document, indent=1, ensure_ascii=False) + "\n"

@@ -14,12 +14,9 @@ A further method is a line in `METHODS`.
 
 from __future__ import annotations
 
-import io
 import signal
-import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Protocol
@@ -171,40 +168,26 @@ def available_methods(model: ModelFunctions) -> tuple[str, ...]:
 
 
 def _call(function: casadi.Function, values: Mapping[str, Any]) -> np.ndarray:
-    try:
-        with _interrupts_kept():
-            return np.asarray(function(**values)["xf"].full())
-    except RuntimeError as fault:
-        lines = [line.strip() for line in str(fault).splitlines() if line.strip()]
-        raise EvaluationError(f"{function.name()}: {lines[-1] if lines else 'failed'}") from fault
-
-
-@contextmanager
-def _interrupts_kept() -> Iterator[None]:
-    """Let Ctrl-C be Ctrl-C: CasADi's integrators report it as a right-hand side that failed, and print that."""
+    """CasADi's integrators report Ctrl-C as a right-hand side that failed: it is noted, and is Ctrl-C again behind."""
     before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
-        yield
-        return
-    noted = False
-    written, words = sys.stderr, io.StringIO()
+    main = threading.current_thread() is threading.main_thread()
+    heard = False
 
     def note(number: int, frame: FrameType | None) -> None:
-        nonlocal noted
-        noted = True
-        sys.stderr = words  # what CasADi writes from here on is of the interrupt
-        before(number, frame)
+        nonlocal heard
+        heard = True
+        if callable(before):
+            before(number, frame)
 
-    signal.signal(signal.SIGINT, note)
+    if main:
+        signal.signal(signal.SIGINT, note)
     try:
-        yield
-    except (RuntimeError, KeyboardInterrupt):
-        if not noted:
-            raise
-        words.truncate(0)
-        raise KeyboardInterrupt from None
+        return np.asarray(function(**values)["xf"].full())
+    except RuntimeError as fault:
+        if heard:
+            raise KeyboardInterrupt from None
+        lines = [line.strip() for line in str(fault).splitlines() if line.strip()]
+        raise EvaluationError(f"{function.name()}: {lines[-1] if lines else 'failed'}") from fault
     finally:
-        signal.signal(signal.SIGINT, before)
-        sys.stderr = written
-        if words.getvalue():
-            written.write(words.getvalue())
+        if main:
+            signal.signal(signal.SIGINT, before)

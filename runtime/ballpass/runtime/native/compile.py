@@ -33,7 +33,6 @@ import platformdirs
 from ballpass.runtime.contract import Manifest, check_unchanged
 from ballpass.runtime.contract.errors import CompileError, RequestError
 from ballpass.runtime.native.compilers import Compiler, find_compiler, run_compiler
-from ballpass.runtime.native.interrupts import held
 
 #: Name of the C source in a generated folder.
 SOURCE = "model.c"
@@ -168,8 +167,7 @@ def compile_sources(
         _place(library, target)
         _open(target, shlex.join(shown))
     finally:
-        with held():
-            shutil.rmtree(made, ignore_errors=True)
+        shutil.rmtree(made, ignore_errors=True)
     seconds = time.perf_counter() - started
     return CompiledLibrary(path=target, key=key, compiler=compiler.identity, cached=False, seconds=seconds)
 

@@ -19,7 +19,6 @@ from functools import lru_cache
 from pathlib import Path
 
 from ballpass.runtime.contract.errors import CompileError, RequestError
-from ballpass.runtime.native.interrupts import held
 
 #: -ffp-contract=off: the same bits with and without fused multiply-add, so that results do not depend on the processor.
 FLAGS = ("-O2", "-fPIC", "-shared", "-std=c99", "-ffp-contract=off")
@@ -155,25 +154,20 @@ def _finish(command: tuple[str, ...], folder: Path | None, timeout: float) -> su
     A compiler is a driver that starts the real one: ending the driver alone leaves a child that holds the pipes, and
     reading them would wait for it.
     """
-    process = None
+    process = subprocess.Popen(
+        command,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        start_new_session=True,
+    )
     try:
-        # an interrupt that arrives before the process has a name here would leave it running
-        with held():
-            process = subprocess.Popen(
-                command,
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True,
-                errors="replace",
-                start_new_session=True,
-            )
         stdout, stderr = process.communicate(timeout=timeout)
     except BaseException:
-        if process is not None:
-            with held():
-                _end(process)
+        _end(process)
         raise
     return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -16,6 +14,7 @@ import numpy as np
 
 from ballpass.runtime.contract import Manifest, VariableInfo
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import no_output
@@ -33,6 +32,9 @@ FILE_SCHEMA = 1
 #: first.
 _SEAL = b"\nballpass sha256 "
 _SEAL_LENGTH = len(_SEAL) + 64 + 1
+
+#: Dimensions, values and attributes of a variable in a file.
+_Variable = tuple[tuple[str, ...], np.ndarray, dict[str, str]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,32 +180,8 @@ class Solution:
         """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions."""
         import xarray
 
-        variables: dict[str, Any] = {}
-        for k, state in enumerate(self.manifest.states):
-            variables[state.name] = ("time", self.x[:, k], _attributes(state))
-        infos = {info.name: info for info in self.manifest.outputs}
-        balls = 0
-        for name, samples in self.outputs.items():
-            if samples.ndim == 2:
-                balls = samples.shape[1]
-            variables[name] = (("time", "ball")[: samples.ndim], samples, _attributes(infos[name]))
-        coordinates: dict[str, Any] = {"time": ("time", self.t, {"units": "s", "long_name": "time"})}
-        if balls:
-            coordinates["ball"] = ("ball", np.arange(1, balls + 1), {"units": "1", "long_name": "number of the ball"})
-        facts = {
-            "title": self.manifest.title,
-            "scene": self.manifest.scene,
-            "status": self.status.name,
-            "ballpass_schema": FILE_SCHEMA,
-            "ballpass_parameters": json.dumps(dict(self.parameters)),
-            "ballpass_constants": json.dumps(dict(self.constants)),
-            "ballpass_run": json.dumps({"cycle_length": self.cycle_length, "transient_cycles": self.transient_cycles}),
-            "ballpass_outputs": json.dumps(list(self.outputs)),
-            "ballpass_reductions": json.dumps(_facts(self.reductions)),
-            "ballpass_steady_reductions": json.dumps(_facts(self.steady_reductions)),
-            "ballpass_statistics": json.dumps(asdict(self.statistics)),
-            "ballpass_manifest": self.manifest.to_json(),
-        }
+        variables, facts = _contents(self)
+        coordinates = {name: variables.pop(name) for name in ("time", "ball") if name in variables}
         return xarray.Dataset(variables, coords=coordinates, attrs=facts)
 
     def save(self, path: str | Path) -> Path:
@@ -215,32 +193,14 @@ class Solution:
             The folder does not exist or cannot be written, or the disk is full.
         """
         target = Path(path)
+        content = _netcdf(self)
         try:
-            descriptor, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}-", suffix=".nc")
+            replace_file(target, content + _SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n")
         except OSError as fault:
             raise RequestError(
-                f"{target}: cannot be written ({fault.strerror}). Give a folder you may write."
+                f"{target}: cannot be written ({fault.strerror or fault}); a file that was there is as it was. Give a "
+                "folder you may write, with enough free space."
             ) from fault
-        os.close(descriptor)
-        try:
-            # in memory first: a disk that is full fails in one plain write, not somewhere within HDF5
-            content = bytes(self.to_xarray().to_netcdf(engine="h5netcdf"))
-            with open(temporary, "wb") as stream:
-                stream.write(content)
-                stream.write(_SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n")
-            mask = os.umask(0)
-            os.umask(mask)
-            os.chmod(temporary, 0o666 & ~mask)
-            os.replace(temporary, target)
-        except OSError as fault:
-            Path(temporary).unlink(missing_ok=True)
-            raise RequestError(
-                f"{target}: cannot be written ({fault.strerror or fault}); a file that was there is as it was. Free "
-                "some space, or give another folder."
-            ) from fault
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
         return target
 
 
@@ -277,29 +237,82 @@ def read_bytes(path: str | Path, content: bytes) -> Solution:
     return _read(path, inner)
 
 
+def _contents(solution: Solution) -> tuple[dict[str, _Variable], dict[str, Any]]:
+    """Variables of a file, each with dimensions, values and attributes, and the facts that stand beside them."""
+    manifest = solution.manifest
+    infos = {info.name: info for info in manifest.outputs}
+    found: dict[str, _Variable] = {
+        state.name: (("time",), solution.x[:, k], _attributes(state)) for k, state in enumerate(manifest.states)
+    }
+    for name, samples in solution.outputs.items():
+        found[name] = (("time", "ball")[: samples.ndim], samples, _attributes(infos[name]))
+    found["time"] = (("time",), solution.t, {"units": "s", "long_name": "time"})
+    balls = max((samples.shape[1] for samples in solution.outputs.values() if samples.ndim == 2), default=0)
+    if balls:
+        numbers = np.arange(1, balls + 1)
+        found["ball"] = (("ball",), numbers, {"units": "1", "long_name": "number of the ball"})
+    facts: dict[str, Any] = {
+        "title": manifest.title,
+        "scene": manifest.scene,
+        "status": solution.status.name,
+        "ballpass_schema": FILE_SCHEMA,
+        "ballpass_parameters": json.dumps(dict(solution.parameters)),
+        "ballpass_constants": json.dumps(dict(solution.constants)),
+        "ballpass_run": json.dumps(
+            {"cycle_length": solution.cycle_length, "transient_cycles": solution.transient_cycles}
+        ),
+        "ballpass_outputs": json.dumps(list(solution.outputs)),
+        "ballpass_reductions": json.dumps(_facts(solution.reductions)),
+        "ballpass_steady_reductions": json.dumps(_facts(solution.steady_reductions)),
+        "ballpass_statistics": json.dumps(asdict(solution.statistics)),
+        "ballpass_manifest": manifest.to_json(),
+    }
+    return found, facts
+
+
+def _netcdf(solution: Solution) -> bytes:
+    """A NetCDF-4 file, in memory: a disk that is full then fails in one plain write, not somewhere within HDF5."""
+    import h5netcdf
+
+    variables, facts = _contents(solution)
+    memory = io.BytesIO()
+    with h5netcdf.File(memory, "w") as file:
+        for _, (dimensions, values, _) in variables.items():
+            for dimension, length in zip(dimensions, values.shape, strict=True):
+                if dimension not in file.dimensions:
+                    file.dimensions[dimension] = length
+        for name, (dimensions, values, attributes) in variables.items():
+            variable = file.create_variable(name, dimensions, values.dtype, data=values)
+            for key, text in attributes.items():
+                variable.attrs[key] = text
+        for key, fact in facts.items():
+            file.attrs[key] = fact
+    return memory.getvalue()
+
+
 def _read(path: str | Path, content: bytes) -> Solution:
     """Solution from the bytes of a file that nobody has touched."""
-    import xarray
+    import h5netcdf
 
-    with xarray.open_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False) as stored:
-        dataset = stored.load()
-    facts = dataset.attrs
-    schema = facts.get("ballpass_schema")
-    if schema is None or int(schema) != FILE_SCHEMA:
-        raise RequestError(
-            f"{path}: layout {schema!r} was found, this version reads layout {FILE_SCHEMA}. Run the scene again."
-        )
+    with h5netcdf.File(io.BytesIO(content), "r") as stored:
+        facts = dict(stored.attrs)
+        schema = facts.get("ballpass_schema")
+        if schema is None or int(schema) != FILE_SCHEMA:
+            raise RequestError(
+                f"{path}: layout {schema!r} was found, this version reads layout {FILE_SCHEMA}. Run the scene again."
+            )
+        values = {name: variable[...] for name, variable in stored.variables.items()}
     manifest = Manifest.from_json(facts["ballpass_manifest"], source=f"{path}, manifest")
     statistics = json.loads(facts["ballpass_statistics"])
     statistics["magnitudes"] = tuple(statistics["magnitudes"])
     if statistics.get("initial") is not None:
         statistics["initial"] = tuple(statistics["initial"])
-    columns = [np.asarray(dataset[state.name].values) for state in manifest.states]
-    t = np.asarray(dataset["time"].values)
+    columns = [values[state.name] for state in manifest.states]
+    t = values["time"]
     return Solution(
         t=t,
         x=np.stack(columns, axis=1) if columns else np.zeros((len(t), 0)),
-        outputs={name: np.asarray(dataset[name].values) for name in json.loads(facts["ballpass_outputs"])},
+        outputs={name: values[name] for name in json.loads(facts["ballpass_outputs"])},
         parameters=json.loads(facts["ballpass_parameters"]),
         constants=json.loads(facts["ballpass_constants"]),
         manifest=manifest,

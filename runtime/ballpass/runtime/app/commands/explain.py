@@ -51,7 +51,7 @@ def explain(
         stages("read")
         read, _, overrides = read_with_settings(scene, set_ or [])
         with faults_of(scene):
-            model = load_model(read, stages, "erk")
+            model = load_model(read, stages, "erk", overrides=overrides)
             stages("counting operations")
             counted = cost(read)
         stages("looking at time scales")

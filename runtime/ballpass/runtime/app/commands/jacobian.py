@@ -67,7 +67,7 @@ def jacobian(
         read, _, overrides = read_with_settings(scene, set_ or [])
         angle, seconds = _instant(at_angle, time)
         with faults_of(scene):
-            model = load_model(read, stages, "none")
+            model = load_model(read, stages, "none", overrides=overrides)
         stages("differentiate")
         result = _checked(model, overrides, of, wrt, angle, seconds, state, check=check)
     if json_:
@@ -94,7 +94,7 @@ def linearize(
         read, _, overrides = read_with_settings(scene, set_ or [])
         angle, seconds = _instant(at_angle, time)
         with faults_of(scene):
-            model = load_model(read, stages, "none")
+            model = load_model(read, stages, "none", overrides=overrides)
         stages("linearize")
         result = model.linearize(seconds, crank_angle=angle, parameters=overrides)
     if json_:

@@ -72,7 +72,7 @@ def sensitivity(
         if out is not None:
             check_folder(out)
         with faults_of(scene):
-            model = load_model(read, stages, method)
+            model = load_model(read, stages, method, overrides=overrides)
         begun: list[str] = []
 
         def progress(words: str, fraction: float) -> None:

@@ -13,7 +13,7 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -173,8 +173,6 @@ def read_with_settings(
     transient : turns at its start that do not count, beside a duration
     """
     from ballpass.derive import SceneError, read_scene
-    from ballpass.derive.drive import constant_speed
-    from ballpass.derive.mechanism.linkage import check_assembly, derive_linkage
     from ballpass.derive.scene.read import parse_override, with_values
 
     read = read_scene(path)
@@ -204,10 +202,6 @@ def read_with_settings(
         return read, asked, {}
     with faults_of("--set"):
         asked = with_values(asked, overrides)
-        if asked.mechanism is not None:
-            # here, so that nothing is written for a linkage that locks
-            linkage = derive_linkage(asked.mechanism, constant_speed(asked.mechanism.driver))
-            check_assembly(linkage, {quantity.path: quantity.value for quantity in asked.quantities})
     return read, asked, overrides
 
 
@@ -308,8 +302,21 @@ def checked_kinks(kinks: str | None, method: str, error: str | None = None) -> K
     return check_located(kinks, "stepper" if method == "auto" else method) if kinks is not None else None
 
 
-def load_model(scene: Scene, stages: Stages, method: str, kinks: str | None = None, rtol: float | None = None) -> Model:
-    """The scene's model, derived and compiled where it is stale; with the stepper that a run of these will take."""
+def load_model(
+    scene: Scene,
+    stages: Stages,
+    method: str,
+    kinks: str | None = None,
+    rtol: float | None = None,
+    *,
+    overrides: Mapping[str, float] | None = None,
+) -> Model:
+    """The scene's model, derived and compiled where it is stale; with the stepper that a run of these will take.
+
+    Parameters
+    ----------
+    overrides : numbers of ``--set``; refused where the linkage locks with them
+    """
     from ballpass.derive import generate
     from ballpass.runtime.model import load
     from ballpass.runtime.native.stepper import METHODS as STEPPERS
@@ -318,6 +325,8 @@ def load_model(scene: Scene, stages: Stages, method: str, kinks: str | None = No
     folder = generate(scene, progress=stages)
     stages("compile")
     model = load(folder)
+    if any(path.startswith("mechanism.") for path in overrides or {}):
+        model.check_assembly(overrides)
     if model.has_stepper and method in ("auto", *STEPPERS):
         _ = model.stepper  # compiled here, where it is announced
         tolerance = model.manifest.run.rtol if rtol is None else rtol

@@ -129,7 +129,7 @@ def sweep(
         folder = out if out is not None else Path("results") / read.name
         check_folder(folder)
         with faults_of(scene):
-            model = load_model(read, stages, method or read.run.method, at_kinks, rtol)
+            model = load_model(read, stages, method or read.run.method, at_kinks, rtol, overrides=overrides)
             _ = model.ensemble_driver  # compiled here, where it is announced
 
         varied = grid(ranges)

@@ -144,7 +144,7 @@ def load_models(scene: Scene, folder: Path, stages: Stages) -> dict[str, Model]:
 
 def key_of(scene: Scene, of: Sequence[str] | None, members: int) -> dict[str, Any]:
     """What a measurement is valid for: structure, numbers, run, deriving sources, versions, request."""
-    from ballpass.derive.emit.folder import signature
+    from ballpass.derive.emit.signature import signature
     from ballpass.runtime.certify.stored_trade import versions
     from ballpass.runtime.native.compilers import find_compiler
 

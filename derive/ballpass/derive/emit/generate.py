@@ -1,0 +1,195 @@
+"""Bring the generated folder of a scene up to date.
+
+In: a scene.  Out: its folder, derived anew where it is stale.  Whatever needs SymPy is imported only then.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballpass.derive.emit.signature import run_info, signature
+from ballpass.derive.scene.read import read_scene
+from ballpass.derive.scene.records import Scene
+from ballpass.runtime import contract as mf
+from ballpass.runtime.contract.errors import ArtefactError, RequestError
+from ballpass.runtime.contract.folders import locked, replace_files
+
+if TYPE_CHECKING:
+    from ballpass.derive.lower.functions import Functions
+    from ballpass.derive.system import System
+
+#: Every file that a derivation writes.
+GENERATED = (
+    "EQUATIONS.md",
+    "ensemble_kernels.h",
+    "jacobians.c",
+    "jacobians.casadi",
+    "jacobians.h",
+    "kernels.h",
+    mf.FILE_NAME,
+    "methods.h",
+    "model.c",
+    "model.casadi",
+    "model.h",
+    "switches.h",
+    "tangents.h",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """Result of comparing a folder with what its scene derives today; `stale` names the files that differ."""
+
+    folder: Path
+    stale: tuple[str, ...]
+
+
+def generate(
+    scene: str | Path | Scene,
+    out: str | Path | None = None,
+    *,
+    force: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> Path:
+    """Write the generated folder of a scene unless it is there and fresh.
+
+    Parameters
+    ----------
+    scene : path of a scene file, or a scene
+    out : folder to write; ``./generated/<scene name>`` by default
+    force : derive again even where nothing changed
+    progress : called with the name of each stage
+
+    Returns
+    -------
+    The folder.
+
+    Raises
+    ------
+    SceneError
+        The scene is wrong.  Nothing is written then.
+    RequestError
+        The folder holds files, but none that this function wrote.  Nothing is written then.
+    """
+    say = progress or (lambda _: None)
+    read = scene if isinstance(scene, Scene) else read_scene(scene)
+    folder = Path(out) if out is not None else Path("generated") / read.name
+    present = None if force else _fresh(folder, read)
+    if present is not None:
+        _refresh(folder, present, read)
+        return folder
+    _refuse_foreign(folder)
+    system, functions = _derive_and_lower(read, say)
+    say("emit")
+    from ballpass.derive.emit.folder import write_folder
+
+    replace_files(
+        folder, lambda made: write_folder(made, system, functions), last=mf.FILE_NAME, owned=lambda: _written(folder)
+    )
+    return folder
+
+
+def check(scene: str | Path | Scene, out: str | Path | None = None) -> Check:
+    """Derive a scene afresh and compare with the folder, byte for byte; writes nothing to it.
+
+    A file that is not there, as in a clean checkout, is compared by the digest that the folder's manifest gives it.
+    """
+    from ballpass.derive.emit.folder import write_folder
+
+    read = scene if isinstance(scene, Scene) else read_scene(scene)
+    folder = Path(out) if out is not None else Path("generated") / read.name
+    system, functions = _derive_and_lower(read, lambda _: None)
+    with tempfile.TemporaryDirectory() as made:
+        write_folder(Path(made), system, functions)
+        fresh = _digests(Path(made))
+    try:
+        present = dict(mf.read_manifest(folder).files)
+    except ArtefactError:
+        present = {}
+    present |= _digests(folder)
+    stale = sorted(name for name in fresh.keys() | present.keys() if fresh.get(name) != present.get(name))
+    return Check(folder=folder, stale=tuple(stale))
+
+
+def _derive_and_lower(scene: Scene, say: Callable[[str], None]) -> tuple[System, Functions]:
+    from ballpass.derive.lower.functions import lower
+    from ballpass.derive.mechanism.linkage import check_assembly
+    from ballpass.derive.system import derive
+
+    say("derive")
+    system = derive(scene)
+    if system.linkage is not None:
+        check_assembly(system.linkage, {q.path: q.value for q in scene.quantities})
+    say("lower")
+    return system, lower(system)
+
+
+def _digests(folder: Path) -> dict[str, str]:
+    """Digests of the files in a folder by name."""
+    paths = folder.glob("[!.]*") if folder.is_dir() else ()
+    return {path.name: mf.file_digest(path) for path in paths if path.is_file()}
+
+
+def _fresh(folder: Path, scene: Scene) -> mf.Manifest | None:
+    """The folder's manifest where signature and file digests agree with the scene, else None: then it is derived
+    anew."""
+    try:
+        present = mf.read_manifest(folder)
+        mf.check_files(folder, present)
+    except ArtefactError:
+        return None
+    return present if present.signature == signature(scene) else None
+
+
+def _refresh(folder: Path, present: mf.Manifest, scene: Scene) -> None:
+    """Bring the numbers of a fresh folder up to the scene's."""
+    values = {q.path: q.value for q in scene.quantities}
+    updated = replace(
+        present,
+        title=scene.title,
+        parameters=tuple(replace(p, default=values[p.name]) for p in present.parameters),
+        run=run_info(scene),
+    )
+    if updated == present:
+        return
+    if scene.mechanism is not None and updated.parameters != present.parameters:
+        from ballpass.derive.mechanism.linkage import check_assembly
+        from ballpass.derive.system import derive
+
+        linkage = derive(scene).linkage
+        if linkage is not None:
+            check_assembly(linkage, values)
+    with locked(folder):
+        mf.write(folder, updated)
+
+
+def _refuse_foreign(folder: Path) -> None:
+    """Refuse what is no folder, or holds files but none that a derivation wrote: somebody gave the wrong path."""
+    if not folder.is_dir():
+        if os.path.lexists(folder):
+            raise RequestError(
+                f"{folder} cannot be written: it is no folder. Allowed: a folder that is empty, new, or was written by "
+                "ballpass derive. Nothing was changed. Give another folder."
+            )
+        return
+    names = sorted(path.name for path in folder.iterdir() if not path.name.startswith(".ballpass"))
+    if names and not any(name in GENERATED for name in names):
+        raise RequestError(
+            f"The folder {folder} holds other files ({', '.join(names[:5])}{', ...' if len(names) > 5 else ''}), and "
+            "none that ballpass derive wrote. Allowed: a folder that is empty, new, or was written by ballpass derive. "
+            "Nothing was changed. Give another folder, for example one inside it."
+        )
+
+
+def _written(folder: Path) -> set[str]:
+    """Names of the files in a folder that a derivation wrote, this version's or the one that left the manifest."""
+    names = set(GENERATED)
+    with contextlib.suppress(ArtefactError):
+        names |= {name for name, _ in mf.read_manifest(folder).files if Path(name).name == name}
+    return {name for name in names if (folder / name).is_file() and not (folder / name).is_symlink()}
