@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ballpass.derive import generate
 from ballpass.runtime import load
-from ballpass.runtime.app.figures import draw_all
+from ballpass.runtime.app.figures.gallery import draw_all
 
 ROOT = Path(__file__).resolve().parent.parent
 IMAGES = ROOT / "docs" / "images"

@@ -7,6 +7,7 @@ import string
 import subprocess
 import sys
 from fractions import Fraction
+from pathlib import Path
 
 import mpmath
 import pint
@@ -14,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ballpass.derive.scene.units import KINDS, QuantityError, parse_quantity
+from ballpass.derive.scene.units import COMMON, KINDS, QuantityError, looked_up_size, parse_quantity
 from ballpass.runtime.contract.errors import BallpassError
 
 
@@ -199,12 +200,18 @@ def test_sizes_agree_with_pints_own_conversion(name: str) -> None:
     assert parse_quantity(f"2.5 {name}", target) == pytest.approx(quantity.magnitude, rel=1e-14)
 
 
-def test_pint_is_not_asked_before_the_first_quantity() -> None:
+def test_sizes_kept_here_are_those_of_pint() -> None:
+    for name, size in COMMON.items():
+        assert looked_up_size(name) == size
+
+
+def test_scenes_are_read_without_pint_and_sympy() -> None:
     code = (
-        "import pint, ballpass.derive.scene.units as u; assert u._registry.cache_info().currsize == 0; "
-        "u.parse_quantity('6 mm', 'm'); assert u._registry.cache_info().currsize == 1"
+        "import sys; from pathlib import Path; from ballpass.derive import read_scene\n"
+        "for path in Path('scenes').glob('*.toml'): read_scene(path)\n"
+        "assert not {'pint', 'sympy', 'casadi'} & set(sys.modules)"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).resolve().parents[2])
 
 
 def test_refusals_name_the_kind_that_is_asked_for() -> None:

@@ -20,14 +20,14 @@ from matplotlib.patches import Circle
 from matplotlib.text import Annotation, Text
 
 from ballpass.runtime import Model, Solution
-from ballpass.runtime.app.figures import FIGURES, draw, draw_all
+from ballpass.runtime.app.figures import NAMES
 from ballpass.runtime.app.figures.canvas import INK, PALE, SAND, SIGNAL
+from ballpass.runtime.app.figures.gallery import FIGURES, draw, draw_all
 from ballpass.runtime.app.figures.mechanism import draw_mechanism
 from ballpass.runtime.app.figures.record import gather
 from ballpass.runtime.contract.errors import RequestError
 
 Run = tuple[Model, Solution]
-NAMES = [kind.name for kind in FIGURES]
 
 
 @pytest.fixture(scope="module")

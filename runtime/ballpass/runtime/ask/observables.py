@@ -10,7 +10,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from ballpass.runtime.contract.errors import RequestError
 
@@ -202,12 +201,21 @@ def stroboscopic_points(
     first = int(np.ceil((time[0] - offset) / cycle_length - _TURN_TOLERANCE))
     last = int(np.floor((time[-1] - offset) / cycle_length + _TURN_TOLERANCE))
     at = np.clip(offset + cycle_length * np.arange(first, last + 1), time[0], time[-1])
-    curve = CubicHermiteSpline(time, x, v)
-    return StroboscopicPoints(
-        time=at,
-        position=np.asarray(curve(at), dtype=float),
-        velocity=np.asarray(curve(at, 1), dtype=float),
-    )
+    place, speed = hermite(time, x, v, at)
+    return StroboscopicPoints(time=at, position=place, velocity=speed)
+
+
+def hermite(
+    t: NDArray[np.float64], x: NDArray[np.float64], v: NDArray[np.float64], at: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values and slopes of the cubic between samples with slopes, at times within them (n,)."""
+    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
+    step = t[k + 1] - t[k]
+    s = (at - t[k]) / step
+    chord = (x[k + 1] - x[k]) / step
+    bend, twist = 3.0 * chord - 2.0 * v[k] - v[k + 1], v[k] + v[k + 1] - 2.0 * chord
+    value = x[k] + step * s * (v[k] + s * (bend + s * twist))
+    return value, v[k] + s * (2.0 * bend + 3.0 * s * twist)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

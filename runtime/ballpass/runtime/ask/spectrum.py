@@ -21,9 +21,6 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import fft
-from scipy.interpolate import CubicSpline
-from scipy.signal import get_window
 
 from ballpass.runtime.contract.errors import RequestError
 
@@ -94,6 +91,8 @@ def whole_cycles(
     if abs(per_cycle * step - cycle_length) * cycles < _STEP_TOLERANCE * step:
         first = time.size - 1 - count
         return grid, values[first : first + count], cycles
+    from scipy.interpolate import CubicSpline  # here: the import takes longer than a run
+
     return grid, np.asarray(CubicSpline(time, values)(grid), dtype=float), cycles
 
 
@@ -128,9 +127,9 @@ def amplitude_spectrum(
         time, values, cycles = whole_cycles(t, signal, cycle_length)
     count = values.size
     length = count * (time[-1] - time[0]) / (count - 1)
-    weight = np.asarray(get_window(window, count), dtype=float)  # periodic form, the one for spectra
+    weight = _weight(window, count)
     centred = values - np.sum(weight * values) / np.sum(weight)
-    amplitude = np.abs(fft.rfft(weight * centred)) * (2.0 / np.sum(weight))
+    amplitude = np.abs(np.fft.rfft(weight * centred)) * (2.0 / np.sum(weight))
     if count % 2 == 0:
         amplitude[-1] /= 2.0  # this line has no mirror image
     return AmplitudeSpectrum(
@@ -140,6 +139,15 @@ def amplitude_spectrum(
         cycles=cycles,
         window=window,
     )
+
+
+def _weight(window: Window, count: int) -> NDArray[np.float64]:
+    """Weights of a window in its periodic form, the one for spectra."""
+    if window == "boxcar":
+        return np.ones(count)
+    from scipy.signal import get_window  # here: the import takes longer than a run
+
+    return np.asarray(get_window(window, count), dtype=float)
 
 
 def _samples(t: ArrayLike, signal: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

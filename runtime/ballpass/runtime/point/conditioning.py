@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
@@ -30,6 +29,9 @@ FUNCTION = "reaction_system"
 
 #: Angles looked at in a turn; around the largest value the maximum is refined.
 ANGLES = 360
+
+#: Sweeps around the largest sample, each so many times finer than the one before.
+SWEEPS, FINE = 3, 16
 
 #: Scaled condition number above which reactions are warned about [1].
 BOUND = 1e4
@@ -87,13 +89,12 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
         k = int(np.argmax(values))
         time, largest = float(times[k]), float(values[k])
         if span and math.isfinite(largest):
-            near = minimize_scalar(
-                lambda t, of=condition: -float(of(matrix(t))),
-                bounds=(time - span / ANGLES, time + span / ANGLES),
-                method="bounded",
-                options={"xatol": 1e-7 * span},
-            )
-            time, largest = max((largest, time), (-float(near.fun), float(near.x)))[::-1]
+            reach = span / ANGLES
+            for _ in range(SWEEPS):
+                near = time + reach * np.linspace(-1.0, 1.0, 2 * FINE + 1)
+                values = condition(np.array([matrix(float(t)) for t in near]))
+                k = int(np.argmax(values))
+                time, largest, reach = float(near[k]), float(values[k]), reach / FINE
         found.append((largest, clock.crank_angle(model.manifest, numbers.values, time)))
     (whole, whole_angle), (equal, equal_angle) = found
     if not equal <= BOUND:

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 from rich import box
 from rich.table import Table
-from scipy.optimize import brentq
 
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real, vector
@@ -329,6 +328,8 @@ def _start(model: LoadedModel, numbers: Numbers, force: Callable[[Array], Array]
                 f"static_equilibrium: the inner ring meets no ball within a metre along the load of {size:.6g} N. "
                 "Check clearance and contact stiffness."
             )
+    from scipy.optimize import brentq  # here: the import takes longer than a run
+
     left(float(brentq(left, below, travel, xtol=1e-15, rtol=1e-12)))
     return q
 

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 from rich import box
 from rich.console import Group
@@ -201,6 +200,8 @@ def _modes(mass: Array, damping: Array, stiffness: Array) -> tuple[Mode, ...]:
     unit = math.sqrt(max(float(np.max(np.abs(np.linalg.solve(mass, stiffness)))), 1e-300))
     left = np.block([[zero, one], [-stiffness / unit**2, -damping / unit]])
     right = np.block([[one, zero], [zero, mass]])
+    import scipy.linalg  # here: the import takes longer than a run
+
     values, vectors = scipy.linalg.eig(left, right)
     values = values * unit
     largest = float(np.max(np.abs(values)))

@@ -1,5 +1,4 @@
-"""The paper's figures of a run: `draw_all` writes those for which the outputs exist."""
+"""The paper's figures of a run; `gallery` draws them.  Their names are here, for they are needed without matplotlib."""
 
-from ballpass.runtime.app.figures.gallery import FIGURES, FigureKind, draw, draw_all
-
-__all__ = ["FIGURES", "FigureKind", "draw", "draw_all"]
+#: Names of the figures of a run, in their order.
+NAMES = ("load_curve", "orbit", "spectra", "phase_portrait", "ball_loads", "peak_moment")

@@ -6,11 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from scipy.interpolate import CubicHermiteSpline
 
 from ballpass.runtime.app.figures.canvas import GREY, INK, SAND, SIGNAL, caption, new_figure, styled
 from ballpass.runtime.app.figures.record import Array, Record
-from ballpass.runtime.ask.observables import orbits, stroboscopic_points
+from ballpass.runtime.ask.observables import hermite, orbits, stroboscopic_points
 from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
 
 #: Points drawn between two samples where velocities are known: a resonance has but ten samples a period.
@@ -28,9 +27,8 @@ def _path(record: Record, window: slice, axis: str) -> tuple[Array, Array, Array
     t, x = record.t[window], record.solution[f"inner.{axis}"][window]
     if not record.has(f"inner.v{axis}"):
         return t, x, np.zeros(0)
-    curve = CubicHermiteSpline(t, x, record.solution[f"inner.v{axis}"][window])
     fine = np.append((t[:-1, None] + np.diff(t)[:, None] * np.arange(_FINER) / _FINER).ravel(), t[-1])
-    return fine, np.asarray(curve(fine), dtype=float), np.asarray(curve(fine, 1), dtype=float)
+    return fine, *hermite(t, x, record.solution[f"inner.v{axis}"][window], fine)
 
 
 @styled
