@@ -205,11 +205,11 @@ def test_sizes_kept_here_are_those_of_pint() -> None:
         assert looked_up_size(name) == size
 
 
-def test_scenes_are_read_without_pint_and_sympy() -> None:
+def test_scenes_are_read_without_pint() -> None:
     code = (
         "import sys; from pathlib import Path; from ballpass.derive import read_scene\n"
         "for path in Path('scenes').glob('*.toml'): read_scene(path)\n"
-        "assert not {'pint', 'sympy', 'casadi'} & set(sys.modules)"
+        "assert 'pint' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).resolve().parents[2])
 

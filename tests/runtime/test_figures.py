@@ -74,7 +74,7 @@ def test_figures_are_the_same_bytes_whatever_the_user_s_settings(press: Run, tmp
 
 
 def test_a_scene_without_mechanism_gets_the_bearing_s_figures(shaft: Run, tmp_path: Path) -> None:
-    assert [path.stem for path in draw_all(*shaft, tmp_path)] == NAMES[1:]
+    assert [path.stem for path in draw_all(*shaft, tmp_path)] == [*NAMES[1:]]
 
 
 def test_a_scene_without_bearing_gets_reactions_and_mechanism(linkage_alone: Run, tmp_path: Path) -> None:
