@@ -132,6 +132,7 @@ def manifest(
     found = mf.Manifest(
         scene="oscillator",
         title="Oscillator made by hand",
+        source="",
         signature="0" * 64,
         versions=(("casadi", ca.__version__),),
         parameters=tuple(

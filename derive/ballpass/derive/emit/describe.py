@@ -16,13 +16,14 @@ from ballpass.derive.variables import Output
 from ballpass.runtime import contract as mf
 
 
-def describe(system: System, functions: Functions, files: tuple[tuple[str, str], ...]) -> mf.Manifest:
-    """Manifest of a model whose files have these digests."""
+def describe(system: System, functions: Functions, source: str, files: tuple[tuple[str, str], ...]) -> mf.Manifest:
+    """Manifest of a model whose files have these digests; `source` is the digest of the scene file."""
     scene = system.scene
     bounds = value_bounds(scene)
     return mf.Manifest(
         scene=scene.name,
         title=scene.title,
+        source=source,
         signature=signature(scene),
         versions=versions(),
         parameters=tuple(

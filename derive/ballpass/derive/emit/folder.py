@@ -35,8 +35,8 @@ from ballpass.derive.system import System
 from ballpass.runtime import contract as mf
 
 
-def write_folder(folder: Path, system: System, functions: Functions) -> None:
-    """Write all files of a generated folder into an empty one."""
+def write_folder(folder: Path, system: System, functions: Functions, source: str) -> None:
+    """Write all files of a generated folder into an empty one; `source` goes into the manifest."""
     _write_c(folder, "model", functions.functions)
     _write_c(folder, "jacobians", functions.jacobians)
     for name, text in _headers(system, functions).items():
@@ -47,7 +47,7 @@ def write_folder(folder: Path, system: System, functions: Functions) -> None:
     _pack(folder / "jacobians.casadi", values)
     (folder / "EQUATIONS.md").write_text(equations(system), encoding="utf-8", newline="\n")
     files = tuple((p.name, mf.file_digest(p)) for p in sorted(folder.iterdir()))
-    mf.write(folder, describe(system, functions, files))
+    mf.write(folder, describe(system, functions, source, files))
 
 
 def _headers(system: System, functions: Functions) -> dict[str, str]:

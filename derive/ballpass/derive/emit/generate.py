@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballpass.derive.emit.signature import run_info, signature
+from ballpass.derive.emit.signature import run_info, signature, source_key
 from ballpass.derive.scene.read import read_scene
 from ballpass.derive.scene.records import Scene
 from ballpass.runtime import contract as mf
@@ -78,11 +78,14 @@ def generate(
         The folder holds files, but none that this function wrote.  Nothing is written then.
     """
     say = progress or (lambda _: None)
+    if not force and not isinstance(scene, Scene) and fresh_manifest(scene, out) is not None:
+        return folder_of(scene, out)
     read = scene if isinstance(scene, Scene) else read_scene(scene)
-    folder = Path(out) if out is not None else Path("generated") / read.name
-    present = None if force else _fresh(folder, read)
-    if present is not None:
-        _refresh(folder, present, read)
+    source = "" if isinstance(scene, Scene) else source_key(Path(scene))
+    folder = folder_of(scene, out)
+    present = None if force else _intact(folder)
+    if present is not None and present.signature == signature(read):
+        _refresh(folder, present, read, source)
         return folder
     _refuse_foreign(folder)
     system, functions = _derive_and_lower(read, say)
@@ -90,9 +93,28 @@ def generate(
     from ballpass.derive.emit.folder import write_folder
 
     replace_files(
-        folder, lambda made: write_folder(made, system, functions), last=mf.FILE_NAME, owned=lambda: _written(folder)
+        folder,
+        lambda made: write_folder(made, system, functions, source),
+        last=mf.FILE_NAME,
+        owned=lambda: _written(folder),
     )
     return folder
+
+
+def folder_of(scene: str | Path | Scene, out: str | Path | None = None) -> Path:
+    """The generated folder of a scene: `out`, or ``./generated/<scene name>``."""
+    if out is not None:
+        return Path(out)
+    return Path("generated") / (scene.name if isinstance(scene, Scene) else Path(scene).stem)
+
+
+def fresh_manifest(scene: str | Path, out: str | Path | None = None) -> mf.Manifest | None:
+    """Manifest of a scene file's folder where both are what they were when it was written, else None."""
+    present = _intact(folder_of(scene, out))
+    try:
+        return present if present is not None and present.source == source_key(Path(scene)) else None
+    except (OSError, ValueError):  # no such file, no path: whoever reads it says so
+        return None
 
 
 def check(scene: str | Path | Scene, out: str | Path | None = None) -> Check:
@@ -103,16 +125,18 @@ def check(scene: str | Path | Scene, out: str | Path | None = None) -> Check:
     from ballpass.derive.emit.folder import write_folder
 
     read = scene if isinstance(scene, Scene) else read_scene(scene)
-    folder = Path(out) if out is not None else Path("generated") / read.name
+    folder = folder_of(scene, out)
+    source, present = "", {}
+    with contextlib.suppress(ArtefactError):
+        manifest = mf.read_manifest(folder)
+        source, present = manifest.source, dict(manifest.files)
+    if not isinstance(scene, Scene):
+        source = source_key(Path(scene))
+    present |= _digests(folder)
     system, functions = _derive_and_lower(read, lambda _: None)
     with tempfile.TemporaryDirectory() as made:
-        write_folder(Path(made), system, functions)
+        write_folder(Path(made), system, functions, source)
         fresh = _digests(Path(made))
-    try:
-        present = dict(mf.read_manifest(folder).files)
-    except ArtefactError:
-        present = {}
-    present |= _digests(folder)
     stale = sorted(name for name in fresh.keys() | present.keys() if fresh.get(name) != present.get(name))
     return Check(folder=folder, stale=tuple(stale))
 
@@ -136,18 +160,17 @@ def _digests(folder: Path) -> dict[str, str]:
     return {path.name: mf.file_digest(path) for path in paths if path.is_file()}
 
 
-def _fresh(folder: Path, scene: Scene) -> mf.Manifest | None:
-    """The folder's manifest where signature and file digests agree with the scene, else None: then it is derived
-    anew."""
+def _intact(folder: Path) -> mf.Manifest | None:
+    """The folder's manifest where its files have the digests it gives them."""
     try:
         present = mf.read_manifest(folder)
         mf.check_files(folder, present)
     except ArtefactError:
         return None
-    return present if present.signature == signature(scene) else None
+    return present
 
 
-def _refresh(folder: Path, present: mf.Manifest, scene: Scene) -> None:
+def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> None:
     """Bring the numbers of a fresh folder up to the scene's."""
     values = {q.path: q.value for q in scene.quantities}
     updated = replace(
@@ -156,6 +179,8 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene) -> None:
         parameters=tuple(replace(p, default=values[p.name]) for p in present.parameters),
         run=run_info(scene),
     )
+    if updated != present or source:
+        updated = replace(updated, source=source)
     if updated == present:
         return
     if scene.mechanism is not None and updated.parameters != present.parameters:

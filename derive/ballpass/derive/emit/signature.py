@@ -20,6 +20,19 @@ def signature(scene: Scene) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def source_key(path: Path) -> str:
+    """Digest of a scene file, whatever its ends of lines, of the deriving sources and of the versions.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    """
+    digest = hashlib.sha256(repr((mf.SCHEMA, path.stem, _sources(), versions())).encode())
+    digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
+    return digest.hexdigest()
+
+
 def versions() -> tuple[tuple[str, str], ...]:
     """Names and versions of the packages that decide what is generated."""
     return tuple((name, version(name)) for name in ("ballpass", "casadi", "sympy"))

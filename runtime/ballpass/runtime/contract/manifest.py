@@ -190,6 +190,7 @@ class Manifest:
     schema: int = SCHEMA
     scene: str
     title: str
+    source: str  # digest of the scene file and of all that derives it; empty where there was no file
     signature: str
     versions: tuple[tuple[str, str], ...]
     parameters: tuple[ParameterInfo, ...]
