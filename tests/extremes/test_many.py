@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -143,7 +142,7 @@ def test_free_rings_of_1_mg_to_10_t(rotor: Press, holds: Holds) -> None:
 
 
 #: Parameters by which runs are differentiated, and the steps of the differences.
-BY = {CLEARANCE: 1e-9, CRANK: 1e-8, f"{WINDOW}.start": 1e-6}
+BY = {CLEARANCE: 1e-9, CRANK: 1e-7, f"{WINDOW}.start": 1e-6}
 
 
 @pytest.mark.parametrize(
@@ -165,16 +164,13 @@ def test_derivatives_equal_differences(press: Press, holds: Holds, numbers: dict
     size = 1e-2 * np.max(np.abs(found.solution.x), axis=0) + 1e-12
     places = [len(t) // 2, -1]
 
-    @cache
     def moved(name: str, change: float) -> np.ndarray:
         value = {**model.parameters, **given}[name] + change
         machine = Machine.of(model, {**given, name: value})
         return machine.integrate(t[[0, *places]], start, rtol=1e-10, magnitude=size)[1:]
 
     worst = 0.0
-    for k, (name, plain) in enumerate(BY.items()):
-        # a parameter far from the shipped one moves in proportion
-        step = plain * max(1.0, abs(given.get(name, 0.0) / (model.parameters[name] or 1.0)))
+    for k, (name, step) in enumerate(BY.items()):
         expected = (moved(name, step) - moved(name, -step)) / (2.0 * step)
         for half in (slice(0, 4), slice(4, 8)):
             scale = np.max(np.abs(expected[:, half])) or 1.0
