@@ -94,7 +94,7 @@ def _at_place(view: View, quantity: Quantity) -> Estimate:
 
 def _amplitude(view: View, quantity: Quantity) -> Estimate:
     value, slope = view.channel(quantity)
-    line_frequency, faster = frequency(view, quantity.place)
+    line_frequency, faster = frequency(view, quantity)
     length, longer = view.length
     total, moved = view.integral(value, slope)
     mean = total.real / length

@@ -28,6 +28,12 @@ from ballpass.runtime.run.request import no_output
 #: Kinds of the ensembles' observables that are no differentiable quantities.
 _COUNTED = ("peak_time", "peak_ball", "min_time")
 
+#: What is asked for of each bearing when nothing is named.
+DEFAULTS = (
+    *(("max", "ball.force"), ("rms", "inner.x"), ("rms", "inner.y")),
+    *(("range", "inner.y"), ("rms", "outer.y")),
+)
+
 #: Words people use for kinds.
 _SYNONYMS = {"peak": "max"}
 
@@ -53,7 +59,7 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
     bare, _, instant = text.partition("@")
     kind = KINDS.get(bare)
     if kind is not None and kind.static:
-        if manifest.bearing is None:
+        if not manifest.bearings:
             raise RequestError(f"{text}: this scene has no bearing. Ask for another quantity.")
         if instant:
             _check_place(manifest, text, kind, bare, instant)
@@ -87,11 +93,9 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
 def default_quantities(manifest: Manifest) -> tuple[str, ...]:
     """What is asked for when nothing is named: ball forces and motion of the rings, else loads of the mechanism."""
     channels = channels_of(manifest)
-    wanted = [
-        *(("peak_ball_force", "ball.force"), ("rms:inner.x", "inner.x"), ("rms:inner.y", "inner.y")),
-        *(("range:inner.y", "inner.y"), ("rms:outer.y", "outer.y")),
-    ]
-    found = [name for name, channel in wanted if channel in channels]
+    wanted = [(kind, f"{bearing.prefix}{channel}") for bearing in manifest.bearings for kind, channel in DEFAULTS]
+    found = [f"{kind}:{channel}" for kind, channel in wanted if channel in channels]
+    found = ["peak_ball_force" if name == "max:ball.force" else name for name in found]
     if not found:
         found = [f"max:{name}" for name in channels if name.startswith("reaction.")]
         found += ["max:drive_torque"] if "drive_torque" in channels else []
@@ -130,6 +134,6 @@ def _usable(manifest: Manifest, channels: Mapping[str, tuple[int, str]]) -> list
         *(
             name
             for name, kind in alone.items()
-            if (manifest.bearing is not None if kind.static else kind.channel in channels)
+            if (bool(manifest.bearings) if kind.static else kind.channel in channels)
         ),
     ]

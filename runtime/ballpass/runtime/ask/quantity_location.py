@@ -106,9 +106,10 @@ def place_slope(
     return -moved / speed
 
 
-def frequency(view: View, place: str) -> tuple[float, Array]:
+def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     """The frequency written behind ``@`` [Hz], and its derivative along the directions, shape (directions,)."""
     manifest, values = view.manifest, view.numbers.values
+    place = quantity.place
     form = _PLACE.fullmatch(place)
     if form is not None and form["unit"] == "Hz":
         return float(form["number"]), np.zeros(view.directions)
@@ -119,9 +120,11 @@ def frequency(view: View, place: str) -> tuple[float, Array]:
     if form is not None:
         order = float(form["number"])
         return order * abs(speed) / clock.TURN, order * math.copysign(1.0, speed) * faster / clock.TURN
-    bearing = manifest.bearing
-    assert bearing is not None
-    ball, pitch = values["bearing.ball_diameter"], values["bearing.pitch_diameter"]
+    # the bearing that the channel is one of, else the first
+    bearings = sorted(manifest.bearings, key=lambda one: not (one.prefix and quantity.channel.startswith(one.prefix)))
+    bearing = bearings[0]
+    ball_name, pitch_name = f"{bearing.path}.ball_diameter", f"{bearing.path}.pitch_diameter"
+    ball, pitch = values[ball_name], values[pitch_name]
 
     def of(ratio: complex, shaft: complex) -> complex:
         """The same closed forms for complex numbers: their derivative is exact to rounding (complex step)."""
@@ -134,7 +137,7 @@ def frequency(view: View, place: str) -> tuple[float, Array]:
     ratio, shaft, tiny = ball / pitch, abs(speed) / clock.TURN, 1e-30
     by_ratio = of(complex(ratio, tiny), shaft).imag / tiny
     by_shaft = of(ratio, complex(shaft, tiny)).imag / tiny
-    ratio_slope = (view.slopes("bearing.ball_diameter") - ratio * view.slopes("bearing.pitch_diameter")) / pitch
+    ratio_slope = (view.slopes(ball_name) - ratio * view.slopes(pitch_name)) / pitch
     shaft_slope = math.copysign(1.0, speed) * faster / clock.TURN
     return float(getattr(known, _FREQUENCIES[place])), by_ratio * ratio_slope + by_shaft * shaft_slope
 
@@ -144,13 +147,13 @@ def is_frequency(manifest: Manifest, place: str) -> bool:
     form = _PLACE.fullmatch(place)
     if form is not None:
         return form["unit"] in ("Hz", "x")
-    return place in _FREQUENCIES and manifest.bearing is not None and manifest.bearing.balls >= 1
+    return place in _FREQUENCIES and any(bearing.balls >= 1 for bearing in manifest.bearings)
 
 
 def is_instant(manifest: Manifest, place: str) -> bool:
     """Whether what stands behind ``@`` is a time, or an angle of something that turns."""
     form = _PLACE.fullmatch(place)
-    turning = manifest.mechanism is not None or manifest.bearing is not None
+    turning = manifest.mechanism is not None or bool(manifest.bearings)
     return form is not None and (form["unit"] == "s" or (form["unit"] in ("deg", "rad") and turning))
 
 

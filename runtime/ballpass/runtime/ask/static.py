@@ -40,12 +40,14 @@ def at_rest(model: LoadedModel, numbers: Numbers, quantity: Quantity, chain: Cha
     rest = static_equilibrium(model, numbers, t=time)
     names = [] if chain is None else [*chain.names, "time"]
     if quantity.kind == "static_deflection":
-        place = np.array([rest["inner.x"], rest["inner.y"]])
+        inner = [rest.coordinates.index(f"{model.manifest.bearings[0].prefix}inner.{axis}") for axis in "xy"]
+        place = rest.positions[inner]
         value, ball = float(np.hypot(*place)), None
-        rows = rest.derivative("positions", names)[:2] if names else np.zeros((2, 1))
+        rows = rest.derivative("positions", names)[inner] if names else np.zeros((2, 1))
         slope = place @ rows / value if value else np.zeros(rows.shape[1])
     else:
         best = int(np.argmax(rest.ball_force))
         value, ball = float(rest.ball_force[best]), best + 1
-        slope = rest.derivative("ball.elastic_force", names)[best] if names else np.zeros(1)
+        forces = [f"{bearing.prefix}ball.elastic_force" for bearing in model.manifest.bearings]
+        slope = rest.derivative(forces, names)[best] if names else np.zeros(1)
     return Estimate(value=value, slope=slope[:-1] + slope[-1] * moved, time=time, ball=ball)

@@ -35,6 +35,7 @@ class Grazing:
     crank_angle : of the driver or shaft, in [0, 2 pi) [rad]
     depth : deflection [m] or rate of deflection [m/s] at its extreme; negative before the kink is reached
     kink : "contact" or "rate"
+    bearing : its name, "" for the scene's only one
     """
 
     ball: int
@@ -42,6 +43,7 @@ class Grazing:
     crank_angle: float
     depth: float
     kink: str
+    bearing: str = ""
 
     def __str__(self) -> str:
         return describe((self,))
@@ -52,7 +54,7 @@ def describe(place: Sequence[Grazing]) -> str:
     first = place[0]
     unit = "m" if first.kink == "contact" else "m/s"
     what = "contact" if first.kink == "contact" else "the kink of one-sided damping"
-    balls = " and ".join(str(item.ball) for item in place)
+    balls = " and ".join(str(item.ball) for item in place) + (f" of {first.bearing}" if first.bearing else "")
     return (
         f"{'balls' if len(place) > 1 else 'ball'} {balls} graze{'' if len(place) > 1 else 's'} {what} at t = "
         f"{first.time:.6g} s, crank angle {np.degrees(first.crank_angle):.4g} deg, with {first.depth:.2e} {unit}"
@@ -66,7 +68,8 @@ def merge_grazing(found: Sequence[Grazing]) -> list[tuple[Grazing, ...]]:
         same = [
             place
             for place in places
-            if place[0].kink == item.kink and abs(place[0].time - item.time) <= SAME * item.time
+            if (place[0].kink, place[0].bearing) == (item.kink, item.bearing)
+            and abs(place[0].time - item.time) <= SAME * item.time
         ]
         if same:
             same[0].append(item)
@@ -83,6 +86,7 @@ def find_grazing(
     *,
     one_sided: bool,
     tolerance: float = TOLERANCE,
+    bearing: str = "",
 ) -> tuple[Grazing, ...]:
     """Extremes of deflection near zero, and of its rate where the law is one-sided, in order of time.
 
@@ -94,6 +98,7 @@ def find_grazing(
     angles : crank angle at each time, shape (n,) [rad]
     one_sided : whether the damping law has a kink at rate zero, in contact or not
     tolerance : share of the largest deflection (rate) that counts as zero [1]
+    bearing : name of the balls' bearing
     """
     found: list[Grazing] = []
     for k in np.unique(segment).tolist():
@@ -102,28 +107,38 @@ def find_grazing(
         if len(rows) < 5:
             continue
         time, part = t[rows], deflection[rows]
-        found += _near_zero(time, part, angles[rows], "contact", tolerance * float(np.max(np.abs(deflection))))
+        found += _near_zero(time, part, angles[rows], "contact", tolerance * float(np.max(np.abs(deflection))), bearing)
         if one_sided:
             rate = np.gradient(part, time, axis=0)
-            found += _near_zero(time, rate, angles[rows], "rate", tolerance * float(np.max(np.abs(rate))))
+            found += _near_zero(time, rate, angles[rows], "rate", tolerance * float(np.max(np.abs(rate))), bearing)
     return tuple(sorted(found, key=lambda item: (item.time, item.kink, item.ball)))
 
 
-def _near_zero(t: Array, signal: Array, angles: Array, kink: str, width: float) -> list[Grazing]:
+def _near_zero(t: Array, signal: Array, angles: Array, kink: str, width: float, bearing: str) -> list[Grazing]:
     """Extremes within `width` of zero that touch zero rather than cross it, by parabolas through three neighbours."""
     before, here, behind = signal[:-2], signal[1:-1], signal[2:]
     top = (here > before) & (here >= behind) & (here <= 2.0 * width)
     bottom = (here < before) & (here <= behind) & (here >= -2.0 * width)
-    found: list[Grazing] = []
     # a signal that stands still wiggles by rounding
     moving = np.maximum(np.abs(here - before), np.abs(here - behind)) > 1e-6 * width
-    for row, ball in np.argwhere((top | bottom) & moving).tolist():
-        fit = np.polynomial.Polynomial.fit(t[row : row + 3], signal[row : row + 3, ball], 2)
-        places = fit.deriv().roots()
-        time = float(np.real(places[0])) if len(places) else float(t[row + 1])
-        time = min(max(time, float(t[row])), float(t[row + 2]))
-        depth = float(fit(time))
-        if abs(depth) <= width:
-            angle = float(angles[row + 1])
-            found.append(Grazing(ball=ball + 1, time=time, crank_angle=angle, depth=depth, kink=kink))
-    return found
+    rows, balls = np.nonzero((top | bottom) & moving)
+    # Newton's form of the parabola about the middle point
+    left, right = t[rows] - t[rows + 1], t[rows + 2] - t[rows + 1]
+    middle = here[rows, balls]
+    fall, rise = (before[rows, balls] - middle) / left, (behind[rows, balls] - middle) / right
+    bend = (rise - fall) / (right - left)
+    slope = fall - bend * left
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shift = np.clip(np.where(bend != 0.0, -0.5 * slope / bend, 0.0), left, right)
+    depth = middle + shift * (slope + bend * shift)
+    return [
+        Grazing(
+            ball=int(balls[k]) + 1,
+            time=float(t[rows[k] + 1] + shift[k]),
+            crank_angle=float(angles[rows[k] + 1]),
+            depth=float(depth[k]),
+            kink=kink,
+            bearing=bearing,
+        )
+        for k in np.flatnonzero(np.abs(depth) <= width)
+    ]

@@ -337,17 +337,24 @@ def _difference_scales(manifest: Manifest, numbers: Numbers, names: Sequence[str
 def _grazing(model: LoadedModel, numbers: Numbers, course: Course, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:
     """Where the run grazes a kink, whether or not the scene's outputs name the balls' deflections."""
     manifest, track = model.manifest, course.track
-    if track is None or manifest.bearing is None:
+    if track is None or not manifest.bearings:
         return ()
-    deflection = Outlook(model, [DEFLECTION]).look(track, numbers)[DEFLECTION].value
+    names = [bearing.prefix + DEFLECTION for bearing in manifest.bearings]
+    signals = Outlook(model, names).look(track, numbers)
     order = np.lexsort((track.nodes.t, track.nodes.segment))
     times = track.nodes.t[order]
     angles = np.array([clock.crank_angle(manifest, numbers.values, float(time)) for time in times])
-    return find_grazing(
-        times,
-        track.nodes.segment[order],
-        deflection[order],
-        angles,
-        one_sided=manifest.bearing.damping_law == "one-sided",
-        tolerance=tolerance,
-    )
+    found = [
+        item
+        for bearing, name in zip(manifest.bearings, names, strict=True)
+        for item in find_grazing(
+            times,
+            track.nodes.segment[order],
+            signals[name].value[order],
+            angles,
+            one_sided=bearing.damping_law == "one-sided",
+            tolerance=tolerance,
+            bearing=bearing.name,
+        )
+    ]
+    return tuple(sorted(found, key=lambda item: item.time))

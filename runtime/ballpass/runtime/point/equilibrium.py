@@ -2,9 +2,8 @@
 
 In: a model, numbers, an instant.  Out: a `StaticEquilibrium`.
 
-Everything is at rest: the balls stand where they are at that instant, and no damping force acts.  The deflection of
-each ball is linear in the positions, so the potential energy is convex, and Newton's method with a step that does not
-pass far beyond the minimum along its direction finds it from any start.  The start is the equilibrium along the load.
+Everything is at rest: the balls stand where they are at that instant, and no damping force acts.  The search starts
+with concentric rings (`ballpass.runtime.run.equilibrium_newton`).
 
 Derivatives are those of the implicit function: 0 = f(q(p), p) gives dq/dp = K^-1 df/dp with the stiffness K = -df/dq.
 """
@@ -13,7 +12,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,6 +26,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import RHS, Rows, contract, directions_of, rows_of
 from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.equilibrium_newton import Rest, settle
 from ballpass.runtime.run.printed import printed
 
 Array = NDArray[np.float64]
@@ -34,8 +34,8 @@ Array = NDArray[np.float64]
 #: Net force left over, relative to the forces at work.
 TOLERANCE = 1e-12
 
-#: Most Newton steps; a dozen are usual.
-ITERATIONS = 200
+#: Most Newton steps, and distance at which nothing holds a ring [m].
+ITERATIONS, FAR = 400, 1.0
 
 #: Largest angle of crank or shaft that is taken for one in radians: who gives more means degrees [rad].
 LARGEST_ANGLE = 4.0 * math.pi
@@ -58,7 +58,7 @@ class StaticEquilibrium:
     positions : shape (coordinates,) [m]
     x : the state with these positions and no velocities, shape (states,)
     time : the instant [s]
-    load : on the inner ring, x and y [N]
+    load : on the inner ring of each bearing, x and y [N]
     deflection : of each ball, shape (balls,) [m]
     ball_force : elastic force of each ball, shape (balls,) [N]
     stiffness : -d(force)/d(position), shape (coordinates, coordinates) [N/m]
@@ -71,7 +71,7 @@ class StaticEquilibrium:
     positions: Array
     x: Array
     time: float
-    load: tuple[float, float]
+    load: tuple[float, ...]
     deflection: Array
     ball_force: Array
     stiffness: Array
@@ -135,8 +135,8 @@ class StaticEquilibrium:
         there = point(self.model, self.numbers, self.time, self.x)
         moved = contract(self.model, _force_rows(self.model), directions, there)
         if self.load_is_given:
-            (load,) = rows_of(self.model, ["load.x", "load.y"])
-            moved[:2] -= contract(self.model, load, directions, there)
+            (load,) = rows_of(self.model, _loads(self.model))
+            moved[_loaded(self.model)] -= contract(self.model, load, directions, there)
         slopes = np.linalg.solve(self.stiffness, moved)
         if of == "positions":
             total = slopes
@@ -205,12 +205,16 @@ def static_equilibrium(
     half = len(model.states) // 2
     there = point(model, numbers, t, np.zeros(2 * half))
     kernel, slopes = model.kernel("static_forces"), model.kernel("static_forces_jac_x")
-    (rows,) = rows_of(model, ["load.x", "load.y"])
+    (rows,) = rows_of(model, _loads(model))
     own = model.kernel(rows.function)(there)[rows.indices]
     applied = own if load is None else vector(load)
-    if applied.shape != (2,) or not np.all(np.isfinite(applied)):
-        raise RequestError(f"load: two finite numbers, x and y [N], are expected, not {load!r}.")
-    extra = np.concatenate([applied - own, np.zeros(half - 2)])
+    if applied.shape != own.shape or not np.all(np.isfinite(applied)):
+        words = (
+            "two finite numbers, x and y" if len(own) == 2 else f"{len(own)} finite numbers, x and y of each bearing"
+        )
+        raise RequestError(f"load: {words} [N], are expected, not {load!r}.")
+    extra = np.zeros(half)
+    extra[_loaded(model)] = applied - own
 
     def force(q: Array) -> Array:
         there["x"] = np.concatenate([q, np.zeros(half)])
@@ -221,9 +225,30 @@ def static_equilibrium(
         matrix = -slopes(there).reshape(half, 2 * half)[:, :half]
         return np.asarray(0.5 * (matrix + matrix.T))
 
-    start = _start(model, numbers, force, applied, half)
-    clearance = abs(numbers.values["bearing.clearance"])
-    q, iterations = _newton(force, stiffness, start, float(np.linalg.norm(applied)), clearance)
+    size = float(np.linalg.norm(applied))
+    clearance = max(abs(numbers.values[f"{bearing.path}.clearance"]) for bearing in model.manifest.bearings)
+
+    def done(q: Array, net: Array, matrix: Array) -> bool:
+        # rounding of the forces themselves: stiffness times the last digit of what a deflection is computed from
+        rounding = 16.0 * np.finfo(float).eps * float(np.max(np.abs(matrix))) * (float(np.max(np.abs(q))) + clearance)
+        return bool(np.max(np.abs(net)) <= TOLERANCE * size + rounding)
+
+    found = settle(
+        force,
+        stiffness,
+        np.zeros(half),
+        weights=np.ones(half),
+        done=done,
+        gone=lambda q: float(np.max(np.abs(q))) > FAR,
+        iterations=ITERATIONS,
+    )
+    if found.end is not Rest.FOUND:
+        raise SimulationError(
+            f"static_equilibrium: {found.end.value}; a net force of {float(np.max(np.abs(found.force))):.3g} N is left "
+            f"of a load of {size:.6g} N. Check clearance, load, contact stiffness, and the stiffness of the housing "
+            "(outer_ring.stiffness), which must be above 0 where the outer ring moves."
+        )
+    q = found.q
     matrix = stiffness(q)
     eigenvalues, vectors = np.linalg.eigh(matrix)
     free = vectors[:, eigenvalues <= FREE * max(float(eigenvalues[-1]), 0.0)].T
@@ -247,13 +272,13 @@ def static_equilibrium(
         positions=q,
         x=held,
         time=t,
-        load=(float(applied[0]), float(applied[1])),
+        load=tuple(applied.tolist()),
         deflection=deflection,
         ball_force=ball_force,
         stiffness=matrix,
         free_directions=free,
-        iterations=iterations,
-        residual=float(np.max(np.abs(force(q)))),
+        iterations=found.iterations,
+        residual=float(np.max(np.abs(found.force))),
         model=model,
         numbers=numbers,
         load_is_given=load is not None,
@@ -264,7 +289,7 @@ def _render(found: StaticEquilibrium) -> Table:
     """Positions, load and balls as a table, a row for each."""
     table = Table(
         title=f"Static equilibrium at t = {found.time:.6g} s",
-        caption=f"load {found.load[0]:.6g} N, {found.load[1]:.6g} N; net force left {found.residual:.2g} N",
+        caption=f"load {', '.join(f'{part:.6g} N' for part in found.load)}; net force left {found.residual:.2g} N",
         title_justify="left",
         caption_justify="left",
         box=box.SIMPLE_HEAD,
@@ -287,85 +312,22 @@ def _force_rows(model: LoadedModel) -> Rows:
     )
 
 
+def _loads(model: LoadedModel) -> list[str]:
+    """Names of the loads on the inner rings."""
+    return [f"{bearing.prefix}load.{axis}" for bearing in model.manifest.bearings for axis in "xy"]
+
+
+def _loaded(model: LoadedModel) -> list[int]:
+    """Coordinates that these loads act on."""
+    return [model.states.index(f"{bearing.prefix}inner.{axis}") for bearing in model.manifest.bearings for axis in "xy"]
+
+
 def _balls(model: LoadedModel, numbers: Numbers, t: float, x: Array) -> tuple[Array, Array]:
-    """Deflection and elastic force of each ball."""
+    """Deflection and elastic force of each ball, bearing by bearing."""
     there = point(model, numbers, t, x)
-    found = []
-    for name in ("ball.deflection", "ball.elastic_force"):
-        (rows,) = rows_of(model, name)
-        found.append(model.kernel(rows.function)(there)[rows.indices])
-    return found[0], found[1]
 
+    def of_all(name: str) -> Array:
+        rows = [rows for bearing in model.manifest.bearings for rows in rows_of(model, bearing.prefix + name)]
+        return np.concatenate([model.kernel(some.function)(there)[some.indices] for some in rows])
 
-def _start(model: LoadedModel, numbers: Numbers, force: Callable[[Array], Array], applied: Array, half: int) -> Array:
-    """Equilibrium along the load alone, the housing carrying all of it; concentric rings where there is no load."""
-    size = float(np.linalg.norm(applied))
-    q = np.zeros(half)
-    if size == 0.0:
-        return q
-    direction = applied / size
-    if half > 2:
-        housing = numbers.values["bearing.outer_ring.stiffness"]
-        if housing == 0.0:
-            raise SimulationError(
-                "static_equilibrium: the housing has no stiffness, so nothing holds the outer ring against the load of "
-                f"{size:.6g} N. Give bearing.outer_ring.stiffness a value above 0."
-            )
-        q[2:] = applied / housing
-
-    def left(travel: float) -> float:
-        q[:2] = (q[2:] if half > 2 else 0.0) + travel * direction
-        return float(force(q)[:2] @ direction)
-
-    # three balls or more: one of them lies within 60 degrees of the load and takes it in the end
-    below, travel = 0.0, 1e-6
-    if left(0.0) <= 0.0:
-        return q
-    while left(travel) > 0.0:
-        below, travel = travel, 2.0 * travel
-        if travel > 1.0:
-            raise SimulationError(
-                f"static_equilibrium: the inner ring meets no ball within a metre along the load of {size:.6g} N. "
-                "Check clearance and contact stiffness."
-            )
-    from scipy.optimize import brentq  # here: the import takes longer than a run
-
-    left(float(brentq(left, below, travel, xtol=1e-15, rtol=1e-12)))
-    return q
-
-
-def _newton(
-    force: Callable[[Array], Array], stiffness: Callable[[Array], Array], q: Array, scale: float, length: float
-) -> tuple[Array, int]:
-    """Newton's method on a convex energy: steps are halved until they do not pass far beyond the minimum.
-
-    `scale` is the size of the load [N], `length` that of the clearance [m].
-    """
-    net = force(q)
-    for iteration in range(ITERATIONS):
-        matrix = stiffness(q)
-        eigenvalues, vectors = np.linalg.eigh(matrix)
-        largest = float(eigenvalues[-1])
-        # rounding of the forces themselves: stiffness times the last digit of what a deflection is computed from
-        rounding = 16.0 * np.finfo(float).eps * largest * (float(np.max(np.abs(q))) + length)
-        if float(np.max(np.abs(net))) <= TOLERANCE * scale + rounding or largest <= 0.0:
-            return q, iteration
-        held = np.maximum(eigenvalues, 0.1 * FREE * largest)
-        step = vectors @ ((vectors.T @ net) / held)
-        descent, share = float(net @ step), 1.0
-        while True:
-            trial = q + share * step
-            there = force(trial)
-            if np.all(np.isfinite(there)) and float(there @ step) >= -0.5 * descent:
-                break
-            share *= 0.5
-            if share < 1e-15:
-                raise SimulationError(
-                    f"static_equilibrium: no step lowers the energy after {iteration} iterations; a net force of "
-                    f"{float(np.max(np.abs(net))):.3g} N is left. Check the parameters: stiffnesses must be positive."
-                )
-        q, net = trial, there
-    raise SimulationError(
-        f"static_equilibrium: not found within {ITERATIONS} iterations; a net force of "
-        f"{float(np.max(np.abs(net))):.3g} N is left. Check clearance, stiffness and load."
-    )
+    return of_all("ball.deflection"), of_all("ball.elastic_force")

@@ -24,10 +24,12 @@ from rich.console import Group
 from rich.table import Table
 
 from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.manifest import BearingInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import rows_of
+from ballpass.runtime.run.magnitudes import moved_masses
 from ballpass.runtime.run.printed import printed
 
 Array = NDArray[np.float64]
@@ -165,7 +167,7 @@ def linearize(
     jacobian = model.kernel("rhs_jac_x")(there).reshape(count, count)
     if not np.all(np.isfinite(jacobian)):
         raise SimulationError("linearize: the derivatives at this state are not finite. Check state and parameters.")
-    mass = np.diag(masses(model, numbers))
+    mass = np.diag(moved_masses(model.manifest, numbers))
     stiffness, damping = -mass @ jacobian[half:, :half], -mass @ jacobian[half:, half:]
     state = np.asarray(there["x"], dtype=float)
     notes = kink_notes(model, numbers, t, state)
@@ -183,13 +185,6 @@ def linearize(
         unbalanced=float(np.max(np.abs(model.kernel("rhs")(there)[half:]))),
         notes=notes,
     )
-
-
-def masses(model: LoadedModel, numbers: Numbers) -> Array:
-    """Mass moved along each coordinate, shape (coordinates,) [kg]."""
-    names = {"inner": "bearing.m_ei", "outer": "bearing.outer_ring.mass"}
-    half = len(model.states) // 2
-    return np.array([numbers.values[names[state.partition(".")[0]]] for state in model.states[:half]])
 
 
 def _modes(mass: Array, damping: Array, stiffness: Array) -> tuple[Mode, ...]:
@@ -229,10 +224,15 @@ def _modes(mass: Array, damping: Array, stiffness: Array) -> tuple[Mode, ...]:
 def kink_notes(model: LoadedModel, numbers: Numbers, t: float, x: Array) -> tuple[str, ...]:
     """Where the damping law has no derivative at this state, in words; empty where it has one."""
     smoothness = dict(model.manifest.smoothness).get("damping")
-    if smoothness not in ("kinked", "discontinuous") or model.manifest.bearing is None:
+    if smoothness not in ("kinked", "discontinuous"):
         return ()
-    law = model.manifest.bearing.damping_law
-    deflection, rate, speed = _deflections(model, numbers, t, x)
+    return tuple(note for bearing in model.manifest.bearings for note in _kink_notes(model, bearing, numbers, t, x))
+
+
+def _kink_notes(model: LoadedModel, bearing: BearingInfo, numbers: Numbers, t: float, x: Array) -> list[str]:
+    """The same of one bearing."""
+    law = bearing.damping_law
+    deflection, rate, speed = _deflections(model, bearing, numbers, t, x)
     length = max(float(np.max(np.abs(deflection))), 1e-12)
     at_onset = np.flatnonzero(np.abs(deflection) <= ON_THE_KINK * length).tolist()
     at_rest = np.flatnonzero(np.abs(rate) <= ON_THE_KINK * max(speed, 1e-12)).tolist()
@@ -243,7 +243,7 @@ def kink_notes(model: LoadedModel, numbers: Numbers, t: float, x: Array) -> tupl
             notes.append(
                 f"the law {law} has a kink where the deflection's rate is zero, as at {_balls(resting)}: damping is "
                 "that of the parting side, without resistance; on the approaching side each of these balls adds "
-                f"{numbers.values['bearing.c_b']:.6g} N*s/m along its direction. Give bearing.damping.smoothing, and "
+                f"{numbers.values[f'{bearing.path}.c_b']:.6g} N*s/m along its direction. Give {bearing.path}.damping.smoothing, and "
                 "there is one derivative."
             )
     if law.endswith("gated") or law == "tangent":
@@ -251,19 +251,21 @@ def kink_notes(model: LoadedModel, numbers: Numbers, t: float, x: Array) -> tupl
         if touching:
             notes.append(
                 f"the law {law} has no derivative at contact onset, where {_balls(touching)} stands: the derivative is "
-                "that of the free side. Give bearing.contact.smoothing, and there is one derivative."
+                f"that of the free side. Give {bearing.path}.contact.smoothing, and there is one derivative."
             )
-    return tuple(notes)
+    return notes
 
 
 def _balls(indices: Sequence[int]) -> str:
     return "ball " + ", ".join(str(k + 1) for k in indices)
 
 
-def _deflections(model: LoadedModel, numbers: Numbers, t: float, x: Array) -> tuple[Array, Array, float]:
+def _deflections(
+    model: LoadedModel, bearing: BearingInfo, numbers: Numbers, t: float, x: Array
+) -> tuple[Array, Array, float]:
     """Deflection of each ball, its rate, and the largest speed in it [m], [m/s]."""
     there = point(model, numbers, t, x)
-    (rows,) = rows_of(model, "ball.deflection")
+    (rows,) = rows_of(model, f"{bearing.prefix}ball.deflection")
     half = len(x) // 2
     value = model.kernel(rows.function)(there)[rows.indices]
     by_states = model.kernel(f"{rows.function}_jac_x")(there).reshape(-1, len(x))[rows.indices]

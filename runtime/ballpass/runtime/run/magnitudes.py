@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Stepper
@@ -58,14 +59,18 @@ def model_scales(model: LoadedModel, numbers: Numbers, initial: np.ndarray, dura
         list(inputs),
         initial,
         horizon,
-        moved_masses(numbers, len(initial) // 2).tolist() if model.manifest.bearing is not None else None,
+        moved_masses(model.manifest, numbers).tolist() if model.manifest.bearings else None,
     )
 
 
-def moved_masses(numbers: Numbers, coordinates: int) -> np.ndarray:
+def moved_masses(manifest: Manifest, numbers: Numbers) -> np.ndarray:
     """Mass of each coordinate, shape (coordinates,) [kg]."""
-    inner, outer = numbers.values["bearing.m_ei"], numbers.values.get("bearing.outer_ring.mass", 0.0)
-    return np.array([inner, inner, outer, outer])[:coordinates]
+    names = {}
+    for bearing in manifest.bearings:
+        names[f"{bearing.prefix}inner"] = f"{bearing.path}.m_ei"
+        names[f"{bearing.prefix}outer"] = f"{bearing.path}.outer_ring.mass"
+    rings = [state.name.rpartition(".")[0] for state in manifest.states[: len(manifest.states) // 2]]
+    return np.array([numbers.values[names[ring]] for ring in rings])
 
 
 def _moments(

@@ -5,13 +5,10 @@ nonsense when a coordinate passes zero; so they are found once a run, from the m
 moments that load it most:
 
 1. The moments with the largest acceleration at the initial positions, at rest, are picked from the run.
-2. At each, the positions of static equilibrium are found by pseudo-transient continuation,
-   ``q += (I / tau - J)^-1 a(q)`` with tau growing while the residual falls.  Where nothing touches (J = 0) this is a
-   walk along the force, and where something does it is Newton's method.  (Kelley and Keyes, SIAM J. Numer. Anal. 35
-   (1998) 508, doi:10.1137/S0036142996304796.)  What has to fall is the residual of the accelerations; where that
-   gets stuck, that of the forces: a ring of a milligramme has enormous accelerations on the way.  The walk ends where
-   both rings have gone too far for the distance between them to be told: nothing holds them, but the balls between
-   them have found their deflection.
+2. At each, the positions of static equilibrium are found (`equilibrium_newton`).  What has to fall is the residual of
+   the accelerations; where that gets stuck, that of the forces: a ring of a milligramme has enormous accelerations on
+   the way.  The walk ends where both rings have gone too far for the distance between them to be told: nothing holds
+   them, but the balls between them have found their deflection.
 3. Position magnitude: the largest coordinate among these equilibria and the initial state; for a bearing, half the
    clearance and the deflection.  At most `SOFT` times the largest distance of the two rings' centres: in a soft
    housing both move far, and the balls feel the small difference.  Velocity magnitude: ``sqrt(acceleration x
@@ -29,11 +26,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ballpass.runtime.run.equilibrium_newton import Rest, settle
+
 #: Moments at which equilibria are sought: the most loaded ones of the run.
 LOADED_MOMENTS = 3
 
 #: Most iterations of the continuation for one equilibrium.
 ITERATIONS = 80
+
+#: Residual left over, relative to that at the start [1].
+SETTLED = 1e-6
 
 #: Largest coordinate over the distance between the rings' centres at which that distance still has digits [1].
 FAR = 1e9
@@ -155,33 +157,21 @@ def _equilibrium(
     None when the continuation gets nowhere.
     """
     half = len(start) // 2
-    x = start.copy()
-    force = rhs(u, x)[half:]
-    size = first = float(np.linalg.norm(weights * force))
-    if size == 0.0:
-        return x, True
-    # the first step moves by a nanometre (or a nano of what else is moved): well inside any clearance
-    tau = 1e-9 * (1.0 + float(np.max(np.abs(x[:half])))) / float(np.linalg.norm(force))
-    for _ in range(ITERATIONS):
-        stiffness = jacobian(u, x)[half:, :half]
-        trial = x.copy()
-        try:
-            trial[:half] += np.linalg.solve(np.eye(half) / tau - stiffness, force)
-        except np.linalg.LinAlgError:
-            return None
-        force_there = rhs(u, trial)[half:]
-        size_there = float(np.linalg.norm(weights * force_there))
-        if not math.isfinite(size_there) or size_there > 1.5 * size:
-            tau /= 8.0
-            continue
-        if float(np.max(np.abs(trial[:half]))) > FAR * _apart(trial):
-            return x, False
-        x, force = trial, force_there
-        tau *= 4.0 * min(max(size / size_there if size_there else 1.0, 1.0), 16.0)
-        size = size_there
-        if size <= 1e-6 * first:
-            return x, True
-    return None
+
+    def state(q: np.ndarray) -> np.ndarray:
+        return np.concatenate([q, np.zeros(half)])
+
+    first = float(np.linalg.norm(weights * rhs(u, start)[half:]))
+    found = settle(
+        lambda q: rhs(u, state(q))[half:],
+        lambda q: -jacobian(u, state(q))[half:, :half],
+        start[:half],
+        weights=weights,
+        done=lambda _q, net, _k: float(np.linalg.norm(weights * net)) <= SETTLED * first,
+        gone=lambda q: float(np.max(np.abs(q))) > FAR * _apart(state(q)),
+        iterations=ITERATIONS,
+    )
+    return None if found.end is Rest.STUCK else (state(found.q), found.end is Rest.FOUND)
 
 
 def _rounded(value: float) -> float:

@@ -1,0 +1,89 @@
+"""Newton's method for positions at rest, from a start where nothing may touch.
+
+In: forces on the coordinates and their stiffness.  Out: positions where the forces vanish, or how far they got.
+
+Pseudo-transient continuation: ``q += (I / tau + K)^-1 f(q)`` with tau growing while the residual falls.  Where nothing
+touches (K = 0) this is a walk along the force, and where something does it is Newton's method.  (Kelley and Keyes, SIAM
+J. Numer. Anal. 35 (1998) 508, doi:10.1137/S0036142996304796.)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+#: First step [m, or the coordinate's unit]: well inside any clearance.
+FIRST_STEP = 1e-9
+
+#: Least stiffness that is put in place of none, relative to the largest: along a free direction nothing moves.
+FREE = 1e-10
+
+
+class Rest(Enum):
+    """How a search for rest ended."""
+
+    FOUND = "found"
+    UNHELD = "nothing holds the body"
+    STUCK = "the residual does not fall"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settled:
+    """Positions, the force left there, how the search ended, and its iterations."""
+
+    q: np.ndarray
+    force: np.ndarray
+    end: Rest
+    iterations: int
+
+
+def settle(
+    force: Callable[[np.ndarray], np.ndarray],
+    stiffness: Callable[[np.ndarray], np.ndarray],
+    start: np.ndarray,
+    *,
+    weights: np.ndarray,
+    done: Callable[[np.ndarray, np.ndarray, np.ndarray], bool],
+    gone: Callable[[np.ndarray], bool],
+    iterations: int,
+) -> Settled:
+    """Positions at rest.
+
+    Parameters
+    ----------
+    force, stiffness : force on each coordinate, and -d(force)/d(position)
+    start : positions, shape (coordinates,)
+    weights : of the coordinates in the residual that has to fall
+    done : whether the forces count as none, from positions, force and stiffness there
+    gone : whether these positions are so far away that nothing holds the body
+    iterations : most of them
+    """
+    q, net = start.copy(), force(start)
+    size = float(np.linalg.norm(weights * net))
+    if size == 0.0:
+        return Settled(q=q, force=net, end=Rest.FOUND, iterations=0)
+    tau = FIRST_STEP * (1.0 + float(np.max(np.abs(q)))) / float(np.linalg.norm(net))
+    matrix = stiffness(q)
+    for iteration in range(1, iterations + 1):
+        held = max(1.0 / tau, FREE * float(np.max(np.abs(matrix))))
+        try:
+            trial = q + np.linalg.solve(held * np.eye(len(q)) + matrix, net)
+        except np.linalg.LinAlgError:
+            break
+        there = force(trial)
+        size_there = float(np.linalg.norm(weights * there))
+        if not math.isfinite(size_there) or size_there > 1.5 * size:
+            tau = 0.125 / held
+            continue
+        if gone(trial):
+            return Settled(q=q, force=net, end=Rest.UNHELD, iterations=iteration)
+        q, net, matrix = trial, there, stiffness(trial)
+        if size_there == 0.0 or done(q, net, matrix):
+            return Settled(q=q, force=net, end=Rest.FOUND, iterations=iteration)
+        tau = 4.0 * min(max(size / size_there, 1.0), 16.0) / held
+        size = size_there
+    return Settled(q=q, force=net, end=Rest.STUCK, iterations=iterations)
