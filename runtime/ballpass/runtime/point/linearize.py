@@ -243,8 +243,8 @@ def _kink_notes(model: LoadedModel, bearing: BearingInfo, numbers: Numbers, t: f
             notes.append(
                 f"the law {law} has a kink where the deflection's rate is zero, as at {_balls(resting)}: damping is "
                 "that of the parting side, without resistance; on the approaching side each of these balls adds "
-                f"{numbers.values[f'{bearing.path}.c_b']:.6g} N*s/m along its direction. Give {bearing.path}.damping.smoothing, and "
-                "there is one derivative."
+                f"{numbers.values[f'{bearing.path}.c_b']:.6g} N*s/m along its direction. Give "
+                f"{bearing.path}.damping.smoothing, and there is one derivative."
             )
     if law.endswith("gated") or law == "tangent":
         touching = [k for k in at_onset if abs(rate[k]) > 0.0 or law.endswith("gated")]
