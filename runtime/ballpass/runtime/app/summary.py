@@ -21,6 +21,7 @@ from rich.table import Table
 
 from ballpass.runtime.ask.observables import drive_work, kinematic_frequencies, statistics, turns
 from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks
+from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.run.inputs import breakpoints
@@ -32,10 +33,7 @@ if TYPE_CHECKING:
 #: Packages whose version may change a number.
 _TOOLS = ("ballpass", "casadi", "numpy", "scipy")
 
-#: Outputs of which mean, rms and std are told besides the extremes.
-_MOTIONS = ("inner.x", "inner.y", "inner.vx", "inner.vy", "outer.x", "outer.y", "outer.vx", "outer.vy")
-
-#: The ball forces whose peaks are told, by the key they stand under.
+#: The ball forces of a bearing whose peaks are told, by the key they stand under.
 _BALL_FORCES = {"elastic": "ball.elastic_force", "total": "ball.force"}
 
 #: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
@@ -101,7 +99,7 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     peaks = _peaks(model, steady)
     summary |= _forces(steady, peaks)
     summary |= _conditioning(model, steady)
-    summary |= _balls(peaks)
+    summary |= _balls(manifest, peaks)
     summary |= _motions(steady)
     summary |= _constants(steady)
     summary["versions"] = _versions(steady)
@@ -110,9 +108,12 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
 
 def _peaks(model: Model, sol: Solution) -> dict[tuple[str, Kind], Peak]:
     """Peaks of forces and torques: samples miss what a load's step and a contact's spike do between them."""
-    wanted: list[tuple[str, Kind]] = [(name, "max") for name in _BALL_FORCES.values() if name in sol.outputs]
+    prefixes = [bearing.prefix for bearing in sol.manifest.bearings]
+    of_balls = [prefix + name for prefix in prefixes for name in _BALL_FORCES.values()]
+    wanted: list[tuple[str, Kind]] = [(name, "max") for name in of_balls if name in sol.outputs]
+    forces = ("reaction.", "drive_torque", *(f"{prefix}load." for prefix in prefixes))
     for info in sol.manifest.outputs:
-        if info.name in sol.outputs and (info.name.startswith(("reaction.", "load.")) or info.name == "drive_torque"):
+        if info.name in sol.outputs and info.name.startswith(forces):
             wanted += [(info.name, "min"), (info.name, "max")]
     if not wanted:
         return {}
@@ -123,7 +124,7 @@ def _forces(sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, 
     """Extremes of reactions, load and drive torque; the work of the drive."""
     found: dict[str, Any] = {}
     for info in sol.manifest.outputs:
-        if (info.name, "max") in peaks and info.name not in _BALL_FORCES.values():
+        if (info.name, "min") in peaks:
             low, high = peaks[info.name, "min"], peaks[info.name, "max"]
             found[info.name] = {
                 "min": _finite(low.value, info.name),
@@ -155,65 +156,65 @@ def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:
     return {"reaction_condition": conditions}
 
 
-def _balls(found_peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
-    """The highest force of any ball, and how it was looked for."""
-    peaks = {key: found_peaks[name, "max"] for key, name in _BALL_FORCES.items() if (name, "max") in found_peaks}
-    if not peaks:
-        return {}
-    found: dict[str, Any] = {key: _finite(peak.value, "ball.force") for key, peak in peaks.items()}
-    found["unit"] = "N"
-    found["time"] = {**{key: peak.time for key, peak in peaks.items()}, "unit": "s"}
-    found["ball"] = {**{key: peak.ball for key, peak in peaks.items()}, "unit": "1"}
-    found["sampled"] = {**{key: peak.sampled for key, peak in peaks.items()}, "unit": "N"}
-    found["searched"] = {key: peak.searched for key, peak in peaks.items()}
-    return {"peak_ball_force": found}
+def _balls(manifest: Manifest, found_peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
+    """The highest force of any ball of each bearing, and how it was looked for."""
+    told = {}
+    for bearing in manifest.bearings:
+        names: dict[str, tuple[str, Kind]] = {key: (bearing.prefix + name, "max") for key, name in _BALL_FORCES.items()}
+        peaks = {key: found_peaks[name] for key, name in names.items() if name in found_peaks}
+        if not peaks:
+            continue
+        found: dict[str, Any] = {key: _finite(peak.value, "ball.force") for key, peak in peaks.items()}
+        found["unit"] = "N"
+        found["time"] = {**{key: peak.time for key, peak in peaks.items()}, "unit": "s"}
+        found["ball"] = {**{key: peak.ball for key, peak in peaks.items()}, "unit": "1"}
+        found["sampled"] = {**{key: peak.sampled for key, peak in peaks.items()}, "unit": "N"}
+        found["searched"] = {key: peak.searched for key, peak in peaks.items()}
+        told[f"{bearing.prefix}peak_ball_force"] = found
+    return told
 
 
 def _motions(sol: Solution) -> dict[str, Any]:
-    units = {info.name: info.unit for info in (*sol.manifest.states, *sol.manifest.outputs)}
+    """Extremes and means of the states: of every step where the stepper ran, else of the samples."""
     found: dict[str, Any] = {}
-    for name in _MOTIONS:
-        if name not in sol:
-            continue
-        reduced = None if sol.reductions is None else sol.reductions.get(name)
-        values = reduced or statistics(sol.t, sol[name])
-        found[name] = {
-            "min": _finite(values.minimum, name),
-            "max": _finite(values.maximum, name),
-            "mean": _finite(values.mean, name),
-            "rms": _finite(values.rms, name),
-            "std": _finite(values.std, name),
-            "unit": units[name],
+    for info in sol.manifest.states:
+        reduced = None if sol.reductions is None else sol.reductions.get(info.name)
+        values = reduced or statistics(sol.t, sol[info.name])
+        found[info.name] = {
+            "min": _finite(values.minimum, info.name),
+            "max": _finite(values.maximum, info.name),
+            "mean": _finite(values.mean, info.name),
+            "rms": _finite(values.rms, info.name),
+            "std": _finite(values.std, info.name),
+            "unit": info.unit,
         }
     return found
 
 
 def _constants(sol: Solution) -> dict[str, Any]:
-    """Derived constants by the last part of their name, and the kinematic frequencies."""
-    bearing = sol.manifest.bearing
-    if bearing is None:
-        return {}
+    """Derived constants of each bearing by the last part of their name, and the kinematic frequencies."""
     units = {info.name: info.unit for info in sol.manifest.constants}
     found: dict[str, Any] = {}
-    for key in ("k_i", "k_o", "k_b", "c_b", "m_ei", "cage_ratio"):
-        name = f"bearing.{key}"
-        if name in units:
-            found[key] = _value(sol.constants[name], units[name], name)
-    frequencies = kinematic_frequencies(
-        bearing.balls,
-        sol.parameters["bearing.ball_diameter"],
-        sol.parameters["bearing.pitch_diameter"],
-        sol.parameters[bearing.shaft_speed],
-    )
-    found["frequencies"] = {
-        "shaft": frequencies.shaft,
-        "cage": frequencies.cage,
-        "ball_pass_outer": frequencies.ball_pass_outer,
-        "ball_pass_inner": frequencies.ball_pass_inner,
-        "ball_spin": frequencies.ball_spin,
-        "unit": "Hz",
-    }
-    found["damping_law"] = bearing.damping_law
+    for bearing in sol.manifest.bearings:
+        for key in ("k_i", "k_o", "k_b", "c_b", "m_ei", "cage_ratio"):
+            name = f"{bearing.path}.{key}"
+            if name in units:
+                found[bearing.prefix + key] = _value(sol.constants[name], units[name], name)
+        frequencies = kinematic_frequencies(
+            bearing.balls,
+            sol.parameters[f"{bearing.path}.ball_diameter"],
+            sol.parameters[f"{bearing.path}.pitch_diameter"],
+            sol.parameters[bearing.shaft_speed],
+        )
+        found[f"{bearing.prefix}frequencies"] = {
+            "shaft": frequencies.shaft,
+            "cage": frequencies.cage,
+            "ball_pass_outer": frequencies.ball_pass_outer,
+            "ball_pass_inner": frequencies.ball_pass_inner,
+            "ball_spin": frequencies.ball_spin,
+            "unit": "Hz",
+        }
+        found[f"{bearing.prefix}damping_law"] = bearing.damping_law
     return found
 
 

@@ -165,11 +165,12 @@ def _blame(own: float, second: float, allowed: float) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Second:
-    """Derivatives by a second route: shapes (quantities, parameters)."""
+    """Derivatives by a second route: shapes (quantities, parameters); and its values of the quantities themselves."""
 
     route: str
     value: Array
     uncertainty: Array
+    quantities: Array
 
 
 def by_differences(
@@ -192,7 +193,7 @@ def by_differences(
     """
     names, centre = list(at), np.array(list(at.values()))
     step, left = np.full(len(names), FIRST_STEP), np.arange(len(names))
-    noise = np.zeros(len(quantum))
+    noise = quantities = np.zeros(len(quantum))
     value, error = np.full(quantum.shape, np.nan), np.full(quantum.shape, np.inf)
     for tried in range(1, TRIANGLES + 1):
         halves = 0.5 ** np.arange(HALVINGS)
@@ -207,7 +208,7 @@ def by_differences(
         jitter = _jittered(at, scales) if tried == 1 else []
         found = measure([*jitter, *changes])
         if jitter:
-            noise = _noise(found[: len(jitter)])
+            noise, quantities = _noise(found[: len(jitter)]), found[len(jitter) // 2]
         table = found[len(jitter) :].reshape(2, len(left), HALVINGS, len(noise))
         poor = np.zeros(len(left), dtype=bool)
         for place, k in enumerate(left.tolist()):
@@ -224,7 +225,7 @@ def by_differences(
         left = left[poor]
         if not len(left):
             break
-    return Second(route="differences", value=value, uncertainty=error)
+    return Second(route="differences", value=value, uncertainty=error, quantities=quantities)
 
 
 def _jittered(at: Mapping[str, float], scales: Array) -> list[dict[str, float]]:

@@ -199,6 +199,10 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
             quantum=quantum,
             agreement=query.agreement,
         )
+        with np.errstate(invalid="ignore", divide="ignore"):
+            # what the routes differ in tells how well quadratures and extremes are known
+            apart = np.nan_to_num(np.abs(values - second.quantities) / np.abs(values))
+        own = own + apart[:, None] * np.abs(slopes)
     pairs = []
     units = {info.name: info.unit for info in manifest.parameters}
     for row, (quantity, estimate) in enumerate(zip(quantities, course.estimates, strict=True)):
