@@ -21,8 +21,8 @@ from ballpass.runtime.ask.study import Span, Study
 from ballpass.runtime.ask.track import Stepping
 from ballpass.runtime.native.stepper import Family
 from ballpass.runtime.run import request
+from ballpass.runtime.run.directions import Directions
 from ballpass.runtime.run.segments import WORK, segment_edges
-from ballpass.runtime.run.sensitivity import Directions
 from ballpass.runtime.run.trajectory import start_trajectory
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"

@@ -17,7 +17,7 @@ from ballpass.runtime.native.stepper import End, Family, Outcome, Segments
 from ballpass.runtime.point.evaluate import neighbour
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.direction_scales import direction_scales
-from ballpass.runtime.run.sensitivity import Directions
+from ballpass.runtime.run.directions import Directions
 
 # preload: every ball stays in contact, and the motion is smooth in every parameter
 SMOOTH = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.2, "bearing.initial.inner.y": 2e-6}

@@ -9,7 +9,7 @@ import pytest
 
 from ballpass.runtime import Model
 from ballpass.runtime.certify.certificate import Verdict
-from ballpass.runtime.run.sensitivity import Chain
+from ballpass.runtime.run.directions import Chain
 
 # preload keeps every ball in contact: nothing but the punch's window makes a derivative jump
 PRELOADED = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.0}

@@ -12,7 +12,7 @@ from ballpass.runtime.ask.quantity_records import Estimate, Quantity
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.equilibrium import instant, static_equilibrium
-from ballpass.runtime.run.sensitivity import Chain
+from ballpass.runtime.run.directions import Chain
 
 
 def at_rest(model: LoadedModel, numbers: Numbers, quantity: Quantity, chain: Chain | None) -> Estimate:

@@ -38,9 +38,9 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.reduced_run import check_span
 from ballpass.runtime.run.request import check_memory
-from ballpass.runtime.run.sensitivity import Chain
 
 Array = NDArray[np.float64]
 

@@ -24,13 +24,13 @@ from ballpass.runtime.native.kernel import Loop
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import End, Family
 from ballpass.runtime.point.jacobian import rows_of
+from ballpass.runtime.run.directions import Directions
 from ballpass.runtime.run.reduced_run import RunFailed
 from ballpass.runtime.run.request import no_output
 from ballpass.runtime.run.segments import make_segments
-from ballpass.runtime.run.sensitivity import Directions
 
 if TYPE_CHECKING:
-    from ballpass.runtime.run.sensitivity import Chain
+    from ballpass.runtime.run.directions import Chain
 
 Array = NDArray[np.float64]
 

@@ -1,34 +1,25 @@
 """Forward sensitivities of a run: derivatives of the states by parameters, exact for the discrete solution.
 
 In: a model, numbers of a run, names of parameters.  Out: `Sensitivities`.  The stepper differentiates each accepted
-step line by
-line at fixed step size, many parameters in one pass.  The chain from a parameter goes through the derived constants
-(groove radius, elliptic integrals, stiffness), through the phases, and through the times at which loads switch: where
-such a time moves, the derivative at fixed time jumps by the difference of the rates before and behind.
+step line by line at fixed step size, many parameters in one pass (`directions`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import METHODS, Segments, Tangents
-from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.direction_scales import direction_scales
+from ballpass.runtime.native.stepper import METHODS
+from ballpass.runtime.run.directions import Directions
 from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, check_kinks
-from ballpass.runtime.run.request import check_memory
-
-if TYPE_CHECKING:
-    from ballpass.runtime.contract.parameters import Numbers
-    from ballpass.runtime.run.request import Request
-    from ballpass.runtime.run.solution import Solution
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.simulate import simulate
+from ballpass.runtime.run.solution import Solution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,182 +48,6 @@ class Sensitivities:
         return np.asarray(self.x[:, states.index(state), self.names.index(parameter)])
 
 
-class Chain:
-    """Derivatives of the numbers of a run along parameters, all but those of the states.
-
-    Parameters
-    ----------
-    model, numbers : the model and the run's numbers
-    names : parameters, one direction each
-
-    Attributes
-    ----------
-    names : as given
-    p, c : derivatives of parameters and derived constants, shapes (parameters, directions), (constants, directions)
-    initial : of the states at the start, shape (states, directions)
-
-    Raises
-    ------
-    RequestError
-        An unknown parameter.
-    """
-
-    def __init__(self, model: LoadedModel, numbers: Numbers, names: Sequence[str]) -> None:
-        self._inputs = model.manifest.inputs
-        self._values = numbers.values
-        rows = {name: row for row, name in enumerate(numbers.parameters)}
-        for name in names:
-            if name not in rows:
-                raise RequestError(unknown_name("parameter", name, rows))
-        self.names = tuple(names)
-        self.p = np.zeros((len(numbers.p), len(names)))
-        for column, name in enumerate(names):
-            self.p[rows[name], column] = 1.0
-        self.c = np.zeros((0, len(names)))
-        if len(numbers.c):
-            by_parameters = model.kernel("constants_jac")({"p": numbers.p}).reshape(len(numbers.c), len(numbers.p))
-            self.c = by_parameters @ self.p
-        self._rows = rows
-        self._constants = {info.name: row for row, info in enumerate(model.manifest.constants)}
-        self.initial = np.zeros((len(model.states), len(names)))
-        for row, name in enumerate(model.manifest.initial):
-            self.initial[row] = self.p[rows[name]]
-
-    def derivative(self, name: str) -> np.ndarray:
-        """Derivative of a parameter or derived constant, shape (directions,)."""
-        matrix, row = (self.p, self._rows) if name in self._rows else (self.c, self._constants)
-        return np.asarray(matrix[row[name]])
-
-    def inputs(self, time: float) -> np.ndarray:
-        """Derivative of the inputs at a fixed time, shape (inputs, directions); gates are flat."""
-        u = np.zeros((len(self._inputs), len(self.names)))
-        for row, name, slope in clock.input_derivatives(self._inputs, self._values, time):
-            u[row] += slope * self.derivative(name)
-        return u
-
-    def breakpoint(self, time: float) -> np.ndarray:
-        """Derivative of the time of the breakpoint there, shape (directions,); zero where no load switches [s/unit].
-
-        Raises
-        ------
-        RequestError
-            Several loads switch at that time, each of which could move on its own.
-        """
-        shift = np.zeros(len(self.names))
-        for name, slope in clock.breakpoint_derivative(self._inputs, self._values, time):
-            shift += slope * self.derivative(name)
-        return shift
-
-
-class Directions:
-    """Directions of a run along parameters, as the driver takes them, and the derivatives it gives.
-
-    Parameters
-    ----------
-    model, numbers : the model and the run's numbers
-    names : parameters
-    samples : number of samples of the run
-
-    Raises
-    ------
-    RequestError
-        An unknown parameter, or derivatives that would not fit into memory.
-    """
-
-    def __init__(self, model: LoadedModel, numbers: Numbers, names: Sequence[str], samples: int) -> None:
-        self.chain = Chain(model, numbers, names)
-        self.names = self.chain.names
-        count, lanes = len(names), model.differentiating_stepper.lanes
-        self._lanes, self._blocks, self._count = lanes, -(-count // lanes), count
-        self._check_memory(
-            f"{samples} samples of derivatives of {len(model.states)} states by {count} parameters, as the driver "
-            "writes them and as they are handed out, of",
-            samples,
-            2 * len(model.states),
-        )
-        self._x = self._blocked(self.chain.initial)
-        self._height = max(len(model.manifest.inputs), 1)
-        self.samples = np.zeros((samples, self._blocks, len(model.states), lanes))
-        self._scales = partial(direction_scales, model.manifest, numbers.values, self.names)
-        self._weight: np.ndarray | None = None
-        self._rtol = 0.0
-
-    @property
-    def controlled(self) -> bool:
-        """Whether the derivatives take part in the choice of step sizes."""
-        return self._weight is not None
-
-    def control(self, rtol: float, magnitude: np.ndarray) -> None:
-        """Let the derivatives take part in the choice of step sizes.
-
-        Parameters
-        ----------
-        rtol : error allowed in a step, relative to the states' magnitudes over the parameters' scales (see
-            `ballpass.runtime.run.direction_scales`), or to the derivative itself where it is larger [1]
-        magnitude : of the states, shape (states,)
-        """
-        self._rtol = rtol
-        self._weight = self._blocked(self._scales(magnitude)[None, :] / (rtol * magnitude[:, None]))
-
-    def _blocked(self, columns: np.ndarray) -> np.ndarray:
-        """(rows, directions) to (blocks, rows, lanes); directions that fill the last block are zero."""
-        padded = np.zeros((columns.shape[0], self._blocks * self._lanes))
-        padded[:, : self._count] = columns
-        blocks = padded.reshape(columns.shape[0], self._blocks, self._lanes)
-        return np.ascontiguousarray(blocks.transpose(1, 0, 2))
-
-    def _check_memory(self, what: str, rows: int, columns: int) -> None:
-        """Refuse rows of so many columns along each direction, all lanes counted, that would not fit into memory."""
-        check_memory(
-            what,
-            rows,
-            columns * self._blocks * self._lanes,
-            "Take fewer samples a cycle, a shorter run, or fewer parameters at a time.",
-        )
-
-    def tangents(self, segments: Segments, first: int, count: int) -> Tangents:
-        """What the driver needs for `segments`, whose samples are `first` ... `first + count`.
-
-        Raises
-        ------
-        RequestError
-            It would not fit into memory.
-        """
-        starts = segments.times[:-1]
-        self._check_memory(
-            f"{len(starts)} segments in one call, with derivatives of their inputs and starts by {self._count} "
-            "parameters, of",
-            len(starts),
-            self._height + 1,
-        )
-        u = np.zeros((len(starts), self._blocks, self._height, self._lanes))
-        shift = np.zeros((len(starts), self._blocks, self._lanes))
-        for k, start in enumerate(starts):
-            moved = self.chain.inputs(float(start))
-            u[k, :, : len(moved)] = self._blocked(moved)
-            if segments.restarts[k] and start > 0.0:
-                shift[k] = self._blocked(self.chain.breakpoint(float(start))[None, :])[:, 0]
-        return Tangents(
-            p=self._blocked(self.chain.p),
-            c=self._blocked(self.chain.c),
-            u=u,
-            shift=shift,
-            x=self._x,
-            outputs=self.samples[first : first + count],
-            weight=self._weight,
-            rtol=self._rtol,
-        )
-
-    def states(self, finished: int) -> np.ndarray:
-        """Derivatives of the states at the samples, shape (finished, states, parameters)."""
-        found = np.empty((finished, self.samples.shape[2], self._count))
-        # block by block: a transposed array would be copied on the way
-        for block, first in enumerate(range(0, self._count, self._lanes)):
-            columns = found[:, :, first : first + self._lanes]
-            columns[:] = self.samples[:finished, block, :, : columns.shape[2]]
-        return found
-
-
 def refuse_located(kinks: str | None) -> None:
     """Raise `RequestError` where derivatives are asked for of steps that end on the kinks of the laws."""
     if kinks is not None and check_kinks(kinks) == LOCATED:
@@ -253,8 +68,6 @@ def sensitivities(model: LoadedModel, numbers: Numbers, request: Request, names:
     IntegrationError
         The computation failed.
     """
-    from ballpass.runtime.run.simulate import simulate
-
     refuse_located(request.kinks)
     jumping = [law for law, smoothness in model.manifest.smoothness if smoothness == "discontinuous"]
     if jumping:

@@ -41,7 +41,7 @@ from ballpass.runtime.run.stepping import Cost, step_through
 from ballpass.runtime.run.trajectory import Interrupted, Trajectory, evaluate_outputs, start_trajectory
 
 if TYPE_CHECKING:
-    from ballpass.runtime.run.sensitivity import Directions
+    from ballpass.runtime.run.directions import Directions
 
 #: `auto` takes ``rosenbrock`` above this ratio of fastest decay to fastest natural frequency.  Measured on a press with
 #: four degrees of freedom and eight balls at rtol 1e-6: both take equal time at a ratio of 2, ``erk`` twice as long at

@@ -22,7 +22,7 @@ from ballpass.runtime.run.segments import part_of, rest_of
 from ballpass.runtime.run.trajectory import Interrupted, Trajectory
 
 if TYPE_CHECKING:
-    from ballpass.runtime.run.sensitivity import Directions
+    from ballpass.runtime.run.directions import Directions
 
 #: Segments that one call of the stepper takes, ...
 SEGMENTS_A_CALL = 600

@@ -102,7 +102,7 @@ def sensitivity(
             place = out / "sensitivity.json"
             place.write_text(json.dumps(report.to_json(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
             written = [place, *draw_tornados(report, out)]
-    from ballpass.runtime.certify.sensitivity_table import render_report
+    from ballpass.runtime.certify.sensitivity_report import render_report
 
     if json_:
         typer.echo(json.dumps(report.to_json(), indent=2, allow_nan=False))
