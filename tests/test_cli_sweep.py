@@ -143,7 +143,7 @@ def test_three_varied_parameters_have_no_figure_and_are_told_so(site: Path, swee
     assert list(report["quantities"]) == [
         "peak_ball_force", "rms_inner_x", "rms_inner_y", "range_inner_x", "range_inner_y"
     ]  # fmt: skip
-    assert sorted(path.name for path in (site / "three").iterdir()) == ["sweep.csv", "sweep.json", "sweep.nc"]
+    assert sorted(path.name for path in (site / "three").glob("[!.]*")) == ["sweep.csv", "sweep.json", "sweep.nc"]
 
 
 def test_a_member_that_fails_is_named_and_the_others_are_kept(site: Path, sweep: Callable[..., Result]) -> None:

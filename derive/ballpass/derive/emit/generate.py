@@ -13,15 +13,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballpass.derive.emit.signature import run_info, signature, source_key
-from ballpass.derive.scene.read import read_scene
-from ballpass.derive.scene.records import Scene
+from ballpass.derive.emit.signature import (
+    folder_of,
+    fresh_manifest,
+    intact_manifest,
+    run_info,
+    signature,
+    source_key,
+)
 from ballpass.runtime import contract as mf
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.contract.folders import locked, replace_files
 
 if TYPE_CHECKING:
     from ballpass.derive.lower.functions import Functions
+    from ballpass.derive.scene.records import Scene
     from ballpass.derive.system import System
 
 #: Every file that a derivation writes.
@@ -78,12 +84,11 @@ def generate(
         The folder holds files, but none that this function wrote.  Nothing is written then.
     """
     say = progress or (lambda _: None)
-    if not force and not isinstance(scene, Scene) and fresh_manifest(scene, out) is not None:
+    if not force and fresh_manifest(scene, out) is not None:
         return folder_of(scene, out)
-    read = scene if isinstance(scene, Scene) else read_scene(scene)
-    source = "" if isinstance(scene, Scene) else source_key(Path(scene))
+    read, source = _read(scene)
     folder = folder_of(scene, out)
-    present = None if force else _intact(folder)
+    present = None if force else intact_manifest(folder)
     if present is not None and present.signature == signature(read):
         _refresh(folder, present, read, source)
         return folder
@@ -101,22 +106,6 @@ def generate(
     return folder
 
 
-def folder_of(scene: str | Path | Scene, out: str | Path | None = None) -> Path:
-    """The generated folder of a scene: `out`, or ``./generated/<scene name>``."""
-    if out is not None:
-        return Path(out)
-    return Path("generated") / (scene.name if isinstance(scene, Scene) else Path(scene).stem)
-
-
-def fresh_manifest(scene: str | Path, out: str | Path | None = None) -> mf.Manifest | None:
-    """Manifest of a scene file's folder where both are what they were when it was written, else None."""
-    present = _intact(folder_of(scene, out))
-    try:
-        return present if present is not None and present.source == source_key(Path(scene)) else None
-    except (OSError, ValueError):  # no such file, no path: whoever reads it says so
-        return None
-
-
 def check(scene: str | Path | Scene, out: str | Path | None = None) -> Check:
     """Derive a scene afresh and compare with the folder, byte for byte; writes nothing to it.
 
@@ -124,14 +113,12 @@ def check(scene: str | Path | Scene, out: str | Path | None = None) -> Check:
     """
     from ballpass.derive.emit.folder import write_folder
 
-    read = scene if isinstance(scene, Scene) else read_scene(scene)
+    read, source = _read(scene)
     folder = folder_of(scene, out)
-    source, present = "", {}
+    present: dict[str, str] = {}
     with contextlib.suppress(ArtefactError):
         manifest = mf.read_manifest(folder)
-        source, present = manifest.source, dict(manifest.files)
-    if not isinstance(scene, Scene):
-        source = source_key(Path(scene))
+        source, present = source or manifest.source, dict(manifest.files)
     present |= _digests(folder)
     system, functions = _derive_and_lower(read, lambda _: None)
     with tempfile.TemporaryDirectory() as made:
@@ -139,6 +126,15 @@ def check(scene: str | Path | Scene, out: str | Path | None = None) -> Check:
         fresh = _digests(Path(made))
     stale = sorted(name for name in fresh.keys() | present.keys() if fresh.get(name) != present.get(name))
     return Check(folder=folder, stale=tuple(stale))
+
+
+def _read(scene: str | Path | Scene) -> tuple[Scene, str]:
+    """A scene, and the digest of its file where there is one."""
+    if not isinstance(scene, str | Path):
+        return scene, ""
+    from ballpass.derive.scene.read import read_scene
+
+    return read_scene(scene), source_key(Path(scene))
 
 
 def _derive_and_lower(scene: Scene, say: Callable[[str], None]) -> tuple[System, Functions]:
@@ -158,16 +154,6 @@ def _digests(folder: Path) -> dict[str, str]:
     """Digests of the files in a folder by name."""
     paths = folder.glob("[!.]*") if folder.is_dir() else ()
     return {path.name: mf.file_digest(path) for path in paths if path.is_file()}
-
-
-def _intact(folder: Path) -> mf.Manifest | None:
-    """The folder's manifest where its files have the digests it gives them."""
-    try:
-        present = mf.read_manifest(folder)
-        mf.check_files(folder, present)
-    except ArtefactError:
-        return None
-    return present
 
 
 def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> None:

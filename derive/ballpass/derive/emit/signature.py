@@ -9,9 +9,13 @@ from __future__ import annotations
 import hashlib
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from ballpass.derive.scene.records import Scene
 from ballpass.runtime import contract as mf
+from ballpass.runtime.contract.errors import ArtefactError
+
+if TYPE_CHECKING:
+    from ballpass.derive.scene.records import Scene
 
 
 def signature(scene: Scene) -> str:
@@ -36,6 +40,34 @@ def source_key(path: Path) -> str:
 def versions() -> tuple[tuple[str, str], ...]:
     """Names and versions of the packages that decide what is generated."""
     return tuple((name, version(name)) for name in ("ballpass", "casadi", "sympy"))
+
+
+def folder_of(scene: str | Path | Scene, out: str | Path | None = None) -> Path:
+    """The generated folder of a scene: `out`, or ``./generated/<scene name>``."""
+    if out is not None:
+        return Path(out)
+    return Path("generated") / (Path(scene).stem if isinstance(scene, str | Path) else scene.name)
+
+
+def fresh_manifest(scene: str | Path | Scene, out: str | Path | None = None) -> mf.Manifest | None:
+    """Manifest of a scene file's folder where both are what they were when it was written, else None."""
+    if not isinstance(scene, str | Path):
+        return None
+    present = intact_manifest(folder_of(scene, out))
+    try:
+        return present if present is not None and present.source == source_key(Path(scene)) else None
+    except (OSError, ValueError):  # no such file, no path: whoever reads it says so
+        return None
+
+
+def intact_manifest(folder: Path) -> mf.Manifest | None:
+    """The folder's manifest where its files have the digests it gives them."""
+    try:
+        present = mf.read_manifest(folder)
+        mf.check_files(folder, present)
+    except ArtefactError:
+        return None
+    return present
 
 
 def run_info(scene: Scene) -> mf.RunInfo:

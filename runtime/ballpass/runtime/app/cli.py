@@ -29,6 +29,7 @@ from ballpass.runtime.app.commands.options import (
 )
 from ballpass.runtime.app.commands.sensitivity import sensitivity
 from ballpass.runtime.app.commands.shared import (
+    Asked,
     Stages,
     check_folder,
     checked_kinks,
@@ -37,6 +38,7 @@ from ballpass.runtime.app.commands.shared import (
     faults_of_turns,
     load_model,
     note,
+    read_asked,
     read_duration,
     read_with_settings,
     reported,
@@ -47,7 +49,6 @@ from ballpass.runtime.app.commands.trade import read_error, trade, usable_trade
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:
-    from ballpass.derive import Scene
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.solution import Solution
 
@@ -132,21 +133,24 @@ def run(
     with reported(), warnings_shown(), Stages() as stages:
         stages("read")
         seconds = read_duration(duration, cycles)
-        read, asked, overrides = read_with_settings(scene, set_ or [], seconds, transient)
+        asked = read_asked(scene, set_ or [], seconds, transient)
         _check_request(asked, cycles, transient, rtol, method)
-        at_kinks = checked_kinks(kinks, method or read.run.method, error)
+        at_kinks = checked_kinks(kinks, method or asked.run.method, error)
         target = read_error(error, of, method, rtol)
-        folder = out if out is not None else Path("results") / read.name
+        folder = out if out is not None else Path("results") / asked.name
         check_folder(folder)
         with faults_of(scene):
-            model = load_model(read, stages, method or read.run.method, kinks, rtol, overrides=overrides)
-        measured = usable_trade(folder, asked, read) if target is not None else None
+            model = load_model(scene, stages, method or asked.run.method, kinks, rtol, overrides=asked.overrides)
+        measured = None
+        if target is not None:
+            read, changed, _ = read_with_settings(scene, set_ or [], seconds, transient)
+            measured = usable_trade(folder, changed, read)
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,
             duration=seconds,
             transient=transient,
-            parameters=overrides,
+            parameters=asked.overrides,
             method=method,
             rtol=rtol,
             kinks=at_kinks,
@@ -254,7 +258,7 @@ app.command()(trade)
 
 
 def _check_request(
-    scene: Scene, cycles: float | None, transient: float | None, rtol: float | None, method: str | None
+    asked: Asked, cycles: float | None, transient: float | None, rtol: float | None, method: str | None
 ) -> None:
     """Refuse options that no model can follow, before anything is derived or written."""
     from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
@@ -275,17 +279,16 @@ def _check_request(
     faults += faults_of_turns(cycles, transient)
     if faults:
         raise RequestError("\n".join(faults))
-    shaft = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
-    speed = abs(shaft.value) if shaft is not None else 0.0
+    speed = abs(asked.speed)
     if cycles is not None and speed == 0.0:
         raise RequestError(
             f"--cycles: {cycles:g} turns were asked for, but nothing turns in this scene. Give it a speed, or a "
             'time instead of turns: --duration "0.5 s".'
         )
-    turns = cycles if cycles is not None else scene.run.cycles
+    turns = cycles if cycles is not None else asked.run.cycles
     if turns is None:
-        turns = (scene.run.duration or 0.0) * speed / math.tau
-    dropped = scene.run.transient_cycles if transient is None else transient
+        turns = (asked.run.duration or 0.0) * speed / math.tau
+    dropped = asked.run.transient_cycles if transient is None else transient
     if dropped > 0.0 and turns <= dropped:
         raise RequestError(
             f"The run of {turns:g} turns lies within its {dropped:g} transient turns: nothing is left to report. "

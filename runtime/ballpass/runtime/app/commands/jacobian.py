@@ -17,7 +17,7 @@ from ballpass.runtime.app.commands.shared import (
     complain,
     faults_of,
     load_model,
-    read_with_settings,
+    read_asked,
     reported,
     warnings_shown,
 )
@@ -64,10 +64,10 @@ def jacobian(
         if state not in ("equilibrium", "initial"):
             raise RequestError(f"--state: {state!r} is none of the choices. Allowed: equilibrium, initial.")
         stages("read")
-        read, _, overrides = read_with_settings(scene, set_ or [])
+        overrides = read_asked(scene, set_ or []).overrides
         angle, seconds = _instant(at_angle, time)
         with faults_of(scene):
-            model = load_model(read, stages, "none", overrides=overrides)
+            model = load_model(scene, stages, "none", overrides=overrides)
         stages("differentiate")
         result = _checked(model, overrides, of, wrt, angle, seconds, state, check=check)
     if json_:
@@ -91,10 +91,10 @@ def linearize(
     """Matrices, natural frequencies and modes of small vibrations about the static equilibrium of an instant."""
     with reported(), warnings_shown(), Stages() as stages:
         stages("read")
-        read, _, overrides = read_with_settings(scene, set_ or [])
+        overrides = read_asked(scene, set_ or []).overrides
         angle, seconds = _instant(at_angle, time)
         with faults_of(scene):
-            model = load_model(read, stages, "none", overrides=overrides)
+            model = load_model(scene, stages, "none", overrides=overrides)
         stages("linearize")
         result = model.linearize(seconds, crank_angle=angle, parameters=overrides)
     if json_:

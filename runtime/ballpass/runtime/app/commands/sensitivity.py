@@ -16,7 +16,7 @@ from ballpass.runtime.app.commands.shared import (
     complain,
     faults_of,
     load_model,
-    read_with_settings,
+    read_asked,
     reported,
     warnings_shown,
 )
@@ -68,11 +68,11 @@ def sensitivity(
     """
     with reported(), warnings_shown(), Stages() as stages:
         stages("read")
-        read, _, overrides = read_with_settings(scene, set_ or [])
+        overrides = read_asked(scene, set_ or []).overrides
         if out is not None:
             check_folder(out)
         with faults_of(scene):
-            model = load_model(read, stages, method, overrides=overrides)
+            model = load_model(scene, stages, method, overrides=overrides)
         begun: list[str] = []
 
         def progress(words: str, fraction: float) -> None:

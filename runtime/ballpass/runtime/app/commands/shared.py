@@ -14,7 +14,7 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,8 @@ from ballpass.runtime.contract.errors import BallpassError, RequestError
 if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.derive.scene.errors import Fault
+    from ballpass.derive.scene.records import Run
+    from ballpass.runtime.contract import Manifest, RunInfo
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.locating import Kinks
 
@@ -152,7 +154,7 @@ class Stages:
 @contextlib.contextmanager
 def faults_of(source: Path | str) -> Iterator[None]:
     """Say whose faults they are, where a later stage than reading finds them."""
-    from ballpass.derive import SceneError
+    from ballpass.derive.scene.errors import SceneError
 
     try:
         yield
@@ -160,6 +162,78 @@ def faults_of(source: Path | str) -> Iterator[None]:
         if error.source is not None:
             raise
         raise SceneError(error.faults, source=source) from None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """What a command needs of a scene before it has a model.
+
+    Attributes
+    ----------
+    path : the scene file
+    run : its run settings, with what was asked for instead
+    overrides : numbers of ``--set`` by path [SI]
+    speed : of driver or shaft, with the overrides; 0 where nothing turns [rad/s]
+    """
+
+    path: Path
+    run: Run | RunInfo
+    overrides: dict[str, float]
+    speed: float
+
+    @property
+    def name(self) -> str:
+        """Name of the scene."""
+        return self.path.stem
+
+
+def read_asked(path: Path, settings: list[str], duration: float | None = None, transient: float | None = None) -> Asked:
+    """What is asked of a scene; arguments as for `read_with_settings`.
+
+    Where the generated folder is fresh its manifest tells all that is needed; the scene is read where it is not, and
+    where something is wrong, to say so in the scene's words.
+    """
+    from ballpass.derive.emit.signature import fresh_manifest
+
+    manifest = fresh_manifest(path)
+    overrides = _plain_overrides(manifest, settings) if manifest is not None else None
+    if manifest is not None and overrides is not None:
+        run: Run | RunInfo = manifest.run
+        names = [m.speed for m in (manifest.mechanism,) if m] + [b.shaft_speed for b in manifest.bearings]
+        values = {info.name: info.default for info in manifest.parameters} | overrides
+        speed = values.get(names[0], 0.0) if names else 0.0
+    else:
+        _, scene, overrides = read_with_settings(path, settings)
+        run = scene.run
+        shaft = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
+        speed = shaft.value if shaft is not None else 0.0
+    if duration is not None:
+        dropped = run.transient_cycles if transient is None else transient
+        run = replace(run, cycles=None, duration=duration, transient_cycles=dropped)
+    return Asked(path=path, run=run, overrides=overrides, speed=speed)
+
+
+def _plain_overrides(manifest: Manifest, settings: list[str]) -> dict[str, float] | None:
+    """Numbers of ``--set`` by path, where the manifest's bounds alone tell that they are right; else None."""
+    from ballpass.derive.scene.units import QuantityError, parse_quantity
+    from ballpass.runtime.contract.parameters import resolve_parameters
+
+    units = {info.name: info.unit for info in manifest.parameters}
+    found: dict[str, float] = {}
+    for text in settings:
+        path, _, value = (part.strip() for part in text.partition("="))
+        # ends of windows and knots of tables are checked against each other when a scene is read
+        if path not in units or path in found or ".window" in path or path.startswith("load."):
+            return None
+        try:
+            found[path] = parse_quantity(value, units[path])
+        except QuantityError:
+            return None
+    try:
+        resolve_parameters(manifest, found)
+    except RequestError:
+        return None
+    return found
 
 
 def read_with_settings(
@@ -303,7 +377,7 @@ def checked_kinks(kinks: str | None, method: str, error: str | None = None) -> K
 
 
 def load_model(
-    scene: Scene,
+    scene: Path | Scene,
     stages: Stages,
     method: str,
     kinks: str | None = None,
@@ -317,7 +391,7 @@ def load_model(
     ----------
     overrides : numbers of ``--set``; refused where the linkage locks with them
     """
-    from ballpass.derive import generate
+    from ballpass.derive.emit.generate import generate
     from ballpass.runtime.model import load
     from ballpass.runtime.native.stepper import METHODS as STEPPERS
     from ballpass.runtime.run.locating import choose_kinks, stepper_for
