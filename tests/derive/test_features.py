@@ -123,7 +123,6 @@ def test_shipped_scenes_cost_what_they_cost(name: str) -> None:
 
 CONTACT = ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n')
 RATE = ('ratio = "0.25e-5 s*mm^0.5"\n', 'ratio = "0.25e-5 s*mm^0.5"\nsmoothing = "1 mm/s"\n')
-HARMONICS = ("balls = 8", "balls = 8\nload_harmonics = 4")
 
 
 @pytest.mark.parametrize(
@@ -131,7 +130,6 @@ HARMONICS = ("balls = 8", "balls = 8\nload_harmonics = 4")
     [
         ("bearing.contact.smoothing", CONTACT, ()),
         ("bearing.damping.smoothing", RATE, (CONTACT,)),
-        ("bearing.load_harmonics", HARMONICS, ()),
     ],
 )
 def test_optional_lines_of_the_bearing_are_features(

@@ -114,11 +114,7 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
 def _rest(shares: list[tuple[str, int]], counted: Cost) -> int:
     """Operations of the right-hand side that no part adds by itself; a part within another counts with that one."""
     paths = [path for path, _ in shares]
-    within = [
-        any(path.startswith(f"{other}.") for other in paths)
-        or (path == "bearing.load_harmonics" and "mechanism" in paths)
-        for path in paths
-    ]
+    within = [any(path.startswith(f"{other}.") for other in paths) for path in paths]
     return counted.functions["rhs"] - sum(v for (_, v), inner in zip(shares, within, strict=True) if not inner)
 
 

@@ -37,9 +37,6 @@ if TYPE_CHECKING:
     from ballpass.runtime.certify.trade import Trade
     from ballpass.runtime.model import Model
 
-#: Harmonics of the load that simpler models keep.
-HARMONICS = (4, 16)
-
 #: Name of the folder with the models, beside it.
 MODELS = "models"
 

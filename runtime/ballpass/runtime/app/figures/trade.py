@@ -29,8 +29,6 @@ _METHODS: dict[str, tuple[str, str]] = {
 #: Markers and faces of simpler models (filled) and of switches (open): the same in every figure.
 _OTHERS: dict[str, tuple[str, str]] = {
     "the outer ring fixed": ("P", SAND),
-    "4 harmonics of the load": ("X", SAND),
-    "16 harmonics of the load": ("<", SAND),
     FAST_MATH: ("o", "white"),
     KINKS_LOCATED: ("s", "white"),
 }
