@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import sys
 
-#: What an interrupted command says.
-INTERRUPTED = "interrupted. Whatever files are there are whole."
+from ballpass.runtime.app.interrupted import INTERRUPTED
 
 
 def main() -> None:

@@ -23,7 +23,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from ballpass.runtime.app.entry import INTERRUPTED
+from ballpass.runtime.app.interrupted import INTERRUPTED
 from ballpass.runtime.contract.errors import BallpassError, RequestError
 
 if TYPE_CHECKING:

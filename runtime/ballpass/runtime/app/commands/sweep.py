@@ -41,7 +41,7 @@ from ballpass.runtime.app.commands.shared import (
     warn,
     warnings_shown,
 )
-from ballpass.runtime.app.entry import INTERRUPTED
+from ballpass.runtime.app.interrupted import INTERRUPTED
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:
