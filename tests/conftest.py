@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from ballpass.derive import generate
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, load
 
 ROOT = Path(__file__).resolve().parent.parent

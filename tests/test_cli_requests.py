@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from ballpass.derive import SceneError
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError, load_solution
 from ballpass.runtime.app.cli import app
 

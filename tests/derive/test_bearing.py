@@ -12,7 +12,7 @@ import sympy as sp
 from scene_texts import PRESS, ROTOR
 
 from ballpass.derive.lower.functions import Functions, lower
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import System, derive
 
 

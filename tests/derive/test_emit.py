@@ -13,7 +13,7 @@ import pytest
 from ballpass.derive import SceneError, check, derive, generate, read_scene
 from ballpass.derive.emit.equations import equations
 from ballpass.derive.emit.signature import signature
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime.contract import read_manifest
 
 ROOT = Path(__file__).resolve().parents[2]

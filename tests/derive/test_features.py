@@ -10,7 +10,7 @@ import pytest
 
 from ballpass.derive import generate, read_scene
 from ballpass.derive.features import cost, count_operations, features
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.records import Scene
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -12,7 +12,7 @@ import sympy as sp
 from ballpass.derive import derive
 from ballpass.derive.lower.functions import lower, operations
 from ballpass.derive.lower.visitor import Visitor
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
 from ballpass.runtime import Model

@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scene_texts import PRESS, ROTOR, SCENES, edited
 
+from ballpass.derive.reading.read import parse_override, read_scene, scene_from_text, with_values
 from ballpass.derive.scene.errors import SceneError
-from ballpass.derive.scene.read import parse_override, read_scene, scene_from_text, with_values
 from ballpass.derive.scene.records import (
     EquivalentMass,
     GivenContact,

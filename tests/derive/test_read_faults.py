@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from scene_texts import PRESS, ROTOR, SCENES, edited
 
+from ballpass.derive.reading.read import read_scene, scene_from_text
 from ballpass.derive.scene.errors import SceneError
-from ballpass.derive.scene.read import read_scene, scene_from_text
 from ballpass.runtime.contract.errors import BallpassError
 
 

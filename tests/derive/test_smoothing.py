@@ -12,7 +12,7 @@ import pytest
 from ballpass.derive import SceneError, derive, generate
 from ballpass.derive.bearing.laws import RAMP_ERROR, SMOOTHED_HERTZ_ERROR
 from ballpass.derive.lower.functions import lower
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import System
 from ballpass.runtime import Model
 from ballpass.runtime.certify.differences import richardson

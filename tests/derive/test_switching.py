@@ -11,7 +11,7 @@ import sympy as sp
 from ballpass.derive import generate
 from ballpass.derive.bearing.laws import LAWS, Contact, Rest
 from ballpass.derive.bearing.switching import Switching, find_switching
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 
 DELTA, RATE, STIFFNESS, COEFFICIENT, WIDTH, RATE_WIDTH = sp.symbols("delta rate k c w w_v", real=True)
 

@@ -10,7 +10,7 @@ import pytest
 
 from ballpass.derive import derive
 from ballpass.derive.lower.functions import lower
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
 
 GIVEN = 'stiffness = "13.34e9 N/m^1.5"'

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from ballpass.derive import generate
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime.contract.folders import LOCK
 from ballpass.runtime.native import compile as compiling
 

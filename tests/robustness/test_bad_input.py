@@ -24,7 +24,7 @@ from profiles import LONG, examples
 from typer.testing import CliRunner
 
 from ballpass.derive import SceneError, derive, generate
-from ballpass.derive.scene.read import parse_override, read_scene, scene_from_text, with_values
+from ballpass.derive.reading.read import parse_override, read_scene, scene_from_text, with_values
 from ballpass.derive.scene.records import Scene
 from ballpass.runtime import Model, RequestError, load
 from ballpass.runtime.app.cli import app

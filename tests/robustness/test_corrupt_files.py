@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from ballpass.derive import check, generate
 from ballpass.derive.emit.generate import GENERATED
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import CacheWarning, CompileError, RequestError, load, load_solution
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract import read_manifest

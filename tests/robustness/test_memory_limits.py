@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from ballpass.derive import generate
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError, load
 from ballpass.runtime.ask.quantities import parse_quantity
 from ballpass.runtime.ask.study import Span, Study

@@ -29,7 +29,7 @@ import pytest
 from profiles import LONG
 
 from ballpass.derive import generate
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import CacheWarning, CompileError, RequestError, load, load_solution
 from ballpass.runtime.contract import read_artefact, read_manifest
 from ballpass.runtime.contract.errors import ArtefactError

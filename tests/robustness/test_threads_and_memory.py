@@ -20,7 +20,7 @@ import pytest
 from profiles import LONG
 
 from ballpass.derive import generate
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import ArtefactError, Model, load
 from ballpass.runtime.certify import quasi_static
 from ballpass.runtime.native import ensemble_driver, stepper

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from ballpass.derive import SceneError
-from ballpass.derive.scene.read import scene_from_text
-from ballpass.derive.scene.values import value_bounds, value_relations, with_values
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.derive.reading.values import value_bounds, value_relations, with_values
 from ballpass.runtime import Model, RequestError
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ballpass.derive import generate
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime.native.compile import find_compiler
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS
 

@@ -21,7 +21,7 @@ from artefact import write_folder
 from typer.testing import CliRunner
 
 from ballpass.derive import generate
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import ArtefactError, IntegrationError, Model, RequestError, load
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract import ParameterInfo

@@ -12,7 +12,7 @@ import pytest
 
 from ballpass.derive import derive, generate
 from ballpass.derive.lower.functions import Functions, lower
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import System
 from ballpass.runtime.native.compile import compile_sources, find_compiler
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from ballpass.derive import generate
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError, load
 from ballpass.runtime.app.commands.trade import models_of
 from ballpass.runtime.certify.error_target import Search, like_those_measured, meet_target

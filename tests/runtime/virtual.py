@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ballpass.derive import generate
-from ballpass.derive.scene.read import scene_from_text
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
 from ballpass.runtime.contract import read_manifest
 

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from ballpass.derive.emit.equations import equations
     from ballpass.derive.emit.generate import check, generate
     from ballpass.derive.lower.functions import lower
+    from ballpass.derive.reading.read import read_scene
     from ballpass.derive.scene.errors import SceneError
-    from ballpass.derive.scene.read import read_scene
     from ballpass.derive.scene.records import Scene
     from ballpass.derive.system import System, derive
 
@@ -35,7 +35,7 @@ _HOME = {
     "equations": "emit.equations",
     "generate": "emit.generate",
     "lower": "lower.functions",
-    "read_scene": "scene.read",
+    "read_scene": "reading.read",
 }
 
 

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from ballpass.derive.emit.signature import run_info, signature, versions
 from ballpass.derive.lower.functions import Functions, operations
 from ballpass.derive.mechanism.forces import drawn_forces
-from ballpass.derive.scene.values import value_bounds, value_relations
+from ballpass.derive.reading.values import value_bounds, value_relations
 from ballpass.derive.system import System
 from ballpass.derive.variables import Output
 from ballpass.runtime import contract as mf

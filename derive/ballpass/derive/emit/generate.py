@@ -132,7 +132,7 @@ def _read(scene: str | Path | Scene) -> tuple[Scene, str]:
     """A scene, and the digest of its file where there is one."""
     if not isinstance(scene, str | Path):
         return scene, ""
-    from ballpass.derive.scene.read import read_scene
+    from ballpass.derive.reading.read import read_scene
 
     return read_scene(scene), source_key(Path(scene))
 

@@ -1,1 +1,1 @@
-"""Scene files: records, units, reading rules, checks."""
+"""Scene files: records, units, words of faults, and what reading rules are made of."""

@@ -21,9 +21,9 @@ from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.linkage import Linkage
+from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import Force, Mechanism
 from ballpass.derive.scene.schema import Table
-from ballpass.derive.scene.values import Checker
 from ballpass.derive.variables import Input, Output
 
 #: Names of the points of every body and of the frame.

@@ -9,9 +9,9 @@ from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points, Setting
 from ballpass.derive.mechanism.kinematics import body_point, scale
 from ballpass.derive.scene.body_keys import read_moving_body, refuse_unknown_point
+from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import Vector
 from ballpass.derive.scene.schema import Table, upright, words_of_force
-from ballpass.derive.scene.values import Checker
 from ballpass.derive.terms import components
 
 

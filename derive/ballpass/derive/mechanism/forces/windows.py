@@ -9,9 +9,9 @@ from typing import Any, ClassVar, Self
 import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
+from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import Quantity
 from ballpass.derive.scene.schema import Table, upright
-from ballpass.derive.scene.values import Checker
 
 _TURN = 2.0 * math.pi
 

@@ -118,8 +118,8 @@ def grid(ranges: Sequence[Range]) -> dict[str, np.ndarray]:
 
 def _read_range(scene: Scene, text: str) -> Range:
     from ballpass.derive import SceneError
+    from ballpass.derive.reading.read import parse_override
     from ballpass.derive.scene.errors import Fault
-    from ballpass.derive.scene.read import parse_override
     from ballpass.derive.scene.units import parse_quantity
 
     path, equals, written = (part.strip() for part in text.partition("="))
@@ -166,7 +166,7 @@ def _read_range(scene: Scene, text: str) -> Range:
 def _check_path(scene: Scene, path: str) -> None:
     """Refuse what is no number: structure decides what is derived, and a setting of the run is no parameter."""
     from ballpass.derive import SceneError
-    from ballpass.derive.scene.values import check_path
+    from ballpass.derive.reading.values import check_path
     from ballpass.runtime.app.commands.shared import run_setting
 
     misplaced = run_setting(path)
@@ -178,8 +178,8 @@ def _check_path(scene: Scene, path: str) -> None:
 def _check_ends(scene: Scene, path: str, text: str, ends: tuple[float, float]) -> None:
     """Refuse ends that a scene file could not have there; what lies between is then within the bounds as well."""
     from ballpass.derive import SceneError
+    from ballpass.derive.reading.values import value_bounds
     from ballpass.derive.scene.errors import Fault
-    from ballpass.derive.scene.values import value_bounds
 
     bounds = value_bounds(scene).get(path)
     if bounds is None:

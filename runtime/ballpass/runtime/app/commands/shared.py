@@ -247,7 +247,7 @@ def read_with_settings(
     transient : turns at its start that do not count, beside a duration
     """
     from ballpass.derive import SceneError, read_scene
-    from ballpass.derive.scene.read import parse_override, with_values
+    from ballpass.derive.reading.read import parse_override, with_values
 
     read = read_scene(path)
     faults: list[Fault] = []

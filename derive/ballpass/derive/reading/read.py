@@ -15,14 +15,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ballpass.derive.reading.read_bearing import read_bearing, read_load, read_shaft
+from ballpass.derive.reading.read_mechanism import read_mechanism
+from ballpass.derive.reading.values import parse_override, quantities_of, replaced, value_faults, with_values
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.read_bearing import read_bearing, read_load, read_shaft
-from ballpass.derive.scene.read_mechanism import read_mechanism
 from ballpass.derive.scene.records import Bearing, Mechanism, Run, Scene
 from ballpass.derive.scene.schema import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
-from ballpass.derive.scene.values import parse_override, quantities_of, replaced, value_faults, with_values
 from ballpass.derive.terms import Names
 
 __all__ = ["METHODS", "parse_override", "read_scene", "scene_from_text", "with_values"]
