@@ -22,7 +22,6 @@ from profiles import LONG
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import ArtefactError, Model, load
-from ballpass.runtime.certify import quasi_static
 from ballpass.runtime.native import ensemble_driver, stepper
 from ballpass.runtime.native.compile import compile_sources, find_compiler
 from ballpass.runtime.native.driver_library import DRIVER
@@ -150,8 +149,6 @@ LAYOUTS = {
     "ballpass_result": stepper._Result,
     "ballpass_tangents": stepper._Tangents,
     "ballpass_ensemble_options": ensemble_driver._Options,
-    "ballpass_equilibrium_options": quasi_static._Options,
-    "ballpass_equilibrium_result": quasi_static._Result,
 }
 
 
@@ -163,7 +160,7 @@ def test_records_of_the_driver_have_the_layout_that_python_gives_them(name: str,
     entries = [f"sizeof({name})"]
     for field in fields:
         entries += [f"offsetof({name}, {field})", f"sizeof((({name} *)0)->{field})"]
-    includes = "".join(f'#include "{header}"\n' for header in ("stepper.h", "ensemble.h", "equilibrium.h"))
+    includes = "".join(f'#include "{header}"\n' for header in ("stepper.h", "ensemble.h"))
     source = tmp_path / "layout.c"
     numbers = ", ".join(f"(long){entry}" for entry in entries)
     source.write_text(f"#include <stddef.h>\n{includes}const long layout[] = {{{numbers}}};\n", encoding="utf-8")
@@ -195,8 +192,6 @@ def test_a_driver_of_other_records_is_refused_before_it_is_called(
     longer = type(record.__name__, (ctypes.Structure,), {"_fields_": (*record._fields_, ("later", ctypes.c_double))})
     driver, module = {
         "ballpass_ensemble_options": (model.ensemble_driver, ensemble_driver),
-        "ballpass_equilibrium_options": (model.quasi_static, quasi_static),
-        "ballpass_equilibrium_result": (model.quasi_static, quasi_static),
     }.get(name, (model.stepper, stepper))
     library = model.ensemble_driver.stepper.library if driver is model.ensemble_driver else driver.library
     type(driver)(library, model.manifest)

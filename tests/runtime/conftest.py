@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import pytest
 from virtual import virtual_model
 
 from ballpass.runtime import Model
-from ballpass.runtime.certify import prepared
-from ballpass.runtime.native.stepper import Outcome, Stepper
 
 
 @pytest.fixture(scope="session")
@@ -35,20 +32,3 @@ def press(make_model: Callable[..., Model]) -> Model:
 def rotor(make_model: Callable[..., Model]) -> Model:
     """20 kg in a bearing with a fixed outer ring and damping of 200 N s/m to the frame."""
     return make_model("varying_compliance")
-
-
-@pytest.fixture
-def counted_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What integrations by the stepper cost is counted instead of timed: the same on every machine, however busy.
-
-    In evaluations of the equations; a factorization, with its Jacobian, is as much as three of them.
-    """
-    work, run = [0.0], Stepper.run
-
-    def counting(stepper: Stepper, **given: Any) -> Outcome:
-        outcome = run(stepper, **given)
-        work[0] += outcome.evaluations + 3.0 * outcome.factorizations
-        return outcome
-
-    monkeypatch.setattr(Stepper, "run", counting)
-    monkeypatch.setattr(prepared, "_now", lambda: work[0])

@@ -510,7 +510,6 @@ def test_reductions_locate_as_runs_do(gated: Model) -> None:
         ({"kinks": "located", "method": "cvodes"}, "Take one of these, or leave kinks stepped-over"),
         ({"kinks": "located", "method": "erk"}, "stepper-dp54"),
         ({"kinks": "located", "method": "rosenbrock"}, "stepper-rodas5p"),
-        ({"kinks": "located", "method": "quasi-static"}, "cannot end its steps"),
         ({"kinks": "located", "error": 0.01}, "Leave kinks out"),
     ],
 )

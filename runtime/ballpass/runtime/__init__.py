@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from ballpass.runtime.app.results import Results, load_results
     from ballpass.runtime.ask.peaks import Peak
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport
-    from ballpass.runtime.certify.stored_trade import load_trade
-    from ballpass.runtime.certify.trade import Trade
     from ballpass.runtime.contract import Manifest, read_manifest
     from ballpass.runtime.contract.errors import (
         ArtefactError,
@@ -68,11 +66,9 @@ __all__ = [
     "StaticEquilibrium",
     "Statistics",
     "Status",
-    "Trade",
     "load",
     "load_results",
     "load_solution",
-    "load_trade",
     "read_manifest",
 ]
 
@@ -81,8 +77,6 @@ _HOME = {
     "load_results": "app.results",
     "Peak": "ask.peaks",
     "SensitivityReport": "certify.sensitivity_report",
-    "load_trade": "certify.stored_trade",
-    "Trade": "certify.trade",
     "Manifest": "contract",
     "read_manifest": "contract",
     "ArtefactError": "contract.errors",

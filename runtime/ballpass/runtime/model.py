@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ballpass.runtime.ask.peaks import Peak, refine_peak
-from ballpass.runtime.certify.named_error import Models, simulate_to_error
+from ballpass.runtime.certify.error_target import simulate_to_error
 from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.contract.parameters import Numbers, vector
@@ -34,7 +34,6 @@ from ballpass.runtime.run.simulate import method_names, simulate
 
 if TYPE_CHECKING:
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport
-    from ballpass.runtime.certify.trade import Trade
     from ballpass.runtime.point.equilibrium import StaticEquilibrium
     from ballpass.runtime.point.linearize import Linearization
     from ballpass.runtime.run.solution import Solution
@@ -167,8 +166,6 @@ class Model(LoadedModel):
         progress: Callable[[float], None] | None = None,
         error: float | None = None,
         of: str | Sequence[str] | None = None,
-        trade: Trade | None = None,
-        models: Models = "any",
     ) -> Solution:
         """Simulate from t = 0.  What is not given is taken from the scene's run settings.
 
@@ -195,9 +192,6 @@ class Model(LoadedModel):
             this run and tightens until the estimate is within it; ``Solution.accuracy`` tells (see
             `ballpass.runtime.certify.error_target`)
         of : quantities that `error` is about.  Default: peak ball force, rms and range of the inner ring's motion
-        trade : a measurement of this scene (`ballpass trade`), from which `error` begins its search
-        models : which models `error` may take: ``"any"``, simpler ones that were kept with the trade as well, or
-            ``"full"``
 
         Raises
         ------
@@ -225,7 +219,7 @@ class Model(LoadedModel):
         refuse_with_error(kinks, error)
         if error is None:
             return simulate(self, numbers, request)
-        return simulate_to_error(self, numbers, request, error, of, trade, models)
+        return simulate_to_error(self, numbers, request, error, of)
 
     def sensitivities(
         self,

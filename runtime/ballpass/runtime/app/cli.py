@@ -40,12 +40,11 @@ from ballpass.runtime.app.commands.shared import (
     note,
     read_asked,
     read_duration,
-    read_with_settings,
     reported,
     warnings_shown,
 )
 from ballpass.runtime.app.commands.sweep import sweep
-from ballpass.runtime.app.commands.trade import read_error, trade, usable_trade
+from ballpass.runtime.app.commands.trade import read_error, trade
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:
@@ -95,8 +94,7 @@ def run(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Integrator: auto, stepper (or stepper-rodas4, -rodas5p, -dp54, -dop853), erk, rosenbrock, "
-            "cvodes; or quasi-static, the rings in equilibrium at each instant.",
+            help="Integrator: auto, stepper (or stepper-rodas4, -rodas5p, -dp54, -dop853), erk, rosenbrock, cvodes.",
         ),
     ] = None,
     kinks: Annotated[
@@ -119,9 +117,6 @@ def run(
         list[str] | None,
         typer.Option("--of", metavar="Q", help="Quantity that --error is about: peak_ball_force. May be repeated."),
     ] = None,
-    full_model: Annotated[
-        bool, typer.Option("--full-model", help="With --error: take no simpler model, however accurate and fast.")
-    ] = False,
     out: ResultsFolder = None,
     json_: Json = False,
     figures: Figures = True,
@@ -141,10 +136,6 @@ def run(
         check_folder(folder)
         with faults_of(scene):
             model = load_model(scene, stages, method or asked.run.method, kinks, rtol, overrides=asked.overrides)
-        measured = None
-        if target is not None:
-            read, changed, _ = read_with_settings(scene, set_ or [], seconds, transient)
-            measured = usable_trade(folder, changed, read)
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,
@@ -157,12 +148,7 @@ def run(
             progress=stages.fraction,
             error=target,
             of=of,
-            trade=measured,
-            models="full" if full_model else "any",
         )
-        if measured is not None and solution.accuracy is not None and solution.accuracy.model in measured.folders:
-            # the solution is of the model that was chosen, which may be a simpler one
-            model = measured.model(solution.accuracy.model)
         _note_size(solution)
         summary, files = _write_results(model, solution, folder, stages, figures=figures)
     from ballpass.runtime.app.summary import render_summary
@@ -261,14 +247,13 @@ def _check_request(
     asked: Asked, cycles: float | None, transient: float | None, rtol: float | None, method: str | None
 ) -> None:
     """Refuse options that no model can follow, before anything is derived or written."""
-    from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
     from ballpass.runtime.contract.parameters import unknown_name
     from ballpass.runtime.native.casadi_integrators import METHODS
     from ballpass.runtime.native.stepper import METHODS as STEPPERS
     from ballpass.runtime.run.request import TOLERANCES
 
     faults = []
-    known = ("auto", *STEPPERS, QUASI_STATIC, *METHODS)
+    known = ("auto", *STEPPERS, *METHODS)
     if method is not None and method not in known:
         faults.append(f"--method: {unknown_name('method', method, known)}")
     if rtol is not None and not TOLERANCES[0] <= rtol <= TOLERANCES[1]:

@@ -26,12 +26,3 @@ class Status(Enum):
         "The integrator could not go on: the tolerance asks for steps too small or too many. "
         'Try method="rosenbrock" for a stiff model, a looser rtol, or check initial state and parameters.'
     )
-    NO_EQUILIBRIUM = (
-        "The quasi-static model finds no position of the rings that balances the load at this instant. Check load, "
-        "stiffness and clearance, or take the model with inertia: method stepper."
-    )
-    FREE_RING = (
-        "The quasi-static model has no single answer at this instant: nothing holds a ring in some direction, because "
-        "the load vanishes or a single ball carries it. Inertia decides there: take method stepper; or preload the "
-        "bearing (a negative clearance), or move bearing.ball_angle off the load line."
-    )

@@ -8,7 +8,6 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
-from ballpass.runtime.certify.quasi_static import QuasiStatic, compile_quasi_static
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.native.compilers import Compiler, find_compiler
@@ -39,7 +38,6 @@ class Drivers:
         self._differentiating: Stepper | None = None
         self._locating: Stepper | None = None
         self._ensemble: EnsembleDriver | None = None
-        self._quasi_static: QuasiStatic | None = None
 
     @property
     def available(self) -> bool:
@@ -100,15 +98,6 @@ class Drivers:
                 library = compile_ensemble(self._folder, self._manifest, self._find_compiler())
                 self._ensemble = EnsembleDriver(library, self._manifest)
             return self._ensemble
-
-    @property
-    def quasi_static(self) -> QuasiStatic:
-        """The driver of the quasi-static model; errors as for `stepper`."""
-        with self._making:
-            if self._quasi_static is None:
-                library = compile_quasi_static(self._folder, self._manifest, self._find_compiler())
-                self._quasi_static = QuasiStatic(library, self._manifest)
-            return self._quasi_static
 
     def _find_compiler(self) -> Compiler:
         compiler = find_compiler(self._compiler) if self.available else None

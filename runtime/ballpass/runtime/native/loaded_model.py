@@ -11,7 +11,6 @@ from typing import Any
 
 import casadi
 
-from ballpass.runtime.certify.quasi_static import QuasiStatic
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters
 from ballpass.runtime.native.compile import CompiledLibrary
@@ -97,11 +96,6 @@ class LoadedModel:
     def ensemble_driver(self) -> EnsembleDriver:
         """The driver of ensembles and reductions, compiled when first asked for; errors as for `stepper`."""
         return self._drivers.ensemble
-
-    @property
-    def quasi_static(self) -> QuasiStatic:
-        """The driver of the quasi-static model, compiled when first asked for; errors as for `stepper`."""
-        return self._drivers.quasi_static
 
     def has(self, name: str) -> bool:
         """Whether the model has a function of that name."""

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
-from ballpass.runtime.certify.quasi_static_runs import reduce_quasi_static
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -100,22 +98,19 @@ def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reduct
     duration = run_length(model, request, turn)
     transient = run.transient_cycles if request.transient_cycles is None else real(request.transient_cycles)
     start = check_span(duration, turn, transient)
-    family = choose_family(method) if method != QUASI_STATIC else None
-    named = "stepper" if family is not None and method == "auto" else method
+    family = choose_family(method)
+    named = "stepper" if method == "auto" else method
     chosen = choose_kinks(request.kinks, named, model.manifest, check_rtol(rtol))
     looked_at = min(duration, SCALED_TURNS * turn)
     tolerance = check_rtol(rtol) * stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn)
     names = channel_names(model.manifest)
     row = reduction_rows(model.manifest).empty(1, start, names)[0]
     state = initial.copy()
-    if family is None:
-        steps, rejected = reduce_quasi_static(model, numbers, tolerance, state, row, (duration, turn, start))
-    else:
-        stepper = model.locating_stepper if chosen == LOCATED and has_kinks(model.manifest) else model.stepper
-        steps, rejected = integrate_reduced(
-            *(model, stepper, numbers, family, tolerance, state, row, (duration, turn, start)),
-            progress=request.progress,
-        )
+    stepper = model.locating_stepper if chosen == LOCATED and has_kinks(model.manifest) else model.stepper
+    steps, rejected = integrate_reduced(
+        *(model, stepper, numbers, family, tolerance, state, row, (duration, turn, start)),
+        progress=request.progress,
+    )
     found = reductions_of(model.manifest, row, names, end=state, steps=steps, rejected=rejected, turn=turn)
     assert found is not None  # `check_span` leaves some time
     return found

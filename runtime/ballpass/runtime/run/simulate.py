@@ -5,7 +5,7 @@ In: a model, numbers, a request.  Out: a `Solution`.
 1. The request is checked, and what it leaves open taken from the scene (`request`).
 2. The run is split where a load switches and at every whole turn (`segments`).
 3. A method is chosen; tolerances are relative to the magnitudes of the states (`magnitudes`).
-4. The method fills the samples (`stepping`: the project's own; `pieces`: CasADi's; `quasi_static_runs`).
+4. The method fills the samples (`stepping`: the project's own; `pieces`: CasADi's).
 5. The outputs asked for are evaluated at all samples at once (`trajectory`).
 """
 
@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.contract.status import Status
@@ -173,7 +172,7 @@ def to_solution(
     return Solution(
         t=trajectory.t[:done],
         x=trajectory.x[:done],
-        outputs=evaluate_outputs(model, numbers, trajectory, plan.outputs, at_rest=method == QUASI_STATIC),
+        outputs=evaluate_outputs(model, numbers, trajectory, plan.outputs),
         parameters=dict(numbers.parameters),
         constants={info.name: numbers.values[info.name] for info in model.manifest.constants},
         cycle_length=plan.turn if math.isfinite(plan.turn) else None,
@@ -224,11 +223,6 @@ def fill(
             reductions=reductions,
         )
         return
-    if method == QUASI_STATIC:
-        from ballpass.runtime.certify.quasi_static_runs import fill_quasi_static  # it builds on this module
-
-        fill_quasi_static(model, numbers, tolerance, trajectory, cost, progress)
-        return
     integrator = METHODS[method](model) if method != "none" else None
     try:
         integrate(numbers, integrator, tolerance, trajectory, progress)
@@ -245,7 +239,7 @@ def _choose(
         return "none", "the model has no states: its outputs follow from time alone", np.zeros(0)
     name = asked or model.manifest.run.method
     scales = None
-    if not (model.has_stepper and name in ("auto", *STEPPERS, QUASI_STATIC)):
+    if not (model.has_stepper and name in ("auto", *STEPPERS)):
         scales = model_scales(model, numbers, plan.initial, plan.duration, plan.turn)
     method, reason = choose_method(model, name, scales)
     if scales is not None:
@@ -259,7 +253,7 @@ def _choose(
 
 def method_names(model: LoadedModel) -> tuple[str, ...]:
     """Integration methods of a model, besides ``auto``."""
-    return (*((*STEPPERS, QUASI_STATIC) if model.has_stepper else ()), *available_methods(model))
+    return (*(STEPPERS if model.has_stepper else ()), *available_methods(model))
 
 
 def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tuple[str, str]:
@@ -276,7 +270,7 @@ def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tupl
     """
     if asked == "auto" and model.has_stepper:
         return "stepper", "the fastest method that a compiler allows"
-    if (asked in STEPPERS or asked == QUASI_STATIC) and model.has_stepper:
+    if asked in STEPPERS and model.has_stepper:
         return asked, "asked for"
     available = available_methods(model)
     if asked == "auto" and scales is not None:
@@ -285,7 +279,7 @@ def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tupl
         if name in available:
             return name, f"{why}: {ratio}"
         raise RequestError("The model has no right-hand side to integrate. Generate it again with `ballpass derive`.")
-    if asked in STEPPERS or asked == QUASI_STATIC:
+    if asked in STEPPERS:
         missing = (
             "the generated folder has no kernels for it; write it again with `ballpass derive`"
             if model.compiled

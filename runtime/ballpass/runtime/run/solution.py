@@ -16,13 +16,13 @@ from ballpass.runtime.contract import Manifest, VariableInfo
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.status import Status
+from ballpass.runtime.run.accuracy import Accuracy
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import no_output
 
 if TYPE_CHECKING:
     import xarray
 
-    from ballpass.runtime.certify.error_target import Accuracy
 
 #: Number of the layout of saved files.
 FILE_SCHEMA = 1

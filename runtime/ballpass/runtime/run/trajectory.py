@@ -112,7 +112,6 @@ def evaluate_outputs(
     names: Sequence[str],
     *,
     lean: bool = True,
-    at_rest: bool = False,
 ) -> dict[str, np.ndarray]:
     """Outputs at the finished samples: shape (samples,), or (samples, balls).
 
@@ -121,7 +120,6 @@ def evaluate_outputs(
     names : of the outputs wanted
     lean : evaluate nothing else, by a function of these outputs alone that is compiled when they are first asked for;
         False: all are evaluated, and the others dropped
-    at_rest : forces are those with the rings at rest
     """
     done = trajectory.finished
     states = {state.name: k for k, state in enumerate(model.manifest.states)}
@@ -131,12 +129,9 @@ def evaluate_outputs(
     if computed:
         lengths = np.diff(np.minimum(trajectory.stops, done))
         segments = trajectory.segments
-        x = trajectory.x[:done]
-        if at_rest:
-            x = np.hstack([x[:, : x.shape[1] // 2], np.zeros((done, x.shape[1] // 2))])
         values = {
             "t": trajectory.t[:done] - np.repeat(segments.times[:-1], lengths),
-            "x": x,
+            "x": trajectory.x[:done],
             "u": np.repeat(segments.inputs, lengths, axis=0),
             "p": numbers.p,
             "c": numbers.c,

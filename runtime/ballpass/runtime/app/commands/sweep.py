@@ -103,7 +103,7 @@ def sweep(
 
     from ballpass.runtime.app import sweep_results as results
     from ballpass.runtime.app.commands.ranges import grid, read_ranges
-    from ballpass.runtime.certify.prepared import default_observables
+    from ballpass.runtime.certify.whole_run import default_observables
 
     with reported(), warnings_shown(), Stages() as stages:
         stages("read")

@@ -1,40 +1,25 @@
-"""The figure of a trade: error against time, both logarithmic, and the front that no configuration beats."""
+"""The figure of a trade: error against time, both logarithmic, and the front that no other way beats."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ballpass.runtime.app.figures.canvas import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
-from ballpass.runtime.certify.quasi_static import NAME as QUASI_STATIC
-from ballpass.runtime.certify.trade import FAST_MATH, FULL, KINKS_LOCATED, Measured, Trade
+from ballpass.runtime.certify.trade import Measured, Trade
+from ballpass.runtime.run.locating import LOCATED
 
-#: Marker, colour and edge of each method; shapes tell them apart in grey as well.
+#: Marker and colour of each method; shapes tell them apart in grey as well, and open ones locate kinks.
 _METHODS: dict[str, tuple[str, str]] = {
     "stepper": ("o", INK),
-    "stepper-rodas4": ("s", SIGNAL),
+    "stepper-rodas4": ("s", SAND),
     "stepper-rodas5p": ("D", SIGNAL),
     "stepper-dp54": ("p", INK),
-    "stepper-dop853": ("^", INK),
-    QUASI_STATIC: ("*", SAND),
-    "rosenbrock": ("x", GREY),
-    "erk": ("+", GREY),
-    "cvodes": ("v", GREY),
+    "stepper-dop853": ("^", GREY),
 }
-
-#: Markers and faces of simpler models (filled) and of switches (open): the same in every figure.
-_OTHERS: dict[str, tuple[str, str]] = {
-    "the outer ring fixed": ("P", SAND),
-    FAST_MATH: ("o", "white"),
-    KINKS_LOCATED: ("s", "white"),
-}
-
-#: Markers of models that have none above, in the order they were measured.
-_SPARE = (">", "h", "8", "d")
 
 #: Decades the axis is lengthened at most to show where the reference is uncertain.
 _DECADES = 4.0
@@ -45,31 +30,26 @@ def draw_trade(trade: Trade, quantity: str | None = None) -> Figure:
     """Error (95 % point over the members) against time a cycle; `quantity` None takes the worst of all."""
     figure = new_figure(5.4)
     axes = figure.add_subplot()
-    groups: dict[str, list[Measured]] = {}
+    groups: dict[tuple[str, str], list[Measured]] = {}
     for one in trade.measured:
         if math.isfinite(one.time) and math.isfinite(trade.error(one, quantity)) and trade.error(one, quantity) > 0.0:
-            groups.setdefault(_group(one), []).append(one)
-    spare = iter(_SPARE)
-    for name, ones in groups.items():
-        ones.sort(key=lambda m: -m.configuration.rtol)
-        if name in _METHODS:
-            marker, colour = _METHODS[name]
-            looks: dict[str, Any] = {"markersize": 10 if name == QUASI_STATIC else 6}
-        else:
-            marker, colour = _OTHERS[name] if name in _OTHERS else (next(spare, "."), SAND)
-            looks = {"markersize": 7}
+            groups.setdefault((one.way.method, one.way.kinks), []).append(one)
+    for (method, kinks), ones in groups.items():
+        ones.sort(key=lambda m: -m.way.rtol)
+        marker, colour = _METHODS[method]
         axes.plot(
             [1e3 * m.time for m in ones],
             [100.0 * trade.error(m, quantity) for m in ones],
             marker=marker,
+            markersize=6,
             color=colour,
-            markeredgecolor=colour if marker in "x+" else INK,
-            markeredgewidth=1.2 if marker in "x+" else 0.6,
-            linestyle=":" if name in _METHODS else "none",
+            markerfacecolor="white" if kinks == LOCATED else colour,
+            markeredgecolor=colour if kinks == LOCATED else INK,
+            markeredgewidth=1.0,
+            linestyle=":",
             linewidth=0.7,
-            label=name,
+            label=method + (", kinks located" if kinks == LOCATED else ""),
             zorder=3,
-            **looks,
         )
     front = trade.front(quantity)
     axes.plot(
@@ -114,10 +94,3 @@ def _axes(axes: Axes, floor: float) -> bool:
     axes.set_ylim(low, min(high, 1e3))
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return shown
-
-
-def _group(one: Measured) -> str:
-    c = one.configuration
-    if c.switch:
-        return c.switch
-    return c.method if c.model == FULL else c.model

@@ -1,0 +1,59 @@
+"""What a run to a named error asked, chose and found; `ballpass.runtime.certify.error_target` makes it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Accuracy:
+    """What was asked, chosen and found.
+
+    Attributes
+    ----------
+    target : relative error asked for [1]
+    estimate : of the worst quantity of this run [1]
+    of : quantities
+    values : of the quantities, in SI
+    estimates : of each quantity [1]
+    method, rtol, kinks : chosen
+    check : words for the second run: method, tolerance, kinks
+    tried : words for the ways that were integrated before and did not meet the target, with their estimates
+    time : of the chosen integration [s]
+    check_time : of all others [s]
+    """
+
+    target: float
+    estimate: float
+    of: tuple[str, ...]
+    values: dict[str, float]
+    estimates: dict[str, float]
+    method: str
+    rtol: float
+    kinks: str
+    check: str
+    tried: tuple[tuple[str, float], ...]
+    time: float
+    check_time: float
+
+    def plain(self) -> dict[str, Any]:
+        """Plain data for JSON; an estimate that is infinite becomes None."""
+        data = asdict(self)
+        data["tried"] = [(way, e if math.isfinite(e) else None) for way, e in self.tried]
+        return data
+
+    @property
+    def words(self) -> str:
+        """One paragraph for people."""
+        worst = max(self.estimates, key=lambda name: self.estimates[name])
+        values = ", ".join(f"{name} = {value:.7g}" for name, value in self.values.items())
+        after = f", after {len(self.tried)} other ways" if self.tried else ""
+        return (
+            f"{values} (SI, extremes between samples included): "
+            f"error asked for {100 * self.target:g} %, estimated {100 * self.estimate:.2g} % (worst of "
+            f"{', '.join(self.of)}: {worst}) by {self.method} at rtol {self.rtol:g}, against a second whole run: "
+            f"{self.check}. Integrated in {1e3 * self.time:.3g} ms; {1e3 * self.check_time:.3g} ms more went into the "
+            f"estimate{after}."
+        )
