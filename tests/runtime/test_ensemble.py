@@ -15,12 +15,13 @@ from press_laws import press
 
 from ballpass.runtime import Model, RequestError, SimulationError
 from ballpass.runtime.many.ensemble import EnsembleResult
-from ballpass.runtime.many.member_segments import inputs_of, moments, stretches
+from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Members, Span, make_members
 from ballpass.runtime.native.ensemble_driver import EnsembleDriver, MemberArrays, MemberNumbers
+from ballpass.runtime.native.member_schedule import MOMENTS
 from ballpass.runtime.native.stepper import End
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.magnitudes import MOMENTS, model_scales
+from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.reduced_run import SCALED_TURNS, choose_family, edge_windows
 from ballpass.runtime.run.segments import segment_edges
 
@@ -408,7 +409,8 @@ def test_inputs_made_for_many_are_those_made_for_one(make_model: ModelMaker) -> 
     random = np.random.default_rng(3)
     owner = random.integers(0, count, 400)
     times = random.uniform(0.0, 1.0, 400)
-    found = inputs_of(model.manifest.inputs, members.columns, owner, times, times + 1e-4)
+    schedule = model.ensemble_driver.schedule
+    found = schedule.inputs(np.hstack([members.p, members.c]), owner, times, times + 1e-4)
     for row, (k, time) in enumerate(zip(owner, times, strict=True)):
         values = members.numbers(model, int(k)).values
         assert np.array_equal(found[row], clock.inputs_at(model.manifest.inputs, values, time, time + 1e-4))

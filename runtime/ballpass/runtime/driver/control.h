@@ -31,9 +31,6 @@ static const double BP_DP54_DECAY = 3.3, BP_DOP853_DECAY = 6.3, BP_DOP853_OSCILL
    last the ring flies free. */
 static const double BP_HIGH_ORDER = 0.35, BP_LOW_ORDER = 1.2, BP_FREE = 1e-3;
 
-/* Logarithm of 1e-4: smaller errors of the step before do not tell the controller more. */
-static const double BP_LOG_SMALL_ERROR = -9.210340371976182;
-
 /* Whether limits of the step size [s] are numbers that can be kept to. */
 static inline int bp_are_limits(double first, double smallest, double largest) { return first >= 0.0 && smallest >= 0.0 && largest > 0.0; }
 

@@ -10,6 +10,7 @@
 #ifndef BALLPASS_ENSEMBLE_H
 #define BALLPASS_ENSEMBLE_H
 
+#include "schedule.h"
 #include "stepper.h"
 
 enum { BALLPASS_STOPPED = 5 }; /* status of members that were under way when the caller asked to stop */
@@ -52,7 +53,35 @@ BALLPASS_EXPORT void ballpass_ensemble_magnitudes(long members, const double *p,
 
 BALLPASS_EXPORT long ballpass_ensemble_work(long members);
 
-/* Numbers in a reduction, its channels, the lanes of this library; bytes of the options. */
+/* What the segments of members are made of: the model's inputs, and the numbers these name, [members][columns]. */
+typedef struct {
+    const schedule_input *inputs;
+    int count, columns;
+    long members;
+    const double *values;
+} ballpass_schedule;
+
+/* Ends of the segments of so many windows of each run from the number `window` on: a window is so many turns, and of a run that is over
+   there is its end alone.
+
+   durations, turns of the runs, and of a turn, which may be infinite [s]
+   starts          where reductions start: an edge [s]
+   room            numbers of segments that `times` has room for; zero: only the most that there can be are counted
+   first, times    as for ballpass_ensemble
+   Returns the number of segments, or the most; -1 where memory is short. */
+BALLPASS_EXPORT double ballpass_schedule_edges(const ballpass_schedule *schedule, const double *durations, const double *turns,
+                                               const double *starts, double turns_a_window, long window, long windows, double room,
+                                               long *first, double *times);
+
+/* Inputs of so many segments that start at `t`, of the members `owner`; gates and slopes hold for a time `inside`. */
+BALLPASS_EXPORT void ballpass_schedule_inputs(const ballpass_schedule *schedule, long count, const long *owner, const double *t,
+                                              const double *inside, double *u);
+
+/* Inputs at the moments that magnitudes are taken from, with the first row of each member; returns the number of rows. */
+BALLPASS_EXPORT long ballpass_schedule_moments(const ballpass_schedule *schedule, const long *first, const double *times,
+                                               const double *horizons, long *rows, double *u);
+
+/* Numbers in a reduction, its channels, the lanes of this library; bytes of the options, of a schedule and of an input in it. */
 BALLPASS_EXPORT void ballpass_ensemble_sizes(int *sizes);
 
 #endif

@@ -124,6 +124,22 @@ static inline int bp_after_linear(bp_family *family, bp_seen *seen, int method, 
     return BALLPASS_DP54;
 }
 
+/* The largest stable step of Dormand-Prince 5(4) or DOP853 where a run's step started [s]. */
+typedef double bp_stable(void *run, int dp54);
+
+/* The method for the next step, from an accepted one of size h that is looked at; `reach`: of an explicit method. */
+static inline int bp_judge_family(bp_family *family, bp_seen *seen, int method, int high_order, double h, double reach, bp_stable *stable,
+                                  void *run)
+{
+    const int dp54 = method == BALLPASS_DP54;
+    if (!dp54 && method != BALLPASS_DOP853)
+        return bp_look_at_linear(family, h) ? bp_after_linear(family, seen, method, stable(run, 1)) : method;
+    const int wanted = bp_look_at_explicit(family, method, reach, h);
+    if (wanted == BP_GO_ON) return method;
+    if (wanted == BP_GIVE_UP) return bp_try_linear(family, seen, dp54 ? h : 0.5 * h);
+    return bp_after_explicit(family, seen, method, wanted == BP_ASK ? stable(run, dp54) : INFINITY, high_order);
+}
+
 /* Whether a segment behind a breakpoint starts with the linearly implicit family. */
 static inline int bp_starts_linear(const bp_seen *seen, const double *restrict A, const double *restrict B)
 {

@@ -31,8 +31,11 @@ static inline void bp_lane_log(const double *restrict x, double *restrict y)
     }
 }
 
-static inline void bp_lane_exp(const double *restrict x, double *restrict y)
+static inline void bp_lane_exp(const double *restrict x, double *restrict y, const double *accepted, const double *error, double order)
 {
+    (void)accepted;
+    (void)error;
+    (void)order;
     bp_lane_bits shifted BP_ALIGNED, power BP_ALIGNED;
     double series[BP_L] BP_ALIGNED;
     BP_EACH_LANE {
@@ -100,6 +103,7 @@ BP_INLINE bp_lane bp_lane_time_term(const bp_lane_linear *at, int i, int c, bp_l
 #include "explicit.h"
 #include "rosenbrock.h"
 #include "iteration_matrix.h"
+#include "step_size.h"
 #undef BP_NAME
 #undef BP_W
 #undef BP_N

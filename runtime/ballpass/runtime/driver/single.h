@@ -2,6 +2,7 @@
 #ifndef BALLPASS_SINGLE_H
 #define BALLPASS_SINGLE_H
 
+#include <float.h>
 #include <stddef.h>
 
 #include "methods.h"
@@ -67,6 +68,15 @@ BP_INLINE double bp_time_term(const bp_linear *at, int i, int c, double d)
     return d * at->at[c];
 }
 
+static inline void bp_log(const double *x, double *y) { *y = log(*x); }
+static inline void bp_exp(const double *x, double *y, const double *accepted, const double *error, double order)
+{
+    *y = *accepted != 0.0 ? exp(*x) : pow(*error, -1.0 / order);
+}
+
+/* Logarithm of 1e-4: smaller errors of the step before do not tell the controller more. */
+static const double BP_LOG_SMALL_ERROR = -9.210340371976182;
+
 #define BP_NAME(f) bp_##f
 #define BP_W 1
 #define BP_N double
@@ -77,6 +87,7 @@ BP_INLINE double bp_time_term(const bp_linear *at, int i, int c, double d)
 #include "explicit.h"
 #include "rosenbrock.h"
 #include "iteration_matrix.h"
+#include "step_size.h"
 #undef BP_NAME
 #undef BP_W
 #undef BP_N

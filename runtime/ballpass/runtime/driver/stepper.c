@@ -28,26 +28,28 @@ static int choose_method(bp_run *run, double t)
     return bp_starts_linear(&run->seen, run->linear.A, run->linear.B) ? BALLPASS_RODAS5P : BALLPASS_DP54;
 }
 
+typedef struct {
+    bp_run *run;
+    double t;
+} bp_step_start;
+
+static double stable_step(void *from, int dp54)
+{
+    const bp_step_start *start = from;
+    bp_run *run = start->run;
+    if (is_explicit(run->method)) linearize(run, start->t, 1);
+    return bp_stable_step(run->linear.A, run->linear.B, dp54);
+}
+
 /* The method for the next step, from the accepted one of size h at time t. */
 static int judge_family(bp_run *run, bp_family *family, double t, double h)
 {
+    const bp_explicit_method *plain = explicit_method(run->method);
+    bp_step_start start = {run, t};
+    double reach = 0.0;
     if (!bp_family_looks(family)) return run->method;
-    if (!is_explicit(run->method)) {
-        if (!bp_look_at_linear(family, h)) return run->method;
-        return bp_after_linear(family, &run->seen, run->method, bp_stable_step(run->linear.A, run->linear.B, 1));
-    }
-    const int dp54 = run->method == BALLPASS_DP54, stages = explicit_method(run->method)->stages;
-    double reach;
-    bp_explicit_reach(stages, (const double(*)[BP_NX])run->plain.k, run->plain.y, &h, run->next, run->weight, &reach);
-    const int wanted = bp_look_at_explicit(family, run->method, reach, h);
-    if (wanted == BP_GO_ON) return run->method;
-    if (wanted == BP_GIVE_UP) return bp_try_linear(family, &run->seen, dp54 ? h : 0.5 * h);
-    double stable = INFINITY;
-    if (wanted == BP_ASK) {
-        linearize(run, t, 1);
-        stable = bp_stable_step(run->linear.A, run->linear.B, dp54);
-    }
-    return bp_after_explicit(family, &run->seen, run->method, stable, 1);
+    if (plain) bp_explicit_reach(plain->stages, (const double(*)[BP_NX])run->plain.k, run->plain.y, &h, run->next, run->weight, &reach);
+    return bp_judge_family(family, &run->seen, run->method, 1, h, reach, stable_step, &start);
 }
 
 /* The first step of a segment from `start` on: its size and method, and what it starts from. */
@@ -120,7 +122,6 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
         }
         set_pace(run, start, t, h);
         double error = try_step(run, t, h);
-        const double q = error_exponent(run->method);
         if (error >= 0.0 && error <= 1.0 && within_reach(run)) error = tangent_step(run, t, h, error);
         const double tried = h;
         const int met = error >= 0.0 && error <= 1.0 && within_reach(run)
@@ -133,13 +134,10 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
             continue;
         }
         if (h != tried) last = 0;
-        if (error >= 0.0 && error <= 1.0 && within_reach(run)) {
-            /* PI controller (Hairer & Wanner II, section IV.2) */
-            const double log_error = log(error > 1e-10 ? error : 1e-10);
-            double factor = 0.9 * exp((0.4 * run->last_error - 0.7 * log_error) / q);
-            factor = factor > 6.0 ? 6.0 : factor < 0.2 ? 0.2 : factor;
-            if (rejected_last && factor > 1.0) factor = 1.0;
-            run->last_error = log_error > BP_LOG_SMALL_ERROR ? log_error : BP_LOG_SMALL_ERROR;
+        const double accepted = error >= 0.0 && error <= 1.0 && within_reach(run), rejected_before = rejected_last;
+        double factor;
+        bp_step_factor(error_exponent(run->method), &error, &accepted, &rejected_before, &run->last_error, &factor);
+        if (accepted != 0.0) {
             result->steps++;
             write_outputs(run, start, t, h, last ? end : start + (t + h));
             reduce_step(run, start, t, h);
@@ -176,9 +174,6 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
             }
         } else {
             const int finite = error >= 0.0 && error <= DBL_MAX && is_finite(run->next);
-            double factor = finite && error > 1.0 ? 0.9 * pow(error, -1.0 / q) : 0.1;
-            if (factor < 0.1) factor = 0.1;
-            if (factor > 0.9) factor = 0.9;
             result->rejected++;
             rejected_last = 1;
             run->step = stretched(run, start, t, h, factor, 0);

@@ -4,7 +4,7 @@ In: a generated folder.  Out: the model's kernels, the driver with its methods, 
 a CSV, a Makefile and a README.  `make` needs gcc, clang or another compiler of C99
 that knows their vector types, and nothing else.
 
-The program finds the segments of a run in C (``schedule.c``, the counterpart of `integrate/clock.py`), the magnitudes
+The program finds the segments of a run in C (``schedule.c``, as ensembles do), the magnitudes
 that tolerances are relative to (``scales.h``, as the stepper does), and evaluates the derived constants there, so that
 parameters can be changed on its command line and the numbers are those of the model in Python.
 """
@@ -93,7 +93,7 @@ def _texts(model: LoadedModel, folder: Path) -> dict[str, str]:
         texts["margins.c"] = margins_source(model)
     extra = [STANDALONE / "located.c"] if has_kinks(manifest) else []
     extra += [STANDALONE / "assembly.c"] if margins_of(manifest) else []
-    for source in (STANDALONE / "main.c", STANDALONE / "schedule.c", DRIVER / "stepper.c", *extra):
+    for source in (STANDALONE / "main.c", DRIVER / "schedule.c", DRIVER / "stepper.c", *extra):
         texts.update(_with_includes(source, (STANDALONE, DRIVER, folder), texts))
     objects = sorted(name for name in texts if name.endswith(".c"))
     headers = sorted(name for name in texts if name.endswith(".h"))

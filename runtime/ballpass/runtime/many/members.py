@@ -51,12 +51,6 @@ class Members:
         parameters = Parameters(model.manifest.parameters, values)
         return Numbers(parameters=parameters, p=self.p[member], c=self.c[member], values=values)
 
-    def timing(self, model: LoadedModel, names: Sequence[str], member: int) -> Numbers:
-        """The same with only these of its values by name: all that edges of segments need."""
-        values = {name: float(self.columns[name][member]) for name in names}
-        parameters = Parameters((), {})
-        return Numbers(parameters=parameters, p=self.p[member], c=self.c[member], values=values)
-
 
 def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
     """Columns of a table of parameters, each of shape (members,).

@@ -28,6 +28,7 @@ from ballpass.runtime.native.driver_library import (
     padded,
     sizes_of,
 )
+from ballpass.runtime.native.member_schedule import SCHEDULE_RECORDS, MemberSchedule
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import MAX_STEPS, Family, Stepper
 
@@ -113,7 +114,8 @@ def compile_ensemble(folder: Path, manifest: Manifest, compiler: Compiler) -> Co
         The compiler failed.
     """
     check_headers(folder, ENSEMBLE_HEADERS)
-    sources, flags = ("stepper.c", "ensemble.c"), ("-DBALLPASS_REDUCTIONS",)
+    sources = ("stepper.c", "ensemble.c", "member_schedule.c", "schedule.c")
+    flags = ("-DBALLPASS_REDUCTIONS",)
     return compile_driver(folder, manifest, compiler, sources, kind="ensemble", headers=ENSEMBLE_HEADERS, flags=flags)
 
 
@@ -125,6 +127,7 @@ class EnsembleDriver:
     stepper : driver of single runs, with reductions
     rows : layout of the reductions
     lanes : members that advance together
+    schedule : segments of many members
 
     Raises
     ------
@@ -137,7 +140,7 @@ class EnsembleDriver:
         self.rows = reduction_rows(manifest)
         code = ctypes.CDLL(str(library.path))
         row, channels, self.lanes, *records = sizes_of(code, "ballpass_ensemble_sizes")
-        check_records(library, records, (_Options,))
+        check_records(library, records, (_Options, *SCHEDULE_RECORDS))
         if (row, channels) != (self.rows.size, len(self.rows.channels)):
             raise ArtefactError(
                 f"{library.path}: reductions of {row} numbers and {channels} channels, {self.rows.size} and "
@@ -145,6 +148,7 @@ class EnsembleDriver:
             )
         self._inputs = input_columns(manifest)
         self._code = code
+        self.schedule = MemberSchedule(code, manifest)
         code.ballpass_ensemble_work.restype = ctypes.c_long
         code.ballpass_ensemble.restype = ctypes.c_int
 

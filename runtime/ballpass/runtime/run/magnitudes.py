@@ -11,13 +11,11 @@ import numpy as np
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.member_schedule import MOMENTS
 from ballpass.runtime.native.stepper import Stepper
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.scales import Scales, find_scales
 from ballpass.runtime.run.segments import segment_edges
-
-#: Moments of the run that are looked at for magnitudes: so many between breakpoints, and so many evenly spread.
-MOMENTS = 32
 
 
 def stepper_magnitudes(

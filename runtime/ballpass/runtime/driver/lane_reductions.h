@@ -1,0 +1,96 @@
+/* On-line reductions of the members in lanes; see reductions.h. */
+#ifndef BALLPASS_LANE_REDUCTIONS_H
+#define BALLPASS_LANE_REDUCTIONS_H
+
+#include "lane_block.h"
+
+/* A member within the step just taken, for bp_extreme. */
+typedef struct {
+    bp_numbers n;
+    double t, h, x[BP_NX], next[BP_NX], dense[BP_DENSE_ROWS][BP_NX];
+    int linearly;
+} bp_lane_source;
+
+static bp_lane_source lane_source(const bp_job *job, const bp_lane_block *b, int lane)
+{
+    bp_lane_source source;
+    source.n = member_numbers(job, b->who[lane]);
+    source.t = b->t[lane];
+    source.h = b->h[lane];
+    source.linearly = b->linearly;
+    get(b->x, lane, source.x, BP_NX);
+    get(b->next, lane, source.next, BP_NX);
+    const int rows = b->linearly ? bp_rodas5p.dense_rows : 2 + bp_dp54.dense_rows;
+    for (int row = 0; row < rows; row++) get(b->dense[row], lane, source.dense[row], BP_NX);
+    return source;
+}
+
+static double lane_channel(const void *from, int channel, double theta, int *ball)
+{
+    const bp_lane_source *source = from;
+    const double(*dense)[BP_NX] = (const double(*)[BP_NX])source->dense;
+    double y[BP_NX];
+    if (source->linearly) bp_rosenbrock_at(&bp_rodas5p, dense, source->x, source->next, theta, y);
+    else bp_explicit_at(&bp_dp54, dense, source->x, source->next, theta, y);
+    return bp_channel(&source->n, source->t + theta * source->h, y, channel, ball);
+}
+
+/* Reductions of the lanes whose step was accepted; the same rules as bp_reduce. */
+static void reduce(const bp_job *job, bp_lane_block *b)
+{
+    double add[BP_L] BP_ALIGNED;
+    BP_EACH_LANE add[lane] = b->accepted[lane] * b->reducing[lane];
+    const double(*dense)[BP_NX * BP_L] = (const double(*)[BP_NX * BP_L])b->dense;
+    if (b->linearly) bp_lane_rosenbrock_dense(&bp_rodas5p, (const double(*)[BP_NX * BP_L])b->linear.u, b->dense);
+    else bp_lane_explicit_dense(&bp_dp54, NULL, b->plain.k, b->x, b->h, b->next, b->dense);
+    for (int q = 1; q < BP_POINTS; q++) {
+        const double theta = (double)q / (BP_POINTS - 1);
+        double *restrict y = b->sampled[q];
+        if (q == BP_POINTS - 1) memcpy(y, b->next, sizeof b->next);
+        else if (b->linearly) bp_lane_rosenbrock_at(&bp_rodas5p, dense, b->x, b->next, theta, y);
+        else bp_lane_explicit_at(&bp_dp54, dense, b->x, b->next, theta, y);
+        if (!b->balls) continue;
+        bp_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, y + BP_NX * BP_L);
+    }
+    for (int k = 0; k < BP_CHANNELS; k++) {
+        if (!(b->wanted >> k & 1)) continue;
+        double news[BP_L] BP_ALIGNED, any = 0.0;
+        const int row = k * BP_L;
+        BP_EACH_LANE {
+            const double v0 = b->sampled[0][row + lane], v1 = b->sampled[1][row + lane], v2 = b->sampled[2][row + lane];
+            const double v3 = b->sampled[3][row + lane], v4 = b->sampled[4][row + lane];
+            const double sum = bp_boole[0] * (v0 + v4) + bp_boole[1] * (v1 + v3) + bp_boole[2] * v2;
+            double q[5], low, high;
+            bp_quartic(v0, v1, v2, v3, v4, q);
+            bp_survey(v0, v1, v2, v3, v4, q, &low, &high);
+            const double boole = bp_boole[0] * (v0 * v0 + v4 * v4) + bp_boole[1] * (v1 * v1 + v3 * v3) + bp_boole[2] * (v2 * v2);
+            const double squares = k < BP_NX ? bp_mean_square(q) : boole;
+            b->integral[row + lane] += add[lane] != 0.0 ? b->h[lane] * sum : 0.0;
+            b->square[row + lane] += add[lane] != 0.0 ? b->h[lane] * squares : 0.0;
+            const double above = high > b->maximum[row + lane] ? 1.0 : 0.0, below = low < b->minimum[row + lane] ? 1.0 : 0.0;
+            news[lane] = add[lane] * (above + 2.0 * below);
+        }
+        for (int lane = 0; lane < BP_L; lane++) any += news[lane];
+        if (any == 0.0) continue;
+        for (int lane = 0; lane < BP_L; lane++) {
+            if (news[lane] == 0.0) continue;
+            const long m = b->who[lane];
+            double *reduction = job->reductions + m * BP_REDUCTION;
+            const bp_lane_source source = lane_source(job, b, lane);
+            const double time = b->start[lane] + b->t[lane], *v = b->sampled[0] + row + lane;
+            if (news[lane] != 2.0) bp_extreme(reduction, BP_MAX, k, 1.0, v, BP_CHANNELS * BP_L, time, b->h[lane], lane_channel, &source);
+            if (news[lane] != 1.0) bp_extreme(reduction, BP_MIN, k, -1.0, v, BP_CHANNELS * BP_L, time, b->h[lane], lane_channel, &source);
+            b->maximum[row + lane] = reduction[BP_MAX + k];
+            b->minimum[row + lane] = reduction[BP_MIN + k];
+        }
+    }
+    for (int lane = 0; lane < BP_L; lane++)
+        if (add[lane] != 0.0) job->reductions[b->who[lane] * BP_REDUCTION + BP_DURATION] += b->h[lane];
+    for (int k = 0; k < BP_CHANNELS; k++)
+        BP_EACH_LANE {
+            const int i = k * BP_L + lane;
+            b->sampled[0][i] = add[lane] != 0.0 ? b->sampled[BP_POINTS - 1][i] : b->sampled[0][i];
+        }
+}
+
+#endif

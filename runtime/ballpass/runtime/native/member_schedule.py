@@ -1,0 +1,183 @@
+"""Segments of many members at once, by C of `driver/schedule.c`, which exported programs have as well.
+
+In: parameters and constants of members, their spans.  Out: ends of segments, the inputs that hold in them, and those at
+the moments that magnitudes are taken from.  `ballpass.runtime.run.segments` finds the same for one run, to the last
+bit, and needs no compiler.
+"""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.native.driver_library import address
+
+#: Kinds of inputs in the order of schedule.h.
+KINDS = ("phase", "gate", "table", "table_rate")
+
+#: Moments between edges, and as many evenly spread; as in schedule.h.
+MOMENTS = 32
+
+
+class _Input(ctypes.Structure):
+    _fields_ = (
+        *((name, ctypes.c_int) for name in ("kind", "offset", "rate", "windows")),
+        ("edges", ctypes.c_void_p),
+        ("knots", ctypes.c_int),
+        ("times", ctypes.c_void_p),
+        ("heights", ctypes.c_void_p),
+    )
+
+
+class _Schedule(ctypes.Structure):
+    _fields_ = (
+        ("inputs", ctypes.c_void_p),
+        ("count", ctypes.c_int),
+        ("columns", ctypes.c_int),
+        ("members", ctypes.c_long),
+        ("values", ctypes.c_void_p),
+    )
+
+
+#: Records as the library declares them, in the order in which it tells their sizes.
+SCHEDULE_RECORDS = (_Schedule, _Input)
+
+
+class MemberSchedule:
+    """When loads of a model switch, and which inputs hold in between.
+
+    Parameters
+    ----------
+    code : library of the ensembles' driver
+    manifest : of the model
+    """
+
+    def __init__(self, code: ctypes.CDLL, manifest: Manifest) -> None:
+        self._code = code
+        names = [*(info.name for info in manifest.parameters), *(info.name for info in manifest.constants)]
+        place = {name: k for k, name in enumerate(names)} | {"": -1}
+        self._kept: list[np.ndarray] = []
+
+        def places(named: tuple[str, ...]) -> int:
+            self._kept.append(np.array([place[name] for name in named], dtype=ctypes.c_int))
+            return int(self._kept[-1].ctypes.data)
+
+        self._count = len(manifest.inputs)
+        self._inputs = (_Input * max(self._count, 1))(
+            *(
+                _Input(
+                    KINDS.index(item.kind),
+                    place[item.offset],
+                    place[item.rate],
+                    len(item.windows),
+                    places(tuple(name for window in item.windows for name in window)),
+                    len(item.times),
+                    places(item.times),
+                    places(item.values),
+                )
+                for item in manifest.inputs
+            )
+        )
+        code.ballpass_schedule_edges.restype = ctypes.c_double
+        code.ballpass_schedule_moments.restype = ctypes.c_long
+
+    def _of(self, values: np.ndarray) -> ctypes.Structure:
+        members, columns = values.shape
+        inputs = ctypes.addressof(self._inputs)
+        return _Schedule(inputs, self._count, columns, members, address("values", values))
+
+    def most(self, values: np.ndarray, spans: tuple[np.ndarray, np.ndarray, np.ndarray], *windows: int) -> float:
+        """The most segments that `edges` may give."""
+        return float(self._edges(values, spans, windows, 0.0, None, None))
+
+    def edges(
+        self,
+        values: np.ndarray,
+        spans: tuple[np.ndarray, np.ndarray, np.ndarray],
+        *windows: int,
+        most: float,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Ends of the segments of some windows of the members' runs.
+
+        Parameters
+        ----------
+        values : parameters and then constants, shape (members, .)
+        spans : durations, turns, and where reductions start, each of shape (members,) [s]
+        windows : turns of a window, the first window, and how many
+        most : segments that there may be
+
+        Returns
+        -------
+        first segment of each member, shape (members + 1,); ends, one more than segments for each, increasing [s]
+        """
+        members = len(values)
+        first, times = np.zeros(members + 1, dtype=ctypes.c_long), np.empty(int(most) + 2 * members)
+        count = self._edges(values, spans, windows, most, first.ctypes.data, address("times", times))
+        if count < 0.0:
+            raise MemoryError(f"Segments of {members} members")
+        return first, times[: int(count) + members].copy()
+
+    def _edges(
+        self,
+        values: np.ndarray,
+        spans: tuple[np.ndarray, np.ndarray, np.ndarray],
+        windows: tuple[int, ...],
+        room: float,
+        first: int | None,
+        times: int | None,
+    ) -> float:
+        turns_a_window, begin, count = windows
+        found: float = self._code.ballpass_schedule_edges(
+            ctypes.byref(self._of(values)),
+            *(ctypes.c_void_p(address("spans", span)) for span in spans),
+            ctypes.c_double(turns_a_window),
+            ctypes.c_long(begin),
+            ctypes.c_long(count),
+            ctypes.c_double(room),
+            ctypes.c_void_p(first),
+            ctypes.c_void_p(times),
+        )
+        return found
+
+    def inputs(self, values: np.ndarray, owner: np.ndarray, t: np.ndarray, inside: np.ndarray) -> np.ndarray:
+        """Inputs of segments that start at `t`, shape (n, inputs).
+
+        Parameters
+        ----------
+        values : as for `edges`
+        owner : member of each, shape (n,)
+        t, inside : reference times, and times for which gates and slopes hold, shape (n,) [s]
+        """
+        found = np.empty((len(t), self._count))
+        owners = np.ascontiguousarray(owner, dtype=ctypes.c_long)
+        self._code.ballpass_schedule_inputs(
+            ctypes.byref(self._of(values)),
+            ctypes.c_long(len(t)),
+            ctypes.c_void_p(owners.ctypes.data),
+            *(ctypes.c_void_p(address("times", times)) for times in (t, inside, found)),
+        )
+        return found
+
+    def moments(
+        self, values: np.ndarray, first: np.ndarray, times: np.ndarray, horizons: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """First moment of each member, shape (members + 1,), and inputs at the moments, shape (moments, inputs).
+
+        Parameters
+        ----------
+        values : as for `edges`
+        first, times : from `edges`
+        horizons : a turn, or the run, of each member [s]
+        """
+        rows = np.zeros(len(values) + 1, dtype=ctypes.c_long)
+        found = np.empty((2 * MOMENTS * len(values), max(self._count, 1)))
+        count = self._code.ballpass_schedule_moments(
+            ctypes.byref(self._of(values)),
+            ctypes.c_void_p(first.ctypes.data),
+            *(ctypes.c_void_p(address("times", given)) for given in (times, horizons)),
+            ctypes.c_void_p(rows.ctypes.data),
+            ctypes.c_void_p(address("inputs", found)),
+        )
+        return rows, np.ascontiguousarray(found[:count, : self._count])
