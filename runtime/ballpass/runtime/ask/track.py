@@ -25,6 +25,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import End, Family
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.run.directions import Directions
+from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, stepper_for
 from ballpass.runtime.run.reduced_run import RunFailed
 from ballpass.runtime.run.request import no_output
 from ballpass.runtime.run.segments import make_segments
@@ -47,12 +48,14 @@ class Stepping:
     family : method of the driver
     rtol, magnitude : error allowed in a step: relative, and the states' magnitudes, shape (states,)
     sensitivity_rtol : tolerance of the derivatives in the choice of step sizes [1]
+    kinks : what is done at the kinks of the laws; derivatives step over them
     """
 
     family: Family
     rtol: float
     magnitude: Array
     sensitivity_rtol: float | None = None
+    kinks: Kinks = STEPPED_OVER
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,7 +133,7 @@ def follow(
     made = None if chain is None else Directions(model, numbers, chain.names, len(times))
     if made is not None and stepping.sensitivity_rtol is not None:
         made.control(stepping.sensitivity_rtol, stepping.magnitude)
-    stepper = model.stepper if made is None else model.differentiating_stepper
+    stepper = stepper_for(model, stepping.kinks) if made is None else model.differentiating_stepper
     outcome = stepper.run(
         family=stepping.family,
         tolerance=stepping.rtol * stepping.magnitude,

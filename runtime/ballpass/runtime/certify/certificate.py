@@ -36,7 +36,7 @@ CAUTION = 4.0
 FIRST_STEP, LARGER, SMALLER = 1e-3, 10.0, 0.1
 
 #: Most triangles of a parameter, and steps of each.
-TRIANGLES, HALVINGS = 3, 4
+TRIANGLES, HALVINGS = 3, 3
 
 #: Relative change of parameters that shows the noise of a run: what step sizes that are chosen anew do to its values.
 JITTER, JITTERED = 1e-7, 5

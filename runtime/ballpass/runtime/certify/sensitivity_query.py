@@ -303,7 +303,7 @@ def _families(method: str, scales: Scales) -> tuple[Family, Family]:
     family = METHODS.get(method, Family.AUTO)
     if family is Family.AUTO:
         family = Family.RODAS5P if stiff else Family.DP54
-    return family, Family.RODAS5P if stiff else Family.DP54
+    return family, Family.RODAS5P if stiff else Family.DOP853
 
 
 def _differentiate(study: Study, numbers: Numbers, names: Sequence[str], stepping: Stepping) -> tuple[Course, float]:
