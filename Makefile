@@ -1,6 +1,6 @@
 # make demo    sets up, then runs the paper's press: derive, generate, compile, simulate, figures
 # make test    sets up, then runs the whole test suite
-# make lint    style, types, import contract, freshness of the committed artefact
+# make lint    style, types, layers of imports, freshness of the committed artefact
 # make docs    builds the documentation into docs/_build/html
 # make generated   derives the committed artefact anew
 # make extremes   runs all extreme cases, also the long ones, and writes docs/extremes.md (some minutes)
@@ -28,6 +28,7 @@ lint: $(VENV)/.ready-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
 	$(BIN)/python scripts/import_contract.py
 	$(BIN)/ballpass derive --check scenes/punching_press.toml
 

@@ -104,7 +104,11 @@ def test_percent_signs_and_plain_numbers_mean_the_same() -> None:
 
 def test_a_scene_without_a_bearing_has_nothing_to_trade(place: Path) -> None:
     text = (ROOT / "scenes" / "four_bar.toml").read_text(encoding="utf-8")
-    bare = text[: text.index("[bearing]")] + text[text.index("[run]") : text.index("outputs = ")] + 'outputs = ["drive_torque"]'
+    bare = (
+        text[: text.index("[bearing]")]
+        + text[text.index("[run]") : text.index("outputs = ")]
+        + 'outputs = ["drive_torque"]'
+    )
     (place / "bare.toml").write_text(bare, encoding="utf-8")
     done = CliRunner().invoke(app, ["trade", "bare.toml"])
     assert done.exit_code == 2
