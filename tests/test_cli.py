@@ -337,7 +337,6 @@ def test_wrong_request_is_refused_before_anything_is_written(
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="the superuser may write everywhere")
 def test_a_linkage_that_locks_with_a_number_is_refused_and_no_results_are_written(
     site: Site, ballpass: Callable[..., Result], tmp_path: Path
 ) -> None:
@@ -347,6 +346,7 @@ def test_a_linkage_that_locks_with_a_number_is_refused_and_no_results_are_writte
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="the superuser may write everywhere")
 def test_folder_without_permission_is_refused(ballpass: Callable[..., Result], tmp_path: Path) -> None:
     locked = tmp_path / "locked"
     locked.mkdir(mode=0o555)

@@ -144,6 +144,11 @@ def manifest(
             mf.VariableInfo(name="body.x", unit="m", description="Position of the body"),
             mf.VariableInfo(name="body.v", unit="m/s", description="Velocity of the body"),
         ),
+        coordinates=(
+            mf.CoordinateInfo(
+                name="body.x", velocity="body.v", kind="displacement", unit="m", group="body", partner=""
+            ),
+        ),
         initial=("initial.x", "initial.v"),
         inputs=INPUTS,
         outputs=OUTPUTS,
@@ -176,5 +181,5 @@ def manifest(
         files=tuple((name, mf.file_digest(folder / name)) for name in ("model.c", "model.casadi")),
     )
     if not states:
-        found = replace(found, states=(), initial=())
+        found = replace(found, states=(), coordinates=(), initial=())
     return found

@@ -20,6 +20,9 @@ from artefact import write_folder
 from ballpass.runtime import CacheWarning, CompileError, NoCompilerWarning, RequestError, load
 from ballpass.runtime.native import compile, compilers
 
+# models made by hand here have no kernels
+pytestmark = pytest.mark.filterwarnings("ignore::ballpass.runtime.NoKernelsWarning")
+
 SOURCE = "double twice(double x) { return 2.0 * x; }\n"
 
 
@@ -206,7 +209,7 @@ def test_two_processes_loading_at_once_both_get_a_whole_library(cache: Path, tmp
     folder = write_folder(tmp_path / "model")
     code = (
         "import sys; from ballpass.runtime import load; m = load(sys.argv[1]); "
-        "print(m.simulate(cycles=0.2).x[-1].tobytes().hex())"
+        "print(m.simulate(cycles=0.2, method='erk').x[-1].tobytes().hex())"
     )
     running = [
         subprocess.Popen([sys.executable, "-W", "error", "-c", code, str(folder)], stdout=subprocess.PIPE, text=True)

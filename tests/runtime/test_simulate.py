@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from artefact import DEFAULTS, write_folder
 
-from ballpass.runtime import IntegrationError, Model, RequestError, Status, load, load_solution
+from ballpass.runtime import IntegrationError, Model, NoKernelsWarning, RequestError, Status, load, load_solution
 from ballpass.runtime.native import compile
 from ballpass.runtime.native.casadi_integrators import METHODS, Frozen, OneStepIntegrator
 from ballpass.runtime.native.kernel import EvaluationError
+
+# models made by hand here have no kernels
+pytestmark = pytest.mark.filterwarnings("ignore::ballpass.runtime.NoKernelsWarning")
 
 TURN = 2.0 * math.pi
 
@@ -135,6 +138,13 @@ def test_sample_on_a_gate_shows_the_load_behind_it(model: Model) -> None:
     solution = model.simulate(cycles=1, parameters=changes, samples_per_cycle=200)
     acting = np.flatnonzero(solution["push.power"])
     assert (acting[0], acting[-1]) == (50, 99)
+
+
+@pytest.mark.filterwarnings("error::ballpass.runtime.NoKernelsWarning")
+def test_a_folder_without_kernels_runs_with_a_warning_that_names_the_cost(model: Model) -> None:
+    with pytest.warns(NoKernelsWarning, match=r"no kernels.*CasADi's functions.*some ten times as long.*no ensembles"):
+        model.simulate(cycles=0.1)
+    model.simulate(cycles=0.1, method="erk")  # asked for: no warning
 
 
 def test_auto_takes_the_implicit_method_for_a_stiff_model_and_says_why(model: Model) -> None:

@@ -16,6 +16,10 @@ from ballpass.runtime.native.ensemble_driver import EnsembleDriver, compile_ense
 from ballpass.runtime.native.stepper import Stepper, compile_locating_stepper, compile_stepper
 
 
+class NoKernelsWarning(UserWarning):
+    """The generated folder has no kernels: CasADi's functions and integrators take the place of the stepper."""
+
+
 class Drivers:
     """Drivers of one generated folder.
 

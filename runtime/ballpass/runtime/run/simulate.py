@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import time as clocks
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -23,6 +24,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.casadi_integrators import METHODS, available_methods
+from ballpass.runtime.native.drivers import NoKernelsWarning
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
@@ -273,6 +275,15 @@ def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tupl
     if asked in STEPPERS and model.has_stepper:
         return asked, "asked for"
     available = available_methods(model)
+    if asked == "auto" and model.compiled:
+        warnings.warn(
+            f"{model.manifest.scene}: the generated folder has no kernels for the project's own stepper, which does "
+            "not take such a scene. CasADi's functions and integrators run instead: results are the same within the "
+            "tolerance, a simulation takes some ten times as long, and there are no ensembles, reductions and "
+            "derivatives of runs. Name the method to run it without this warning.",
+            NoKernelsWarning,
+            stacklevel=4,
+        )
     if asked == "auto" and scales is not None:
         ratio = f"fastest decay {scales.decay:.3g} 1/s, fastest natural frequency {scales.frequency:.3g} rad/s"
         name, why = ("rosenbrock", "stiff") if scales.stiffness > STIFF_RATIO else ("erk", "not stiff")
