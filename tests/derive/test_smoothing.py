@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ballpass.derive import SceneError, derive, generate
-from ballpass.derive.bearing.laws import RAMP_ERROR, SMOOTHED_HERTZ_ERROR
+from ballpass.derive.bearing.laws.contact import RAMP_ERROR, SMOOTHED_HERTZ_ERROR
 from ballpass.derive.lower.functions import lower
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import System

@@ -9,7 +9,8 @@ import pytest
 import sympy as sp
 
 from ballpass.derive import generate
-from ballpass.derive.bearing.laws import LAWS, Contact, Rest
+from ballpass.derive.bearing.laws import LAWS
+from ballpass.derive.bearing.laws.contact import Contact, Rest
 from ballpass.derive.bearing.switching import Switching, find_switching
 from ballpass.derive.reading.read import scene_from_text
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.bearing.effects import EFFECTS
-from ballpass.derive.bearing.laws import LAWS, Contact, Rest
+from ballpass.derive.bearing.laws import LAWS
+from ballpass.derive.bearing.laws.contact import Contact, Rest
 from ballpass.derive.bearing.own_terms import OwnTerms, own_terms
 from ballpass.derive.bearing.stiffness import stiffness_constants
 from ballpass.derive.bearing.switching import Switching, find_switching, smoothness_of

@@ -6,12 +6,13 @@ An effect is one object in one file of this folder; `EFFECTS` in ``__init__.py``
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
-
-import sympy as sp
+from typing import TYPE_CHECKING, ClassVar
 
 from ballpass.derive.scene.records import BallEffect
 from ballpass.derive.scene.schema import Table
+
+if TYPE_CHECKING:
+    import sympy as sp
 
 
 class Effect(ABC):

@@ -1,6 +1,5 @@
 """Damping laws of a ball, one file each, and the contact they act in.  A new law is a file and a line here."""
 
-from ballpass.derive.bearing.laws.contact import RAMP_ERROR, SMOOTHED_HERTZ_ERROR, Contact, Rest
 from ballpass.derive.bearing.laws.law import DampingLaw
 from ballpass.derive.bearing.laws.no_damping import NoDamping
 from ballpass.derive.bearing.laws.one_sided import OneSided
@@ -13,4 +12,4 @@ LAWS: dict[str, DampingLaw] = {
     law.name: law for law in (NoDamping(), OneSided(), OneSidedGated(), TwoSidedGated(), Tangent())
 }
 
-__all__ = ["LAWS", "RAMP_ERROR", "SMOOTHED_HERTZ_ERROR", "Contact", "DampingLaw", "Rest"]
+__all__ = ["LAWS", "DampingLaw"]

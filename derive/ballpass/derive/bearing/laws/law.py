@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-import sympy as sp
-
-from ballpass.derive.bearing.laws.contact import Contact, Rest
 from ballpass.derive.scene.records import Bounds, Quantity
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.scene.units import show
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from ballpass.derive.bearing.laws.contact import Contact, Rest
 
 
 class DampingLaw(ABC):

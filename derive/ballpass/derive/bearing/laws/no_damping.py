@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-import sympy as sp
-
-from ballpass.derive.bearing.laws.contact import Contact, Rest
 from ballpass.derive.bearing.laws.law import DampingLaw
 from ballpass.derive.scene.records import Quantity
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.scene.units import show
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from ballpass.derive.bearing.laws.contact import Contact, Rest
 
 
 class NoDamping(DampingLaw):
@@ -31,7 +34,7 @@ class NoDamping(DampingLaw):
         return ()
 
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
-        return sp.S.Zero
+        return 0 * stiffness
 
     def force(self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: Rest) -> sp.Expr:
-        return sp.S.Zero
+        return 0 * rate

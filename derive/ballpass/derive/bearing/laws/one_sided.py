@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-import sympy as sp
+from typing import TYPE_CHECKING
 
-from ballpass.derive.bearing.laws.contact import Contact, Rest
 from ballpass.derive.bearing.laws.law import ViscousLaw
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from ballpass.derive.bearing.laws.contact import Contact, Rest
 
 
 class OneSided(ViscousLaw):

@@ -6,14 +6,17 @@ Consistent in dimension, gated by itself, continuous.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-import sympy as sp
-
-from ballpass.derive.bearing.laws.contact import Contact, Rest
 from ballpass.derive.bearing.laws.law import DampingLaw
 from ballpass.derive.scene.records import Quantity
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.scene.units import show
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from ballpass.derive.bearing.laws.contact import Contact, Rest
 
 
 class Tangent(DampingLaw):
