@@ -1,5 +1,6 @@
 """Damping laws of a ball, one file each, and the contact they act in.  A new law is a file and a line here."""
 
+from ballpass.derive.bearing.laws.hunt_crossley import HuntCrossley
 from ballpass.derive.bearing.laws.law import DampingLaw
 from ballpass.derive.bearing.laws.no_damping import NoDamping
 from ballpass.derive.bearing.laws.one_sided import OneSided
@@ -9,7 +10,7 @@ from ballpass.derive.bearing.laws.two_sided_gated import TwoSidedGated
 
 #: Laws by their name in the scene file.
 LAWS: dict[str, DampingLaw] = {
-    law.name: law for law in (NoDamping(), OneSided(), OneSidedGated(), TwoSidedGated(), Tangent())
+    law.name: law for law in (NoDamping(), OneSided(), OneSidedGated(), TwoSidedGated(), Tangent(), HuntCrossley())
 }
 
 __all__ = ["LAWS", "DampingLaw"]
