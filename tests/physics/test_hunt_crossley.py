@@ -97,5 +97,5 @@ def test_the_force_pulls_only_where_the_ball_parts_faster_than_it_may(model: Mod
 
 @pytest.mark.parametrize("damping", ["", "restitution = 0.9", 'hysteresis = "1 s/m"\nrestitution = 0.9'])
 def test_its_factor_is_given_in_one_way(tmp_path: Path, damping: str) -> None:
-    with pytest.raises(SceneError, match="hysteresis .* or restitution"):
+    with pytest.raises(SceneError, match=r"hysteresis .* or restitution"):
         impact(tmp_path, damping)
