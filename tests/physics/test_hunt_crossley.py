@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballpass.derive.scene.read import scene_from_text
 from scipy.optimize import brentq
 
 from ballpass.derive import SceneError, generate
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, load
 
 MASS, STIFFNESS, SPEED, FACTOR = 0.4, 8e9, 0.3, 0.9

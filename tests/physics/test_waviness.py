@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballpass.derive.scene.read import scene_from_text
 
 from ballpass.derive import SceneError, generate
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
 
 BALLS, PRELOAD, AMPLITUDE = 8, 4e-6, 1e-11
