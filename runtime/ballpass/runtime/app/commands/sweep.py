@@ -101,7 +101,7 @@ def sweep(
     """
     import numpy as np
 
-    from ballpass.runtime.app import sweep_results as results
+    from ballpass.runtime.app.commands import sweep_results as results
     from ballpass.runtime.app.commands.ranges import grid, read_ranges
     from ballpass.runtime.certify.whole_run import default_observables
 
