@@ -40,15 +40,40 @@ static inline void bp_masses(const bp_numbers *n, double *mass)
     for (int k = 0; k < BP_NQ; k++) mass[k] = force / fabs(b[k] - a[k]);
 }
 
-/* Distance between the centres of the rings, the larger component; of one ring to the fixed other. */
-static inline double bp_apart(const double *x)
+/* Coordinates of a group share a magnitude (bp_group); what counts of one that has a partner (bp_partner) is their difference. */
+static inline double bp_largest_of(const double *v, int group)
 {
     double most = 0.0;
-    for (int k = 0; k < 2; k++) {
-        const double between = fabs(x[k] - (BP_NQ > 2 ? x[(k + 2) % BP_NQ] : 0.0));
-        most = between > most ? between : most;
+    for (int k = 0; k < BP_NQ; k++)
+        if (bp_group[k] == group && fabs(v[k]) > most) most = fabs(v[k]);
+    return most;
+}
+
+static inline int bp_has_partners(int group)
+{
+    int found = 0;
+    for (int k = 0; k < BP_NQ; k++) found |= bp_group[k] == group && bp_partner[k] >= 0;
+    return found;
+}
+
+/* Largest difference between coordinates of a group and their partners. */
+static inline double bp_apart(const double *x, int group)
+{
+    double most = 0.0;
+    for (int k = 0; k < BP_NQ; k++) {
+        const int partner = (int)bp_partner[k];
+        const double between = fabs(x[k] - (partner >= 0 ? x[partner] : 0.0));
+        if (bp_group[k] == group && between > most) most = between;
     }
     return most;
+}
+
+/* Whether a group has gone too far for the differences in it to be told. */
+static inline int bp_is_gone(const double *x)
+{
+    int gone = 0;
+    for (int g = 0; g < BP_NQ; g++) gone |= bp_largest_of(x, g) > BP_FAR * bp_apart(x, g);
+    return gone;
 }
 
 static inline double bp_weighted(const double *mass, const double *a)
@@ -81,7 +106,7 @@ static inline int bp_equilibrium(const bp_numbers *n, const double *mass, double
             tau /= 8.0;
             continue;
         }
-        if (bp_largest(trial) > BP_FAR * bp_apart(trial)) return 0;
+        if (bp_is_gone(trial)) return 0;
         memcpy(x, trial, sizeof trial);
         memcpy(a, there, sizeof a);
         memcpy(A, slopes, sizeof A);
@@ -103,22 +128,16 @@ static double bp_rounded(double value)
     return ldexp(rint(part * 4096.0) / 4096.0, exponent);
 }
 
-/* Magnitudes of a member whose inputs at so many moments are the rows of u. */
-static inline void bp_magnitudes(const double *p, const double *c, const double *initial, long moments, const double *u, double horizon,
-                                 double *magnitude)
+/* The moments that load a group most, by its acceleration at rest; returns how many, with that of the first. */
+static inline int bp_loaded_moments(const double *p, const double *c, const double *rest, long moments, const double *u, int group,
+                                    long which[BP_LOADED_MOMENTS], double *highest)
 {
-    const double turn = 6.283185307179586;
-    bp_numbers n = {u, p, c};
-    double rest[BP_NX] = {0.0}, a[BP_NQ], A[BP_NQ * BP_NQ], highest = 0.0, position = 0.0, apart = bp_apart(initial), speed;
-    double loaded[BP_LOADED_MOMENTS], equal[BP_NQ], mass[BP_NQ];
-    long which[BP_LOADED_MOMENTS];
-    int kept = 0, found = 0;
-    memcpy(rest, initial, BP_NQ * sizeof *rest);
-    for (int k = 0; k < BP_NQ; k++) equal[k] = 1.0;
+    double loaded[BP_LOADED_MOMENTS], a[BP_NQ], A[BP_NQ * BP_NQ];
+    int kept = 0;
     for (long i = 0; i < moments; i++) {
-        n.u = u + i * BP_NU;
+        const bp_numbers n = {.u = u + i * BP_NU, .p = p, .c = c};
         bp_field(&n, rest, a, A);
-        double size = bp_largest(a);
+        double size = bp_largest_of(a, group);
         if (!(size <= DBL_MAX)) size = 0.0;
         int place = kept;
         while (place > 0 && size > loaded[place - 1]) place--;
@@ -131,38 +150,56 @@ static inline void bp_magnitudes(const double *p, const double *c, const double 
         which[place] = i;
         if (kept < BP_LOADED_MOMENTS) kept++;
     }
-    if (kept > 0) highest = loaded[0];
-    for (int i = 0; i < kept; i++) {
-        double x[BP_NX];
-        memcpy(x, rest, sizeof x);
-        n.u = u + which[i] * BP_NU;
-        /* a light ring has enormous accelerations on the way: then the forces have to fall */
-        int held = bp_equilibrium(&n, equal, x);
-        if (held < 0) {
+    *highest = kept > 0 ? loaded[0] : 0.0;
+    return kept;
+}
+
+/* Magnitudes of a member whose inputs at so many moments are the rows of u. */
+static inline void bp_magnitudes(const double *p, const double *c, const double *initial, long moments, const double *u, double horizon,
+                                 double *magnitude)
+{
+    const double turn = 6.283185307179586;
+    double rest[BP_NX] = {0.0}, highest[BP_NQ], travel[BP_NQ] = {0.0}, apart[BP_NQ], equal[BP_NQ], mass[BP_NQ];
+    int found = 0;
+    memcpy(rest, initial, BP_NQ * sizeof *rest);
+    for (int k = 0; k < BP_NQ; k++) equal[k] = 1.0;
+    for (int g = 0; g < BP_NQ; g++) apart[g] = bp_apart(initial, g);
+    for (int g = 0; g < BP_NQ; g++) {
+        long which[BP_LOADED_MOMENTS];
+        int any = 0;
+        for (int k = 0; k < BP_NQ; k++) any |= bp_group[k] == g;
+        const int kept = any ? bp_loaded_moments(p, c, rest, moments, u, g, which, &highest[g]) : 0;
+        for (int i = 0; i < kept; i++) {
+            const bp_numbers n = {.u = u + which[i] * BP_NU, .p = p, .c = c};
+            double x[BP_NX];
             memcpy(x, rest, sizeof x);
-            bp_masses(&n, mass);
-            held = bp_equilibrium(&n, mass, x);
+            /* a light ring has enormous accelerations on the way: then the forces have to fall */
+            int held = bp_equilibrium(&n, equal, x);
+            if (held < 0) {
+                memcpy(x, rest, sizeof x);
+                bp_masses(&n, mass);
+                held = bp_equilibrium(&n, mass, x);
+            }
+            if (held < 0) continue;
+            found |= held;
+            for (int k = 0; k < BP_NQ; k++) {
+                apart[k] = fmax(apart[k], bp_apart(x, k));
+                if (held) travel[k] = fmax(travel[k], bp_largest_of(x, k));
+            }
         }
-        if (held < 0) continue;
-        apart = bp_apart(x) > apart ? bp_apart(x) : apart;
-        if (!held) continue;
-        found = 1;
-        position = bp_largest(x) > position ? bp_largest(x) : position;
     }
-    /* nothing holds the body: what it travels in the time at hand, pushed by its load and carried by its initial velocity */
-    if (!found || highest == 0.0) {
-        const double carried = bp_largest(initial + BP_NQ) * (horizon / turn);
-        if (!found && highest > 0.0) position = highest * (horizon / turn) * (horizon / turn);
-        if (carried > position) position = carried;
-    }
-    if (bp_largest(initial) > position) position = bp_largest(initial);
-    if (BP_NQ > 2 && apart > 0.0 && position > BP_SOFT * apart) position = BP_SOFT * apart;
-    speed = sqrt(highest * position);
-    if (bp_largest(initial + BP_NQ) > speed) speed = bp_largest(initial + BP_NQ);
-    /* a model at rest without load: any magnitude will do */
-    if (position == 0.0) position = speed > 0.0 ? speed * horizon / turn : 1.0;
-    if (speed == 0.0) speed = position * turn / horizon;
     for (int k = 0; k < BP_NQ; k++) {
+        const int g = bp_group[k];
+        const double moving = bp_largest_of(initial + BP_NQ, g);
+        double position = fmax(travel[g], bp_largest_of(initial, g));
+        /* nothing holds the body: what it travels in the time at hand, pushed by its load and carried by its initial velocity */
+        if (!found) position = fmax(position, highest[g] * (horizon / turn) * (horizon / turn));
+        if (!found || highest[g] == 0.0) position = fmax(position, moving * (horizon / turn));
+        if (bp_has_partners(g) && apart[g] > 0.0) position = fmin(position, BP_SOFT * apart[g]);
+        double speed = fmax(sqrt(highest[g] * position), moving);
+        /* a model at rest without load: any magnitude will do */
+        if (position == 0.0) position = speed > 0.0 ? speed * horizon / turn : 1.0;
+        if (speed == 0.0) speed = position * turn / horizon;
         magnitude[k] = bp_rounded(position);
         magnitude[BP_NQ + k] = bp_rounded(speed);
     }

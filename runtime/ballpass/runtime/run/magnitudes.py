@@ -14,7 +14,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.member_schedule import MOMENTS
 from ballpass.runtime.native.stepper import Stepper
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.scales import Scales, find_scales
+from ballpass.runtime.run.scales import Groups, Scales, find_scales
 from ballpass.runtime.run.segments import segment_edges
 
 
@@ -57,7 +57,17 @@ def model_scales(model: LoadedModel, numbers: Numbers, initial: np.ndarray, dura
         list(inputs),
         initial,
         horizon,
+        _groups(model.manifest),
         moved_masses(model.manifest, numbers).tolist() if model.manifest.bearings else None,
+    )
+
+
+def _groups(manifest: Manifest) -> Groups:
+    names = [info.name for info in manifest.coordinates]
+    kinds = np.array([info.group for info in manifest.coordinates])
+    return Groups(
+        {str(group): np.flatnonzero(kinds == group) for group in dict.fromkeys(kinds)},
+        np.array([names.index(info.partner) if info.partner else -1 for info in manifest.coordinates]),
     )
 
 

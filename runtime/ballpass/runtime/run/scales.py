@@ -4,14 +4,17 @@ Tolerances are relative to magnitudes.  With magnitudes taken from the momentary
 nonsense when a coordinate passes zero; so they are found once a run, from the model's own right-hand side, at the
 moments that load it most:
 
-1. The moments with the largest acceleration at the initial positions, at rest, are picked from the run.
+Coordinates that share a magnitude make a group, as the rings of a bearing do; some have a partner, as the other ring's
+coordinate along the same axis.
+
+1. For each group the moments with its largest acceleration at the initial positions, at rest, are picked from the run.
 2. At each, the positions of static equilibrium are found (`equilibrium_newton`).  What has to fall is the residual of
    the accelerations; where that gets stuck, that of the forces: a ring of a milligramme has enormous accelerations on
    the way.  The walk ends where both rings have gone too far for the distance between them to be told: nothing holds
    them, but the balls between them have found their deflection.
-3. Position magnitude: the largest coordinate among these equilibria and the initial state; for a bearing, half the
-   clearance and the deflection.  At most `SOFT` times the largest distance of the two rings' centres: in a soft
-   housing both move far, and the balls feel the small difference.  Velocity magnitude: ``sqrt(acceleration x
+3. Position magnitude: the group's largest coordinate among these equilibria and the initial state; for a bearing, half
+   the clearance and the deflection.  At most `SOFT` times the largest difference between partners: in a soft housing
+   both rings move far, and the balls feel the small difference.  Velocity magnitude: ``sqrt(acceleration x
    position)``, the speed gained on falling through that distance; for a linear oscillator, amplitude times natural
    frequency.
 4. Stiffness: eigenvalues of the Jacobian at those equilibria, at rest and moving in each direction (laws that damp
@@ -37,10 +40,10 @@ ITERATIONS = 80
 #: Residual left over, relative to that at the start [1].
 SETTLED = 1e-6
 
-#: Largest coordinate over the distance between the rings' centres at which that distance still has digits [1].
+#: Largest coordinate over the difference to its partner at which that difference still has digits [1].
 FAR = 1e9
 
-#: Most that a position's magnitude may be of the distance between the rings' centres [1].
+#: Most that a position's magnitude may be of the difference between partners [1].
 SOFT = 10.0
 
 
@@ -67,6 +70,30 @@ class Scales:
         return self.decay / self.frequency
 
 
+@dataclass(frozen=True, slots=True)
+class Groups:
+    """Coordinates that share a magnitude.
+
+    Attributes
+    ----------
+    members : coordinates of each group
+    partners : of each coordinate the one whose difference to it counts, -1 where there is none
+    """
+
+    members: dict[str, np.ndarray]
+    partners: np.ndarray
+
+    def apart(self, group: str, x: np.ndarray) -> float:
+        """Largest difference between coordinates of a group and their partners."""
+        own = self.members[group]
+        other = np.where(self.partners[own] >= 0, x[self.partners[own]], 0.0)
+        return float(np.max(np.abs(x[own] - other)))
+
+    def gone(self, x: np.ndarray) -> bool:
+        """Whether a group has gone too far for the differences in it to be told."""
+        return any(np.max(np.abs(x[own])) > FAR * self.apart(name, x) for name, own in self.members.items())
+
+
 #: (inputs u, state x) -> vector or matrix.
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -77,6 +104,7 @@ def find_scales(
     inputs: Sequence[np.ndarray],
     initial: np.ndarray,
     horizon: float,
+    groups: Groups,
     masses: Sequence[float] | None = None,
 ) -> Scales:
     """Magnitudes and stiffness of a model of positions followed by velocities.
@@ -87,11 +115,12 @@ def find_scales(
     inputs : inputs at moments spread over the run
     initial : state at the start, shape (states,)
     horizon : a turn, or the run [s]; bounds the travel of a body that nothing holds
+    groups : which coordinates share a magnitude
     masses : of the coordinates [kg].  Default: equal ones
     """
     # numbers that overflow end a search or a run further down, with words
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _find_scales(rhs, jacobian, inputs, initial, horizon, masses)
+        return _find_scales(rhs, jacobian, inputs, initial, horizon, groups, masses)
 
 
 def _find_scales(
@@ -100,41 +129,47 @@ def _find_scales(
     inputs: Sequence[np.ndarray],
     initial: np.ndarray,
     horizon: float,
+    groups: Groups,
     masses: Sequence[float] | None,
 ) -> Scales:
     half = len(initial) // 2
     rest = np.concatenate([initial[:half], np.zeros(half)])
-    accelerations = np.array([np.max(np.abs(rhs(u, rest)[half:])) for u in inputs])
-    accelerations[~np.isfinite(accelerations)] = 0.0
-    order = np.argsort(-accelerations, kind="stable")[:LOADED_MOMENTS]
-    acceleration = float(accelerations[order[0]])
-    # what a body travels in the time at hand where nothing holds it
-    reach = acceleration * (horizon / (2.0 * math.pi)) ** 2
+    accelerations = np.abs([rhs(u, rest)[half:] for u in inputs])
     weights = np.ones(half) if masses is None else np.array(masses, dtype=float)
+    ranked = {}
+    for name, members in groups.members.items():
+        size = np.max(accelerations[:, members], axis=1)
+        size[~np.isfinite(size)] = 0.0
+        order = np.argsort(-size, kind="stable")[:LOADED_MOMENTS]
+        ranked[name] = (order, float(size[order[0]]))
     loaded = []
-    for k in order:
-        end = _equilibrium(rhs, jacobian, inputs[k], rest, np.ones(half))
+    for k in dict.fromkeys(k for order, _ in ranked.values() for k in order.tolist()):
+        end = _equilibrium(rhs, jacobian, groups, inputs[k], rest, np.ones(half))
         if end is None:
-            end = _equilibrium(rhs, jacobian, inputs[k], rest, weights)
+            end = _equilibrium(rhs, jacobian, groups, inputs[k], rest, weights)
         loaded.append((inputs[k], *(end or (rest, False))))
-
-    travel = [float(np.max(np.abs(x[:half]))) for _, x, held in loaded if held]
-    if not travel or acceleration == 0.0:
-        # its load pushes the body, and its initial velocity carries it
-        travel += [reach, float(np.max(np.abs(initial[half:]))) * horizon / (2.0 * math.pi)]
-    position = max([*travel, float(np.max(np.abs(initial[:half])))])
-    apart = max(_apart(x) for x in (initial, *(x for _, x, _ in loaded)))
-    if half > 2 and apart > 0.0:
-        position = min(position, SOFT * apart)
-    speed = max(math.sqrt(acceleration * position), float(np.max(np.abs(initial[half:]))))
-    # a model at rest without load: any magnitude will do
-    position = position or speed * horizon / (2.0 * math.pi) or 1.0
-    speed = speed or position * 2.0 * math.pi / horizon
-    magnitude = np.concatenate([np.full(half, _rounded(position)), np.full(half, _rounded(speed))])
+    held = [x for _, x, is_held in loaded if is_held]
+    magnitude = np.empty(2 * half)
+    for name, members in groups.members.items():
+        acceleration, moving = ranked[name][1], float(np.max(np.abs(initial[half + members])))
+        position = max(float(np.max(np.abs(x[members]))) for x in (initial, *held))
+        # nothing holds the body: its load pushes it, and its initial velocity carries it
+        if not held:
+            position = max(position, acceleration * (horizon / (2.0 * math.pi)) ** 2)
+        if not held or acceleration == 0.0:
+            position = max(position, moving * horizon / (2.0 * math.pi))
+        apart = max(groups.apart(name, x) for x in (initial, *(x for _, x, _ in loaded)))
+        if np.any(groups.partners[members] >= 0) and apart > 0.0:
+            position = min(position, SOFT * apart)
+        speed = max(math.sqrt(acceleration * position), moving)
+        # a model at rest without load: any magnitude will do
+        position = position or speed * horizon / (2.0 * math.pi) or 1.0
+        speed = speed or position * 2.0 * math.pi / horizon
+        magnitude[members], magnitude[half + members] = _rounded(position), _rounded(speed)
 
     decay = frequency = 0.0
     for u, base, _ in loaded:
-        for kick in (np.zeros(half), *(sign * speed * unit for unit in np.eye(half) for sign in (1.0, -1.0))):
+        for kick in (np.zeros(half), *np.diag(magnitude[half:]), *np.diag(-magnitude[half:])):
             matrix = jacobian(u, base + np.concatenate([np.zeros(half), kick]))
             if not np.all(np.isfinite(matrix)):
                 continue
@@ -144,15 +179,10 @@ def _find_scales(
     return Scales(magnitude=magnitude, decay=decay, frequency=frequency)
 
 
-def _apart(x: np.ndarray) -> float:
-    """Distance between the centres of the rings, the larger component; of one ring to the fixed other [m]."""
-    return float(np.max(np.abs(x[:2] - x[2:4]))) if len(x) == 8 else float(np.max(np.abs(x[: len(x) // 2])))
-
-
 def _equilibrium(
-    rhs: Field, jacobian: Field, u: np.ndarray, start: np.ndarray, weights: np.ndarray
+    rhs: Field, jacobian: Field, groups: Groups, u: np.ndarray, start: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, bool] | None:
-    """State at rest with vanishing acceleration, True; or where both rings got to as nothing holds them, False.
+    """State at rest with vanishing acceleration, True; or where it got to as nothing holds a group, False.
 
     None when the continuation gets nowhere.
     """
@@ -168,7 +198,7 @@ def _equilibrium(
         start[:half],
         weights=weights,
         done=lambda _q, net, _k: float(np.linalg.norm(weights * net)) <= SETTLED * first,
-        gone=lambda q: float(np.max(np.abs(q))) > FAR * _apart(state(q)),
+        gone=groups.gone,
         iterations=ITERATIONS,
     )
     return None if found.end is Rest.STUCK else (state(found.q), found.end is Rest.FOUND)
