@@ -54,6 +54,9 @@ SMALLEST, LARGEST = 1e-8, 0.5
 #: An estimate must be this much below the target.
 SAFETY = 1.5
 
+#: Two runs may agree by luck, or share a mistake where both step over a kink: no estimate is below so many tolerances.
+LEAST = 0.05
+
 #: Two runs of a motion that forgets its errors differ by less, in parts of a magnitude and in tolerances of the looser.
 SUSPECT, SUSPECT_TOLERANCES = 3e-3, 100.0
 
@@ -189,7 +192,7 @@ def _compare(search: _Search, way: Way, check: Way) -> tuple[list[float], bool]:
         One of them could not reach the end.
     """
     loose, tight = search(way), search(check)
-    estimates = _relative(loose, tight)
+    estimates = _relative(loose, tight, LEAST * way.rtol)
     if max(*estimates, _apart(loose, tight)) <= min(SUSPECT, SUSPECT_TOLERANCES * way.rtol):
         return estimates, False
     moved = search(check, MOVED)
@@ -208,13 +211,17 @@ def _apart(one: Integrated, other: Integrated) -> float:
     return float(np.abs(one.motion - other.motion).max())
 
 
-def _relative(one: Integrated, other: Integrated) -> list[float]:
-    """Relative differences of quantities; infinite where one is zero or no number, unless both runs say zero."""
+def _relative(one: Integrated, other: Integrated, least: float = 0.0) -> list[float]:
+    """Relative differences of quantities, at least `least`; infinite where one is zero or no number.
+
+    Where both runs say zero, and where they agree to the last bit, it is a rounding.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         found = np.abs(one.values - other.values) / np.abs(other.values)
-    smallest = np.finfo(float).eps  # two runs that agree to the last bit still round
-    found = np.where((one.values == 0.0) & (other.values == 0.0), smallest, found)
-    return np.where(np.isfinite(found), np.maximum(found, smallest), np.inf).tolist()  # type: ignore[no-any-return]
+    rounding = np.finfo(float).eps
+    found = np.where(np.isfinite(found), np.maximum(found, max(least, rounding)), np.inf)
+    zero = (one.values == 0.0) & (other.values == 0.0)
+    return np.where(zero, rounding, found).tolist()  # type: ignore[no-any-return]
 
 
 def _chaos(found: Accuracy) -> str:
