@@ -132,11 +132,16 @@ def _of_mechanism(scene: Scene, mechanism: Mechanism) -> Iterator[Feature]:
         )
     for force in mechanism.forces:
         rest = tuple(f for f in mechanism.forces if f is not force)
+        alone = all(f.table != force.table for f in rest)
         yield Feature(
-            name=f"{force.table.removesuffix('s').replace('_', ' ')} {force.name}",
+            name=f"{force.word.replace('_', ' ')} {force.name}",
             path=f"mechanism.{force.table}.{force.name}",
             modelled=force.pathway.words() + force.law.words(),
-            without=replace(scene, mechanism=replace(mechanism, forces=rest)),
+            without=replace(
+                scene,
+                mechanism=replace(mechanism, forces=rest),
+                outputs=_patterns(scene, f"{force.word}." if alone else f"{force.label}."),
+            ),
         )
 
 
@@ -238,7 +243,7 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
         load=_no_load(),
         bearings=tuple(bearings),
         quantities=tuple(quantities),
-        outputs=_patterns(scene, "reaction", "drive", "body"),
+        outputs=_patterns(scene, "reaction", "drive", "body", *(f"{f.word}." for f in mechanism.forces)),
     )
 
 

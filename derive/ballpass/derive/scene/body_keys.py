@@ -13,6 +13,7 @@ Points = Mapping[str, Sequence[str]]
 
 
 def read_pair(data: Table, key: str, example: str) -> tuple[str, str] | None:
+    """A list of two names; None, with a fault, where there is none."""
     given = data.take(key, example)
     if given is None:
         return None
@@ -25,6 +26,7 @@ def read_pair(data: Table, key: str, example: str) -> tuple[str, str] | None:
 
 
 def refuse_unknown_body(data: Table, key: str, body: str, points: Points) -> bool:
+    """Note a fault where there is no such body; whether there is."""
     if body in points:
         return True
     names = list(points)
@@ -39,6 +41,7 @@ def refuse_unknown_body(data: Table, key: str, body: str, points: Points) -> boo
 
 
 def refuse_unknown_point(data: Table, key: str, body: str, point: str, points: Points) -> None:
+    """Note a fault where a known body has no such point."""
     if body not in points or point in points[body]:
         return
     place = "mechanism.frame.points" if body == FRAME else f"mechanism.bodies.{body}.points"
@@ -67,3 +70,20 @@ def read_moving_body(data: Table, points: Points) -> str:
         )
         return ""
     return body if refuse_unknown_body(data, "body", body, points) else ""
+
+
+def read_two_bodies(data: Table, points: Points) -> tuple[str, str]:
+    """The two different bodies of the key bodies; empty names, with a fault, where there are none."""
+    bodies = read_pair(data, "bodies", '["frame", "lever"]')
+    if bodies is None:
+        return "", ""
+    known = [refuse_unknown_body(data, "bodies", body, points) for body in bodies]
+    if bodies[0] == bodies[1]:
+        data.fault(
+            "bodies",
+            "both ends are on one body",
+            given=listing(bodies),
+            allowed="two different bodies",
+            remedy="name the other body",
+        )
+    return bodies if all(known) else ("", "")

@@ -148,6 +148,16 @@ class Force:
     pathway: Any
     law: Any
 
+    @property
+    def word(self) -> str:
+        """One entry of its table: "spring"."""
+        return self.table.removesuffix("s")
+
+    @property
+    def label(self) -> str:
+        """Prefix of its names: "spring.return"."""
+        return f"{self.word}.{self.name}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mechanism:

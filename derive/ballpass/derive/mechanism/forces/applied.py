@@ -29,8 +29,8 @@ def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Force
     setting = Setting(mechanism=mechanism, linkage=linkage, drive=drive)
     loads: list[Load] = []
     for force in mechanism.forces:
-        action = force.pathway.act(force.name, setting)
-        loads += action.loads(force.law.amount(force.name, action, setting))
+        action = force.pathway.act(force, setting)
+        loads += action.loads(force.law.amount(force, action, setting))
     return Forces(
         loads=tuple(loads),
         definitions=setting.ledger.definitions,

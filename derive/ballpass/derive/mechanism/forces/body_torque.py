@@ -8,7 +8,7 @@ from typing import Self
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points, Setting
 from ballpass.derive.scene.body_keys import read_moving_body
-from ballpass.derive.scene.records import Quantity
+from ballpass.derive.scene.records import Force, Quantity
 from ballpass.derive.scene.schema import Table, upright
 from ballpass.derive.terms import symbol_of
 
@@ -35,7 +35,7 @@ class BodyTorque(Pathway):
         )
         return cls(body=body, torque=torque)
 
-    def act(self, name: str, setting: Setting) -> Action:
+    def act(self, force: Force, setting: Setting) -> Action:
         """The torque times the law's factor, or the law's torque."""
         torque = 1 if self.torque is None else symbol_of(self.torque)
         return Action(loads=lambda amount: (Load(body=self.body, torque=amount * torque),))

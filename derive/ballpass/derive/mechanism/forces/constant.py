@@ -8,6 +8,7 @@ from typing import ClassVar, Self
 import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
+from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.schema import Table
 
 
@@ -22,6 +23,6 @@ class Constant(Law):
         """No key."""
         return cls()
 
-    def amount(self, name: str, action: Action, setting: Setting) -> sp.Expr:
+    def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """One."""
         return sp.S.One

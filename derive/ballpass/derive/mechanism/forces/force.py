@@ -43,16 +43,41 @@ class Setting:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Measure:
+    """What a pathway measures, "length" in "m", and the amount that acts along it, "tension" in "N"."""
+
+    size: str
+    size_unit: str
+    amount: str
+    amount_unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Action:
-    """A pathway in its linkage: `loads` gives what an amount does to the bodies."""
+    """A pathway in its linkage.
+
+    Attributes
+    ----------
+    loads : what an amount does to the bodies
+    excess : of the pathway's size over a free one [m] or [rad]; None where the pathway has no size
+    rate : of the size [m/s] or [rad/s]
+    """
 
     loads: Callable[[sp.Expr], tuple[Load, ...]]
+    excess: Callable[[sp.Expr], sp.Expr] | None = None
+    rate: sp.Expr | None = None
 
 
 class Pathway(ABC):
-    """Which bodies a force acts on, and along what; a frozen record of the scene."""
+    """Which bodies a force acts on, and along what; a frozen record of the scene.
+
+    Attributes
+    ----------
+    measure : what a law may depend on; None where there is nothing to measure
+    """
 
     __slots__ = ()
+    measure: ClassVar[Measure | None] = None
 
     @classmethod
     @abstractmethod
@@ -60,7 +85,7 @@ class Pathway(ABC):
         """The pathway from the keys of a force's table, faults noted there."""
 
     @abstractmethod
-    def act(self, name: str, setting: Setting) -> Action:
+    def act(self, force: Force, setting: Setting) -> Action:
         """Place it in the linkage."""
 
     @abstractmethod
@@ -90,7 +115,7 @@ class Law(ABC):
         """The law from the keys of a force's table, faults noted there."""
 
     @abstractmethod
-    def amount(self, name: str, action: Action, setting: Setting) -> sp.Expr:
+    def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """Factor [1], force [N] or torque [N*m]."""
 
     def words(self) -> str:

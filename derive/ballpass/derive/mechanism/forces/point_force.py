@@ -10,7 +10,7 @@ from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points,
 from ballpass.derive.mechanism.kinematics import body_point, scale
 from ballpass.derive.scene.body_keys import read_moving_body, refuse_unknown_point
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import Vector
+from ballpass.derive.scene.records import Force, Vector
 from ballpass.derive.scene.schema import Table, upright, words_of_force
 from ballpass.derive.terms import components
 
@@ -33,13 +33,11 @@ class PointForce(Pathway):
         what = f"the force {name} on the {body.replace('_', ' ')}"
         return cls(body=body, point=point, force=data.vector("force", "N", words_of_force(what, "F", upright(name))))
 
-    def act(self, name: str, setting: Setting) -> Action:
+    def act(self, force: Force, setting: Setting) -> Action:
         """The force times the law's factor."""
         point = body_point(setting.mechanism, self.body, self.point)
-        force = components(self.force)
-        return Action(
-            loads=lambda amount: (Load(body=self.body, point=point, force=scale(amount, force)),),
-        )
+        vector = components(self.force)
+        return Action(loads=lambda amount: (Load(body=self.body, point=point, force=scale(amount, vector)),))
 
     def words(self) -> str:
         """Force and point."""

@@ -10,7 +10,7 @@ import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import Quantity
+from ballpass.derive.scene.records import Force, Quantity
 from ballpass.derive.scene.schema import Table, upright
 
 _TURN = 2.0 * math.pi
@@ -53,9 +53,9 @@ class Windows(Law):
         tables = ((number, numbered.table(number, "start and end")) for number in numbered.data)
         return cls(windows=tuple(_read_window(table, name, f",{number}") for number, table in tables))
 
-    def amount(self, name: str, action: Action, setting: Setting) -> sp.Expr:
+    def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The gate."""
-        gate = setting.drive.gate(name, [(w.start.path, w.end.path) for w in self.windows])
+        gate = setting.drive.gate(force.name, [(w.start.path, w.end.path) for w in self.windows])
         setting.inputs.append(gate)
         return gate.symbol
 

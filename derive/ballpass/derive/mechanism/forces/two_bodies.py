@@ -1,0 +1,52 @@
+"""Pathway: the angle between two bodies, of which one may be the frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import sympy as sp
+
+from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.forces.force import Action, Law, Measure, Pathway, Points, Setting
+from ballpass.derive.mechanism.kinematics import cross, dot
+from ballpass.derive.scene.body_keys import read_two_bodies
+from ballpass.derive.scene.records import FRAME, Force
+from ballpass.derive.scene.schema import Table
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TwoBodies(Pathway):
+    """A torque turns ``bodies[0]`` counter-clockwise and ``bodies[1]`` clockwise.
+
+    The angle is that of ``bodies[1]`` in the axes of ``bodies[0]``; its excess over a free one lies within half a turn.
+    """
+
+    measure: ClassVar[Measure] = Measure(size="angle", size_unit="rad", amount="torque", amount_unit="N*m")
+
+    bodies: tuple[str, str]
+
+    @classmethod
+    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
+        """Key bodies."""
+        return cls(bodies=read_two_bodies(data, points))
+
+    def act(self, force: Force, setting: Setting) -> Action:
+        """Relative angle and its rate."""
+        one, two = (setting.linkage.pose(body) for body in self.bodies)
+        first, second = (one.cos, one.sin), (two.cos, two.sin)
+
+        def excess(free: sp.Expr) -> sp.Expr:
+            from_free = (sp.cos(free), sp.sin(free))
+            turned = (dot(first, second), cross(first, second))
+            return sp.atan2(cross(from_free, turned), dot(from_free, turned))
+
+        def loads(torque: sp.Expr) -> tuple[Load, ...]:
+            signed = zip(self.bodies, (torque, -torque), strict=True)
+            return tuple(Load(body=body, torque=on) for body, on in signed if body != FRAME)
+
+        return Action(loads=loads, excess=excess, rate=two.rate - one.rate)
+
+    def words(self) -> str:
+        """The two bodies."""
+        return f"torque between {self.bodies[0]} and {self.bodies[1]}"

@@ -1,0 +1,61 @@
+"""Pathway: along the line between points of two bodies, of which one may be the frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import sympy as sp
+
+from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.forces.force import Action, Law, Measure, Pathway, Points, Setting
+from ballpass.derive.mechanism.kinematics import body_point, dot, scale, subscript, subtract
+from ballpass.derive.scene.body_keys import read_pair, read_two_bodies, refuse_unknown_point
+from ballpass.derive.scene.records import FRAME, Force
+from ballpass.derive.scene.schema import Table
+from ballpass.derive.variables import Output
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TwoPoints(Pathway):
+    """A tension pulls ``points[0]`` of ``bodies[0]`` and ``points[1]`` of ``bodies[1]`` towards each other."""
+
+    measure: ClassVar[Measure] = Measure(size="length", size_unit="m", amount="tension", amount_unit="N")
+
+    bodies: tuple[str, str]
+    points: tuple[str, str]
+
+    @classmethod
+    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
+        """Keys bodies and points."""
+        bodies = read_two_bodies(data, points)
+        ends = read_pair(data, "points", '["anchor", "tip"]') or ("", "")
+        for body, point in zip(bodies, ends, strict=True):
+            if point:
+                refuse_unknown_point(data, "points", body, point, points)
+        return cls(bodies=bodies, points=ends)
+
+    def act(self, force: Force, setting: Setting) -> Action:
+        """Length, its rate and the direction of the line."""
+        mechanism, ledger, label, mark = setting.mechanism, setting.ledger, force.label, subscript(force.name)
+        places = [body_point(mechanism, *end) for end in zip(self.bodies, self.points, strict=True)]
+        one, two = (setting.linkage.pose(body).motion(place) for body, place in zip(self.bodies, places, strict=True))
+        words, unit = f"the line between the points of {force.name}", "m"
+        line = subtract(two.position, one.position)
+        line = ledger.name_pair(f"{label}.line", "", line, unit, f"component of {words}", f"d_{{{mark},AXIS}}")
+        length = ledger.define(f"{label}.length", sp.sqrt(dot(line, line)), "m", f"length of {words}", f"L_{{{mark}}}")
+        along = scale(1 / length, line)
+        rate = dot(along, subtract(two.velocity, one.velocity))
+        setting.outputs.append(Output(name=length.name, expression=length, unit="m", description=f"Length of {words}"))
+
+        def loads(tension: sp.Expr) -> tuple[Load, ...]:
+            pull = scale(tension, along)
+            ends = zip(self.bodies, places, (pull, scale(sp.Integer(-1), pull)), strict=True)
+            return tuple(Load(body=body, point=place, force=on) for body, place, on in ends if body != FRAME)
+
+        return Action(loads=loads, excess=lambda free: length - free, rate=rate)
+
+    def words(self) -> str:
+        """The two points."""
+        ends = " and ".join(".".join(end) for end in zip(self.bodies, self.points, strict=True))
+        return f"force along the line between {ends}"
