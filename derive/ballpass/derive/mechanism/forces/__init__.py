@@ -8,6 +8,9 @@ from ballpass.derive.mechanism.forces.body_torque import BodyTorque
 from ballpass.derive.mechanism.forces.constant import Constant
 from ballpass.derive.mechanism.forces.force import ForceTable, Law, Pathway
 from ballpass.derive.mechanism.forces.point_force import PointForce
+from ballpass.derive.mechanism.forces.spring_damper import SpringDamper
+from ballpass.derive.mechanism.forces.two_bodies import TwoBodies
+from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.mechanism.forces.windows import Windows
 
 __all__ = ["FORCE_TABLES", "BodyTorque", "Constant", "ForceTable", "Forces", "Law", "Pathway", "PointForce", "Windows"]
@@ -19,4 +22,10 @@ FORCE_TABLES: tuple[ForceTable, ...] = (
         key="forces", word="force", example="body, point and force", pathway=PointForce, laws=(Windows, Constant)
     ),
     ForceTable(key="torques", word="torque", example="body and torque", pathway=BodyTorque, laws=(Windows, Constant)),
+    ForceTable(
+        key="springs", word="spring", example="bodies, points and stiffness", pathway=TwoPoints, laws=(SpringDamper,)
+    ),
+    ForceTable(
+        key="torsion_springs", word="spring", example="bodies and stiffness", pathway=TwoBodies, laws=(SpringDamper,)
+    ),
 )
