@@ -242,6 +242,24 @@ def test_table_of_loads_and_many_segments_equal_python(exported: Callable[..., P
     assert "increase" in refused.stderr
 
 
+def test_table_over_the_drivers_angle_equals_python(exported: Callable[..., Program]) -> None:
+    rows = 'angle = ["-20 deg", "30 deg", "190 deg"], force = ["0 N", "1200 N", "-60 N"]'
+    program = exported(
+        "crank_shaper",
+        ('force = ["1500 N", "0 N"]', f'direction = "10 deg"\ntable = {{ {rows} }}'),
+        ('window = { start = "350 deg", end = "190 deg" }\n', ""),
+    )
+    for changes in ({}, {"mechanism.driver.speed": -9.0, "mechanism.driver.start_angle": 2.5}):
+        solution = program.model.simulate(2, parameters=changes, method="stepper-dop853", samples_per_cycle=50)
+        overrides = [f"{name}={value!r}" for name, value in changes.items()]
+        found = program.table("--cycles=2", "--samples=50", "--method=dop853", *overrides)
+        assert np.array_equal(found[:, 0], solution.t)
+        assert np.max(np.abs(found[:, 1:] - solution.x) / np.array(solution.statistics.magnitudes)) < 1e-12
+    refused = program("mechanism.forces.cut.table.angle.3=6.2")
+    assert refused.returncode == 2
+    assert "within a turn" in refused.stderr
+
+
 HARMONIC = (
     ('type = "constant"  ', 'type = "harmonic"  '),
     (

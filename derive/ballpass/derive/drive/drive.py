@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import sympy as sp
 
@@ -36,6 +37,33 @@ class Drive:
     definitions: tuple[Definition, ...]
     phase: Input
     advance: sp.Expr
+
+    def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str]) -> tuple[Input, Input]:
+        """Value at the reference time, and slope over the angle [unit/rad], of a table over a turn of the angle.
+
+        The table is linear between its knots and periodic.
+
+        Parameters
+        ----------
+        angles, values : names of parameters, in [rad] and `unit`
+        """
+
+        def entry(kind: Literal["table", "table_rate"], ending: str, unit: str, words: str, latex: str) -> Input:
+            return Input(
+                name=f"{name}{ending}",
+                symbol=sp.Symbol(f"input.{name}{ending}", real=True),
+                kind=kind,
+                unit=unit,
+                description=f"{words} of the table of {name} at the reference time",
+                latex=rf"{latex}_{{0,\mathrm{{{name}}}}}",
+                offset=self.phase.offset,
+                rate=self.phase.rate,
+                times=tuple(angles),
+                values=tuple(values),
+            )
+
+        value = entry("table", "", unit, "Value", "T")
+        return value, entry("table_rate", "_slope", f"{unit}/rad", "Slope over the driver's angle", "T'")
 
     def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> Input:
         """Input that is 1 while the angle lies in one of some windows, pairs of parameter names [rad], else 0."""

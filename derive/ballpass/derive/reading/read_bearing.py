@@ -5,8 +5,6 @@ In: the tables.  Out: records, possibly with placeholders where faults were note
 
 from __future__ import annotations
 
-from typing import Any
-
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.scene.records import (
@@ -61,47 +59,12 @@ def read_load(table: Table) -> Load | None:
             )
         if kind == "table":
             return TableLoad(
-                time=_read_column(table, "time", "s", "Time of row {} of the load's table", "t_{{{}}}"),
-                x=_read_column(table, "x", "N", "x component of the load in row {} of its table", "F_{{x,{}}}"),
-                y=_read_column(table, "y", "N", "y component of the load in row {} of its table", "F_{{y,{}}}"),
+                time=table.column("time", "s", "Time of row ROW of the load's table", "t_{ROW}"),
+                x=table.column("x", "N", "x component of the load in row ROW of its table", "F_{x,ROW}"),
+                y=table.column("y", "N", "y component of the load in row ROW of its table", "F_{y,ROW}"),
             )
         table.know(*table.data)
     return None
-
-
-def _read_column(table: Table, key: str, unit: str, description: str, latex: str) -> tuple[Quantity, ...]:
-    example = f'["0 {unit}", "1 {unit}"]'
-    allowed = f'{example}, or {{ values = [0, 1], unit = "{unit}" }}'
-    given = table.take(key, example)
-    if given is None:
-        return ()
-    values: Any = given
-    suffix = ""
-    if isinstance(given, dict):
-        with table.table(key) as column:
-            values, column_unit = column.take("values", "[0, 1]"), column.text("unit", unit)
-        if values is None or column_unit is None:
-            return ()
-        suffix = column_unit
-    if not isinstance(values, list) or not values:
-        table.fault(
-            key,
-            "this is no column of numbers",
-            given=show(given),
-            allowed=allowed,
-            remedy="write a list with one value for each row",
-        )
-        return ()
-    return tuple(
-        table.collector.quantity(
-            (*table.path, key, str(row)),
-            f"{value!r} {suffix}" if suffix and isinstance(value, int | float) and abs(value) < 1e300 else value,
-            unit,
-            description.format(row),
-            latex.format(row),
-        )
-        for row, value in enumerate(values, start=1)
-    )
 
 
 def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, name: str = "") -> Bearing:

@@ -351,3 +351,41 @@ class Table:
             remedy="write the components along x and y, each with its unit",
         )
         return zero
+
+    def column(self, key: str, unit: str, description: str, latex: str) -> tuple[Quantity, ...]:
+        """The quantities of a list, or of a list of numbers with one unit; empty, with a fault, where there is none.
+
+        The number of a row, counted from 1, takes the place of ROW in description and symbol.
+        """
+        example = f'["0 {unit}", "1 {unit}"]'
+        allowed = f'{example}, or {{ values = [0, 1], unit = "{unit}" }}'
+        given = self.take(key, example)
+        if given is None:
+            return ()
+        values: Any = given
+        suffix = ""
+        if isinstance(given, dict):
+            with self.table(key) as column:
+                values, column_unit = column.take("values", "[0, 1]"), column.text("unit", unit)
+            if values is None or column_unit is None:
+                return ()
+            suffix = column_unit
+        if not isinstance(values, list) or not values:
+            self.fault(
+                key,
+                "this is no column of numbers",
+                given=show(given),
+                allowed=allowed,
+                remedy="write a list with one value for each row",
+            )
+            return ()
+        return tuple(
+            self.collector.quantity(
+                (*self.path, key, str(row)),
+                f"{value!r} {suffix}" if suffix and isinstance(value, int | float) and abs(value) < 1e300 else value,
+                unit,
+                description.replace("ROW", str(row)),
+                latex.replace("ROW", str(row)),
+            )
+            for row, value in enumerate(values, start=1)
+        )

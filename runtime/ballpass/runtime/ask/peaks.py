@@ -193,7 +193,7 @@ def _comes_back(model: LoadedModel, numbers: Numbers, names: Sequence[str], turn
     """Whether what these outputs depend on comes back with each turn."""
     places = dict.fromkeys(k for name in names for k in depends(model, name, "u"))
     inputs = [model.manifest.inputs[k] for k in places]
-    if not math.isfinite(turn) or not all(item.kind in ("phase", "gate") for item in inputs):
+    if not math.isfinite(turn) or not all(item.rate for item in inputs):
         return False
     turns = np.array([numbers.values[item.rate] * turn / clock.TURN for item in inputs])
     return bool(np.all(np.abs(turns - np.rint(turns)) <= ALIKE))

@@ -93,7 +93,8 @@ class InputInfo:
     kind ``gate``: 1 while ``offset + rate * t`` modulo a turn lies in one of `windows` (pairs of parameter names),
     else 0.
     kind ``table``: value at the reference time of the piecewise linear table with the knots `times` and `values`
-    (names of parameters); kind ``table_rate``: its slope there.
+    (names of parameters); kind ``table_rate``: its slope there.  Where `rate` is named, `times` are values of the angle
+    ``offset + rate * t`` [rad], the table is periodic over a turn, and its slope is that over the angle.
     """
 
     name: str

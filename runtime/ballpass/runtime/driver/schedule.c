@@ -79,22 +79,32 @@ static int covers(double angle, double start, double width)
     return past < width - ANGLE_RESOLUTION;
 }
 
-/* The interval of a table in which `time` lies: number of knots at or before it. */
-static int knots_before(const schedule_input *input, const double *values, double time)
+/* The interval of a table in which an argument lies: number of knots at or before it. */
+static int knots_before(const schedule_input *input, const double *values, double argument)
 {
     int before = 0;
-    while (before < input->knots && values[input->times[before]] <= time) before++;
+    while (before < input->knots && values[input->times[before]] <= argument) before++;
     return before;
 }
 
+/* Value at t, or slope, of the piece that holds at `inside`.  A table over an angle is periodic: its last knot joins the first. */
 static double table(const schedule_input *input, const double *values, double t, double inside)
 {
-    const int slope_only = input->kind == SCHEDULE_TABLE_RATE, k = knots_before(input, values, inside);
-    if (k == 0 || k == input->knots) return slope_only ? 0.0 : values[input->heights[k == 0 ? 0 : k - 1]];
-    const double left = values[input->times[k - 1]], right = values[input->times[k]];
-    const double low = values[input->heights[k - 1]], high = values[input->heights[k]];
+    const int slope_only = input->kind == SCHEDULE_TABLE_RATE, over_angle = input->rate >= 0;
+    double argument = inside, at = t;
+    if (over_angle) {
+        const double first = values[input->times[0]], rate = values[input->rate];
+        double past = modulo(values[input->offset] + rate * inside - first, TURN);
+        if (TURN - past < ANGLE_RESOLUTION) past = 0.0;
+        argument = first + past;
+        at = argument + rate * (t - inside);
+    }
+    const int k = knots_before(input, values, argument), last = k == input->knots;
+    if (!over_angle && (k == 0 || last)) return slope_only ? 0.0 : values[input->heights[k == 0 ? 0 : k - 1]];
+    const double left = values[input->times[k - 1]], right = last ? values[input->times[0]] + TURN : values[input->times[k]];
+    const double low = values[input->heights[k - 1]], high = values[input->heights[last ? 0 : k]];
     const double slope = (high - low) / (right - left);
-    return slope_only ? slope : low + slope * (t - left);
+    return slope_only ? slope : low + slope * (at - left);
 }
 
 void schedule_inputs(const schedule_input *inputs, int count, const double *values, double t, double inside, double *u)
@@ -119,9 +129,12 @@ void schedule_inputs(const schedule_input *inputs, int count, const double *valu
 
 int schedule_fault(const schedule_input *inputs, int count, const double *values)
 {
-    for (int i = 0; i < count; i++)
-        for (int k = 1; k < inputs[i].knots; k++)
-            if (!(values[inputs[i].times[k]] > values[inputs[i].times[k - 1]])) return i;
+    for (int i = 0; i < count; i++) {
+        const int *times = inputs[i].times, knots = inputs[i].knots;
+        for (int k = 1; k < knots; k++)
+            if (!(values[times[k]] > values[times[k - 1]])) return i;
+        if (knots && inputs[i].rate >= 0 && !(values[times[knots - 1]] - values[times[0]] < TURN - ANGLE_RESOLUTION)) return i;
+    }
     return -1;
 }
 
@@ -140,7 +153,11 @@ static void add_breakpoints(time_list *list, const schedule_input *inputs, int c
                 add_passages(&found, start + width, values[input->offset], values[input->rate], begin, end);
             }
         }
-        for (int k = 0; k < input->knots; k++) add(&found, values[input->times[k]]);
+        for (int k = 0; k < input->knots; k++) {
+            const double knot = values[input->times[k]];
+            if (input->rate < 0) add(&found, knot);
+            else if (values[input->rate] != 0.0) add_passages(&found, knot, values[input->offset], values[input->rate], begin, end);
+        }
     }
     if (found.count) qsort(found.times, (size_t)found.count, sizeof *found.times, by_size);
     const double largest = fabs(begin) > fabs(end) ? fabs(begin) : fabs(end), near = TIME_RESOLUTION * largest;
@@ -200,8 +217,8 @@ double schedule_most_segments(const schedule_input *inputs, int count, const dou
 {
     double most = 1.0 + length / turn + length * fastest_phase(inputs, count, values) / LARGEST_PHASE;
     for (int i = 0; i < count; i++) {
-        if (inputs[i].kind == SCHEDULE_GATE) most += 2.0 * inputs[i].windows * (1.0 + length * fabs(values[inputs[i].rate]) / TURN);
-        most += inputs[i].knots;
+        const double turns = inputs[i].rate >= 0 ? 1.0 + length * fabs(values[inputs[i].rate]) / TURN : 1.0;
+        most += (2.0 * inputs[i].windows + inputs[i].knots) * turns;
     }
     return most;
 }

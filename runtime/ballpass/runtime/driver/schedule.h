@@ -9,7 +9,8 @@ enum schedule_kind { SCHEDULE_PHASE, SCHEDULE_GATE, SCHEDULE_TABLE, SCHEDULE_TAB
    phase        the angle offset + rate t at the segment's start [rad]
    gate         1 while that angle lies in one of the windows, else 0
    table        value of the piecewise linear table at the segment's start
-   table rate   its slope there */
+   table rate   its slope there
+   A table with a rate is one over that angle, periodic over a turn; others are over time. */
 typedef struct {
     enum schedule_kind kind;
     int offset, rate;
@@ -50,7 +51,7 @@ int schedule_moments(const schedule_input *inputs, int count, const double *valu
 /* Inputs for a segment that starts at t; `inside` is a time within it, for which gates and slopes hold. */
 void schedule_inputs(const schedule_input *inputs, int count, const double *values, double t, double inside, double *u);
 
-/* The first table whose times do not increase, -1 where all do. */
+/* The first table whose knots do not increase, or not within a turn of their angle; -1 where all are right. */
 int schedule_fault(const schedule_input *inputs, int count, const double *values);
 
 #endif

@@ -166,13 +166,17 @@ def make_members(model: LoadedModel, table: Table, *, bounded: bool = True) -> M
 
 
 def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused: dict[int, str]) -> None:
-    """Note members whose tables have times that do not increase."""
+    """Note members whose tables have knots that do not increase, or not within a turn."""
     for item in manifest.inputs:
         if item.kind != "table":
             continue
-        wrong = np.any(np.diff([columns[name] for name in item.times], axis=0) <= 0.0, axis=0)
+        knots = np.array([columns[name] for name in item.times])
+        wrong = np.any(np.diff(knots, axis=0) <= 0.0, axis=0) | (
+            bool(item.rate) & (knots[-1] - knots[0] >= clock.TURN - clock.ANGLE_RESOLUTION)
+        )
         for member in np.flatnonzero(wrong).tolist():
-            values = {name: float(columns[name][member]) for name in (*item.times, *item.values)}
+            names = (item.offset, item.rate, *item.times, *item.values)
+            values = {name: float(columns[name][member]) for name in names if name}
             try:
                 clock.breakpoints((item,), values, 0.0, 1.0)
             except RequestError as fault:

@@ -122,10 +122,16 @@ def _input(item: InputInfo, known: dict[str, ca.SX], numbers: Numbers, t: float)
         return known[item.offset] + known[item.rate] * t + (now - whole)
     if item.kind == "gate":
         return ca.SX(float(clock.inputs_at([item], numbers.values, t)[0]))
-    times = [numbers.values[name] for name in item.times]
-    k = int(np.searchsorted(times, t, side="right"))
-    if k in (0, len(times)):
-        return ca.SX(0.0) if item.kind == "table_rate" else known[item.values[0 if k == 0 else -1]]
-    (t0, t1), (y0, y1) = ([known[names[j]] for j in (k - 1, k)] for names in (item.times, item.values))
+    piece = clock.table_piece(item, numbers.values, t)
+    if piece.rows[0] == piece.rows[1]:
+        return ca.SX(0.0) if item.kind == "table_rate" else known[item.values[piece.rows[0]]]
+    (t0, t1), (y0, y1) = ([known[names[row]] for row in piece.rows] for names in (item.times, item.values))
+    # angles are counted on beyond a turn; what is added has no derivative
+    t0, t1 = (
+        k + (v - numbers.values[item.times[r]]) for k, v, r in zip((t0, t1), piece.knots, piece.rows, strict=True)
+    )
+    at = ca.SX(piece.argument)
+    if item.rate:
+        at += known[item.offset] + known[item.rate] * t - numbers.values[item.offset] - numbers.values[item.rate] * t
     slope = (y1 - y0) / (t1 - t0)
-    return slope if item.kind == "table_rate" else y0 + slope * (t - t0)
+    return slope if item.kind == "table_rate" else y0 + slope * (at - t0)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -110,7 +111,11 @@ def breakpoints(inputs: Sequence[InputInfo], values: Values, t0: float, t1: floa
                     if 0.0 < width < TURN:
                         found += [_passages(edge, offset, rate, t0, t1) for edge in (start, start + width)]
         elif item.kind in ("table", "table_rate"):
-            found.append(_knots(item, values)[0])
+            knots = _knots(item, values)[0]
+            if not item.rate:
+                found.append(knots)
+            elif values[item.rate] != 0.0:
+                found += [_passages(float(a), values[item.offset], values[item.rate], t0, t1) for a in knots]
     near = TIME_RESOLUTION * max(abs(t0), abs(t1))
     times = np.sort(np.concatenate(found))
     times = times[(t0 + near < times) & (times < t1 - near)]
@@ -133,18 +138,20 @@ def input_derivatives(inputs: Sequence[InputInfo], values: Values, t: float) -> 
         if item.kind == "phase":
             entries += [(row, item.offset, 1.0), (row, item.rate, t)]
         elif item.kind in ("table", "table_rate"):
-            times, heights = _knots(item, values)
-            k = int(np.searchsorted(times, t, side="right"))
-            if k in (0, len(times)):
+            piece = table_piece(item, values, t)
+            left, right = piece.rows
+            if left == right:
                 if item.kind == "table":
-                    entries.append((row, item.values[0 if k == 0 else -1], 1.0))
+                    entries.append((row, item.values[left], 1.0))
                 continue
-            span = times[k] - times[k - 1]
-            slope = (heights[k] - heights[k - 1]) / span
-            share = (t - times[k - 1]) / span
+            span = piece.knots[1] - piece.knots[0]
+            slope = (values[item.values[right]] - values[item.values[left]]) / span
+            share = (piece.argument - piece.knots[0]) / span
             weights = (1.0 - share, share) if item.kind == "table" else (-1.0 / span, 1.0 / span)
-            for weight, knot in zip(weights, (k - 1, k), strict=True):
+            for weight, knot in zip(weights, piece.rows, strict=True):
                 entries += [(row, item.values[knot], weight), (row, item.times[knot], -slope * weight)]
+            if item.rate and item.kind == "table":
+                entries += [(row, item.offset, slope), (row, item.rate, slope * t)]
     return entries
 
 
@@ -165,9 +172,13 @@ def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float)
                 if not 0.0 < width < TURN:
                     continue
                 for name, edge in zip(names, (start, start + width), strict=True):
-                    past = (angle - edge + math.pi) % TURN - math.pi
-                    if abs(past) < 1e3 * ANGLE_RESOLUTION * max(1.0, abs(angle)):
+                    if _passes(angle, edge):
                         found[((name, 1.0 / rate), (item.offset, -1.0 / rate), (item.rate, -t / rate))] = None
+        elif item.kind == "table" and item.rate:
+            rate = values[item.rate]
+            for name, edge in zip(item.times, _knots(item, values)[0].tolist(), strict=True):
+                if rate != 0.0 and _passes(values[item.offset] + rate * t, edge):
+                    found[((name, 1.0 / rate), (item.offset, -1.0 / rate), (item.rate, -t / rate))] = None
         elif item.kind == "table":
             times = _knots(item, values)[0]
             near = np.flatnonzero(np.abs(times - t) <= TIME_RESOLUTION * max(abs(t), float(np.max(np.abs(times)))))
@@ -181,17 +192,64 @@ def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float)
     return [pair for entry in found for pair in entry]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TablePiece:
+    """Piece of a table: its two rows (twice one where the table is flat), their knots, and the argument between them.
+
+    Knots and argument are times [s], or angles [rad] counted on beyond a turn, so that they increase.
+    """
+
+    rows: tuple[int, int]
+    knots: tuple[float, float]
+    argument: float
+
+
+def table_piece(item: InputInfo, values: Values, t: float) -> TablePiece:
+    """Piece of a table that holds at a time; at a knot the one that follows."""
+    knots = _knots(item, values)[0]
+    if item.rate:
+        (argument,) = _within_turn(values[item.offset] + values[item.rate] * np.array([t]), knots[0])
+        knots = np.append(knots, knots[0] + TURN)
+    else:
+        argument = t
+    k = int(np.searchsorted(knots, argument, side="right"))
+    last = len(item.times) - 1
+    if not item.rate and k in (0, len(knots)):
+        row = 0 if k == 0 else last
+        return TablePiece(rows=(row, row), knots=(float(knots[row]),) * 2, argument=float(argument))
+    rows = (k - 1, k % len(item.times) if item.rate else k)
+    return TablePiece(rows=rows, knots=(float(knots[k - 1]), float(knots[k])), argument=float(argument))
+
+
 def _table(item: InputInfo, values: Values, t: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """Value at `t`, or slope, of the piece of a table that holds at `inside`."""
-    times, heights = _knots(item, values)
-    k = np.searchsorted(times, inside, side="right")
-    within = (k > 0) & (k < len(times))
-    # pieces before the first knot and behind the last are flat
-    slopes = np.concatenate([[0.0], np.diff(heights) / np.diff(times), [0.0]])[k]
+    knots, heights = _knots(item, values)
+    begin, at = inside, t
+    if item.rate:
+        begin = _within_turn(values[item.offset] + values[item.rate] * inside, knots[0])
+        at = begin + values[item.rate] * (t - inside)
+        knots, heights = np.append(knots, knots[0] + TURN), np.append(heights, heights[0])
+    k = np.searchsorted(knots, begin, side="right")
+    within = (k > 0) & (k < len(knots))
+    # pieces before the first knot and behind the last are flat; a table over the angle has none
+    slopes = np.concatenate([[0.0], np.diff(heights) / np.diff(knots), [0.0]])[k]
     if item.kind == "table_rate":
         return np.asarray(slopes)
-    left = np.clip(k - 1, 0, len(times) - 1)
-    return np.where(within, heights[left] + slopes * (t - times[left]), heights[left])
+    left = np.clip(k - 1, 0, len(knots) - 1)
+    return np.where(within, heights[left] + slopes * (at - knots[left]), heights[left])
+
+
+def _within_turn(angle: np.ndarray, first: float) -> np.ndarray:
+    """Angles brought into the turn from `first` on, edges hit by rounding counted as exact."""
+    past = (angle - first) % TURN
+    past[TURN - past < ANGLE_RESOLUTION] = 0.0
+    return np.asarray(first + past)
+
+
+def _passes(angle: float, edge: float) -> bool:
+    """Whether an angle is that of an edge, but for the rounding of the time at which it is passed."""
+    past = (angle - edge + math.pi) % TURN - math.pi
+    return abs(past) < 1e3 * ANGLE_RESOLUTION * max(1.0, abs(angle))
 
 
 def _windows(item: InputInfo, values: Values) -> list[tuple[float, float]]:
@@ -227,13 +285,19 @@ def _passages(edge: float, offset: float, rate: float, t0: float, t1: float) -> 
 
 
 def _knots(item: InputInfo, values: Values) -> tuple[np.ndarray, np.ndarray]:
-    times = np.array([values[name] for name in item.times])
+    knots = np.array([values[name] for name in item.times])
     heights = np.array([values[name] for name in item.values])
-    steps = np.diff(times)
+    steps = np.diff(knots)
+    word, unit = ("angles", "rad") if item.rate else ("times", "s")
     if np.any(steps <= 0.0):
         k = int(np.argmax(steps <= 0.0))
         raise RequestError(
-            f"The times of a table must increase: {item.times[k + 1]} = {times[k + 1]:g} s was given after "
-            f"{item.times[k]} = {times[k]:g} s. Change one of the two."
+            f"The {word} of a table must increase: {item.times[k + 1]} = {knots[k + 1]:g} {unit} was given after "
+            f"{item.times[k]} = {knots[k]:g} {unit}. Change one of the two."
         )
-    return times, heights
+    if item.rate and not knots[-1] - knots[0] < TURN - ANGLE_RESOLUTION:
+        raise RequestError(
+            f"The angles of a table must lie within a turn: {item.times[-1]} = {knots[-1]:g} rad was given with "
+            f"{item.times[0]} = {knots[0]:g} rad. Change one of the two."
+        )
+    return knots, heights

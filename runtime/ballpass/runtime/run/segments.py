@@ -95,7 +95,8 @@ def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, tu
         if item.kind == "gate":
             count += 2.0 * len(item.windows) * (1.0 + length * abs(numbers.values[item.rate]) / clock.TURN)
         else:
-            count += len(item.times)
+            turns = 1.0 + length * abs(numbers.values[item.rate]) / clock.TURN if item.rate else 1.0
+            count += len(item.times) * turns
     check_memory(
         f"Up to {count:.10g} segments, cut where a load switches and at every whole turn, of",
         count,

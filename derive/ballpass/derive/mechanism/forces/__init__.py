@@ -3,6 +3,7 @@
 A new pathway or law is a file here; an entry in `FORCE_TABLES` says in which table of the scene it may stand.
 """
 
+from ballpass.derive.mechanism.forces.angle_table import AngleTable
 from ballpass.derive.mechanism.forces.applied import Forces, derive_forces, drawn_forces
 from ballpass.derive.mechanism.forces.body_torque import BodyTorque
 from ballpass.derive.mechanism.forces.constant import Constant
@@ -18,14 +19,8 @@ __all__ += ["derive_forces", "drawn_forces"]
 
 #: In the order in which their numbers are listed; of the laws of a table the first whose key is there is taken.
 FORCE_TABLES: tuple[ForceTable, ...] = (
-    ForceTable(
-        key="forces", word="force", example="body, point and force", pathway=PointForce, laws=(Windows, Constant)
-    ),
-    ForceTable(key="torques", word="torque", example="body and torque", pathway=BodyTorque, laws=(Windows, Constant)),
-    ForceTable(
-        key="springs", word="spring", example="bodies, points and stiffness", pathway=TwoPoints, laws=(SpringDamper,)
-    ),
-    ForceTable(
-        key="torsion_springs", word="spring", example="bodies and stiffness", pathway=TwoBodies, laws=(SpringDamper,)
-    ),
+    ForceTable("forces", "force", "body, point and force", PointForce, (Windows, AngleTable, Constant)),
+    ForceTable("torques", "torque", "body and torque", BodyTorque, (Windows, AngleTable, Constant)),
+    ForceTable("springs", "spring", "bodies, points and stiffness", TwoPoints, (SpringDamper,)),
+    ForceTable("torsion_springs", "spring", "bodies and stiffness", TwoBodies, (SpringDamper,)),
 )

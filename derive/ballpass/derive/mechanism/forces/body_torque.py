@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar, Self
 
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points, Setting
@@ -16,6 +16,9 @@ from ballpass.derive.terms import symbol_of
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BodyTorque(Pathway):
     """`torque` [N*m], counter-clockwise; None where the law gives it."""
+
+    column: ClassVar[str] = "torque"
+    unit: ClassVar[str] = "N*m"
 
     body: str
     torque: Quantity | None

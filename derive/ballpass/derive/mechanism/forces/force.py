@@ -74,9 +74,12 @@ class Pathway(ABC):
     Attributes
     ----------
     measure : what a law may depend on; None where there is nothing to measure
+    column, unit : what a law gives that is no factor: "force" in "N"
     """
 
     __slots__ = ()
+    column: ClassVar[str] = "force"
+    unit: ClassVar[str] = "N"
     measure: ClassVar[Measure | None] = None
 
     @classmethod
@@ -126,9 +129,10 @@ class Law(ABC):
         """Note faults of its numbers."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class ForceTable:
-    """A table of the scene file, ``[mechanism.<key>.<name>]``, its pathway, and the laws that may stand there."""
+    """A table of the scene file, ``[mechanism.<key>.<name>]``: what one entry is called and holds for example, its
+    pathway, and the laws that may stand there."""
 
     key: str
     word: str

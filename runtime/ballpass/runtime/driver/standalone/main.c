@@ -388,7 +388,7 @@ int main(int argc, char **argv)
     for (int k = 0; k < SCENE_CONSTANTS; k++)
         if (!isfinite(c[k])) return refuse("derived constant", scene_constant_names[k], "geometry and elastic constants that make it a finite number.");
     const int table = schedule_fault(scene_inputs, SCENE_INPUTS, values);
-    if (table >= 0) return refuse("table", "a time that is not after the one before", "times that increase.");
+    if (table >= 0) return refuse("table", "a knot that is not after the one before", "knots that increase, angles within a turn.");
 #ifdef SCENE_LINKAGE
     if (refuse_unassembled(values, time_of_turn(values))) return EXIT_REQUEST;
 #endif

@@ -1,0 +1,82 @@
+"""Law: an amount from a table over the driver's angle, linear between its knots and periodic over a turn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import ClassVar, Self
+
+import sympy as sp
+
+from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
+from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.records import Force, Quantity
+from ballpass.derive.scene.schema import Table, upright
+
+_TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AngleTable(Law):
+    """Knots `angle` [rad], increasing within a turn, and `amount` [N] or [N*m]; the last knot joins the first."""
+
+    key: ClassVar[str] = "table"
+
+    angle: tuple[Quantity, ...]
+    values: tuple[Quantity, ...]
+
+    @classmethod
+    def read(cls, data: Table, name: str, pathway: type[Pathway]) -> Self:
+        """Columns angle and force (or torque)."""
+        column, unit, index = pathway.column, pathway.unit, upright(name)
+        with data.table("table", f"angle and {column}") as table:
+            angle = table.column(
+                "angle", "rad", f"Driver angle in row ROW of the table of {name}", rf"\theta_{{{index},ROW}}"
+            )
+            words = f"{column.capitalize()} in row ROW of the table of {name}"
+            values = table.column(column, unit, words, f"T_{{{index},ROW}}")
+        return cls(angle=angle, values=values)
+
+    def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
+        """Value at the reference time, and slope times the advance of the angle."""
+        knots, values = ([q.path for q in column] for column in (self.angle, self.values))
+        value, slope = setting.drive.table(force.label, force.pathway.unit, knots, values)
+        setting.inputs.extend((value, slope))
+        return value.symbol + slope.symbol * setting.drive.advance
+
+    def words(self) -> str:
+        """Number of rows."""
+        return f", by a table of {len(self.angle)} driver angles"
+
+    def check(self, checker: Checker) -> None:
+        """Columns of one length, of two rows or more; angles increase within a turn."""
+        rows = len(self.angle), len(self.values)
+        if min(rows) == 0:  # reported when it was read
+            return
+        path = self.angle[0].path.rpartition(".")[0]
+        if rows[0] != rows[1] or rows[0] < 2:
+            checker.fault(
+                path,
+                "the columns of the table differ in length" if rows[0] != rows[1] else "the table has too few rows",
+                " and ".join(str(count) for count in rows),
+                "two columns of one length, two rows or more",
+                "give every row an angle and a value, or delete the table for a load that does not change",
+            )
+        for before, behind in pairwise(self.angle):
+            if behind.value <= before.value:
+                checker.fault(
+                    behind.path,
+                    "the angle does not increase",
+                    f"{checker.show(behind)} after {checker.show(before)}",
+                    "strictly increasing angles",
+                    "sort the rows by angle; write a jump as two rows with a small angle between them",
+                )
+        if self.angle[-1].value - self.angle[0].value >= _TURN * (1.0 - 1e-12):
+            checker.fault(
+                self.angle[-1].path,
+                "the angles span a turn or more",
+                f"{checker.show(self.angle[0])} to {checker.show(self.angle[-1])}",
+                "angles within less than a turn",
+                "delete the last row: the table is periodic, its last row joins the first",
+            )
