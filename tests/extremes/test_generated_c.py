@@ -53,7 +53,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_no_warnings(folder: Path) -> None:
     """gcc -Wall -Wextra -Wconversion says nothing about driver, kernels and functions."""
     # CasADi's function interface has arguments that a function need not use
-    flags = ("-std=c99", "-fopenmp-simd", "-Wall", "-Wextra", "-Wconversion", "-Wno-unused-parameter")
+    flags = ("-std=c99", "-march=native", "-fopenmp-simd", "-Wall", "-Wextra", "-Wconversion", "-Wno-unused-parameter")
     said = ""
     for source in (*sorted(DRIVER.glob("*.c")), folder / "model.c"):
         for define in ("", "BALLPASS_SENSITIVITIES", "BALLPASS_REDUCTIONS") if source.name == "stepper.c" else ("",):

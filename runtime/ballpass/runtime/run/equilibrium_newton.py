@@ -2,7 +2,7 @@
 
 In: forces on the coordinates and their stiffness.  Out: positions where the forces vanish, or how far they got.
 
-Pseudo-transient continuation: ``q += (I / tau + K)^-1 f(q)`` with tau growing while the residual falls.  Where nothing
+Pseudo-transient continuation: ``q += (h I + K)^-1 f(q)`` with h falling as the residual falls.  Where nothing
 touches (K = 0) this is a walk along the force, and where something does it is Newton's method.  (Kelley and Keyes, SIAM
 J. Numer. Anal. 35 (1998) 508, doi:10.1137/S0036142996304796.)
 """
@@ -19,7 +19,7 @@ import numpy as np
 #: First step [m, or the coordinate's unit]: well inside any clearance.
 FIRST_STEP = 1e-9
 
-#: Least stiffness that is put in place of none, relative to the largest: along a free direction nothing moves.
+#: Least h, relative to the largest stiffness: along a free direction nothing moves.
 FREE = 1e-10
 
 
@@ -50,6 +50,7 @@ def settle(
     done: Callable[[np.ndarray, np.ndarray, np.ndarray], bool],
     gone: Callable[[np.ndarray], bool],
     iterations: int,
+    free: float = FREE,
 ) -> Settled:
     """Positions at rest.
 
@@ -61,15 +62,16 @@ def settle(
     done : whether the forces count as none, from positions, force and stiffness there
     gone : whether these positions are so far away that nothing holds the body
     iterations : most of them
+    free : least stiffness that is put in place of none, relative to the largest
     """
     q, net = start.copy(), force(start)
     size = float(np.linalg.norm(weights * net))
     if size == 0.0:
         return Settled(q=q, force=net, end=Rest.FOUND, iterations=0)
-    tau = FIRST_STEP * (1.0 + float(np.max(np.abs(q)))) / float(np.linalg.norm(net))
+    held = float(np.linalg.norm(net)) / (FIRST_STEP * (1.0 + float(np.max(np.abs(q)))))
     matrix = stiffness(q)
     for iteration in range(1, iterations + 1):
-        held = max(1.0 / tau, FREE * float(np.max(np.abs(matrix))))
+        held = max(held, free * float(np.max(np.abs(matrix))))
         try:
             trial = q + np.linalg.solve(held * np.eye(len(q)) + matrix, net)
         except np.linalg.LinAlgError:
@@ -77,13 +79,13 @@ def settle(
         there = force(trial)
         size_there = float(np.linalg.norm(weights * there))
         if not math.isfinite(size_there) or size_there > 1.5 * size:
-            tau = 0.125 / held
+            held *= 8.0
             continue
         if gone(trial):
             return Settled(q=q, force=net, end=Rest.UNHELD, iterations=iteration)
         q, net, matrix = trial, there, stiffness(trial)
         if size_there == 0.0 or done(q, net, matrix):
             return Settled(q=q, force=net, end=Rest.FOUND, iterations=iteration)
-        tau = 4.0 * min(max(size / size_there, 1.0), 16.0) / held
+        held /= 4.0 * min(max(size / size_there, 1.0), 16.0)
         size = size_there
     return Settled(q=q, force=net, end=Rest.STUCK, iterations=iterations)

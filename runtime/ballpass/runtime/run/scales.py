@@ -200,6 +200,7 @@ def _equilibrium(
         done=lambda _q, net, _k: float(np.linalg.norm(weights * net)) <= SETTLED * first,
         gone=groups.gone,
         iterations=ITERATIONS,
+        free=0.0,
     )
     return None if found.end is Rest.STUCK else (state(found.q), found.end is Rest.FOUND)
 
