@@ -91,7 +91,7 @@ def pairs(make_model: Callable[..., Model]) -> dict[str, tuple[Sensitivity, ...]
     found = {}
     for scene, case in CASES.items():
         report = make_model(scene).sensitivity(
-            case.of, case.wrt, parameters=case.parameters, samples_per_cycle=4000, **_span(case)
+            case.of, case.wrt, parameters=case.parameters, samples_per_cycle=16000, **_span(case)
         )
         found[scene] = report.pairs
     lines = [

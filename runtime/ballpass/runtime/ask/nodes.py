@@ -147,11 +147,17 @@ def make_edges(
 
 
 def with_kinks(edges: Edges, times: Sequence[float]) -> Edges:
-    """Edges with further ones at `times`, in order, that do not move as yet."""
+    """Edges with further ones at `times`, in order, that keep their place between the neighbouring ones.
+
+    Nothing jumps at a kink, so that any motion of it is right; this one spares turns that get longer from being cut.
+    """
     if not times:
         return edges
     every = np.concatenate([edges.times, times])
-    slopes = np.concatenate([edges.slopes, np.zeros((len(times), edges.slopes.shape[1]))])
+    segment = np.searchsorted(edges.times, times) - 1
+    part = ((times - edges.times[segment]) / np.diff(edges.times)[segment])[:, None]
+    between = edges.slopes[segment] + part * (edges.slopes[segment + 1] - edges.slopes[segment])
+    slopes = np.concatenate([edges.slopes, between])
     order = np.argsort(every, kind="stable")
     places = np.flatnonzero(order >= len(edges.times))
     return Edges(
