@@ -1,0 +1,182 @@
+"""Claims about models with numbers of coordinates that fill no vector: the methods do not care."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import subprocess
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from ballpass.derive import generate
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.runtime import Model, load
+from ballpass.runtime.native.compile import find_compiler
+from ballpass.runtime.native.driver_library import DRIVER, FLAGS
+
+#: Five coordinates with q'' = A q + B q' + sin t, in place of a generated model.
+HARNESS = """
+#include <math.h>
+#define BALLPASS_MODEL_H
+enum { BP_NQ = 5, BP_NX = 10, BP_NW = 1 };
+typedef struct { const double *u, *p, *c; } bp_numbers;
+static void bp_stage(double t, const double *u, const double *p, const double *c, double *w)
+{
+    w[0] = sin(t);
+}
+static void bp_stage_rate(double t, const double *u, const double *p, const double *c, double *w, double *wt)
+{
+    w[0] = sin(t);
+    wt[0] = cos(t);
+}
+static void bp_stages(const bp_numbers *n, double t, double h, const double *nodes, int count, double w[][BP_NW])
+{
+    for (int i = 0; i < count; i++) w[i][0] = sin(t + nodes[i] * h);
+}
+static void bp_stages_and_end(const bp_numbers *n, double t, double h, const double *nodes, int count,
+                              double w[][BP_NW], double *end, double *rate)
+{
+    bp_stages(n, t, h, nodes, count, w);
+    bp_stage_rate(t + h, n->u, n->p, n->c, end, rate);
+}
+static void bp_rate(const bp_numbers *n, const double *w, const double *x, double *dx)
+{
+    for (int i = 0; i < 5; i++) {
+        dx[i] = x[5 + i];
+        dx[5 + i] = w[0];
+        for (int j = 0; j < 5; j++) dx[5 + i] += n->p[5 * i + j] * x[j] + n->c[5 * i + j] * x[5 + j];
+    }
+}
+static void bp_linearize(const bp_numbers *n, const double *w, const double *wt, const double *x, double *dx,
+                         double *A, double *B, double *at)
+{
+    bp_rate(n, w, x, dx);
+    for (int k = 0; k < 25; k++) A[k] = n->p[k], B[k] = n->c[k];
+    for (int k = 0; k < 5; k++) at[k] = wt[0];
+}
+#include "single.h"
+static void explicit_run(const bp_explicit_method *method, int stages, bp_numbers n, double *x, double h, int steps)
+{
+    double weight[10] = {0}, next[10];
+    bp_explicit work;
+    for (int i = 0; i < steps; i++) {
+        bp_explicit_rate(&n, i * h, x, work.k[0]);
+        bp_explicit_step(method, stages, &work, &n, i * h, x, h, 0, weight, next);
+        for (int k = 0; k < 10; k++) x[k] = next[k];
+    }
+}
+static void linear_run(const bp_rosenbrock_method *method, int stages, bp_numbers n, double *x, double h, int steps)
+{
+    double weight[10] = {0}, next[10];
+    bp_linear work;
+    bp_matrix matrix;
+    for (int i = 0; i < steps; i++) {
+        bp_linear_start(&work, &n, i * h, x, 1);
+        bp_rosenbrock_step(method, stages, &work, &matrix, &n, i * h, x, h, weight, next);
+        for (int k = 0; k < 10; k++) x[k] = next[k];
+    }
+}
+#define METHOD(name, run) \\
+    void name(const double *p, const double *c, double *x, double h, int steps) \\
+    { \\
+        const bp_numbers n = {0, p, c}; \\
+        run(&bp_##name, bp_##name.stages, n, x, h, steps); \\
+    }
+METHOD(dp54, explicit_run)
+METHOD(dop853, explicit_run)
+METHOD(rodas4, linear_run)
+METHOD(rodas5p, linear_run)
+"""
+
+
+@pytest.fixture(scope="module")
+def five(scene_text: Callable[..., str], tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    compiler = find_compiler()
+    if compiler is None:
+        pytest.skip("no C compiler")
+    place = tmp_path_factory.mktemp("five")
+    folder = generate(scene_from_text(scene_text("varying_compliance"), "v"), place / "v")
+    source, library = place / "harness.c", place / "harness.so"
+    source.write_text(HARNESS)
+    options = [*FLAGS, "-std=c99", "-shared", "-fPIC", f"-I{DRIVER}", f"-I{folder}"]
+    subprocess.run([*compiler.command, *options, str(source), "-o", str(library), "-lm"], check=True)
+    return ctypes.CDLL(str(library))
+
+
+@pytest.mark.parametrize(
+    ("method", "order", "steps"), [("dp54", 5, 32), ("dop853", 8, 6), ("rodas4", 4, 32), ("rodas5p", 5, 32)]
+)
+def test_five_coordinates_are_advanced_in_the_order_of_the_method(
+    five: ctypes.CDLL, method: str, order: int, steps: int
+) -> None:
+    """Against the exponential of the matrix; sin t is the output of two more states."""
+    random = np.random.default_rng(4)
+    A, B = (-np.eye(5) * size + random.normal(size=(5, 5)) for size in (9.0, 1.0))
+    start = random.normal(size=10)
+    whole = np.zeros((12, 12))
+    whole[:5, 5:10], whole[5:10, :5], whole[5:10, 5:10], whole[5:10, 10] = np.eye(5), A, B, 1.0
+    whole[10, 11], whole[11, 10] = 1.0, -1.0
+    exact = (expm(whole) @ np.concatenate([start, [0.0, 1.0]]))[:10]
+    errors = []
+    for count in (steps, 2 * steps):
+        x = start.copy()
+        pointers = (ctypes.c_void_p(array.ctypes.data) for array in (A, B, x))
+        getattr(five, method)(*pointers, ctypes.c_double(1.0 / count), ctypes.c_int(count))
+        errors.append(float(np.max(np.abs(x - exact))))
+    assert errors[1] < 1e-3
+    assert np.log2(errors[0] / errors[1]) > order - 0.5
+
+
+@pytest.fixture(scope="module")
+def models(scene_text: Callable[..., str], tmp_path_factory: pytest.TempPathFactory) -> tuple[Model, Model]:
+    """Three bearings on a shaft that do not know each other, six coordinates; and one by itself."""
+    text, place = scene_text("varying_compliance"), tmp_path_factory.mktemp("six")
+    begin, end = text.index("[bearing]\n"), text.index("[run]")
+    several = [re.sub(r"^\[bearing\b", f"[bearings.{name}", text[begin:end], flags=re.MULTILINE) for name in "abc"]
+    run = re.sub(r"outputs = .*", 'outputs = ["a.inner.*"]', text[end:])
+    three = "".join([text[:begin], *several, run])
+    return tuple(  # type: ignore[return-value]
+        load(generate(scene_from_text(scene, name), place / name)) for scene, name in ((three, "three"), (text, "one"))
+    )
+
+
+CLEARANCES = {"a": 0.0, "b": 1e-6, "c": 2e-6}
+
+
+@pytest.mark.parametrize("method", ["stepper-dp54", "stepper-dop853", "stepper-rodas4", "stepper-rodas5p"])
+def test_bearings_that_do_not_know_each_other_move_as_each_alone(models: tuple[Model, Model], method: str) -> None:
+    three, one = models
+    given = {f"bearings.{name}.clearance": value for name, value in CLEARANCES.items()}
+    found = three.simulate(cycles=1, method=method, rtol=1e-10, kinks="located", parameters=given)
+    for name, value in CLEARANCES.items():
+        alone = one.simulate(
+            cycles=1, method=method, rtol=1e-10, kinks="located", parameters={"bearing.clearance": value}
+        )
+        for state in one.states:
+            assert np.max(np.abs(found[f"{name}.{state}"] - alone[state])) < 1e-6 * np.max(np.abs(alone[state]))
+
+
+def test_six_coordinates_move_as_casadi_integrates_them(models: tuple[Model, Model]) -> None:
+    three, _ = models
+    given = {f"bearings.{name}.clearance": value for name, value in CLEARANCES.items()}
+    by_driver, by_cvodes = (
+        three.simulate(cycles=1, method=method, rtol=1e-9, parameters=given).x for method in ("stepper", "cvodes")
+    )
+    assert np.all(np.max(np.abs(by_driver - by_cvodes), axis=0) < 1e-4 * np.max(np.abs(by_cvodes), axis=0))
+
+
+def test_members_of_six_coordinates_in_lanes_are_single_runs(models: tuple[Model, Model]) -> None:
+    three, _ = models
+    column = np.linspace(0.0, 2e-6, 3)
+    many = three.simulate_many(
+        {"bearings.b.clearance": column}, "end:b.inner.x", cycles=1, transient=0, rtol=1e-8, kinks="stepped-over"
+    )
+    assert many.statistics.lanes > 1
+    for value, found in zip(column, many["end:b.inner.x"], strict=True):
+        alone = three.simulate(
+            cycles=1, rtol=1e-8, kinks="stepped-over", parameters={"bearings.b.clearance": float(value)}
+        )
+        assert found == pytest.approx(alone["b.inner.x"][-1], rel=1e-4)
