@@ -42,7 +42,7 @@ def test_a_feature_left_out_costs_exactly_what_a_scene_that_never_had_it_costs(s
     assert count_operations(plain)["rhs"] < count_operations(press(scene_text))["rhs"]
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", ["punching_press", "four_bar"])
 def test_every_feature_adds_operations_where_it_acts_and_none_where_it_does_not(name: str) -> None:
     scene = read_scene(ROOT / "scenes" / f"{name}.toml")
     counted = cost(scene)
