@@ -323,4 +323,5 @@ def _write_results(
             draw_all(model, solution, made)
         return summary
 
-    return write_results(folder, write, figures=[f"{name}.png" for name in FIGURES])
+    endings = ["", *(f"_{bearing.name}" for bearing in model.manifest.bearings if bearing.name)]
+    return write_results(folder, write, figures=[f"{name}{ending}.png" for name in FIGURES for ending in endings])

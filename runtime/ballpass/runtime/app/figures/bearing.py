@@ -88,7 +88,7 @@ def ring_centre(record: Record, ring: str, sample: int) -> Array:
     """Centre of a ring at a sample, (2,) [m]."""
     if ring == "outer" and not record.has("outer.x", "outer.y"):
         return np.zeros(2)  # fixed
-    return np.array([record.solution[f"{ring}.x"][sample], record.solution[f"{ring}.y"][sample]])
+    return np.array([record.values(f"{ring}.x")[sample], record.values(f"{ring}.y")[sample]])
 
 
 def _reach(centre: Array, radius: float, direction: Array) -> float:

@@ -10,7 +10,7 @@ import textwrap
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import Any, ParamSpec
+from typing import Any, Literal, ParamSpec
 
 import matplotlib
 from matplotlib.axes import Axes
@@ -52,6 +52,8 @@ _SETTINGS: dict[Any, Any] = {
     "hatch.linewidth": 0.7,
 }
 
+_CAPTION: dict[str, Any] = {"fontsize": 8, "color": "#495057"}
+
 P = ParamSpec("P")
 
 
@@ -68,16 +70,44 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return wrapped
 
 
-def new_figure(height: float) -> Figure:
-    """An empty figure of the common width and a height [inch], without pyplot."""
-    return Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+def new_figure(height: float, *, layout: Literal["constrained"] | None = "constrained") -> Figure:
+    """An empty figure of the common width and a height [inch], without pyplot.
+
+    Parameters
+    ----------
+    layout : "constrained" finds room for all words, which takes as long as drawing; None leaves it to `frame`
+    """
+    return Figure(figsize=(WIDTH, height), dpi=DPI, layout=layout)
+
+
+def frame(
+    figure: Figure, title: str, text: str, *, left: float = 0.75, right: float = 0.2, below: float = 0.6, **gaps: float
+) -> None:
+    """Title above, caption below and the axes between them, by margins [inch].
+
+    Parameters
+    ----------
+    below : room for ticks and label of the x axis
+    gaps : ``wspace`` and ``hspace`` between axes, in parts of their size
+    """
+    width, height = figure.get_size_inches()
+    lines = textwrap.wrap(text, 124, break_on_hyphens=False)
+    figure.suptitle(title, x=0.1 / width, y=1.0 - 0.1 / height, ha="left", va="top", fontsize=12, fontweight="bold")
+    figure.supxlabel("\n".join(lines), x=0.1 / width, y=0.08 / height, ha="left", va="bottom", **_CAPTION)
+    figure.subplots_adjust(
+        left=left / width,
+        right=1.0 - right / width,
+        bottom=(below + 0.14 * len(lines)) / height,
+        top=1.0 - (0.4 + 0.21 * len(title.splitlines())) / height,
+        **gaps,
+    )
 
 
 def caption(figure: Figure, title: str, text: str) -> None:
     """Title above, caption below, both inside the layout."""
     figure.suptitle(title, x=0.012, ha="left", fontsize=12, fontweight="bold")
     wrapped = "\n".join(textwrap.wrap(text, 124, break_on_hyphens=False))
-    figure.supxlabel(wrapped, x=0.012, ha="left", fontsize=8, color="#495057")
+    figure.supxlabel(wrapped, x=0.012, ha="left", **_CAPTION)
 
 
 def degree_axis(axes: Axes, *, end: float = 360.0) -> None:

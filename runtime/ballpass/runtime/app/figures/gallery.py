@@ -107,12 +107,17 @@ def draw_all(model: Model, solution: Solution, folder: Path) -> list[Path]:
     """Write every figure for which the outputs exist, as PNG, into `folder`.
 
     Left out are figures whose outputs were not asked for, and, for a steady part shorter than a turn, load curve and
-    spectra.
+    spectra.  Of several bearings each has its figures, with its name in theirs.
 
     Returns
     -------
     files written, in the order of `FIGURES`
     """
-    record = gather(model, solution)
     folder.mkdir(parents=True, exist_ok=True)
-    return [save(kind.draw(record), folder / f"{kind.name}.png") for kind in FIGURES if kind.possible(record)]
+    written = []
+    for bearing in model.manifest.bearings or (None,):
+        record = gather(model, solution, bearing)
+        ending = f"_{bearing.name}" if bearing is not None and bearing.name else ""
+        kinds = (kind for kind in FIGURES if kind.possible(record))
+        written += [save(kind.draw(record), folder / f"{kind.name}{ending}.png") for kind in kinds]
+    return written

@@ -12,8 +12,8 @@ from ballpass.runtime.app.figures.canvas import (
     INK,
     PALE,
     SECOND,
-    caption,
     degree_axis,
+    frame,
     new_figure,
     styled,
 )
@@ -22,7 +22,7 @@ from ballpass.runtime.app.figures.record import Array, Record
 
 def reaction_joints(record: Record) -> tuple[str, ...]:
     """Joints to show in the load curve: the bearing's, without a bearing all whose reaction was asked for."""
-    mechanism, bearing = record.manifest.mechanism, record.manifest.bearing
+    mechanism, bearing = record.manifest.mechanism, record.bearing
     if mechanism is None:
         return ()
     names = tuple(joint[0] for joint in mechanism.joints)
@@ -40,7 +40,7 @@ def load_curve(record: Record) -> Figure:
     if not joints:
         joints = ("",)  # only the load on the ring was asked for
     rows = len(joints) + with_torque
-    figure = new_figure(1.3 + 1.9 * rows)
+    figure = new_figure(1.3 + 1.9 * rows, layout=None)
     grid = figure.add_gridspec(rows, 2)
     angle, order = _last_turn(record)
     panels: list[Axes] = []
@@ -51,7 +51,7 @@ def load_curve(record: Record) -> Figure:
             if joint:
                 first, second = _bodies(record, joint)
                 title = f"{axis} at {joint}: {second} on {first}"
-                _curve(axes, angle, record.solution[f"reaction.{joint}.{axis}"][order], FIRST, "reaction of the joint")
+                _curve(axes, angle, record.values(f"reaction.{joint}.{axis}")[order], FIRST, "reaction of the joint")
             if ring_load is not None and row == 0:
                 _curve(axes, angle, ring_load[order, column], SECOND, "load on the inner ring")
             axes.set_title(title)
@@ -59,7 +59,7 @@ def load_curve(record: Record) -> Figure:
             panels.append(axes)
     if with_torque:
         axes = figure.add_subplot(grid[rows - 1, :])
-        _curve(axes, angle, record.solution["drive_torque"][order], FIRST, "")
+        _curve(axes, angle, record.values("drive_torque")[order], FIRST, "")
         axes.set_title("torque of the drive on the driven body")
         axes.set_ylabel("torque [N·m]")
         panels.append(axes)
@@ -78,10 +78,13 @@ def load_curve(record: Record) -> Figure:
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper right", ncols=2, bbox_to_anchor=(0.995, 0.995))
     shaded = " Shaded: an applied load acts." if windows else ""
-    caption(
+    frame(
         figure,
-        "Load curve of the inner ring" if record.manifest.bearing is not None else "Joint reactions and drive torque",
+        "Load curve of the inner ring" if record.bearing is not None else "Joint reactions and drive torque",
         f"One turn; x and y have their own scales.{shaded} Counter-clockwise torque is positive. {record.settings()}.",
+        left=0.85,
+        wspace=0.3,
+        hspace=0.5,
     )
     return figure
 
@@ -132,7 +135,7 @@ def ball_loads(record: Record) -> Figure:
         along, label = record.t[window] * 1e3, "time [ms]"
     top = max(float(np.max(force)), 1e-12)
     bottom = min(float(np.min(force)), 0.0)
-    figure = new_figure(1.5 + max(0.5 * balls, 2.0))
+    figure = new_figure(1.5 + max(0.5 * balls, 2.0), layout=None)
     strips = figure.subplots(balls, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for number, axes in enumerate(strips, start=1):
         axes.fill_between(along, 0.0, force[:, number - 1], color=INK, alpha=0.35, linewidth=0)
@@ -152,10 +155,12 @@ def ball_loads(record: Record) -> Figure:
     figure.supylabel("contact load [N]", fontsize=9.5)
     shown = "last two turns" if len(record.turns) >= 2 else "last turn" if record.turns else "the whole record"
     shaded = " Shaded: an applied load acts." if record.gate_windows() and record.turns else ""
-    caption(
+    frame(
         figure,
         "Contact load of every ball",
         f"{words.capitalize()}, {shown}; all strips at one scale, highest sample {top:.4g} N.{shaded} "
         f"{record.settings()}.",
+        right=0.8,
+        hspace=0.15,
     )
     return figure

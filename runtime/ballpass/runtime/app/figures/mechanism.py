@@ -265,7 +265,7 @@ def _reactions(record: Record, now: _Points, sample: int) -> list[tuple[Array, A
             continue
         # the reaction is the force of the second body on the first
         sign = 1.0 if first == FRAME else -1.0
-        force = sign * np.array([record.solution[f"reaction.{name}.{axis}"][sample] for axis in "xy"])
+        force = sign * np.array([record.values(f"reaction.{name}.{axis}")[sample] for axis in "xy"])
         found.append((now[first, point], force))
     return found
 

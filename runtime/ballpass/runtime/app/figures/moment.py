@@ -6,14 +6,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ballpass.runtime.app.figures.bearing import draw_bearing, ring_centre
-from ballpass.runtime.app.figures.canvas import caption, new_figure, styled
+from ballpass.runtime.app.figures.canvas import frame, new_figure, styled
 from ballpass.runtime.app.figures.mechanism import draw_mechanism
 from ballpass.runtime.app.figures.record import Record
 
 
 def can_draw_bearing(record: Record) -> bool:
     """Whether ring position and a ball force were asked for."""
-    if record.manifest.bearing is None or not record.has("inner.x", "inner.y"):
+    if record.bearing is None or not record.has("inner.x", "inner.y"):
         return False
     return record.has("ball.force") or record.has("ball.elastic_force")
 
@@ -27,7 +27,7 @@ def peak_moment(record: Record) -> Figure:
     with_mechanism = record.manifest.mechanism is not None
     with_bearing = can_draw_bearing(record)
     sample, reason = _moment(record)
-    figure = new_figure(5.6)
+    figure = new_figure(5.6, layout=None)
     text = ""
     if with_mechanism and with_bearing:
         left, right = figure.subplots(1, 2, width_ratios=(0.8, 1.0))
@@ -46,11 +46,7 @@ def peak_moment(record: Record) -> Figure:
     if with_bearing:
         words, _ = record.ball_force()
         text += f"Bearing: balls coloured by {words}; clearance and displacement between the rings ×{factor:g}"
-        if (
-            record.manifest.bearing is not None
-            and record.manifest.bearing.outer_ring
-            and record.has("outer.x", "outer.y")
-        ):
+        if record.bearing is not None and record.bearing.outer_ring and record.has("outer.x", "outer.y"):
             moved = 1e6 * np.hypot(*ring_centre(record, "outer", sample))
             text += f", the outer ring itself has moved by {moved:.3g} µm"
         text += ". "
@@ -59,7 +55,7 @@ def peak_moment(record: Record) -> Figure:
         when += f", crank angle {np.degrees(record.crank_angle()[sample]) % 360.0:.1f}°"
     subject = "Mechanism and bearing" if with_mechanism and with_bearing else "Bearing" if with_bearing else "Mechanism"
     title = f"{subject} at the {reason}" + (_between_samples(record) if with_bearing else "")
-    caption(figure, title, f"{when}. {text}{record.settings()}.")
+    frame(figure, title, f"{when}. {text}{record.settings()}.", left=0.2, right=0.3, below=0.1)
     return figure
 
 
@@ -68,7 +64,7 @@ def _between_samples(record: Record) -> str:
     if len(record.solution) < 3:
         return ""
     name = "ball.force" if record.has("ball.force") else "ball.elastic_force"
-    peak = record.model.refine_peak(record.solution, name)
+    peak = record.model.refine_peak(record.solution, record.output(name))
     shown, true = f"{peak.sampled:.4g}", f"{peak.value:.4g}"
     return "" if shown == true else f"\n{shown} N; between the samples it reaches {true} N"
 
@@ -79,5 +75,5 @@ def _moment(record: Record) -> tuple[int, str]:
         _, force = record.ball_force()
         return int(np.argmax(np.max(force, axis=1))), "highest sample of the ball force"
     if record.has("drive_torque"):
-        return int(np.argmax(np.abs(record.solution["drive_torque"]))), "highest sample of the drive torque"
+        return int(np.argmax(np.abs(record.values("drive_torque")))), "highest sample of the drive torque"
     return 0, "start of the steady part"

@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter
 
-from ballpass.runtime.app.figures.canvas import GREY, INK, SAND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.app.figures.canvas import GREY, INK, SAND, SIGNAL, frame, new_figure, styled
 from ballpass.runtime.app.figures.record import Array, Record
 from ballpass.runtime.ask.observables import hermite, orbits, stroboscopic_points
 from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
@@ -24,18 +25,18 @@ def _path(record: Record, window: slice, axis: str) -> tuple[Array, Array, Array
 
     Without the velocity among the outputs: the samples, and no velocities.
     """
-    t, x = record.t[window], record.solution[f"inner.{axis}"][window]
+    t, x = record.t[window], record.values(f"inner.{axis}")[window]
     if not record.has(f"inner.v{axis}"):
         return t, x, np.zeros(0)
     fine = np.append((t[:-1, None] + np.diff(t)[:, None] * np.arange(_FINER) / _FINER).ravel(), t[-1])
-    return fine, *hermite(t, x, record.solution[f"inner.v{axis}"][window], fine)
+    return fine, *hermite(t, x, record.values(f"inner.v{axis}")[window], fine)
 
 
 @styled
 def orbit(record: Record) -> Figure:
     """Path of the inner ring's centre: the last turn dark, the steady turns before it light and wide under it."""
     last = record.last_turns(1)
-    figure = new_figure(5.4)
+    figure = new_figure(5.4, layout=None)
     axes = figure.add_subplot()
     if last.start > 0:
         x, y = (1e6 * _path(record, slice(0, last.start + 1), axis)[1] for axis in "xy")
@@ -50,7 +51,7 @@ def orbit(record: Record) -> Figure:
     )
     axes.plot(x[-1], y[-1], "s", color=INK, markersize=4, label="end of the last turn", zorder=5)
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    wide, high = (max(float(np.ptp(record.solution[f"inner.{axis}"])), 1e-15) for axis in "xy")
+    wide, high = (max(float(np.ptp(record.values(f"inner.{axis}"))), 1e-15) for axis in "xy")
     equal = max(wide, high) < _SLIVER * min(wide, high)
     if equal:
         axes.set_aspect("equal", adjustable="datalim")
@@ -59,11 +60,11 @@ def orbit(record: Record) -> Figure:
     scales = "Equal scales." if equal else "Each axis has a scale of its own."
     gap = ""
     if record.cycle_length is not None and record.turns:
-        path = orbits(
-            record.t, record.solution["inner.x"], record.solution["inner.y"], cycle_length=record.cycle_length
-        )[-1]
+        path = orbits(record.t, record.values("inner.x"), record.values("inner.y"), cycle_length=record.cycle_length)[
+            -1
+        ]
         gap = f" Start and end of the last turn are {1e6 * path.gap:.3g} µm apart."
-    caption(figure, "Orbit of the inner ring's centre", f"{scales}{gap} {record.settings()}.")
+    frame(figure, "Orbit of the inner ring's centre", f"{scales}{gap} {record.settings()}.", left=0.9, right=2.1)
     return figure
 
 
@@ -84,11 +85,11 @@ def spectra(record: Record) -> Figure:
     # a mechanism repeats each turn: its harmonics fall on lines.  Without one a window keeps the leakage low
     window: Window = "boxcar" if record.manifest.mechanism is not None else "hann"
     lines = {
-        axis: amplitude_spectrum(record.t, record.solution[f"inner.{axis}"] * 1e6, cycle_length=length, window=window)
+        axis: amplitude_spectrum(record.t, record.values(f"inner.{axis}") * 1e6, cycle_length=length, window=window)
         for axis in "xy"
     }
     marks = record.frequencies()
-    figure = new_figure(5.6)
+    figure = new_figure(5.6, layout=None)
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     peak = max(float(np.max(s.amplitude)) for s in lines.values())
     floor = max(peak * 1e-4, 1e-12)
@@ -96,6 +97,8 @@ def spectra(record: Record) -> Figure:
     for axes, (axis, spectrum), letter in zip(panels, lines.items(), "ab", strict=True):
         shown = (spectrum.frequency > 0.0) & (spectrum.frequency <= limit)
         axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))  # not by mathtext, which is slow
+        axes.minorticks_off()
         axes.set_ylim(floor, 4.0 * peak)
         if marks is not None and marks.shaft > 0.0:
             _mark(axes, marks.shaft, limit, color="#adb5bd", style=(0, (1, 1.5)), width=0.7)
@@ -134,15 +137,16 @@ def spectra(record: Record) -> Figure:
             bbox_to_anchor=(0.995, 0.995),
         )
         text += _unresolved(marks.ball_pass_outer, marks.shaft, spectrum.resolution, crank)
-    caption(figure, "Displacement spectra", f"{text} {record.settings()}.")
+    frame(figure, "Displacement spectra", f"{text} {record.settings()}.", hspace=0.25)
     return figure
 
 
 def _mark(
     axes: Axes, frequency: float, limit: float, *, color: str, style: tuple[float, tuple[float, ...]], width: float
 ) -> None:
-    for multiple in range(1, int(limit / frequency) + 1):
-        axes.axvline(multiple * frequency, color=color, linestyle=style, linewidth=width, zorder=0.5)
+    marks = frequency * np.arange(1, int(limit / frequency) + 1)
+    across = axes.get_xaxis_transform()
+    axes.vlines(marks, 0.0, 1.0, transform=across, color=color, linestyle=style, linewidth=width, zorder=0.5)
 
 
 def _shown_range(spectra: list[AmplitudeSpectrum], *, shaft: float) -> float:
@@ -172,13 +176,13 @@ def _unresolved(ball_pass: float, shaft: float, resolution: float, crank: str) -
 def phase_portrait(record: Record) -> Figure:
     """Velocity over displacement along x, with the stroboscopic point of each turn."""
     _, x, v = _path(record, slice(0, record.t.size), "x")
-    figure = new_figure(5.2)
+    figure = new_figure(5.2, layout=None)
     axes = figure.add_subplot()
     axes.plot(1e6 * x, 1e3 * v, color=INK, linewidth=0.8, alpha=0.85, label="steady turns" if record.turns else "path")
     text = "Nothing turns: no stroboscopic points."
     if record.cycle_length is not None:
         points = stroboscopic_points(
-            record.t, record.solution["inner.x"], record.solution["inner.vx"], cycle_length=record.cycle_length
+            record.t, record.values("inner.x"), record.values("inner.vx"), cycle_length=record.cycle_length
         )
         axes.plot(
             points.position * 1e6,
@@ -201,5 +205,5 @@ def phase_portrait(record: Record) -> Figure:
     axes.set_xlabel("x of the inner ring's centre [µm]")
     axes.set_ylabel("velocity along x [mm/s]")
     figure.legend(loc="upper right", ncols=2, bbox_to_anchor=(0.995, 0.995))
-    caption(figure, "Phase portrait along x", f"{text} {record.settings()}.")
+    frame(figure, "Phase portrait along x", f"{text} {record.settings()}.", left=0.9)
     return figure

@@ -15,7 +15,7 @@ from ballpass.runtime.ask.observables import KinematicFrequencies, ball_angles, 
 from ballpass.runtime.contract import force_components
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import Manifest
+    from ballpass.runtime.contract import BearingInfo, Manifest
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.solution import Solution
 
@@ -32,12 +32,14 @@ class Record:
     Attributes
     ----------
     solution : steady cycles only
+    bearing : the one that the figures are of; None where the scene has none
     cycle_length : one turn of driver or shaft [s]; None when nothing turns
     turns : whole turns of the steady part, oldest first; empty without them
     """
 
     model: Model
     solution: Solution
+    bearing: BearingInfo | None
     cycle_length: float | None
     turns: tuple[slice, ...]
 
@@ -51,12 +53,23 @@ class Record:
         """Times [s]."""
         return self.solution.t
 
+    def output(self, name: str) -> str:
+        """Name of an output or state of this bearing: "inner.x" may be "left.inner.x"."""
+        ours = self.bearing is not None and name.startswith(("inner.", "outer.", "ball.", "load.", "ring_force."))
+        return f"{self.bearing.prefix}{name}" if self.bearing is not None and ours else name
+
     def has(self, *names: str) -> bool:
-        """Whether all these outputs were asked for."""
-        return all(name in self.solution.outputs or name in self.solution.states for name in names)
+        """Whether all these outputs were asked for, of this bearing where bearings have them."""
+        return all(self.output(name) in self.solution for name in names)
+
+    def values(self, name: str) -> Array:
+        """Samples of an output or state, of this bearing where bearings have it."""
+        return self.solution[self.output(name)]
 
     def parameter(self, name: str) -> float:
-        """Value of a parameter or, where none has this name, of a derived constant [SI]."""
+        """Value of a parameter or, where none has this name, of a derived constant [SI]; "bearing." is this one."""
+        if self.bearing is not None and name.startswith("bearing."):
+            name = f"{self.bearing.path}{name.removeprefix('bearing')}"
         values = self.solution.parameters
         return float(values[name]) if name in values else float(self.solution.constants[name])
 
@@ -70,7 +83,7 @@ class Record:
     def crank_angle(self, t: Array | None = None) -> Array:
         """Angle of the driven body (shaft: from its place at t = 0) at `t` or the samples, not wrapped, (n,) [rad]."""
         time = self.t if t is None else t
-        mechanism, bearing = self.manifest.mechanism, self.manifest.bearing
+        mechanism, bearing = self.manifest.mechanism, self.bearing
         if mechanism is not None:
             return self.parameter(mechanism.start_angle) + self.parameter(mechanism.speed) * time
         if bearing is not None:
@@ -89,7 +102,7 @@ class Record:
 
     def frequencies(self) -> KinematicFrequencies | None:
         """Kinematic frequencies of the bearing [Hz]; None without a bearing."""
-        bearing = self.manifest.bearing
+        bearing = self.bearing
         if bearing is None:
             return None
         return kinematic_frequencies(
@@ -101,7 +114,7 @@ class Record:
 
     def ball_angles(self, t: float) -> Array:
         """Angles of the balls at a time, (balls,) [rad]."""
-        bearing = self.manifest.bearing
+        bearing = self.bearing
         assert bearing is not None  # figures of balls are drawn of scenes with a bearing only
         return ball_angles(
             t,
@@ -112,17 +125,17 @@ class Record:
 
     def ball_force(self) -> tuple[str, Array]:
         """Name and values of the ball force to show: total where asked for, else elastic, (n, balls) [N]."""
-        bearing = self.manifest.bearing
+        bearing = self.bearing
         if self.has("ball.force"):
             damped = bearing is not None and bearing.damping_law != "none"
-            return "elastic and damping force" if damped else "elastic force", self.solution["ball.force"]
-        return "elastic force", self.solution["ball.elastic_force"]
+            return "elastic and damping force" if damped else "elastic force", self.values("ball.force")
+        return "elastic force", self.values("ball.elastic_force")
 
     def ring_load(self) -> Array | None:
         """Load on the inner ring, (n, 2) [N]: the output, else its share of the reaction; None without both."""
         if self.has("load.x", "load.y"):
-            return np.column_stack((self.solution["load.x"], self.solution["load.y"]))
-        mechanism, bearing = self.manifest.mechanism, self.manifest.bearing
+            return np.column_stack((self.values("load.x"), self.values("load.y")))
+        mechanism, bearing = self.manifest.mechanism, self.bearing
         if mechanism is None or bearing is None:
             return None
         names = [f"reaction.{bearing.joint}.{axis}" for axis in "xy"]
@@ -131,7 +144,7 @@ class Record:
         first = next(item[2] for item in mechanism.joints if item[0] == bearing.joint)
         # Eq. (2): the force on the frame presses the ring; the reaction is that of the second body on the first
         share = self.parameter("bearing.share") * (1.0 if first == FRAME else -1.0)
-        return share * np.column_stack([self.solution[name] for name in names])
+        return share * np.column_stack([self.values(name) for name in names])
 
     def applied_forces(self, t: float) -> tuple[tuple[str, tuple[str, str], Array], ...]:
         """Applied forces that act at a time: name, (body, point), components (2,) [N]."""
@@ -176,20 +189,23 @@ class Record:
         parts = [f"{dropped:g} transient cycle{'' if dropped == 1 else 's'} dropped"]
         if self.solution.states:  # a linkage alone needs no integration
             parts.append(f"method {statistics.method}")
-        if self.manifest.bearing is not None:
+        if self.bearing is not None:
             # a no-break space keeps number and unit on one line
             parts.append(f"diametral clearance {self.parameter('bearing.clearance') * 1e6:g}\u00a0µm")
-            parts.append(f"damping law {self.manifest.bearing.damping_law}")
+            parts.append(f"damping law {self.bearing.damping_law}")
+            if self.bearing.name:
+                parts.append(f"bearing {self.bearing.name}")
         return ", ".join(parts)
 
 
-def gather(model: Model, solution: Solution) -> Record:
-    """The steady part of `solution`, with its turns."""
+def gather(model: Model, solution: Solution, bearing: BearingInfo | None = None) -> Record:
+    """The steady part of `solution`, with its turns, for figures of a bearing; the first one if none is given."""
     steady = solution.steady()
     length = steady.cycle_length
     return Record(
         model=model,
         solution=steady,
+        bearing=bearing or model.manifest.bearing,
         cycle_length=length,
         turns=() if length is None else turns(steady.t, length),
     )
