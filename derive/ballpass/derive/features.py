@@ -66,7 +66,8 @@ def features(scene: Scene) -> tuple[Feature, ...]:
 
 
 def count_operations(scene: Scene) -> dict[str, int]:
-    """Arithmetic operations of each generated function of a scene, by name; the stepper's as ``kernel.<name>``.
+    """Arithmetic operations of each generated function of a scene, by name; the stepper's as ``kernel.<name>``, those
+    of a ball as ``kernel.ball.<name>``.
 
     Raises
     ------
@@ -77,6 +78,8 @@ def count_operations(scene: Scene) -> dict[str, int]:
     counts = {f.name(): operations(f) for f, _ in lowered.functions}
     if lowered.kernels is not None:
         counts |= {f"kernel.{k.function.name()}": operations(k.function) for k in lowered.kernels.functions}
+        for balls in lowered.kernels.bearings:
+            counts |= {f"kernel.{balls.prefix}ball.{n}": operations(f) for n, f in balls.over_numbers.items()}
     return counts
 
 

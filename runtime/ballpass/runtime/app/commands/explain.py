@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ from ballpass.runtime.contract.smoothness import WORDS
 if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.derive.features import Cost
+    from ballpass.derive.scene.records import Bearing
     from ballpass.runtime.contract import Manifest
     from ballpass.runtime.point.explain import Explanation
 
@@ -97,7 +99,7 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
         "states": list(said.states),
         "outputs": list(said.outputs),
         "functions": {f.name: {"operations": f.operations, "what": f.description} for f in manifest.functions},
-        "step": _step(kernels, scene.bearing.balls if scene.bearing else 0),
+        "step": _step(kernels, scene.bearings),
         "breakpoints": [
             {"time": b.time, "angle_deg": math.degrees(b.angle), "cause": b.cause} for b in said.breakpoints
         ],
@@ -118,16 +120,16 @@ def _rest(shares: list[tuple[str, int]], counted: Cost) -> int:
     return counted.functions["rhs"] - sum(v for (_, v), inner in zip(shares, within, strict=True) if not inner)
 
 
-def _step(kernels: dict[str, int], balls: int) -> dict[str, int]:
+def _step(kernels: dict[str, int], bearings: Sequence[Bearing]) -> dict[str, int]:
     """Operations of one evaluation of the right-hand side in the stepper, by part."""
     if not kernels:
         return {}
-    # each ball turns its direction, projects the motion and adds its force to two sums
-    around = 2 * 3 + 4 + 1 + 4
+    # each ball turns its direction and adds its force to two sums
+    around = 2 * 3 + 2
     parts = {
         "load and mechanism": kernels["stage"],
         "motion of the rings": kernels["relative"] + kernels["acceleration"],
-        "ball contacts": balls * (kernels["law"] + around),
+        "ball contacts": sum(b.balls * (kernels[f"{b.prefix}ball.forces"] + around) for b in bearings),
     }
     return parts | {"all": sum(parts.values())}
 
