@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 from collections.abc import Callable
 from itertools import groupby
 from pathlib import Path
@@ -48,7 +49,16 @@ class Page:
         reports = sorted(self.reports, key=lambda report: (list(SECTIONS).index(_module(report)), report.location[1]))
         held = sum(report.passed for report in reports)
         minutes = sum(report.duration for report in reports) / 60.0
-        counts = {"HELD": held, "CASES": len(reports), "MINUTES": f"{minutes:.1f}", "PROCESSORS": os.cpu_count()}
+        commit = subprocess.run(
+            ("git", "describe", "--always"), capture_output=True, text=True, check=False
+        ).stdout.strip()
+        counts = {
+            "COMMIT": commit or "unknown",
+            "HELD": held,
+            "CASES": len(reports),
+            "MINUTES": f"{minutes:.1f}",
+            "PROCESSORS": os.cpu_count(),
+        }
         text = HEAD.read_text(encoding="utf-8")
         for name, value in counts.items():
             text = text.replace(f"@{name}@", str(value))
