@@ -1,4 +1,4 @@
-"""Claims about scenes, overrides and requests of any content: read right, or refused in words that name the place.
+"""Claims about scenes and overrides of any content: read right, or refused in words that name the place.
 
 Scenes are made by hypothesis: as a tree whose numbers are known, written as TOML in units drawn at random.
 """
@@ -16,18 +16,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from profiles import LONG, examples
-from typer.testing import CliRunner
 
 from ballpass.derive import SceneError, derive, generate
 from ballpass.derive.reading.read import parse_override, read_scene, scene_from_text, with_values
 from ballpass.derive.scene.records import Scene
-from ballpass.runtime import Model, RequestError, load
-from ballpass.runtime.app.cli import app
 from ballpass.runtime.export.c_program import export_c
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
@@ -453,151 +449,3 @@ def test_words_of_c_and_make_are_names_like_others(word: str, tmp_path: Path) ->
     subprocess.run(["make", "-s", "clean"], cwd=program, check=True, timeout=300)
     assert (program / "scene.c").exists()
     assert not list(program.glob("*.o"))
-
-
-# ------------------------------------------------------------------------------------------------------------- requests
-
-
-@pytest.fixture(scope="module")
-def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
-    return load(generate(scene_from_text(PRESS, "press"), tmp_path_factory.mktemp("requests") / "press"))
-
-
-WRONG_VALUES = [
-    (math.nan, "a finite number in m is expected, not nan"),
-    (math.inf, "a finite number in m is expected, not inf"),
-    (-math.inf, "a finite number in m is expected, not -inf"),
-    (10**400, "a finite number in m is expected, not inf"),
-    ("8 um", "one number in m is expected, not '8 um' (str)"),
-    (b"1", "one number in m is expected, not b'1' (bytes)"),
-    (None, "one number in m is expected, not None (NoneType)"),
-    (True, "one number in m is expected, not True (bool)"),
-    (1 + 2j, "one number in m is expected, not (1+2j) (complex)"),
-    ([1e-6], "one number in m is expected, not [1e-06] (list)"),
-    (np.array([1e-6, 2e-6]), "one number in m is expected, not array"),
-    (np.array([[1e-6]]), "one number in m is expected, not array"),
-]
-
-
-@pytest.mark.parametrize(("value", "words"), WRONG_VALUES, ids=[repr(value)[:20] for value, _ in WRONG_VALUES])
-def test_an_override_that_is_no_finite_number_is_refused(model: Model, value: Any, words: str) -> None:
-    calls: list[Callable[[], object]] = [
-        lambda: model.simulate(cycles=0.1, parameters={"bearing.clearance": value}),
-        lambda: model.reduce(cycles=0.1, parameters={"bearing.clearance": value}),
-        lambda: model.evaluate(0.0, parameters={"bearing.clearance": value}),
-        lambda: model.jacobian("rhs", parameters={"bearing.clearance": value}),
-    ]
-    for call in calls:
-        with pytest.raises(RequestError) as caught:
-            call()
-        assert f"bearing.clearance: {words}" in str(caught.value)
-    with pytest.raises(RequestError, match=r"bearing\.clearance"):
-        model.simulate_many({"bearing.clearance": [1e-6, value]}, ["peak_ball_force"], cycles=0.1)
-
-
-@pytest.mark.parametrize(
-    ("name", "near"),
-    [
-        ("bearing.clearence", "'bearing.clearance'"),
-        ("clearance", "'bearing.clearance'"),
-        ("mechanism.bodies.crank.masss", "'mechanism.bodies.crank.mass'"),
-        ("bearing.balls", "'bearing."),
-        ("x" * 10_000, "There are "),
-        ("__class__", "There are "),
-        (3, "There are "),
-    ],
-)
-def test_an_unknown_parameter_is_refused_with_the_nearest_names(model: Model, name: Any, near: str) -> None:
-    with pytest.raises(RequestError) as caught:
-        model.simulate(cycles=0.1, parameters={name: 1.0})
-    assert "There is no parameter" in str(caught.value)
-    assert near in str(caught.value)
-    assert len(str(caught.value)) < 1000
-
-
-WRONG_REQUESTS = [
-    ("cycles", "2", "cycles: a number above 0 is expected, not '2'"),
-    ("cycles", math.nan, "cycles: a number above 0 is expected, not nan"),
-    ("cycles", -1, "cycles: a number above 0 is expected, not -1"),
-    ("cycles", [1], r"cycles: a number above 0 is expected, not \[1\]"),
-    ("cycles", 10**400, "cycles: a number above 0 is expected"),
-    ("cycles", 1e12, "samples of .* numbers would not fit into memory.*Model.reduce"),
-    ("cycles", 1e300, "samples of .* numbers would not fit into memory.*Model.reduce"),
-    ("duration", "1 s", "duration: a time above 0 s is expected, not '1 s'"),
-    ("duration", 1e12, "samples of .* numbers would not fit into memory.*Model.reduce"),
-    ("rtol", "a", "rtol: a number from 1e-13 to 0.1 is expected, not 'a'"),
-    ("rtol", math.nan, "rtol: a number from 1e-13 to 0.1 is expected, not nan"),
-    ("rtol", 0, "rtol: a number from 1e-13 to 0.1 is expected, not 0"),
-    ("samples_per_cycle", "a", "samples_per_cycle: a whole number from 1 on is expected, not 'a'"),
-    ("samples_per_cycle", math.nan, "samples_per_cycle: a whole number from 1 on is expected, not nan"),
-    ("samples_per_cycle", math.inf, "samples_per_cycle: a whole number from 1 on is expected, not inf"),
-    ("samples_per_cycle", 1.5, r"samples_per_cycle: a whole number from 1 on is expected, not 1\.5"),
-    ("samples_per_cycle", 10**30, "samples of .* numbers would not fit into memory"),
-    ("transient", "x", "transient: a number of cycles from 0 on is expected, not 'x'"),
-    ("transient", math.nan, "transient: a number of cycles from 0 on is expected, not nan"),
-    ("initial", "abc", "initial: 8 finite numbers are expected"),
-    ("initial", [0.0] * 3, r"initial: 8 finite numbers are expected .*not an array of shape \(3,\)"),
-    ("initial", [math.nan] * 8, "initial: 8 finite numbers are expected .*NaN or inf"),
-    ("initial", [[0.0] * 8], r"initial: 8 finite numbers are expected .*shape \(1, 8\)"),
-    ("method", "euler", "There is no method 'euler'"),
-    ("method", 3, "There is no method 3"),
-]
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "words"), WRONG_REQUESTS, ids=[f"{n}={v!r}"[:30] for n, v, _ in WRONG_REQUESTS]
-)
-def test_a_request_out_of_bounds_is_refused(model: Model, name: str, value: Any, words: str) -> None:
-    given = {name: value} if name in ("cycles", "duration") else {"cycles": 0.1, name: value}
-    with pytest.raises(RequestError, match=words):
-        model.simulate(**given)
-
-
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
-        ("bearing.clearence=1 um", ("bearing.clearence", 'did you mean "bearing.clearance"?')),
-        ("bearing.clearance=1 kg", ('"1 kg"', "wrong dimension for a length", "SI: m")),
-        ("bearing.clearance=1", ("the unit is missing",)),
-        ("bearing.clearance=nan m", ("the number is not finite",)),
-        ("bearing.clearance=inf m", ("the number is not finite",)),
-        ("bearing.clearance=1e999 m", ("the number is not finite", "given", "allowed", "remedy")),
-        ("bearing.clearance=[1 m, 2 m]", ("no number in front",)),
-        ("bearing.clearance=__import__('os').getcwd()", ("no number in front",)),
-        ("bearing.clearance=1 m; touch pwned", ("has no place in a unit",)),
-        ("bearing.clearance=$(touch pwned)", ("no number in front",)),
-        ("bearing.clearance", ("an override without a value", "PATH=VALUE")),
-        ("=1 m", ("the scene has no quantity of this path",)),
-        ("x" * 10_000 + "=1", ("the scene has no quantity of this path",)),
-        ("\x1b[31m=1 m", ("the scene has no quantity of this path",)),
-        ("mechanism.bodies.rod.mass=-1 kg", ("the value is negative", "a value above zero")),
-    ],
-)
-def test_a_wrong_setting_exits_with_2_and_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, setting: str, words: tuple[str, ...]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(app, ["run", str(SCENES / "punching_press.toml"), "--set", setting])
-    assert result.exit_code == 2
-    assert result.stdout == ""
-    assert "Traceback" not in result.stderr
-    assert "\x1b" not in result.stderr
-    assert len(result.stderr) < 5000
-    for word in words:
-        assert word in result.stderr
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("evil", [evil for evil in EVIL if "\0" not in evil and "/" not in evil and len(evil) < 200])
-def test_a_scene_file_of_any_name_writes_within_its_folders_or_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, evil: str
-) -> None:
-    here = tmp_path / "outer" / "here"
-    here.mkdir(parents=True)
-    monkeypatch.chdir(here)
-    scene = here / f"{evil}.toml"
-    scene.write_text(ROTOR.replace("balls = 8", "balls = x"), encoding="utf-8")  # refused in any case
-    result = CliRunner().invoke(app, ["derive", str(scene)])
-    assert result.exit_code == 2
-    assert "Traceback" not in result.output
-    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [scene]
