@@ -77,6 +77,24 @@ def test_a_scene_without_mechanism_gets_the_bearing_s_figures(shaft: Run, tmp_pa
     assert [path.stem for path in draw_all(*shaft, tmp_path)] == [*NAMES[1:]]
 
 
+def test_every_bearing_gets_its_figures(
+    make_model: Callable[..., Model], scene_text: Callable[..., str], tmp_path: Path
+) -> None:
+    text = scene_text("varying_compliance")
+    bearing = text[text.index("[bearing]\n") : text.index("[run]")]
+    both = "".join(re.sub(r"^\[bearing\b", f"[bearings.{name}", bearing, flags=re.MULTILINE) for name in ("a", "b"))
+    outputs = re.search(r"outputs = \[.*?\]", text, re.DOTALL)
+    assert outputs is not None
+    model = make_model("varying_compliance", (bearing, both), (outputs[0], 'outputs = ["*.inner.*", "*.ball.force"]'))
+    run = model, model.simulate(cycles=2, transient=1, parameters={"bearings.b.clearance": 5e-6})
+    assert [path.stem for path in draw_all(*run, tmp_path)] == [f"{k}_{name}" for name in "ab" for k in NAMES[1:]]
+    second = gather(*run, model.manifest.bearings[1])
+    np.testing.assert_array_equal(second.values("inner.x"), run[1].steady()["b.inner.x"])
+    caption = texts(next(kind for kind in FIGURES if kind.name == "orbit").draw(second))
+    assert "diametral clearance 5 µm" in caption
+    assert "bearing b" in caption
+
+
 def test_a_scene_without_bearing_gets_reactions_and_mechanism(linkage_alone: Run, tmp_path: Path) -> None:
     assert [path.stem for path in draw_all(*linkage_alone, tmp_path)] == ["load_curve", "peak_moment"]
     figure = draw("load_curve", *linkage_alone)
