@@ -1,0 +1,104 @@
+"""Claims about scenes of several bearings: each moves as it does alone, in every way to compute."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ballpass.derive import SceneError, generate
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.derive.scene.records import Scene
+from ballpass.runtime import Model, load
+
+#: What the right bearing has other than the left one: law, number of balls, clearance, a fixed outer ring.
+OTHER = (
+    ("balls = 8", "balls = 9"),
+    ('clearance = "10 um"', 'clearance = "6 um"'),
+    ('law = "one-sided"\nratio = "0.25e-5 s*mm^0.5"', 'law = "hunt-crossley"\nhysteresis = "5 s/m"'),
+    ('support = "elastic"\nmass', 'support = "fixed"\n#mass'),
+    ('stiffness = "5e7 N/m"', "#"),
+    ('damping = "500 N*s/m"', "#"),
+    ('outer = ["0 um", "0 um"]\nouter_velocity = ["0 m/s", "0 m/s"]', ""),
+)
+
+
+def pair_text(scene_text: Callable[..., str]) -> str:
+    text, other = scene_text("punching_press"), scene_text("punching_press", *OTHER)
+    start, end = (text.index(mark) for mark in ("[bearing]", "[run]"))
+    named = [
+        re.sub(r"^\[bearing(?=[.\]])", f"[bearings.{name}", of[of.index("[bearing]") : of.index("[run]")], flags=re.M)
+        for name, of in (("left", text), ("right", other))
+    ]
+    outputs = ('"inner.*", "outer.*", "ball.*"', '"left.*", "right.*"')
+    return (text[:start] + "".join(named) + text[end:]).replace(*outputs)
+
+
+@pytest.fixture(scope="module")
+def pair(scene_text: Callable[..., str], tmp_path_factory: pytest.TempPathFactory) -> Model:
+    return load(generate(scene_from_text(pair_text(scene_text), "pair"), tmp_path_factory.mktemp("pair") / "pair"))
+
+
+@pytest.fixture(scope="module")
+def alone(make_model: Callable[..., Model]) -> dict[str, Model]:
+    fixed = (*OTHER, ('"outer.*", ', ""))
+    return {"left": make_model("punching_press"), "right": make_model("punching_press", *fixed)}
+
+
+@pytest.mark.parametrize(("method", "bound"), [("stepper", 1e-5), ("stepper-rodas5p", 1e-4), ("cvodes", 1e-3)])
+def test_each_moves_as_it_does_alone(pair: Model, alone: dict[str, Model], method: str, bound: float) -> None:
+    both = pair.simulate(cycles=0.15, transient=0, method=method, rtol=1e-9)
+    for name, model in alone.items():
+        own = model.simulate(cycles=0.15, transient=0, method=method, rtol=1e-9)
+        for output in ("inner.x", "inner.y", "ball.force"):
+            found, expected = both[f"{name}.{output}"], own[output]
+            assert np.max(np.abs(found - expected)) < bound * np.max(np.abs(expected)), (name, output)
+
+
+def test_reductions_and_lanes_tell_the_bearings_apart(pair: Model, alone: dict[str, Model]) -> None:
+    run = {"cycles": 0.15, "transient": 0, "rtol": 1e-9}
+    both = pair.reduce(**run)
+    names = [f"max:{name}.ball.force" for name in alone]
+    many = pair.simulate_many({"bearings.right.clearance": [6e-6] * 3}, names, **run)
+    for name, model in alone.items():
+        own = model.reduce(**run)
+        for channel in ("ball.force", "ball.deflection", "inner.y"):
+            found = both[f"{name}.{channel}"]
+            assert found.maximum == pytest.approx(own[channel].maximum, rel=1e-5)
+            assert found.maximum_ball == own[channel].maximum_ball
+        assert many[f"max:{name}.ball.force"] == pytest.approx(own["ball.force"].maximum, rel=1e-4)
+
+
+def test_derivatives_by_one_bearing_move_that_bearing_alone(pair: Model, alone: dict[str, Model]) -> None:
+    run = {"cycles": 0.05, "rtol": 1e-10, "method": "stepper-dp54"}
+    both = pair.sensitivities(["bearings.left.share", "bearings.right.clearance"], **run)
+    own = alone["right"].sensitivities(["bearing.clearance"], **run)
+    columns = [pair.states.index(f"right.{state}") for state in alone["right"].states]
+    scale = np.max(np.abs(own.x[-1]))
+    assert np.max(np.abs(both.x[-1][columns, 1] - own.x[-1][:, 0])) < 1e-3 * scale
+    assert np.max(np.abs(both.x[-1][columns, 0])) == 0.0
+
+
+def test_the_manifest_lists_them_and_their_coordinates(pair: Model) -> None:
+    assert [(b.name, b.balls, b.outer_ring) for b in pair.manifest.bearings] == [("left", 8, True), ("right", 9, False)]
+    assert [c.name for c in pair.manifest.coordinates] == [
+        *(f"left.{ring}.{axis}" for ring in ("inner", "outer") for axis in "xy"),
+        *(f"right.inner.{axis}" for axis in "xy"),
+    ]
+    assert len(pair.states) == 12
+
+
+def refused(text: str) -> Scene:
+    return scene_from_text(text, "pair")
+
+
+def test_bearings_in_two_places_are_refused(scene_text: Callable[..., str], tmp_path: Path) -> None:
+    text = scene_text("punching_press")
+    one = text[text.index("[bearing]") : text.index("[run]")]
+    with pytest.raises(SceneError, match="bearings are given in two places"):
+        refused(text.replace("[run]", one.replace("[bearing", "[bearings.other") + "[run]"))
+    with pytest.raises(SceneError, match=r"bearings\.left\.clearance"):
+        refused(pair_text(scene_text).replace('clearance = "10 um"', 'clearance = "10 s"'))
