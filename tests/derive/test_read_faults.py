@@ -107,6 +107,13 @@ REFUSED = [
         "mechanism.joints.C.direction",
         "delete the key",
     ),
+    (
+        "name of two loads",
+        "[mechanism.forces.punch]",
+        '[mechanism.torques.punch]\nbody = "rod"\ntorque = "1 N*m"\n\n[mechanism.forces.punch]',
+        "mechanism.torques.punch",
+        "rename",
+    ),
     ("unknown branch", 'branch = "ahead"', 'branch = "before"', "mechanism.joints.C.branch", "branch"),
     (
         "driver unknown",

@@ -231,10 +231,12 @@ def _check_driver(table: Table, driver: Driver, joints: tuple[Joint, ...], sound
 
 
 def _read_forces(table: Table, points: Points) -> tuple[Force, ...]:
-    forces = []
+    forces: list[Force] = []
     for kind in FORCE_TABLES:
         with table.table(kind.key, required=False) as listed:
             for name in listed.names(kind.word):
+                if any(force.name == name for force in forces):
+                    listed.fault(name, "another load has this name", given=show(name), remedy="rename one of the two")
                 with listed.table(name, kind.example) as data:
                     forces.append(kind.read(data, name, points))
     return tuple(forces)

@@ -144,7 +144,7 @@ def _absent(scene: Scene) -> list[str]:
         if mechanism.gravity is None:
             out.append("weight of the mechanism's bodies (mechanism.gravity)")
         if not mechanism.forces:
-            out.append("forces and torques of the process ([mechanism.forces.NAME], [mechanism.torques.NAME])")
+            out.append("forces, torques and springs ([mechanism.forces.NAME], torques, springs, torsion_springs)")
     if bearing is None:
         out.append("a bearing: forces of the mechanism only ([bearing])")
         return out
