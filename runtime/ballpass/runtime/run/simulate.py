@@ -280,8 +280,8 @@ def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tupl
         warnings.warn(
             f"{model.manifest.scene}: the generated folder has no kernels for the project's own stepper, which does "
             f"not take such a scene{reason}. CasADi's functions and integrators run instead: results are the same "
-            "within the tolerance, a simulation takes some ten times as long, and there are no ensembles, reductions and "
-            "derivatives of runs. Name the method to run it without this warning.",
+            "within the tolerance, a simulation takes some ten times as long, and there are no ensembles, reductions "
+            "and derivatives of runs. Name the method to run it without this warning.",
             NoKernelsWarning,
             stacklevel=4,
         )
