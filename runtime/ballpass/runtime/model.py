@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -12,19 +11,14 @@ import numpy as np
 from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.error_target import simulate_to_error
 from ballpass.runtime.contract import Manifest, read_artefact
-from ballpass.runtime.contract.errors import ArtefactError, RequestError
+from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
 from ballpass.runtime.many.members import Table
 from ballpass.runtime.native.compile import CompiledLibrary, compile_model
-from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
-from ballpass.runtime.point.evaluate import checked_time, evaluate_point
 from ballpass.runtime.point.explain import Explanation, explain
-from ballpass.runtime.point.jacobian import jacobian
-from ballpass.runtime.point.jacobian_function import JacobianFunction
-from ballpass.runtime.point.second_derivatives import hessian
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.point.point_model import PointModel
 from ballpass.runtime.run.locating import Kinks, refuse_with_error
 from ballpass.runtime.run.reduced_run import reduce_run
 from ballpass.runtime.run.reductions import Reductions
@@ -34,8 +28,6 @@ from ballpass.runtime.run.simulate import method_names, simulate
 
 if TYPE_CHECKING:
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport
-    from ballpass.runtime.point.equilibrium import StaticEquilibrium
-    from ballpass.runtime.point.linearize import Linearization
     from ballpass.runtime.run.solution import Solution
 
 
@@ -71,7 +63,7 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     return Model(place, manifest, library, compiler=compiler)
 
 
-class Model(LoadedModel):
+class Model(PointModel):
     """Functions of one scene with their names, units and defaults.  All numbers are SI.
 
     For any number of threads at once, with the bits of calls one after the other.  What `kernel` and `loop` give
@@ -102,52 +94,6 @@ class Model(LoadedModel):
             check_assembly(self, numbers)
             self._assembled = looked_at
         return numbers
-
-    def constants(self, parameters: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Derived constants (stiffness, cage ratio, ...) by name, for the defaults with `parameters` put in."""
-        values = self.numbers(parameters).values
-        return {info.name: values[info.name] for info in self.manifest.constants}
-
-    def period(self, parameters: Mapping[str, float] | None = None) -> float:
-        """Time of one turn of driver or shaft [s]; infinite when nothing turns."""
-        return clock.period(self.manifest, self.numbers(parameters).values)
-
-    def breakpoints(self, t0: float, t1: float, parameters: Mapping[str, float] | None = None) -> np.ndarray:
-        """Times in the open interval (t0, t1) at which a load switches or a table has a knot, increasing [s]."""
-        if not (math.isfinite(t0) and math.isfinite(t1) and t0 < t1):
-            raise RequestError(f"breakpoints: finite times t0 < t1 are expected, not {t0!r} and {t1!r}.")
-        return clock.breakpoints(self.manifest.inputs, self.numbers(parameters).values, float(t0), float(t1))
-
-    def inputs_at(self, t: float, parameters: Mapping[str, float] | None = None) -> np.ndarray:
-        """Inputs ``u`` at time `t`, for functions that are then called with ``t = 0``; shape (inputs,)."""
-        return clock.inputs_at(self.manifest.inputs, self.numbers(parameters).values, checked_time(t))
-
-    def initial(self, parameters: Mapping[str, float] | None = None) -> np.ndarray:
-        """State at the start, shape (states,)."""
-        values = self.numbers(parameters).values
-        return np.array([values[name] for name in self.manifest.initial], dtype=float)
-
-    def evaluate(
-        self,
-        t: float,
-        x: Sequence[float] | np.ndarray | None = None,
-        outputs: Sequence[str] | None = None,
-        parameters: Mapping[str, float] | None = None,
-    ) -> dict[str, float | np.ndarray]:
-        """Outputs at one time and state.
-
-        Parameters
-        ----------
-        t : time [s]
-        x : state, shape (states,).  Default: the initial one
-        outputs : names.  Default: all
-        parameters : overrides, SI
-
-        Returns
-        -------
-        dict from name to number, or to array of shape (balls,)
-        """
-        return evaluate_point(self, self.numbers(parameters), t, x, outputs)
 
     def simulate(
         self,
@@ -447,136 +393,6 @@ class Model(LoadedModel):
         numbers = self.numbers(solution.parameters)
         return refine_peak(self, numbers, solution, name, kind=kind)
 
-    def check_assembly(self, parameters: Mapping[str, float] | None = None) -> None:
-        """Raise `RequestError`, naming joint and crank angle, when the linkage locks somewhere in a turn."""
-        check_assembly(self, self.numbers(parameters))
-
-    def jacobian(
-        self,
-        of: str | Sequence[str],
-        wrt: str | Sequence[str] = "states",
-        *,
-        t: float = 0.0,
-        x: Sequence[float] | np.ndarray | None = None,
-        parameters: Mapping[str, float] | None = None,
-    ) -> np.ndarray:
-        """Derivative of the right-hand side or of quantities at one time and state, from generated code.
-
-        Parameters
-        ----------
-        of : "rhs", or names or patterns of quantities ("ball.force", "reaction.A.*"), whether a run reports them or
-            not; `manifest.quantities` lists them
-        wrt : "states", "time", "crank_angle" (time over speed: everything moves on but the rings), names of states or
-            parameters, or several of these.  Derivatives along parameters are total: through the derived constants,
-            the phases and the tables as well, at fixed state.  Gates are flat (they jump at edges).
-        t : time [s]
-        x : state.  Default: the initial one
-        parameters : overrides, SI
-
-        Returns
-        -------
-        array, shape (rows, columns); a single number as `of` has no rows, a single name as `wrt` no columns
-
-        Raises
-        ------
-        RequestError
-            Unknown names, with the nearest ones.
-        """
-        return jacobian(self, self.numbers(parameters), of, wrt, t=t, x=x)
-
-    def jacobian_function(
-        self,
-        of: str | Sequence[str],
-        wrt: str | Sequence[str] = "states",
-        *,
-        t: float = 0.0,
-        parameters: Mapping[str, float] | None = None,
-    ) -> JacobianFunction:
-        """The same, sparse and prepared for many states: ``J = model.jacobian_function("ball.force"); J(x)``."""
-        return JacobianFunction(self, self.numbers(parameters), of, wrt, t=t)
-
-    def hessian(
-        self,
-        of: str | Sequence[str],
-        wrt: tuple[str, str],
-        *,
-        t: float = 0.0,
-        x: Sequence[float] | np.ndarray | None = None,
-        parameters: Mapping[str, float] | None = None,
-    ) -> np.ndarray:
-        """Second derivatives by a pair of names at one time and state, shape (rows,), as for `jacobian`.
-
-        Raises
-        ------
-        RequestError
-            Unknown names, or laws without a bounded second derivative: Hertz's at contact onset.
-        """
-        return hessian(self, self.numbers(parameters), of, wrt, t=t, x=x)
-
     def explain(self, parameters: Mapping[str, float] | None = None) -> Explanation:
         """Breakpoints, smoothness and time scales, and the method they speak for."""
         return explain(self, parameters)
-
-    def static_equilibrium(
-        self,
-        t: float | None = None,
-        *,
-        crank_angle: float | None = None,
-        parameters: Mapping[str, float] | None = None,
-        load: tuple[float, float] | None = None,
-    ) -> StaticEquilibrium:
-        """Positions at which the rings rest under the load of one instant, everything at rest, no damping force.
-
-        Parameters
-        ----------
-        t, crank_angle : the instant: time [s], default 0, or angle of crank or shaft in the first turn in radians,
-            at most two turns
-        parameters : overrides, SI
-        load : on the inner ring, x and y [N], instead of the scene's
-
-        Warns
-        -----
-        FreeRingWarning
-            The rings can move without force along some direction: the place is one of many.
-
-        Raises
-        ------
-        RequestError
-            No bearing, or an unloaded ring in a clearance.
-        SimulationError
-            Nothing holds the rings.
-        """
-        from ballpass.runtime.point.equilibrium import instant, static_equilibrium  # with SciPy
-
-        numbers = self.numbers(parameters)
-        return static_equilibrium(self, numbers, t=instant(self, numbers, t, crank_angle), load=load)
-
-    def linearize(
-        self,
-        t: float | None = None,
-        *,
-        crank_angle: float | None = None,
-        x: Sequence[float] | np.ndarray | None = None,
-        parameters: Mapping[str, float] | None = None,
-    ) -> Linearization:
-        """Mass, damping and stiffness matrices, natural frequencies and modes about a state.
-
-        Parameters
-        ----------
-        t, crank_angle : the instant: time [s], default 0, or angle of crank or shaft in the first turn in radians,
-            at most two turns
-        x : state, shape (states,).  Default: static equilibrium under the load of that instant
-        parameters : overrides, SI
-
-        Warns
-        -----
-        KinkWarning
-            The damping law has no derivative at this state; the warning says which side is given.
-        """
-        from ballpass.runtime.point.equilibrium import instant, static_equilibrium
-        from ballpass.runtime.point.linearize import linearize  # with SciPy
-
-        numbers = self.numbers(parameters)
-        time = instant(self, numbers, t, crank_angle)
-        state = static_equilibrium(self, numbers, t=time).x if x is None else x
-        return linearize(self, numbers, t=time, x=state, at_equilibrium=x is None)
