@@ -164,7 +164,8 @@ def test_results_are_the_files_that_were_promised(site: Site) -> None:
     assert sorted(path.name for path in (site.folder / "results").iterdir()) == sorted(NAMES)
     solution = load_solution(folder / "solution.nc")
     summary = site.summary("punching_press")
-    assert summary["inner.y"]["max"] == solution.steady()["inner.y"].max()
+    steady = solution.steady()  # the summary's extremes are those of every step
+    assert summary["inner.y"]["max"] == steady.reductions["inner.y"].maximum >= steady["inner.y"].max()
     assert summary["reaction.A.y"]["max"] >= solution.steady()["reaction.A.y"].max()
 
 
@@ -498,7 +499,8 @@ def test_without_a_compiler_a_warning_names_the_cost_and_the_numbers_agree(
     found, compiled = json.loads(result.stdout), site.summary("punching_press")
     assert found["compiled"] is False
     # two methods at a relative tolerance of 1e-6 per step
-    assert found["peak_ball_force"]["total"] == pytest.approx(compiled["peak_ball_force"]["total"], rel=1e-4)
+    sampled = compiled["peak_ball_force"]["sampled"]["total"]  # between them only the stepper looks
+    assert found["peak_ball_force"]["total"] == pytest.approx(sampled, rel=1e-4)
 
 
 @pytest.mark.parametrize(("setting", "option"), [("run.cycles=3", "--cycles 3"), ("run.rtol=1e-8", "--rtol 1e-8")])
