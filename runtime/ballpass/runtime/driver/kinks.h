@@ -23,7 +23,7 @@ enum { BP_LOOKS = 4, BP_REPEATS = 4, BP_TURNS = 2, BP_CHATTER = 4, BP_REST = 64,
 /* A root on the dense output is good enough where g is within the part BP_CLOSE of the band. */
 static const double BP_BAND = 0.01, BP_BRIEF = 1.5, BP_CLOSE = 0.1;
 
-/* Steps have the clock of pace.h where they are longer than BP_FAR times the time since an onset.  A slope at a step's end is divided by
+/* Steps have the clock of sqrt_time.h where they are longer than BP_FAR times the time since an onset.  A slope at a step's end is divided by
    the pace there unless it is below BP_LEAST_PACE.  The end of a contact is foreseen no nearer than BP_NEAREST times the step that error
    control proposes, and looked for up to BP_ASTRAY times as far as it was foreseen; a step that leaves less than the part BP_ARRIVED of
    the way there has arrived. */

@@ -1,4 +1,4 @@
-/* Steps that end on kinks of the law, and steps about contacts, which have a clock of their own: what kinks.h and pace.h describe, done in a
+/* Steps that end on kinks of the law, and steps about contacts, which have a clock of their own: what kinks.h and sqrt_time.h describe, done in a
    run.  Without BALLPASS_LOCATED nothing of it is there. */
 #ifndef BALLPASS_LOCATE_H
 #define BALLPASS_LOCATE_H

@@ -64,7 +64,7 @@ typedef struct {
 #ifdef BALLPASS_LOCATED
     bp_sides sides;
     double rate[BP_NX]; /* dx/dt where the step starts: its first slope where its pace is even */
-    double lead;        /* of the step tried, 1 where its pace is even (pace.h) */
+    double lead;        /* of the step tried, 1 where its pace is even (sqrt_time.h) */
     double touch;
     double onset;       /* time of the branch point behind, minus infinity where there is none [s] */
     bp_release release; /* branch point ahead */

@@ -7,7 +7,7 @@
 
 #include "methods.h"
 #include "model.h"
-#include "pace.h"
+#include "sqrt_time.h"
 
 #define BP_INLINE static inline __attribute__((always_inline))
 #define BP_ALIGNED __attribute__((aligned(64)))
@@ -25,7 +25,7 @@ typedef struct {
 
 typedef struct {
     const bp_numbers *n;
-    const double *lead, *theta; /* of a step with an uneven pace (pace.h), else NULL, and its stages' places */
+    const double *lead, *theta; /* of a step with an uneven pace (sqrt_time.h), else NULL, and its stages' places */
     double w[BP_METHOD_STAGES][BP_NW];
 } bp_times;
 

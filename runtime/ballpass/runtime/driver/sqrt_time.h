@@ -6,8 +6,8 @@
 
    Within a step theta goes evenly in s from 0 to 1, and time by the part theta (lead + (1 - lead) theta) of the step: from (s0 + s1)
    (s1 - s0) = h comes lead = 2 s0 / (s0 + s1).  It is 0 on an onset, 2 for a step that ends with a contact, 1 far from both. */
-#ifndef BALLPASS_PACE_H
-#define BALLPASS_PACE_H
+#ifndef BALLPASS_SQRT_TIME_H
+#define BALLPASS_SQRT_TIME_H
 
 #include <math.h>
 
