@@ -178,6 +178,8 @@ def _ball(
     elastic, damping, force = (names.variable(f"ball.{n}") for n in ("elastic_force", "damping_force", "force"))
     parts = [contact.force(delta)]
     damped = LAWS[bearing.damping.law].force(delta, delta_rate, names.constant("c_b"), contact, rest)
+    if contact.width is None and rest.width is None:
+        damped = sp.piecewise_fold(damped)  # constants meet in one product
     definitions = [
         *(own.definitions if own is not None else ()),
         names.define(delta, geometry, "m", "Deflection of ball j, Eq. (6)", r"\delta_j"),
