@@ -10,8 +10,8 @@
 enum { BP_NQ = 4, BP_NX = 8, BP_NU = 3, BP_NP = 41, BP_NC = 39, BP_NW = 4, BP_NA = 2, BP_NJ = 57, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_NR = 5, BP_NG = 6, BP_LANES = 8 };
 
 /* Coordinates of one group share a magnitude; where a coordinate has a partner, their difference counts. */
-static const int bp_group[4] = {0.0, 0.0, 0.0, 0.0};
-static const double bp_partner[4] = {2.0, 3.0, 0.0, 1.0};
+static const int bp_group[4] = {0, 0, 0, 0};
+static const int bp_partner[4] = {2, 3, 0, 1};
 
 #define BP_EACH_BEARING(DO) DO(0)
 

@@ -70,9 +70,9 @@ def kernels_header(system: System, functions: Functions, kernels: Kernels) -> st
         '#include <math.h>\n\n#include "trig.h"',
         _sizes(sizes),
         "/* Coordinates of one group share a magnitude; where a coordinate has a partner, their difference counts. */\n"
-        + print_array("bp_group", [float(groups.index(c.group)) for c in system.coordinates]).replace("double", "int")
+        + _integers("bp_group", [groups.index(c.group) for c in system.coordinates])
         + "\n"
-        + print_array("bp_partner", [float(names.index(c.partner)) if c.partner else -1.0 for c in system.coordinates]),
+        + _integers("bp_partner", [names.index(c.partner) if c.partner else -1 for c in system.coordinates]),
         "#define BP_EACH_BEARING(DO) " + " ".join(f"DO({k})" for k in range(count)),
         *(_bearing(k, kernels.bearings) for k in range(count)),
         *(_single(k) for k in kernels.functions),
@@ -248,6 +248,10 @@ def ensemble_header(kernels: Kernels) -> str:
         }
         parts += [member(bearing.over_model[key], f"bp_member_{index}_", text) for key, text in words.items()]
     return _header("ENSEMBLE_KERNELS", parts)
+
+
+def _integers(name: str, values: list[int]) -> str:
+    return f"static const int {name}[{len(values)}] = {{{', '.join(str(v) for v in values)}}};"
 
 
 def _sizes(sizes: dict[str, int]) -> str:

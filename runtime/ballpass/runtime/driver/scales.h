@@ -103,7 +103,7 @@ static inline double bp_apart(const double *x, int group)
 {
     double most = 0.0;
     for (int k = 0; k < BP_NQ; k++) {
-        const int partner = (int)bp_partner[k];
+        const int partner = bp_partner[k];
         const double between = fabs(x[k] - (partner >= 0 ? x[partner] : 0.0));
         if (bp_group[k] == group && between > most) most = between;
     }
