@@ -16,6 +16,7 @@ from ballpass.derive.bearing.equations import BearingModel, derive_bearing
 from ballpass.derive.bearing.equivalent_mass import inner_mass
 from ballpass.derive.bearing.ring_load import RingLoad, own_load, reaction_share
 from ballpass.derive.drive import constant_speed
+from ballpass.derive.events import Event, events_of
 from ballpass.derive.mechanism.forces import Forces, derive_forces
 from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
@@ -49,6 +50,7 @@ class System:
     quantities: tuple[Output, ...]
     outputs: tuple[Output, ...]
     smoothness: tuple[tuple[str, Smoothness], ...]
+    events: tuple[Event, ...]
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -130,6 +132,7 @@ def derive(scene: Scene) -> System:
         quantities=tuple(quantities),
         outputs=select_outputs(quantities, scene.outputs),
         smoothness=tuple(pair for bearing in bearings for pair in bearing.smoothness),
+        events=events_of(inputs, bearings),
     )
 
 

@@ -86,6 +86,15 @@ def equations(system: System) -> str:
         parts += _contact(tex, model)
     if system.coordinates:
         parts += _motion(tex, system)
+    if system.events:
+        parts += _table_of(
+            "Events, on which steps end",
+            ("name", "switching function", "rate", "what changes"),
+            (
+                (f"`{e.name}`", f"${tex(e.function)}$", "" if e.rate is None else f"${tex(e.rate)}$", e.changes)
+                for e in system.events
+            ),
+        )
     return "\n\n".join(parts) + "\n"
 
 
