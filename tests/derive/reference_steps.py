@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from order_conditions import all_stages
 
 from ballpass.derive.methods.explicit import ExplicitTableau
 from ballpass.derive.methods.rosenbrock import RosenbrockTableau
@@ -41,8 +42,8 @@ def weighted(row: Row, vectors: Vector) -> Vector:
 def explicit_step(tableau: ExplicitTableau, slope: Slope, time: float, start: Vector, step: float) -> ReferenceStep:
     """All stages of an explicit method, those of the dense output included."""
     nodes = [float(c) for c in (*tableau.nodes, 1, *tableau.dense_nodes)]
-    slopes = np.zeros((tableau.all_stages, len(start)), dtype=start.dtype)
-    for stage, row in enumerate(tableau.full_matrix()):
+    slopes = np.zeros((len(nodes), len(start)), dtype=start.dtype)
+    for stage, row in enumerate(all_stages(tableau)):
         slopes[stage] = slope(time + nodes[stage] * step, start + step * weighted(row, slopes))
     end = start + step * weighted(tableau.weights, slopes)
     delta = end - start

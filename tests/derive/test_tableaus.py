@@ -1,9 +1,8 @@
-"""Tableaus: the figures have the order they claim, by algebra and by experiment, and a wrong digit is refused."""
+"""Tableaus: the figures have the orders printed for them, by algebra and by experiment, and a wrong digit is found."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import fields, replace
 from decimal import Decimal, localcontext
@@ -12,62 +11,32 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from order_conditions import PRECISION, Claims, Tableau, classical_form, dense_weights, faults, stability_polynomial
 from reference_steps import ReferenceStep, Vector, explicit_step, floats, rosenbrock_step
 from scipy.integrate import DOP853 as ScipyDop853
 from scipy.integrate import RK45
 
-from ballpass.derive.methods.explicit import DOP853, DORMAND_PRINCE_54, ErrorEstimate, ExplicitTableau
-from ballpass.derive.methods.order_conditions import PRECISION, Tree, rooted_trees
+from ballpass.derive.methods.explicit import DOP853, DORMAND_PRINCE_54, ExplicitTableau
 from ballpass.derive.methods.rosenbrock import RODAS4, RODAS5P, RosenbrockTableau
-from ballpass.derive.methods.tableaus import Row, TableauError, nested_powers
+from ballpass.derive.methods.tableaus import Row, TableauError
 
-Tableau = ExplicitTableau | RosenbrockTableau
 EXPLICIT = (DORMAND_PRINCE_54, DOP853)
 ROSENBROCK = (RODAS4, RODAS5P)
+CLAIMS = {
+    # The figures are exact; what is left is the arithmetic of the check.
+    "Dormand–Prince 5(4)": Claims(order=5, dense_order=4, rounding=Fraction("1e-45")),
+    # Printed to 30 digits, the dense output to 29: up to 5e-27 each where a figure is above 100; 3e-26 is the largest
+    # residual.
+    "DOP853": Claims(order=8, dense_order=7, rounding=Fraction("1e-25")),
+    # Printed to 16 digits: up to 5e-15 each where a figure is above 10; 1.2e-14 is the largest residual.
+    "Rodas4": Claims(order=4, dense_order=3, algebraic_orders=(4, 3, 2), rounding=Fraction("1e-13")),
+    # Printed from double precision: up to 1.4e-14 each where a figure is above 128; 2.3e-13 is the largest residual.
+    "Rodas5P": Claims(order=5, dense_order=4, algebraic_orders=(4, 3, 3), rounding=Fraction("1e-12")),
+}
 
 
 def named(*tableaus: Tableau) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("tableau", tableaus, ids=lambda tableau: tableau.name)
-
-
-# Trees
-
-
-def symmetry(trees: tuple[Tree, ...], tree: Tree) -> int:
-    """Number of ways in which a tree maps onto itself."""
-    product = 1
-    for place, times in Counter(tree.branches).items():
-        product *= math.factorial(times) * symmetry(trees, trees[place]) ** times
-    return product
-
-
-def test_numbers_of_rooted_trees_are_those_of_cayley():
-    counts = Counter(tree.order for tree in rooted_trees(8))
-    assert [counts[order] for order in range(1, 9)] == [1, 1, 2, 4, 9, 20, 48, 115]
-
-
-def test_monotonic_labellings_of_all_trees_add_up():
-    # A tree with n vertices has n! / (density symmetry) monotonic labellings; all trees together have (n - 1)!.
-    trees = rooted_trees(8)
-    for order in range(1, 9):
-        labellings = [
-            Fraction(math.factorial(order), tree.density * symmetry(trees, tree))
-            for tree in trees
-            if tree.order == order
-        ]
-        assert all(number.denominator == 1 for number in labellings)
-        assert sum(labellings) == math.factorial(order - 1)
-
-
-def test_trees_of_index_one_systems_contain_those_of_ordinary_equations():
-    both = rooted_trees(5, algebraic=True)
-    assert [tree for tree in both if not (set("{}") & set(tree.notation))] != []
-    assert {tree.notation for tree in rooted_trees(5)} == {
-        tree.notation for tree in both if not (set("{}") & set(tree.notation))
-    }
-    # The lowest condition of the algebraic component: sum b_i omega_ij alpha_j**2 = 1.
-    lowest = next(tree for tree in both if tree.algebraic)
-    assert (lowest.notation, lowest.order, lowest.density) == ("{•,•}", 2, 1)
 
 
 # Figures against other prints
@@ -80,7 +49,7 @@ def test_dormand_prince_figures_equal_scipys():
     (estimate,) = DORMAND_PRINCE_54.error_estimates
     assert np.allclose(floats((estimate.weights,), 7)[0], -RK45.E, rtol=1e-15, atol=0)
     # SciPy's interpolant is Shampine's in powers of theta, printed apart from the nested form used here.
-    assert np.allclose(floats(DORMAND_PRINCE_54.dense_weights(), 7).T, RK45.P, rtol=1e-14, atol=1e-15)
+    assert np.allclose(floats(dense_weights(DORMAND_PRINCE_54), 7).T, RK45.P, rtol=1e-14, atol=1e-15)
 
 
 def test_dop853_step_error_and_dense_output_equal_scipys():
@@ -102,12 +71,17 @@ def test_dop853_step_error_and_dense_output_equal_scipys():
 
 def test_rodas4_has_the_free_parameters_printed_for_it():
     # Hairer & Wanner print beta_2', beta_3', beta_4', the row sums of beta_ij without the diagonal, beside the figures.
-    form = RODAS4.classical()
+    form = classical_form(RODAS4)
     sums = [sum(form.alpha[row]) + sum(form.gamma[row][:row]) for row in range(4)]
     assert np.allclose([float(number) for number in sums], [0, 0.0317, 0.0635, 0.3438], rtol=0, atol=1e-14)
 
 
-# Claims that do not hold are refused
+# Order conditions
+
+
+@named(*EXPLICIT, *ROSENBROCK)
+def test_figures_meet_every_condition_of_the_claimed_orders(tableau):
+    assert faults(tableau, CLAIMS[tableau.name]) == []
 
 
 def changed_rows(rows: tuple[Row, ...], change: Fraction) -> Iterator[tuple[Row, ...]]:
@@ -126,7 +100,7 @@ def changes(tableau: Tableau, change: Fraction) -> Iterator[tuple[str, object]]:
             for place, estimate in enumerate(value):
                 for (row,) in changed_rows((estimate.weights,), change):
                     yield field.name, (*value[:place], replace(estimate, weights=row), *value[place + 1 :])
-        elif isinstance(value, tuple) and field.name != "algebraic_orders":
+        elif isinstance(value, tuple):
             if value and isinstance(value[0], Fraction):
                 yield from ((field.name, row) for (row,) in changed_rows((value,), change))
             else:
@@ -147,17 +121,15 @@ def free_figures(tableau: Tableau) -> Row:
 
 
 @named(*EXPLICIT, *ROSENBROCK)
-def test_any_changed_figure_is_refused(tableau):
-    change = 1000 * tableau.rounding
-    refused = 0
-    for name, value in changes(tableau, change):
-        if name == "dense_rows" and free_figures(tableau) not in ((), tuple(row[-1] for row in value)):
-            assert replace(tableau, dense_rows=value).dense_rows == value
-            continue
-        with pytest.raises(TableauError, match=r"claims? do(es)? not hold"):
-            replace(tableau, **{name: value})
-        refused += 1
-    assert refused == FIGURES[tableau.name] - len(free_figures(tableau))
+def test_any_changed_figure_is_found(tableau):
+    claims = CLAIMS[tableau.name]
+    found = 0
+    for name, value in changes(tableau, 1000 * claims.rounding):
+        changed = replace(tableau, **{name: value})
+        free = free_figures(changed) != free_figures(tableau)
+        assert (faults(changed, claims) == []) == free, (name, value)
+        found += not free
+    assert found == FIGURES[tableau.name] - len(free_figures(tableau))
 
 
 def test_figures_that_no_condition_fixes_are_the_printed_ones():
@@ -167,34 +139,37 @@ def test_figures_that_no_condition_fixes_are_the_printed_ones():
 
 
 @named(*EXPLICIT, *ROSENBROCK)
-@pytest.mark.parametrize("claim", ["order", "dense_order"])
-def test_one_order_more_is_refused(tableau, claim):
-    with pytest.raises(TableauError, match="is left over"):
-        replace(tableau, **{claim: getattr(tableau, claim) + 1})
+@pytest.mark.parametrize(("claim", "label"), [("order", "solution: tree"), ("dense_order", "dense output: tree")])
+def test_no_order_is_higher_than_claimed(tableau, claim, label):
+    claims = CLAIMS[tableau.name]
+    found = faults(tableau, replace(claims, **{claim: getattr(claims, claim) + 1}))
+    assert found != []
+    assert all(fault.startswith(label) for fault in found)
 
 
 @named(*ROSENBROCK)
-@pytest.mark.parametrize("place", [0, 1, 2])
-def test_one_order_more_in_the_algebraic_component_is_refused(tableau, place):
-    orders = list(tableau.algebraic_orders)
+@pytest.mark.parametrize(("place", "label"), list(enumerate(["solution", "error estimate", "dense output"])))
+def test_no_order_in_the_algebraic_component_is_higher_than_claimed(tableau, place, label):
+    claims = CLAIMS[tableau.name]
+    orders = list(claims.algebraic_orders)
     orders[place] += 1
-    with pytest.raises(TableauError, match=r"tree \{|algebraic_orders"):
-        replace(tableau, algebraic_orders=tuple(orders))
+    found = faults(tableau, replace(claims, algebraic_orders=tuple(orders)))
+    assert found != []
+    assert all(fault.startswith(label) and "tree {" in fault for fault in found)
 
 
 @pytest.mark.parametrize("off", [-1, 1])
 def test_embedded_order_is_exact(off):
-    for tableau in ROSENBROCK:
-        order = tableau.embedded_order + off
-        of_solution, of_embedded, of_dense = tableau.algebraic_orders
-        with pytest.raises(TableauError, match="error estimate"):
-            replace(tableau, embedded_order=order, algebraic_orders=(of_solution, min(order, of_embedded), of_dense))
+    others = [(t, replace(t, embedded_order=t.embedded_order + off)) for t in ROSENBROCK]
     for tableau in EXPLICIT:
         for place, estimate in enumerate(tableau.error_estimates):
             estimates = list(tableau.error_estimates)
-            estimates[place] = ErrorEstimate(weights=estimate.weights, order=estimate.order + off, share=estimate.share)
-            with pytest.raises(TableauError, match=f"error estimate of order {estimate.order + off}"):
-                replace(tableau, error_estimates=tuple(estimates))
+            estimates[place] = replace(estimate, order=estimate.order + off)
+            others.append((tableau, replace(tableau, error_estimates=tuple(estimates))))
+    for tableau, other in others:
+        found = faults(other, CLAIMS[tableau.name])
+        assert found != []
+        assert all(fault.startswith("error estimate of order") for fault in found)
 
 
 def test_missing_figure_is_named():
@@ -263,7 +238,8 @@ def test_one_step_converges_with_the_claimed_orders(tableau):
         embedded = [estimate.order for estimate in tableau.error_estimates]
     else:
         embedded = [tableau.embedded_order]
-    claimed = [order + 1 for order in (tableau.order, *embedded, tableau.dense_order)]
+    claims = CLAIMS[tableau.name]
+    claimed = [order + 1 for order in (claims.order, *embedded, claims.dense_order)]
     assert slopes_of(steps, errors) == pytest.approx(claimed, abs=0.3)
 
 
@@ -283,16 +259,17 @@ def test_combined_error_shrinks_with_the_exponent_for_the_controller(tableau):
 
 @named(*EXPLICIT)
 def test_explicit_dense_output_joins_with_continuous_slope(tableau):
-    weights = floats(tableau.dense_weights(), tableau.all_stages)
+    weights = dense_weights(tableau).astype(float)
     degrees = np.arange(1, len(weights) + 1)
     assert np.allclose(weights.sum(axis=0)[: tableau.stages], floats((tableau.weights,), tableau.stages)[0], atol=1e-12)
-    assert np.allclose(weights[0], np.eye(tableau.all_stages)[0], atol=1e-12)
-    assert np.allclose(degrees @ weights, np.eye(tableau.all_stages)[tableau.stages], atol=1e-11)
+    units = np.eye(weights.shape[1])
+    assert np.allclose(weights[0], units[0], atol=1e-12)
+    assert np.allclose(degrees @ weights, units[tableau.stages], atol=1e-11)
 
 
 @named(*ROSENBROCK)
 def test_rosenbrock_dense_output_meets_both_ends(tableau):
-    weights = floats(tableau.dense_weights(), tableau.stages)
+    weights = dense_weights(tableau).astype(float)
     assert np.allclose(weights.sum(axis=0), floats((tableau.weights,), tableau.stages)[0], rtol=0, atol=1e-13)
     start = np.array([0.7])
     result = rosenbrock_step(tableau, lambda t, y: -(y**2), -2 * start[None], np.zeros(1), 0.0, start, 0.3)
@@ -300,19 +277,16 @@ def test_rosenbrock_dense_output_meets_both_ends(tableau):
     assert result.dense(0.0) == pytest.approx(start, abs=1e-15)
 
 
-def test_nested_powers_of_a_polynomial_worked_by_hand():
-    # theta (1 + (1 - theta) (2 + theta 3)) = 3 theta + theta**2 - 3 theta**3
-    terms = ((Fraction(1),), (Fraction(2),), (Fraction(3),))
-    assert nested_powers(terms, [False, True]) == ((Fraction(3),), (Fraction(1),), (Fraction(-3),))
-
-
 # Stiffness
 
 
 def classical_arrays(tableau: RosenbrockTableau) -> tuple[Vector, Vector, Vector, Vector]:
-    form = tableau.classical()
-    alpha, gamma = (np.array(matrix, dtype=float) for matrix in (form.alpha, form.gamma))
-    return alpha, gamma, np.array(form.weights, dtype=float), np.array(form.error_weights, dtype=float)
+    form = classical_form(tableau)
+    ((_, error_weights),) = form.error_weights
+    alpha, gamma, weights, errors = (
+        figures.astype(float) for figures in (form.alpha, form.gamma, form.weights, error_weights)
+    )
+    return alpha, gamma, weights, errors
 
 
 def stability(tableau: RosenbrockTableau, z: complex) -> complex:
@@ -352,7 +326,7 @@ def test_classical_and_transformed_form_take_the_same_step(tableau):
     transformed = step_of(tableau, time, step)
     assert np.allclose(start + step * weights @ slopes, transformed.end, rtol=1e-13, atol=0)
     assert np.allclose(step * error_weights @ slopes, transformed.errors[0], rtol=1e-7, atol=1e-15)
-    powers = np.array(tableau.classical().dense_weights, dtype=float)
+    powers = classical_form(tableau).dense_weights.astype(float)
     at_middle = start + step * (0.5 ** np.arange(1, len(powers) + 1)) @ powers @ slopes
     assert np.allclose(at_middle, transformed.dense(0.5), rtol=1e-13, atol=0)
 
@@ -379,8 +353,9 @@ def test_index_one_system_converges_with_the_claimed_orders(tableau):
         kinds = [np.array(kind) for kind in zip(*of_starts, strict=True)]
         errors.append([float(np.linalg.norm(kind[..., part])) for part in (0, 1) for kind in kinds])
     found = slopes_of(steps, errors)
-    differential = (tableau.order, tableau.embedded_order, tableau.dense_order)
-    claimed = [order + 1 for order in (*differential, *tableau.algebraic_orders)]
+    claims = CLAIMS[tableau.name]
+    differential = (claims.order, tableau.embedded_order, claims.dense_order)
+    claimed = [order + 1 for order in (*differential, *claims.algebraic_orders)]
     assert all(order > claim - 0.3 for order, claim in zip(found, claimed, strict=True)), (found, claimed)
 
 
@@ -389,25 +364,31 @@ def test_index_one_system_converges_with_the_claimed_orders(tableau):
 
 @named(*EXPLICIT)
 def test_stability_polynomial_is_the_exponential_series_through_the_order(tableau):
-    coefficients = tableau.stability_polynomial()
+    coefficients = stability_polynomial(tableau)
+    claims = CLAIMS[tableau.name]
     assert len(coefficients) == tableau.stages + 1
-    for power in range(tableau.order + 1):
-        assert abs(coefficients[power] - Fraction(1, math.factorial(power))) <= tableau.rounding
-    assert coefficients[tableau.order + 1] != Fraction(1, math.factorial(tableau.order + 1))
+    for power in range(claims.order + 1):
+        assert abs(coefficients[power] - Fraction(1, math.factorial(power))) <= claims.rounding
+    assert coefficients[claims.order + 1] != Fraction(1, math.factorial(claims.order + 1))
 
 
 def test_stability_polynomial_of_dormand_prince_ends_with_one_six_hundredth():
     # Hairer & Wanner II, section IV.2, eq. (2.13): R(z) = 1 + z + ... + z**5 / 120 + z**6 / 600.
-    assert DORMAND_PRINCE_54.stability_polynomial()[6] == Fraction(1, 600)
+    assert stability_polynomial(DORMAND_PRINCE_54)[6] == Fraction(1, 600)
 
 
 # Layout that the generated step relies on
 
 
 def test_end_slope_enters_the_error_of_dormand_prince_only():
-    assert DORMAND_PRINCE_54.error_uses_end_slope
-    assert not DOP853.error_uses_end_slope
-    assert [tableau.all_stages - tableau.stages for tableau in EXPLICIT] == [1, 4]
+    ends = [[estimate.weights[-1] for estimate in tableau.error_estimates] for tableau in EXPLICIT]
+    assert ends == [[Fraction(-1, 40)], [0, 0]]
+    assert [len(tableau.dense_nodes) for tableau in EXPLICIT] == [0, 3]
+
+
+@named(*EXPLICIT)
+def test_first_error_estimate_has_share_one(tableau):
+    assert tableau.error_estimates[0].share == 1
 
 
 @named(*ROSENBROCK)
@@ -420,10 +401,8 @@ def test_arguments_of_the_last_stages_continue_one_another(tableau):
     assert all(weight == 0 for weight in tableau.time_weights[first:])
 
 
-def test_classical_form_is_exact_decimal_and_stiffly_accurate():
-    for tableau in ROSENBROCK:
-        form = tableau.classical()
-        with localcontext() as context:
-            context.prec = PRECISION
-            last = [a + g for a, g in zip(form.alpha[-1], form.gamma[-1], strict=True)]
-            assert max(abs(x - b) for x, b in zip(last, form.weights, strict=True)) < Decimal("1e-45")
+@named(*ROSENBROCK)
+def test_classical_form_is_stiffly_accurate_to_all_decimals(tableau):
+    form = classical_form(tableau)
+    with localcontext(prec=PRECISION):
+        assert max(abs(form.alpha[-1] + form.gamma[-1] - form.weights)) < Decimal("1e-45")

@@ -1,1 +1,1 @@
-"""Tableaus of the integration methods and their order conditions."""
+"""Tableaus of the integration methods."""
