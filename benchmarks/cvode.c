@@ -1,6 +1,7 @@
 /* SUNDIALS CVODE on the press, all in C: BDF or Adams, with Newton's iteration (dense, difference-quotient Jacobian).  peers.py links it with the library that comes with scikit-sundae.  The few declarations needed stand
    here, so that no headers have to be installed (SUNDIALS 7, 64-bit indices). */
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 
 /* Numbers of the press, in the order of press.py, then the magnitudes of the states. */

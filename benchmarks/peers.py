@@ -229,7 +229,7 @@ def cvode_library() -> ctypes.CDLL:
         (folder / "cvode.c",),
         compiler,
         label="cvode",
-        flags=("-O3", "-ffast-math", "-march=native"),
+        flags=("-O3", "-ffast-math"),
     )
     return ctypes.CDLL(str(library.path))
 
