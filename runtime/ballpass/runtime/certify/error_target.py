@@ -37,6 +37,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.accuracy import Accuracy
 from ballpass.runtime.run.locating import LOCATED
 from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.segments import check_count
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution
 
@@ -97,6 +98,7 @@ def simulate_to_error(
         raise RequestError("This model has no states; its outputs follow from time alone, without an error.")
     names = default_observables(model) if of is None else (of,) if isinstance(of, str) else tuple(of)
     run = prepare(model, numbers, request)
+    check_count(model.manifest.inputs, numbers, run.duration, run.turn)  # before a search that may take long
     found = meet_target(run, target, names, request.progress)
     solution = simulate(model, numbers, replace(request, method=found.method, rtol=found.rtol, kinks=found.kinks))
     return replace(
