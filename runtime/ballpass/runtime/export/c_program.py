@@ -20,7 +20,9 @@ from pathlib import Path
 from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.export.scene_numbers import (
+    STANDALONE,
     constants_source,
+    filled,
     margins_of,
     margins_source,
     scene_header,
@@ -30,9 +32,6 @@ from ballpass.runtime.native.compilers import FLAGS as BASE_FLAGS
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS, SWITCHES
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.locating import has_kinks
-
-#: C sources that are the same for every scene, beside the driver.
-STANDALONE = DRIVER / "standalone"
 
 #: What of the compiler's flags makes a shared library, or is overruled.
 _LIBRARY_ONLY = ("-O2", "-fPIC", "-shared")
@@ -120,29 +119,13 @@ def _with_includes(source: Path, places: Sequence[Path], known: Iterable[str]) -
 
 def _makefile(manifest: Manifest, sources: Sequence[str], headers: Sequence[str]) -> str:
     flags = (*FLAGS[:1], *(flag for flag in BASE_FLAGS if flag not in _LIBRARY_ONLY), *FLAGS[1:])
-    objects = " ".join(source.removesuffix(".c") + ".o" for source in sources)
-    program = _program(manifest)
-    return f"""# Written by ballpass export.  make builds {program}; make run writes out.csv
-
-CC ?= cc
-# code for the processor at hand, where the compiler knows how
-NATIVE := $(shell $(CC) -march=native -x c -E /dev/null > /dev/null 2>&1 && echo -march=native)
-CFLAGS ?= {" ".join(flags)} $(NATIVE)
-
-{program}: {objects}
-	$(CC) $(CFLAGS) $(LDFLAGS) -o $@ $^ -lm
-
-%.o: %.c {" ".join(headers)}
-	$(CC) $(CFLAGS) -c -o $@ $<
-
-run: {program}
-	./{program} > out.csv
-
-clean:
-	rm -f *.o {program} out.csv
-
-.PHONY: run clean
-"""
+    return filled(
+        STANDALONE / "Makefile.in",
+        PROGRAM=_program(manifest),
+        FLAGS=" ".join(flags),
+        OBJECTS=" ".join(source.removesuffix(".c") + ".o" for source in sources),
+        HEADERS=" ".join(headers),
+    )
 
 
 def _program(manifest: Manifest) -> str:
@@ -152,36 +135,11 @@ def _program(manifest: Manifest) -> str:
 
 
 def _readme(manifest: Manifest) -> str:
-    example, program = manifest.parameters[0], _program(manifest)
-    return f"""# {manifest.title}
-
-A simulation in C99 with the vector types of GCC and Clang, written by `ballpass export`. It needs one of these
-compilers (or another that knows their `vector_size`) and nothing else.
-
-```console
-$ make
-$ ./{program} > out.csv
-$ ./{program} --cycles 2 --rtol 1e-8 --samples 500 {example.name}={example.default!r} > out.csv
-$ ./{program} --list
-```
-
-The columns of the CSV are the time [s] and the states in SI units: {", ".join(s.name for s in manifest.states)}.
-Parameters are given in SI units; `--list` prints them with units and meaning, `--help` the options. A value that the
-scene file could not have, as a mass of zero or lengths with which a linkage locks, is refused, with what is allowed.
-Exit codes: 0 done, 1 the computation failed (the rows so far are printed), 2 the request was wrong.
-
-| file | what it holds |
-| --- | --- |
-| `scene.c`, `scene.h` | parameters with their defaults, states, loads, run settings |
-| `constants.c` | derived constants (stiffness, cage ratio, ...) of the parameters |
-| `assembly.h`, and `assembly.c`, `margins.c` where there is a linkage | whether it can be assembled all around |
-| `kernels.h` | the model, generated from its equations |
-| `methods.h` | coefficients of the integration methods |
-| `stepper.c`, `stepper.h` and what they include | the integrator; `stepper.h` documents its one call, `ballpass_run` |
-| `located.h`, and `located.c` where the laws have kinks | the same integrator, compiled so that steps end on kinks |
-| `schedule.c`, `schedule.h` | times at which loads switch, inputs in between, moments to look at for magnitudes |
-| `main.c` | command line and CSV |
-
-Tolerances are relative to magnitudes: the sizes that positions and velocities get in the run that is asked for. The
-program finds them anew for every run, from its parameters, its length and its most loaded moments (`scales.h`).
-"""
+    example = manifest.parameters[0]
+    return filled(
+        STANDALONE / "README.md.in",
+        TITLE=manifest.title,
+        PROGRAM=_program(manifest),
+        EXAMPLE=f"{example.name}={example.default!r}",
+        STATES=", ".join(state.name for state in manifest.states),
+    )

@@ -7,13 +7,18 @@ and ``margins.c``.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import casadi
 
 from ballpass.runtime.contract import InputInfo, Manifest, MarginInfo
+from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.run.locating import has_kinks, tight_below
+
+#: C sources that are the same for every scene, and templates of those that are not.
+STANDALONE = DRIVER / "standalone"
 
 #: First line of every file that is written.
 NOTE = "/* Written by ballpass export. */"
@@ -31,6 +36,14 @@ def margins_of(manifest: Manifest) -> tuple[MarginInfo, ...]:
     return manifest.mechanism.margins if manifest.mechanism is not None else ()
 
 
+def filled(template: Path, **values: str) -> str:
+    """Text of a template with values in place of ``@NAME@``."""
+    text = template.read_text(encoding="utf-8")
+    for name, value in values.items():
+        text = text.replace(f"@{name}@", value)
+    return text
+
+
 def scene_header(manifest: Manifest) -> str:
     """Text of ``scene.h``: what the other files know of the scene."""
     sizes = {
@@ -41,75 +54,14 @@ def scene_header(manifest: Manifest) -> str:
         "SCENE_RELATIONS": len(manifest.relations),
         "SCENE_MARGINS": len(margins_of(manifest)),
     }
-    listed = ", ".join(f"{name} = {value}" for name, value in sizes.items())
-    kinks = (
-        "\n/* The laws have kinks, which located.c ends steps on. */\n#define SCENE_KINKS\n"
-        if has_kinks(manifest)
-        else ""
+    kinks = "\n/* The laws have kinks, which located.c ends steps on. */\n#define SCENE_KINKS\n"
+    return filled(
+        STANDALONE / "scene.h.in",
+        SIZES=", ".join(f"{name} = {value}" for name, value in sizes.items()),
+        KINKS=kinks if has_kinks(manifest) else "",
+        TIGHT=repr(tight_below(manifest)),
+        LINKAGE=(STANDALONE / "linkage.h.in").read_text(encoding="utf-8") if margins_of(manifest) else "",
     )
-    linkage = (
-        """
-/* There is a linkage, whose dyads may fail to meet. */
-#define SCENE_LINKAGE
-
-/* A number that is above zero while the dyad at a joint can be assembled. */
-typedef struct {
-    const char *joint, *description;
-} scene_margin;
-
-extern const scene_margin scene_margin_infos[];
-extern const int scene_start_angle; /* of the driver [rad], its place among parameters */
-
-/* The margins, at a time counted from the one that the inputs u belong to. */
-void scene_margins(double t, const double *u, const double *p, const double *c, double *margins);
-"""
-        if margins_of(manifest)
-        else ""
-    )
-    return f"""{NOTE}
-#ifndef SCENE_H
-#define SCENE_H
-
-#include "schedule.h"
-
-enum {{ {listed} }};
-{kinks}
-/* Tolerance at which kinks are located unless something else is asked for. */
-#define SCENE_TIGHT {tight_below(manifest)!r}
-
-/* A parameter in SI; a value must be above `above`, at least `least`, at most `most` and below `below`. */
-typedef struct {{
-    const char *name, *unit, *description;
-    double value, above, least, most, below;
-}} scene_parameter;
-
-/* A parameter that must be above `factor` times another one; places among the parameters. */
-typedef struct {{
-    int parameter, other;
-    double factor;
-}} scene_relation;
-
-extern const char *const scene_title;
-extern const scene_parameter scene_parameters[];
-extern const scene_relation scene_relations[];
-extern const char *const scene_constant_names[];
-extern const char *const scene_states[];
-
-/* Places among parameters and, behind these, derived constants. */
-extern const int scene_initial[];
-extern const int scene_speed; /* of driver or shaft [rad/s]; -1 where there is none */
-extern const schedule_input scene_inputs[];
-
-/* Run settings: of cycles and duration [s] one is above zero. */
-extern const double scene_cycles, scene_duration, scene_rtol;
-extern const long scene_samples;
-extern const char *const scene_method;
-
-/* Derived constants of the parameters. */
-void scene_constants(const double *p, double *c);
-{linkage}
-#endif
-"""
 
 
 def scene_source(manifest: Manifest) -> str:
