@@ -25,9 +25,6 @@ ENSEMBLE_HEADERS = (*HEADERS, "ensemble_kernels.h")
 SWITCHES = "switches.h"
 LOCATING_HEADERS = (*ENSEMBLE_HEADERS, SWITCHES)
 
-#: Numbers that fit where a library tells its sizes, more than any does.
-MOST_SIZES = 16
-
 #: IEEE arithmetic throughout, without fused multiply-add: contact amplifies the last bit, and another compiler should
 #: give the same motion.  What is given up is errno and traps, and what is gained are vectors of square roots.
 #: Packing scalars of short dependent chains costs more than it saves.
@@ -90,63 +87,44 @@ def padded(inputs: np.ndarray, columns: int) -> np.ndarray:
 
 
 def open_driver(
-    library: CompiledLibrary,
-    manifest: Manifest,
-    sizes: str,
-    records: Sequence[type[ctypes.Structure]],
-    *,
-    others: int,
+    library: CompiledLibrary, sizes: str, numbers: int, records: Sequence[type[ctypes.Structure]]
 ) -> tuple[ctypes.CDLL, list[int]]:
-    """Code of a library, checked to be of this model and to take the records that it will be called with.
+    """Code of a library, checked to take the records that it will be called with.
 
     Parameters
     ----------
-    sizes : name of the C function that tells the library's sizes: states, inputs, parameters, constants, others, and
-        bytes of the records
+    sizes : name of the C function that tells the library's sizes: some numbers, then bytes of the records
+    numbers : how many numbers
     records : as declared here
-    others : how many there are
 
     Returns
     -------
-    The code, and the other sizes.
+    The code, and the numbers.
 
     Raises
     ------
     ArtefactError
-        The library is of another model, or its records are others.
+        Records have other sizes in C: it would write beyond them, or read chance numbers.
     """
     code = ctypes.CDLL(str(library.path))
-    found = sizes_of(code, sizes)
-    check_sizes(library, found[:4], manifest)
-    check_records(library, found[4 + others :], records)
-    return code, found[4 : 4 + others]
-
-
-def sizes_of(code: ctypes.CDLL, name: str) -> list[int]:
-    """What a library's function of sizes tells; zeros follow."""
-    sizes = (ctypes.c_int * MOST_SIZES)()
-    getattr(code, name)(sizes)
-    return list(sizes)
-
-
-def check_records(library: CompiledLibrary, found: Sequence[int], records: Sequence[type[ctypes.Structure]]) -> None:
-    """Raise `ArtefactError` where records have other sizes in C: it would write beyond them, or read chance numbers."""
+    found = (ctypes.c_int * (numbers + len(records)))()
+    getattr(code, sizes)(found)
     expected = [ctypes.sizeof(record) for record in records]
-    told = list(found)[: len(expected)]
-    if told != expected:
+    if found[numbers:] != expected:
         raise ArtefactError(
-            f"{library.path}: the records of the driver's calls have {told} bytes there, and {expected} where they are "
-            "called. The driver's C and the Python that calls it are of two versions: install ballpass again."
+            f"{library.path}: the records of the driver's calls have {found[numbers:]} bytes there, and {expected} "
+            "where they are called. The driver's C and the Python that calls it are of two versions: install ballpass "
+            "again."
         )
+    return code, found[:numbers]
 
 
-def check_sizes(library: CompiledLibrary, found: Sequence[int], manifest: Manifest) -> None:
-    """Raise `ArtefactError` where states, inputs, parameters and constants of a library are not the manifest's."""
-    expected = [len(manifest.states), input_columns(manifest), len(manifest.parameters), len(manifest.constants)]
-    if list(found) != expected:
+def check_sizes(library: CompiledLibrary, what: str, found: Sequence[int], expected: Sequence[int]) -> None:
+    """Raise `ArtefactError` where what a library was compiled for is not what the manifest has."""
+    if list(found) != list(expected):
         raise ArtefactError(
-            f"{library.path}: compiled for {list(found)} states, inputs, parameters and constants, the "
-            f"manifest has {expected}. Write the folder again."
+            f"{library.path}: compiled for {list(found)} {what}, the manifest has {list(expected)}. Write the folder "
+            "again."
         )
 
 

@@ -16,39 +16,26 @@ from pathlib import Path
 import numpy as np
 
 from ballpass.runtime.contract import Manifest
-from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.compilers import Compiler
 from ballpass.runtime.native.driver_library import (
     ENSEMBLE_HEADERS,
     check_headers,
-    check_records,
+    check_sizes,
     compile_driver,
     input_columns,
+    open_driver,
     padded,
-    sizes_of,
 )
 from ballpass.runtime.native.member_schedule import SCHEDULE_RECORDS, MemberSchedule
 from ballpass.runtime.native.reduction_rows import reduction_rows
-from ballpass.runtime.native.stepper import MAX_STEPS, Family, Stepper
+from ballpass.runtime.native.stepper import MAX_STEPS, RESULT, Family, Stepper
 
 #: Status of members that were under way when the caller asked to stop; the others are those of `stepper.End`.
 STOPPED = 5
 
 #: Families of methods that advance in lanes.
 LANE_FAMILIES = (Family.AUTO, Family.DP54, Family.RODAS5P)
-
-#: What is told of every member; the fields of ballpass_result in stepper.h.
-RESULT = np.dtype(
-    {
-        "names": [
-            *("status", "method", "state", "segment", "written", "steps", "rejected", "evaluations"),
-            *("factorizations", "pivoted", "switches", "kinks", "time", "step"),
-        ],
-        "formats": [ctypes.c_int] * 3 + [ctypes.c_long] * 9 + [ctypes.c_double] * 2,
-    },
-    align=True,
-)
 
 
 class _Options(ctypes.Structure):
@@ -138,14 +125,11 @@ class EnsembleDriver:
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
         self.stepper = Stepper(library, manifest)
         self.rows = reduction_rows(manifest)
-        code = ctypes.CDLL(str(library.path))
-        row, channels, self.lanes, *records = sizes_of(code, "ballpass_ensemble_sizes")
-        check_records(library, records, (_Options, *SCHEDULE_RECORDS))
-        if (row, channels) != (self.rows.size, len(self.rows.channels)):
-            raise ArtefactError(
-                f"{library.path}: reductions of {row} numbers and {channels} channels, {self.rows.size} and "
-                f"{len(self.rows.channels)} are expected. Write the folder again."
-            )
+        code, (row, channels, self.lanes) = open_driver(
+            library, "ballpass_ensemble_sizes", 3, (_Options, *SCHEDULE_RECORDS)
+        )
+        expected = (self.rows.size, len(self.rows.channels))
+        check_sizes(library, "numbers of a reduction and channels", (row, channels), expected)
         self._inputs = input_columns(manifest)
         self._code = code
         self.schedule = MemberSchedule(code, manifest)

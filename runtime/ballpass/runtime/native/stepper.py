@@ -1,15 +1,14 @@
 """The project's own stepper: generated kernels and the C driver, compiled together and called through ctypes.
 
 In: numbers and segments of a run.  Out: states at the requested times, and what the run cost.  One call integrates
-any number
-of segments; the interpreter is free meanwhile, and calls from several threads do not share anything.
+any number of segments; the interpreter is free meanwhile, and calls from several threads do not share anything.
 """
 
 from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from ballpass.runtime.native.driver_library import (
     HEADERS,
     LOCATING_HEADERS,
     address,
+    check_sizes,
     compile_driver,
     input_columns,
     open_driver,
@@ -89,21 +89,15 @@ class _Tangents(ctypes.Structure):
 
 class _Result(ctypes.Structure):
     _fields_ = (
-        ("status", ctypes.c_int),
-        ("method", ctypes.c_int),
-        ("state", ctypes.c_int),
-        ("segment", ctypes.c_long),
-        ("written", ctypes.c_long),
-        ("steps", ctypes.c_long),
-        ("rejected", ctypes.c_long),
-        ("evaluations", ctypes.c_long),
-        ("factorizations", ctypes.c_long),
-        ("pivoted", ctypes.c_long),
-        ("switches", ctypes.c_long),
-        ("kinks", ctypes.c_long),
-        ("time", ctypes.c_double),
-        ("step", ctypes.c_double),
+        *((name, ctypes.c_int) for name in ("status", "method", "state")),
+        *((name, ctypes.c_long) for name in ("segment", "written", "steps", "rejected", "evaluations")),
+        *((name, ctypes.c_long) for name in ("factorizations", "pivoted", "switches", "kinks")),
+        *((name, ctypes.c_double) for name in ("time", "step")),
     )
+
+
+#: The same for arrays: what is told of every member of an ensemble.
+RESULT = np.dtype(_Result)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,6 +144,10 @@ class Outcome:
     kinks: int
     time: float
     step: float
+
+
+#: Fields of an outcome that are those of C.
+_TOLD = tuple(field.name for field in fields(Outcome) if field.name not in ("end", "family"))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -242,9 +240,11 @@ class Stepper:
 
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
         self.library = library
-        records = (_Options, _Result, _Tangents)
-        code, (_, self.lanes, self._work) = open_driver(library, manifest, "ballpass_sizes", records, others=3)
+        code, sizes = open_driver(library, "ballpass_sizes", 7, (_Options, _Result, _Tangents))
         self._inputs = input_columns(manifest)
+        expected = (len(manifest.states), self._inputs, len(manifest.parameters), len(manifest.constants))
+        check_sizes(library, "states, inputs, parameters and constants", sizes[:4], expected)
+        self.lanes, self._work = sizes[5:]
         self._code = code
         self._run = code.ballpass_run
         self._run.restype = ctypes.c_int
@@ -323,21 +323,8 @@ class Stepper:
             None if output_states is None else address("output_states", output_states),
             ctypes.byref(result),
         )
-        return Outcome(
-            end=End(result.status),
-            family=Family(result.method),
-            state=result.state,
-            written=result.written,
-            steps=result.steps,
-            rejected=result.rejected,
-            evaluations=result.evaluations,
-            factorizations=result.factorizations,
-            pivoted=result.pivoted,
-            switches=result.switches,
-            kinks=result.kinks,
-            time=result.time,
-            step=result.step,
-        )
+        told = {name: getattr(result, name) for name in _TOLD}
+        return Outcome(end=End(result.status), family=Family(result.method), **told)
 
     def magnitudes(
         self, p: np.ndarray, c: np.ndarray, initial: np.ndarray, inputs: np.ndarray, horizon: float
