@@ -257,7 +257,7 @@ def test_the_end_of_a_stretch_is_not_that_of_the_run(make_model: ModelMaker, mon
 def test_runs_of_ten_million_turns_need_little_memory_and_hear_an_interrupt(make_model: ModelMaker) -> None:
     """A process of its own: its largest memory, and how soon Ctrl-C ends it."""
     pytest.importorskip("resource")
-    folder = press(make_model)._drivers._folder
+    folder = press(make_model).folder
     code = """
         import json, os, resource, signal, sys, threading, time
         from ballpass.runtime import load

@@ -25,7 +25,7 @@ def one_library(monkeypatch: pytest.MonkeyPatch) -> Callable[[Model], Model]:
     and a force that jumps makes that a different motion within the tolerance."""
 
     def share(model: Model) -> Model:
-        monkeypatch.setattr(model._drivers, "_stepper", model.ensemble_driver.stepper)
+        monkeypatch.setitem(model._drivers, "plain", model.ensemble_driver.stepper)
         return model
 
     return share

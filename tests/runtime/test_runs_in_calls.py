@@ -136,7 +136,7 @@ def test_members_one_by_one_tell_progress_within_a_turn(
 
 def test_an_interrupt_is_heard_while_a_run_crawls(make_model: ModelMaker) -> None:
     """Millions of steps a turn, which ended in one call; a process of its own takes the signal."""
-    folder = press(make_model)._drivers._folder
+    folder = press(make_model).folder
     code = """
         import json, os, signal, sys, threading, time
         from ballpass.runtime import load

@@ -134,7 +134,7 @@ def test_outputs_in_the_virtual_machine_are_those_asked_for(oscillator: Model) -
 
 def test_outputs_not_asked_for_cost_nothing(press: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     press.simulate(0.1, outputs=["ball.deflection"])
-    (lean,) = [loop for names, loop in press._functions._own.lean.items() if names == ("ball.deflection",)]
+    (lean,) = [loop for names, loop in press._own.lean.items() if names == ("ball.deflection",)]
     assert lean.function.n_instructions() < 0.4 * press.symbolic("outputs").n_instructions()
 
     def refuse(*_: object, **__: object) -> None:

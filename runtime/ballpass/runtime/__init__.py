@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.many.ensemble import EnsembleResult, EnsembleStatistics
     from ballpass.runtime.model import Model, load
     from ballpass.runtime.native.compile import CacheWarning, NoCompilerWarning
-    from ballpass.runtime.native.drivers import NoKernelsWarning
+    from ballpass.runtime.native.loaded_model import NoKernelsWarning
     from ballpass.runtime.point.equilibrium import FreeRingWarning, StaticEquilibrium
     from ballpass.runtime.point.explain import Explanation
     from ballpass.runtime.point.jacobian_function import JacobianFunction
@@ -95,7 +95,7 @@ _HOME = {
     "load": "model",
     "CacheWarning": "native.compile",
     "NoCompilerWarning": "native.compile",
-    "NoKernelsWarning": "native.drivers",
+    "NoKernelsWarning": "native.loaded_model",
     "FreeRingWarning": "point.equilibrium",
     "StaticEquilibrium": "point.equilibrium",
     "Explanation": "point.explain",

@@ -19,7 +19,7 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any, Protocol
+from typing import Any
 
 import casadi
 import numpy as np
@@ -29,32 +29,8 @@ from ballpass.runtime.native.kernel import EvaluationError
 #: Output intervals of the one-step methods with a fine grid.
 GRID = 64
 
-
-class ModelFunctions(Protocol):
-    """What a method needs of a model."""
-
-    def has(self, name: str) -> bool: ...
-    def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function: ...
-
-
-class Integrator(Protocol):
-    """One method at work on one model."""
-
-    #: Accepted and rejected steps so far.
-    steps: int
-    rejected: int
-
-    def pieces(self, intervals: int) -> list[int]:
-        """Numbers of intervals, adding up to `intervals`, that single calls can take."""
-
-    def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
-        """States at ``start + step * k / intervals``, k = 1 ... intervals; shape (intervals, states).
-
-        Raises
-        ------
-        EvaluationError
-            The method could not go on.
-        """
+#: Gives the integrator of a plugin over so many output intervals.
+Maker = Callable[[str, int], casadi.Function]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,24 +48,43 @@ class Frozen:
 
 
 class VirtualIntegrator:
-    """One of CasADi's plugins at work on one model."""
+    """One of CasADi's plugins at work on one model.
+
+    Parameters
+    ----------
+    make : gives the integrator of a plugin over so many output intervals, as `Model.virtual_integrator` does
+    plugin : ``cvodes``, or what a derived class is for
+
+    Attributes
+    ----------
+    steps, rejected : accepted and rejected steps so far
+    """
 
     #: Names under which the plugin counts accepted and rejected steps.
     counters = ("nsteps", "netfails")
 
-    def __init__(self, model: ModelFunctions, plugin: str) -> None:
-        self._model = model
+    def __init__(self, make: Maker, plugin: str) -> None:
+        self._make = make
         self._plugin = plugin
         self.steps = 0
         self.rejected = 0
 
     def pieces(self, intervals: int) -> list[int]:
-        """All at once: a multistep method starts with tiny steps, so there are as few starts as possible."""
+        """Numbers of intervals, adding up to `intervals`, that single calls can take.
+
+        All at once: a multistep method starts with tiny steps, so there are as few starts as possible.
+        """
         return [intervals] if intervals else []
 
     def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
-        """As `Integrator` says."""
-        function = self._model.virtual_integrator(self._plugin, intervals)
+        """States at ``start + step * k / intervals``, k = 1 ... intervals; shape (intervals, states).
+
+        Raises
+        ------
+        EvaluationError
+            The method could not go on.
+        """
+        function = self._make(self._plugin, intervals)
         samples = _call(function, {"x0": state / frozen.scale, "p": frozen.pack(start, step)})
         statistics = function.stats()
         self.steps += int(statistics[self.counters[0]])
@@ -117,7 +112,7 @@ class OneStepIntegrator(VirtualIntegrator):
         return sizes
 
     def advance(self, state: np.ndarray, start: float, step: float, intervals: int, frozen: Frozen) -> np.ndarray:
-        """As `Integrator` says."""
+        """As `VirtualIntegrator` does, on one of two grids."""
         grid = 1 if intervals == 1 else GRID
         every = grid // intervals
         return super().advance(state, start, step, grid, frozen)[every - 1 :: every]
@@ -154,17 +149,12 @@ def make_integrator(rhs: casadi.Function, sizes: Mapping[str, int], plugin: str,
     return casadi.integrator(f"{plugin}_{intervals}", plugin, equations, 0.0, grid, options)
 
 
-#: Name of a method to how it is made for a model; the order is that of messages.
-METHODS: Mapping[str, Callable[[ModelFunctions], Integrator]] = {
-    "erk": lambda model: OneStepIntegrator(model, "erk"),
-    "rosenbrock": lambda model: OneStepIntegrator(model, "rosenbrock"),
-    "cvodes": lambda model: VirtualIntegrator(model, "cvodes"),
+#: Name of a method to how it is made; the order is that of messages.
+METHODS: Mapping[str, Callable[[Maker], VirtualIntegrator]] = {
+    "erk": lambda make: OneStepIntegrator(make, "erk"),
+    "rosenbrock": lambda make: OneStepIntegrator(make, "rosenbrock"),
+    "cvodes": lambda make: VirtualIntegrator(make, "cvodes"),
 }
-
-
-def available_methods(model: ModelFunctions) -> tuple[str, ...]:
-    """Names of the methods that can integrate a model: all, where it has a right-hand side."""
-    return tuple(METHODS) if model.has("rhs") else ()
 
 
 def _call(function: casadi.Function, values: Mapping[str, Any]) -> np.ndarray:

@@ -31,26 +31,27 @@ class Kernel:
     Attributes
     ----------
     function : the CasADi function
+    inputs, outputs : memory of each argument and result, by name
     """
 
     def __init__(self, function: casadi.Function) -> None:
         self.function = function
         buffer: Any = function.buffer()
         self._buffer, self._evaluate = buffer
-        self._inputs: dict[str, Array] = {}
-        self._outputs: dict[str, Array] = {}
+        self.inputs: dict[str, Array] = {}
+        self.outputs: dict[str, Array] = {}
         self._patterns: dict[str, tuple[tuple[int, int], tuple[Array, Array] | None]] = {}
         for k, name in enumerate(function.name_in()):
             memory = np.zeros(function.nnz_in(k))
             if function.size_in(k)[0] * function.size_in(k)[1] != memory.size:
                 raise TypeError(f"{function.name()}: input {name!r} is sparse; a dense one is expected")
-            self._inputs[name] = memory
+            self.inputs[name] = memory
             if memory.size:
                 self._buffer.set_arg(k, memory.data)
         for k, name in enumerate(function.name_out()):
             sparsity = function.sparsity_out(k)
             memory = np.zeros(sparsity.nnz())
-            self._outputs[name] = memory
+            self.outputs[name] = memory
             if memory.size:
                 self._buffer.set_res(k, memory.data)
             self._patterns[name] = (sparsity.shape, None if sparsity.is_dense() else _positions(sparsity))
@@ -58,7 +59,7 @@ class Kernel:
     def __call__(self, values: Mapping[str, Any]) -> Array:
         """First output for the inputs in `values`; a copy, (rows,) or (rows, columns).  Other keys are ignored."""
         self.run(values)
-        return self.output(next(iter(self._outputs)))
+        return self.output(next(iter(self.outputs)))
 
     def run(self, values: Mapping[str, Any]) -> None:
         """Evaluate; the outputs are then to be had by `output`.
@@ -68,7 +69,7 @@ class Kernel:
         EvaluationError
             The function reports failure (an integrator that gave up).
         """
-        for name, memory in self._inputs.items():
+        for name, memory in self.inputs.items():
             if name in values:
                 memory[:] = values[name]
         self._evaluate()
@@ -77,7 +78,7 @@ class Kernel:
 
     def output(self, name: str) -> Array:
         """Copy of an output of the last evaluation, dense, shape (rows, columns); (rows,) where there is one column."""
-        memory = self._outputs[name]
+        memory = self.outputs[name]
         shape, positions = self._patterns[name]
         if positions is None:
             dense = memory.reshape(shape, order="F").copy()
@@ -99,51 +100,35 @@ class Loop:
         """`varying` names the inputs that change from point to point."""
         self.function = function
         names = function.name_in()
-        self._varying = [name for name in names if name in varying]
-        fixed = [k for k, name in enumerate(names) if name not in varying]
-        block = function.map(f"{function.name()}_block", "serial", BLOCK, fixed, [])
-        buffer: Any = block.buffer()
-        self._buffer, self._evaluate = buffer
-        self._inputs: dict[str, Array] = {}
-        self._outputs: dict[str, Array] = {}
-        # columns of CasADi's matrices are points: rows of NumPy's
-        for k, name in enumerate(names):
-            memory = np.zeros((BLOCK if name in varying else 1, function.size1_in(k)))
-            if block.nnz_in(k) != memory.size:
-                raise TypeError(f"{function.name()}: input {name!r} is sparse; a dense one is expected")
-            self._inputs[name] = memory
-            if memory.size:
-                self._buffer.set_arg(k, memory.reshape(-1).data)
         for k, name in enumerate(function.name_out()):
             if not function.sparsity_out(k).is_dense():
                 raise TypeError(f"{function.name()}: output {name!r} is sparse; a dense one is expected")
-            memory = np.zeros((BLOCK, function.size1_out(k)))
-            self._outputs[name] = memory
-            if memory.size:
-                self._buffer.set_res(k, memory.reshape(-1).data)
+        self._varying = [name for name in names if name in varying]
+        fixed = [k for k, name in enumerate(names) if name not in varying]
+        self._block = Kernel(function.map(function.name(), "serial", BLOCK, fixed, []))
 
     def __call__(
         self, count: int, values: Mapping[str, Any], wanted: Collection[str] | None = None
     ) -> dict[str, Array]:
         """Outputs at `count` points, as `ballpass.runtime.native.loops.PointLoop` says."""
-        results = {
-            name: np.empty((count, memory.shape[1]))
-            for name, memory in self._outputs.items()
+        # columns of CasADi's matrices are points: rows of NumPy's
+        blocks = {
+            name: memory.reshape(BLOCK, -1 if memory.size else 0)
+            for name, memory in self._block.outputs.items()
             if wanted is None or name in wanted
         }
-        for name, memory in self._inputs.items():
+        results = {name: np.empty((count, block.shape[1])) for name, block in blocks.items()}
+        for name, memory in self._block.inputs.items():
             if name not in self._varying:
-                memory[0] = values[name]
+                memory[:] = values[name]
         for first in range(0, count, BLOCK):
             size = min(BLOCK, count - first)
             for name in self._varying:
-                memory = self._inputs[name]
-                memory[:size] = np.asarray(values[name])[first : first + size].reshape(size, -1)
-            self._evaluate()  # of the last block, also points left over from earlier ones: they are dropped
-            if self._buffer.ret():
-                raise EvaluationError(f"{self.function.name()} reported failure")
+                points = np.asarray(values[name])[first : first + size]
+                self._block.inputs[name][: points.size] = points.reshape(-1)
+            self._block.run({})  # of the last block, also points left over from earlier ones: they are dropped
             for name, samples in results.items():
-                samples[first : first + size] = self._outputs[name][:size]
+                samples[first : first + size] = blocks[name][:size]
         return results
 
 

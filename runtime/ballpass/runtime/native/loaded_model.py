@@ -5,28 +5,34 @@ Everything that asks something of a model takes a `LoadedModel`; `ballpass.runti
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
+from functools import cached_property
 from pathlib import Path
-from typing import Any
-
-import casadi
+from typing import TypeVar
 
 from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters
 from ballpass.runtime.native.compile import CompiledLibrary
-from ballpass.runtime.native.drivers import Drivers
-from ballpass.runtime.native.ensemble_driver import EnsembleDriver
+from ballpass.runtime.native.compilers import Compiler, find_compiler
+from ballpass.runtime.native.driver_library import ENSEMBLE_HEADERS, SWITCHES
+from ballpass.runtime.native.ensemble_driver import EnsembleDriver, compile_ensemble
 from ballpass.runtime.native.functions import Functions
-from ballpass.runtime.native.kernel import Array, Kernel
-from ballpass.runtime.native.loops import PointLoop
-from ballpass.runtime.native.stepper import Stepper
+from ballpass.runtime.native.stepper import Stepper, compile_locating_stepper, compile_stepper
+
+_Driver = TypeVar("_Driver", Stepper, EnsembleDriver)
 
 
-class LoadedModel:
+class NoKernelsWarning(UserWarning):
+    """The generated folder has no kernels: CasADi's functions and integrators take the place of the stepper."""
+
+
+class LoadedModel(Functions):
     """Functions of one scene with their names, units and defaults.  All numbers are SI.
 
     Attributes
     ----------
+    folder : the generated folder, absolute
     manifest : what the model consists of
     library : the compiled library, None when CasADi's virtual machine runs the functions
     """
@@ -34,10 +40,8 @@ class LoadedModel:
     def __init__(
         self, folder: Path, manifest: Manifest, library: CompiledLibrary | None, *, compiler: str | None = None
     ) -> None:
-        self.manifest = manifest
-        self.library = library
-        self._functions = Functions(folder, manifest, library, compiler)
-        self._drivers = Drivers(folder, manifest, compiler, compiled=library is not None)
+        super().__init__(folder, manifest, library, compiler)
+        self._drivers: dict[str, Stepper | EnsembleDriver] = {}
 
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "in CasADi's virtual machine"
@@ -64,14 +68,14 @@ class LoadedModel:
         """Names of the outputs."""
         return tuple(output.name for output in self.manifest.outputs)
 
-    @property
+    @cached_property
     def has_stepper(self) -> bool:
-        """Whether the folder brings the kernels of the project's own stepper, and a compiler made code of the rest."""
-        return self._drivers.available
+        """Whether there was a compiler, and the folder brought the stepper's kernels, when first asked."""
+        return self.compiled and all((self.folder / name).is_file() for name in ENSEMBLE_HEADERS)
 
     @property
     def stepper(self) -> Stepper:
-        """The project's own stepper, compiled when first asked for.
+        """The project's own stepper, with reductions, compiled when first asked for.
 
         Raises
         ------
@@ -80,58 +84,56 @@ class LoadedModel:
         CompileError
             The compiler failed.
         """
-        return self._drivers.stepper
+        return self._driver("plain", Stepper, lambda compiler: compile_stepper(self.folder, self.manifest, compiler))
 
     @property
     def differentiating_stepper(self) -> Stepper:
         """The stepper with the derivatives of its steps, compiled when first asked for; errors as for `stepper`."""
-        return self._drivers.differentiating_stepper
+        return self._driver(
+            "differentiating",
+            Stepper,
+            lambda compiler: compile_stepper(self.folder, self.manifest, compiler, sensitivities=True),
+        )
 
     @property
     def locating_stepper(self) -> Stepper:
-        """The stepper whose steps end on kinks of the laws, compiled when first asked for; errors as for `stepper`."""
-        return self._drivers.locating_stepper
+        """The stepper whose steps end on kinks of the laws, compiled when first asked for; errors as for `stepper`.
+
+        Raises
+        ------
+        ArtefactError
+            The folder does not say where the kinks are.
+        """
+        if "locating" not in self._drivers and not (self.folder / SWITCHES).is_file():
+            raise ArtefactError(
+                f"{self.folder}: has no {SWITCHES}, which says where the laws have kinks. Write the folder again with "
+                "`ballpass derive`, or leave kinks stepped-over."
+            )
+        return self._driver(
+            "locating", Stepper, lambda compiler: compile_locating_stepper(self.folder, self.manifest, compiler)
+        )
 
     @property
     def ensemble_driver(self) -> EnsembleDriver:
         """The driver of ensembles and reductions, compiled when first asked for; errors as for `stepper`."""
-        return self._drivers.ensemble
+        return self._driver(
+            "ensemble", EnsembleDriver, lambda compiler: compile_ensemble(self.folder, self.manifest, compiler)
+        )
 
-    def has(self, name: str) -> bool:
-        """Whether the model has a function of that name."""
-        return self._functions.has(name)
-
-    def function(self, name: str) -> casadi.Function:
-        """CasADi function by name, compiled if possible.
-
-        Raises
-        ------
-        RequestError
-            The model has no such function.
-        """
-        return self._functions.function(name)
-
-    def kernel(self, name: str) -> Kernel:
-        """Function by name on memory of its own: ``kernel({"t": 0.0, "x": x, ...})`` costs microseconds."""
-        return self._functions.kernel(name)
-
-    def loop(self, name: str, varying: tuple[str, ...]) -> PointLoop:
-        """Function by name for many points at once; `varying` names the inputs that change between them."""
-        return self._functions.loop(name, varying)
-
-    def sample_outputs(
-        self, count: int, values: Mapping[str, Any], names: Sequence[str], *, lean: bool
-    ) -> dict[str, Array]:
-        """Outputs at many points (see `ballpass.runtime.native.functions`)."""
-        return self._functions.sample_outputs(count, values, names, lean=lean)
-
-    def symbolic(self, name: str) -> casadi.Function:
-        """CasADi function by name as an expression graph, which can be differentiated further."""
-        return self._functions.symbolic(name)
-
-    def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function:
-        """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `casadi_integrators`)."""
-        return self._functions.virtual_integrator(plugin, intervals)
+    def _driver(self, name: str, kind: type[_Driver], make: Callable[[Compiler], CompiledLibrary]) -> _Driver:
+        """A driver by name, compiled once, however many threads ask for it."""
+        with self._making:
+            if name not in self._drivers:
+                compiler = find_compiler(self._compiler) if self.has_stepper else None
+                if compiler is None:
+                    raise RequestError(
+                        "method stepper: it needs a C compiler and the kernels in the generated folder. Install gcc or "
+                        "clang, write the folder again, or take another method."
+                    )
+                self._drivers[name] = kind(make(compiler), self.manifest)
+            found = self._drivers[name]
+            assert isinstance(found, kind)
+            return found
 
     def numbers(self, parameters: Mapping[str, float] | None = None) -> Numbers:
         """Parameters with overrides, checked, and the derived constants that follow."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.status import Status
+from ballpass.runtime.run.failure_location import Whereabouts
 from ballpass.runtime.run.solution import Solution
 
 
@@ -20,23 +23,16 @@ class IntegrationError(SimulationError):
     """
 
     def __init__(
-        self,
-        status: Status,
-        *,
-        time: float,
-        crank_angle: float,
-        method: str,
-        detail: str,
-        partial: Solution,
-        ball: int | None = None,
+        self, status: Status, *, time: float, place: Whereabouts, method: str, detail: str, partial: Solution
     ) -> None:
-        degrees = crank_angle * 57.29577951308232
+        words = f"{detail} {place.words}".strip()
         super().__init__(
-            f"{status.value}\nMethod {method}, t = {time:.9g} s, crank angle {degrees:.4f} deg, "
-            f"{len(partial.t)} samples kept in .partial. {detail}".rstrip()
+            f"{status.value}\nMethod {method}, t = {time:.9g} s, "
+            f"crank angle {math.degrees(place.crank_angle):.4f} deg, "
+            f"{len(partial.t)} samples kept in .partial. {words}".rstrip()
         )
         self.status = status
         self.time = time
-        self.crank_angle = crank_angle
-        self.ball = ball
+        self.crank_angle = place.crank_angle
+        self.ball = place.ball
         self.partial = partial

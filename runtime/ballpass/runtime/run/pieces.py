@@ -11,19 +11,20 @@ import numpy as np
 
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
-from ballpass.runtime.native.casadi_integrators import Frozen, Integrator
+from ballpass.runtime.native.casadi_integrators import Frozen, VirtualIntegrator
 from ballpass.runtime.native.kernel import EvaluationError
-from ballpass.runtime.run.trajectory import Interrupted, Trajectory
+from ballpass.runtime.run.trajectory import Cost, Interrupted, Trajectory
 
 
 def integrate(
     numbers: Numbers,
-    integrator: Integrator | None,
+    integrator: VirtualIntegrator | None,
     scale: np.ndarray,
     trajectory: Trajectory,
+    cost: Cost,
     progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Fill the samples of `trajectory`; without integrator there are no states, and nothing to fill.
+    """Fill the samples of `trajectory`, and note the cost; without integrator there are no states, nothing to fill.
 
     Parameters
     ----------
@@ -44,13 +45,16 @@ def integrate(
         frozen = Frozen(scale=scale, u=u, p=numbers.p, c=numbers.c)
         interval = (float(segments.times[k]), float(segments.times[k + 1]))
         trajectory.passed = k + 1
-        state = _segment(integrator, frozen, trajectory, state, interval, (int(stops[k]), int(stops[k + 1])))
+        try:
+            state = _segment(integrator, frozen, trajectory, state, interval, (int(stops[k]), int(stops[k + 1])))
+        finally:
+            cost.steps, cost.rejected = integrator.steps, integrator.rejected
         if progress is not None:
             progress((interval[1] - trajectory.begin) / (trajectory.end - trajectory.begin))
 
 
 def _segment(
-    integrator: Integrator,
+    integrator: VirtualIntegrator,
     frozen: Frozen,
     trajectory: Trajectory,
     state: np.ndarray,

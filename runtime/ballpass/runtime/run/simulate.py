@@ -14,8 +14,7 @@ from __future__ import annotations
 import math
 import time as clocks
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,23 +22,22 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.contract.status import Status
-from ballpass.runtime.native.casadi_integrators import METHODS, available_methods
-from ballpass.runtime.native.drivers import NoKernelsWarning
-from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.casadi_integrators import METHODS
+from ballpass.runtime.native.loaded_model import LoadedModel, NoKernelsWarning
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.run.failure_location import whereabouts
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.limits import refuse_crawl
-from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, choose_kinks
+from ballpass.runtime.run.locating import STEPPED_OVER, choose_kinks
 from ballpass.runtime.run.magnitudes import model_scales, stepper_magnitudes
 from ballpass.runtime.run.pieces import integrate
 from ballpass.runtime.run.reductions import joined, reduced_channels, reductions_of
 from ballpass.runtime.run.request import Plan, Request, make_plan
 from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.run.solution import Solution, Statistics
-from ballpass.runtime.run.stepping import Cost, step_through
-from ballpass.runtime.run.trajectory import Interrupted, Trajectory, evaluate_outputs, start_trajectory
+from ballpass.runtime.run.stepping import step_through
+from ballpass.runtime.run.trajectory import Cost, Interrupted, Trajectory, evaluate_outputs, start_trajectory
 
 if TYPE_CHECKING:
     from ballpass.runtime.run.directions import Directions
@@ -82,96 +80,36 @@ def simulate(
     try:
         if directions is not None and plan.sensitivity_rtol is not None:
             directions.control(plan.sensitivity_rtol, magnitude)
-        fill(
-            *(model, numbers, method, plan.rtol * magnitude, trajectory, cost, request.progress, directions, kinks),
-            reductions=rows if channels and directions is None else None,
-        )
+        if method in STEPPERS:
+            step_through(
+                *(model, numbers, STEPPERS[method], plan.rtol * magnitude, trajectory, cost),
+                progress=request.progress,
+                directions=directions,
+                kinks=kinks,
+                reductions=rows if channels and directions is None else None,
+            )
+        else:
+            integrator = METHODS[method](model.virtual_integrator) if method != "none" else None
+            integrate(numbers, integrator, plan.rtol * magnitude, trajectory, cost, request.progress)
     except Interrupted as end:
         failure = end
     if cost.families:
         reason = f"{reason}; {', '.join(dict.fromkeys(cost.families))} at the end"
 
-    solution = _with_reductions(
-        model,
-        rows,
-        channels,
-        cost,
-        to_solution(
-            model,
-            numbers,
-            plan,
-            trajectory,
-            cost,
-            method=method,
-            reason=reason,
-            magnitude=magnitude,
-            started=started,
-            status=Status.DONE if failure is None else failure.status,
-        ),
-        trajectory,
-    )
-    if failure is not None:
-        state = trajectory.x[max(trajectory.finished - 1, 0)] if failure.state is None else failure.state
-        place = whereabouts(model.manifest, numbers, failure.time, state)
-        raise IntegrationError(
-            failure.status,
-            time=failure.time,
-            crank_angle=place.crank_angle,
-            ball=place.ball,
-            method=method,
-            detail=f"{failure.detail} {place.words}".strip(),
-            partial=solution,
-        )
-    return solution
-
-
-def _with_reductions(
-    model: LoadedModel,
-    rows: np.ndarray,
-    channels: Sequence[str],
-    cost: Cost,
-    solution: Solution,
-    trajectory: Trajectory,
-) -> Solution:
-    """The solution with what the stepper has reduced: of the time that counts, and of the whole run."""
+    done = trajectory.finished
     counted, before = (
         reductions_of(
             model.manifest,
             row,
             channels,
-            end=trajectory.x[max(trajectory.finished - 1, 0)] if len(trajectory.x) else trajectory.initial,
-            steps=cost.steps or 0,
-            rejected=cost.rejected or 0,
+            end=trajectory.x[max(done - 1, 0)] if len(trajectory.x) else trajectory.initial,
+            steps=cost.steps,
+            rejected=cost.rejected,
             turn=trajectory.turn,
         )
         for row in rows
     )
-    return replace(solution, steady_reductions=counted, reductions=joined(before, counted))
-
-
-def to_solution(
-    model: LoadedModel,
-    numbers: Numbers,
-    plan: Plan,
-    trajectory: Trajectory,
-    cost: Cost,
-    *,
-    method: str,
-    reason: str,
-    magnitude: np.ndarray,
-    started: float,
-    status: Status,
-) -> Solution:
-    """The solution of a trajectory that has been filled, with the outputs that the plan names.
-
-    Parameters
-    ----------
-    reason : why that method
-    magnitude : of the states, which the tolerance is relative to, shape (states,)
-    started : reading of `time.perf_counter` when the run began [s]
-    """
-    done = trajectory.finished
-    return Solution(
+    solution = Solution(
         t=trajectory.t[:done],
         x=trajectory.x[:done],
         outputs=evaluate_outputs(model, numbers, trajectory, plan.outputs),
@@ -196,41 +134,17 @@ def to_solution(
             wall_time=clocks.perf_counter() - started,
             compiled=model.compiled and method not in METHODS,
         ),
-        status=status,
+        status=Status.DONE if failure is None else failure.status,
+        reductions=joined(before, counted),
+        steady_reductions=counted,
     )
-
-
-def fill(
-    model: LoadedModel,
-    numbers: Numbers,
-    method: str,
-    tolerance: np.ndarray,
-    trajectory: Trajectory,
-    cost: Cost,
-    progress: Callable[[float], None] | None = None,
-    directions: Directions | None = None,
-    kinks: Kinks = STEPPED_OVER,
-    reductions: np.ndarray | None = None,
-) -> None:
-    """Fill the samples of `trajectory` by a method of that name ("none" for a model without states); notes the cost.
-
-    Raises
-    ------
-    Interrupted
-        The method could not reach the end.
-    """
-    if method in STEPPERS:
-        step_through(
-            *(model, numbers, STEPPERS[method], tolerance, trajectory, cost, progress, directions, kinks),
-            reductions=reductions,
+    if failure is not None:
+        state = trajectory.x[max(done - 1, 0)] if failure.state is None else failure.state
+        place = whereabouts(model.manifest, numbers, failure.time, state)
+        raise IntegrationError(
+            failure.status, time=failure.time, place=place, method=method, detail=failure.detail, partial=solution
         )
-        return
-    integrator = METHODS[method](model) if method != "none" else None
-    try:
-        integrate(numbers, integrator, tolerance, trajectory, progress)
-    finally:
-        if integrator is not None:
-            cost.steps, cost.rejected = integrator.steps, integrator.rejected
+    return solution
 
 
 def _choose(
@@ -255,7 +169,12 @@ def _choose(
 
 def method_names(model: LoadedModel) -> tuple[str, ...]:
     """Integration methods of a model, besides ``auto``."""
-    return (*(STEPPERS if model.has_stepper else ()), *available_methods(model))
+    return (*(STEPPERS if model.has_stepper else ()), *_virtual_methods(model))
+
+
+def _virtual_methods(model: LoadedModel) -> tuple[str, ...]:
+    """CasADi's methods: all, where the model has a right-hand side."""
+    return tuple(METHODS) if model.has("rhs") else ()
 
 
 def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tuple[str, str]:
@@ -274,7 +193,7 @@ def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tupl
         return "stepper", "the fastest method that a compiler allows"
     if asked in STEPPERS and model.has_stepper:
         return asked, "asked for"
-    available = available_methods(model)
+    available = _virtual_methods(model)
     if asked == "auto" and model.compiled:
         reason = f" ({model.manifest.unfit})" if model.manifest.unfit else ""
         warnings.warn(

@@ -7,7 +7,6 @@ so many segments and steps at most.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +18,7 @@ from ballpass.runtime.native.stepper import End, Family, Outcome
 from ballpass.runtime.run.limits import LEAST_PROGRESS, STEPS_A_LOOK, least_progress, step_limit
 from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, Kinks, stepper_for
 from ballpass.runtime.run.segments import part_of, rest_of
-from ballpass.runtime.run.trajectory import Interrupted, Trajectory
+from ballpass.runtime.run.trajectory import Cost, Interrupted, Trajectory
 
 if TYPE_CHECKING:
     from ballpass.runtime.run.directions import Directions
@@ -40,18 +39,6 @@ STATUS_OF_END = {
 }
 
 
-@dataclass(slots=True, kw_only=True)
-class Cost:
-    """What an integration took: steps where the method tells, what it did at kinks and how many of them it located, and
-    the families the stepper ended with."""
-
-    steps: int | None = 0
-    rejected: int | None = 0
-    kinks: Kinks | None = None
-    located: int | None = None
-    families: list[str] = field(default_factory=list)
-
-
 def step_through(
     model: LoadedModel,
     numbers: Numbers,
@@ -59,19 +46,17 @@ def step_through(
     tolerance: np.ndarray,
     trajectory: Trajectory,
     cost: Cost,
+    *,
     progress: Callable[[float], None] | None = None,
     directions: Directions | None = None,
     kinks: Kinks = STEPPED_OVER,
-    reduced: Callable[[int, int, np.ndarray], np.ndarray] | None = None,
     reductions: np.ndarray | None = None,
 ) -> None:
     """Fill the samples of `trajectory`; with derivatives along `directions`.
 
     Parameters
     ----------
-    reduced : gives the row of reductions that a call adds to, from its first and last segment (excluded) and the state
-        it begins with; not with derivatives
-    reductions : instead, two rows to add to: of the time that counts, and of that before; not with derivatives
+    reductions : two rows to add to: of the time that counts, and of that before; not with derivatives
 
     Raises
     ------
@@ -91,9 +76,6 @@ def step_through(
         # a sample that rounding puts beside an edge lies on it
         wanted = np.clip(trajectory.t[sample:stop], left.times[0], left.times[-1])
         step = 0.0
-        row, before = (None, None) if reductions is None else (reductions[0], reductions[1])
-        if reduced is not None:
-            row = reduced(first, last, state)
         while True:
             start = float(left.times[0])
             outcome = stepper.run(
@@ -106,12 +88,17 @@ def step_through(
                 output_times=wanted,
                 output_states=trajectory.x[sample:stop],
                 tangents=None if directions is None else directions.tangents(left, sample, stop - sample),
-                reduction=row,
-                before=before,
+                reduction=None if reductions is None else reductions[0],
+                before=None if reductions is None else reductions[1],
                 max_steps=STEPS_A_CALL,
                 first_step=step,
             )
-            _note(cost, outcome, family)
+            cost.steps += outcome.steps
+            cost.rejected += outcome.rejected
+            if cost.located is not None:
+                cost.located += outcome.kinks
+            if family is Family.AUTO:
+                cost.families.append(outcome.family.name.lower())
             allowed -= outcome.steps + outcome.rejected
             trajectory.calls += 1
             trajectory.finished = sample = sample + outcome.written
@@ -151,15 +138,6 @@ def _calls(restarts: np.ndarray, *, whole: bool) -> Iterator[tuple[int, int]]:
             last += 1
         yield first, last
         first = last
-
-
-def _note(cost: Cost, outcome: Outcome, family: Family) -> None:
-    cost.steps = (cost.steps or 0) + outcome.steps
-    cost.rejected = (cost.rejected or 0) + outcome.rejected
-    if cost.located is not None:
-        cost.located += outcome.kinks
-    if family is Family.AUTO:
-        cost.families.append(outcome.family.name.lower())
 
 
 def _failure(model: LoadedModel, trajectory: Trajectory, outcome: Outcome, start: float) -> Interrupted:

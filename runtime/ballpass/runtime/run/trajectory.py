@@ -7,7 +7,7 @@ samples.  A sample that meets an edge shows the state there with the loads behin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -51,6 +51,24 @@ class Trajectory:
     finished: int = 0
     passed: int = 0
     calls: int = 0
+
+
+@dataclass(slots=True, kw_only=True)
+class Cost:
+    """What an integration took.
+
+    Attributes
+    ----------
+    steps, rejected : accepted and rejected steps
+    kinks, located : what it did at kinks, and how many of them it located
+    families : those the stepper ended with
+    """
+
+    steps: int = 0
+    rejected: int = 0
+    kinks: str | None = None
+    located: int | None = None
+    families: list[str] = field(default_factory=list)
 
 
 class Interrupted(Exception):
