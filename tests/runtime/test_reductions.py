@@ -13,6 +13,7 @@ import pytest
 from press_laws import LAWS, press
 
 from ballpass.runtime import Model, RequestError, SimulationError
+from ballpass.runtime.native.driver_library import PLAIN
 from ballpass.runtime.run.reductions import Reduction
 
 ModelMaker = Callable[..., Model]
@@ -25,7 +26,7 @@ def one_library(monkeypatch: pytest.MonkeyPatch) -> Callable[[Model], Model]:
     and a force that jumps makes that a different motion within the tolerance."""
 
     def share(model: Model) -> Model:
-        monkeypatch.setitem(model._drivers, "plain", model.ensemble_driver.stepper)
+        monkeypatch.setitem(model._drivers, PLAIN, model.ensemble_driver.stepper)
         return model
 
     return share

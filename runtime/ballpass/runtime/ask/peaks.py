@@ -180,7 +180,7 @@ class _TimeGrid:
             "p": self._numbers.p,
             "c": self._numbers.c,
         }
-        found = self._model.sample_outputs(len(local), given, list(self._names), lean=False)
+        found = self._model.sample_outputs(len(local), given, list(self._names))
         for name in self._names:
             for kind, sign in SIGNS.items():
                 k, column = divmod(int(np.argmax(sign * found[name])), found[name].shape[1])

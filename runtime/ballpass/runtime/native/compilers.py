@@ -60,22 +60,14 @@ def find_compiler(command: str | None = None) -> Compiler | None:
     asked = command or os.environ.get("CC", "").strip()
     if asked:
         try:
-            words = shlex.split(asked)
-        except ValueError as fault:
-            raise RequestError(
-                f"{origin} names {asked!r}, which is no command ({str(fault).lower()}). Give the command of a C "
-                "compiler (gcc, clang), or leave it unset."
-            ) from None
-        if not words:
-            raise RequestError(
-                f"{origin} names {asked!r}, which is no command. Give the command of a C compiler (gcc, clang), or "
-                "leave it unset."
-            )
-        path = shutil.which(words[0])
+            words = shlex.split(asked) or [""]
+            path = shutil.which(words[0])
+            fault = "" if path else f", but there is no program {words[0]!r}"
+        except ValueError as error:
+            path, fault = None, f", which is no command ({str(error).lower()})"
         if path is None:
             raise RequestError(
-                f"{origin} names {asked!r}, but there is no program {words[0]!r}. Give the command of a C compiler "
-                "(gcc, clang), or leave it unset."
+                f"{origin} names {asked!r}{fault}. Give the command of a C compiler (gcc, clang), or leave it unset."
             )
         return _describe((path, *words[1:]))
     for name in ("cc", "gcc", "clang"):

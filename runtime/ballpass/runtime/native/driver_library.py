@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +17,11 @@ from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.native.compile import CompiledLibrary, compile_sources, digests_of
 from ballpass.runtime.native.compilers import Compiler
 
-#: C sources of the drivers, and the generated headers they include: those of single runs, and those of reductions too.
+#: Folder with the C sources of the drivers.
 DRIVER = Path(__file__).parent.parent / "driver"
-HEADERS = ("kernels.h", "methods.h", "tangents.h")
-ENSEMBLE_HEADERS = (*HEADERS, "ensemble_kernels.h")
 
 #: Where the laws have kinks, for the driver whose steps end there; laws without kinks have no such file.
 SWITCHES = "switches.h"
-LOCATING_HEADERS = (*ENSEMBLE_HEADERS, SWITCHES)
 
 #: IEEE arithmetic throughout, without fused multiply-add: contact amplifies the last bit, and another compiler should
 #: give the same motion.  What is given up is errno and traps, and what is gained are vectors of square roots.
@@ -31,31 +29,46 @@ LOCATING_HEADERS = (*ENSEMBLE_HEADERS, SWITCHES)
 FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd", "-fno-tree-slp-vectorize")
 
 
-def check_headers(folder: Path, headers: Sequence[str]) -> None:
-    """Raise `ArtefactError` where a generated folder lacks headers, for an older version wrote it."""
-    missing = [name for name in headers if not (folder / name).is_file()]
-    if missing:
-        raise ArtefactError(f"{folder}: has no {', '.join(missing)}. Write the folder again with `ballpass derive`.")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriverSources:
+    """What a driver is compiled from.
 
-
-def compile_driver(
-    folder: Path,
-    manifest: Manifest,
-    compiler: Compiler,
-    sources: Sequence[str],
-    *,
-    kind: str,
-    headers: Sequence[str],
-    flags: tuple[str, ...] = (),
-) -> CompiledLibrary:
-    """Library of a driver and the kernels of a generated folder.
-
-    Parameters
+    Attributes
     ----------
+    kind : word for it in the library's name
     sources : names of C files in `DRIVER`
-    kind : word for the driver in the library's name
-    headers : names of the generated headers that the sources include
+    headers : names of the generated headers that these include
     flags : further flags, behind `FLAGS`
+    """
+
+    kind: str
+    sources: tuple[str, ...] = ("stepper.c",)
+    headers: tuple[str, ...]
+    flags: tuple[str, ...]
+
+
+_DERIVATIVES = ("kernels.h", "methods.h", "tangents.h")
+_REDUCTIONS = (*_DERIVATIVES, "ensemble_kernels.h")
+
+#: Drivers of single runs: with reductions, which cost a run that does not ask for them nothing that can be measured;
+#: with derivatives; with steps that end on the kinks of the laws.
+PLAIN = DriverSources(kind="stepper", headers=_REDUCTIONS, flags=("-DBALLPASS_REDUCTIONS",))
+DIFFERENTIATING = DriverSources(kind="stepper", headers=_DERIVATIVES, flags=("-DBALLPASS_SENSITIVITIES",))
+LOCATING = DriverSources(
+    kind="locating", headers=(*_REDUCTIONS, SWITCHES), flags=("-DBALLPASS_LOCATED", "-DBALLPASS_REDUCTIONS")
+)
+
+#: Driver of ensembles, with that of single runs.
+ENSEMBLE = DriverSources(
+    kind="ensemble",
+    sources=("stepper.c", "ensemble.c", "member_schedule.c", "schedule.c"),
+    headers=_REDUCTIONS,
+    flags=("-DBALLPASS_REDUCTIONS",),
+)
+
+
+def compile_driver(folder: Path, manifest: Manifest, compiler: Compiler, driver: DriverSources) -> CompiledLibrary:
+    """Library of a driver and the kernels of a generated folder.
 
     Raises
     ------
@@ -66,12 +79,12 @@ def compile_driver(
     """
     place = folder.absolute()
     return compile_sources(
-        tuple(DRIVER / name for name in sources),
+        tuple(DRIVER / name for name in driver.sources),
         compiler,
-        label=f"{manifest.scene}-{kind}",
-        headers=[*sorted(DRIVER.glob("*.h")), *(place / name for name in headers)],
+        label=f"{manifest.scene}-{driver.kind}",
+        headers=[*sorted(DRIVER.glob("*.h")), *(place / name for name in driver.headers)],
         include=(place, DRIVER),
-        flags=(*FLAGS, *flags),
+        flags=(*FLAGS, *driver.flags),
         digests=digests_of(place, manifest),
     )
 

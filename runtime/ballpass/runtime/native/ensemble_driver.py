@@ -11,18 +11,13 @@ import copy
 import ctypes
 from collections.abc import Collection
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.native.compile import CompiledLibrary
-from ballpass.runtime.native.compilers import Compiler
 from ballpass.runtime.native.driver_library import (
-    ENSEMBLE_HEADERS,
-    check_headers,
     check_sizes,
-    compile_driver,
     input_columns,
     open_driver,
     padded,
@@ -88,22 +83,6 @@ class Carried:
     results: np.ndarray
     work: np.ndarray
     begun: bool = False
-
-
-def compile_ensemble(folder: Path, manifest: Manifest, compiler: Compiler) -> CompiledLibrary:
-    """Library with the drivers of ensembles and of single runs with reductions.
-
-    Raises
-    ------
-    ArtefactError
-        The folder was written before ensembles were.
-    CompileError
-        The compiler failed.
-    """
-    check_headers(folder, ENSEMBLE_HEADERS)
-    sources = ("stepper.c", "ensemble.c", "member_schedule.c", "schedule.c")
-    flags = ("-DBALLPASS_REDUCTIONS",)
-    return compile_driver(folder, manifest, compiler, sources, kind="ensemble", headers=ENSEMBLE_HEADERS, flags=flags)
 
 
 class EnsembleDriver:

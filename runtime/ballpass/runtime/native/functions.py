@@ -7,7 +7,6 @@ loops that call them cheaply, each made when first asked for and kept.
 from __future__ import annotations
 
 import re
-import tempfile
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -37,7 +36,6 @@ class _OwnMemory(threading.local):
     def __init__(self) -> None:
         self.kernels: dict[str, Kernel] = {}
         self.loops: dict[tuple[str, tuple[str, ...]], PointLoop] = {}
-        self.lean: dict[tuple[str, ...], PointLoop] = {}
 
 
 class Functions:
@@ -97,64 +95,29 @@ class Functions:
         """Function by name for many points at once; `varying` names the inputs that change between them."""
         if (name, varying) not in self._own.loops:
             function = self.function(name)
-            self._own.loops[name, varying] = self._looped(
-                function, None if self.library is None else self._library(name), varying
-            )
+            if self.library is None:
+                loop: PointLoop = Loop(function, varying)
+            else:
+                with self._making:
+                    if self._loop_driver is None:
+                        self._loop_driver = LoopDriver(self._find_compiler("loop.c"))
+                loop = CompiledLoop(self._loop_driver, self._library(name).path, function, varying)
+            self._own.loops[name, varying] = loop
         return self._own.loops[name, varying]
 
-    def sample_outputs(
-        self, count: int, values: Mapping[str, Any], names: Sequence[str], *, lean: bool
-    ) -> dict[str, Array]:
+    def sample_outputs(self, count: int, values: Mapping[str, Any], names: Sequence[str]) -> dict[str, Array]:
         """Outputs by name at `count` points, each of shape (count, rows).
 
         Parameters
         ----------
         values : t, x and u at the points, p and c
         names : of outputs that are no states
-        lean : take a function of these outputs alone, made and compiled when they are first asked for; False: the one
-            of all outputs
         """
-        states = {state.name for state in self.manifest.states}
+        loop = self.loop("outputs", _MOVING)
         known = [info.name for info in self.manifest.outputs]
-        chosen = tuple(name for name in known if name in names)
-        if not lean or len(chosen) == sum(name not in states for name in known):
-            loop = self.loop("outputs", _MOVING)
-            fields = dict(zip(known, loop.function.name_out(), strict=True))
-        else:
-            loop = self._lean_loop(chosen, [known.index(name) for name in chosen])
-            fields = dict(zip(chosen, loop.function.name_out(), strict=True))
-        results = loop(count, values, [fields[name] for name in chosen])
-        return {name: results[fields[name]] for name in chosen}
-
-    def _lean_loop(self, names: tuple[str, ...], places: Sequence[int]) -> PointLoop:
-        """Some of the outputs, at many points."""
-        if names not in self._own.lean:
-            graph = self.symbolic("outputs")
-            given = graph.sx_in()
-            results = graph.call(given)
-            fields = [graph.name_out(k) for k in places]
-            function = casadi.Function("some_outputs", given, [results[k] for k in places], graph.name_in(), fields)
-            library = None
-            if self.library is not None:
-                generator = casadi.CodeGenerator("some_outputs.c")
-                generator.add(function)
-                with tempfile.TemporaryDirectory() as folder:
-                    source = Path(folder) / "some_outputs.c"
-                    source.write_text(generator.dump(), encoding="utf-8")
-                    label = f"{self.manifest.scene}_outputs"
-                    library = compile_sources((source,), self._find_compiler("some_outputs.c"), label=label)
-            self._own.lean[names] = self._looped(function, library, _MOVING)
-        return self._own.lean[names]
-
-    def _looped(
-        self, function: casadi.Function, library: CompiledLibrary | None, varying: tuple[str, ...]
-    ) -> PointLoop:
-        if library is None:
-            return Loop(function, varying)
-        with self._making:
-            if self._loop_driver is None:
-                self._loop_driver = LoopDriver(self._find_compiler("loop.c"))
-        return CompiledLoop(self._loop_driver, library.path, function, varying)
+        fields = dict(zip(known, loop.function.name_out(), strict=True))
+        results = loop(count, values, [fields[name] for name in names])
+        return {name: results[fields[name]] for name in names}
 
     def symbolic(self, name: str) -> casadi.Function:
         """CasADi function by name as an expression graph, which can be differentiated further.

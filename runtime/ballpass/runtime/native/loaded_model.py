@@ -5,7 +5,7 @@ Everything that asks something of a model takes a `LoadedModel`; `ballpass.runti
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -14,11 +14,19 @@ from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters
 from ballpass.runtime.native.compile import CompiledLibrary
-from ballpass.runtime.native.compilers import Compiler, find_compiler
-from ballpass.runtime.native.driver_library import ENSEMBLE_HEADERS, SWITCHES
-from ballpass.runtime.native.ensemble_driver import EnsembleDriver, compile_ensemble
+from ballpass.runtime.native.compilers import find_compiler
+from ballpass.runtime.native.driver_library import (
+    DIFFERENTIATING,
+    ENSEMBLE,
+    LOCATING,
+    PLAIN,
+    SWITCHES,
+    DriverSources,
+    compile_driver,
+)
+from ballpass.runtime.native.ensemble_driver import EnsembleDriver
 from ballpass.runtime.native.functions import Functions
-from ballpass.runtime.native.stepper import Stepper, compile_locating_stepper, compile_stepper
+from ballpass.runtime.native.stepper import Stepper
 
 _Driver = TypeVar("_Driver", Stepper, EnsembleDriver)
 
@@ -41,7 +49,7 @@ class LoadedModel(Functions):
         self, folder: Path, manifest: Manifest, library: CompiledLibrary | None, *, compiler: str | None = None
     ) -> None:
         super().__init__(folder, manifest, library, compiler)
-        self._drivers: dict[str, Stepper | EnsembleDriver] = {}
+        self._drivers: dict[DriverSources, Stepper | EnsembleDriver] = {}
 
     def __repr__(self) -> str:
         how = "compiled" if self.compiled else "in CasADi's virtual machine"
@@ -71,7 +79,7 @@ class LoadedModel(Functions):
     @cached_property
     def has_stepper(self) -> bool:
         """Whether there was a compiler, and the folder brought the stepper's kernels, when first asked."""
-        return self.compiled and all((self.folder / name).is_file() for name in ENSEMBLE_HEADERS)
+        return self.compiled and all((self.folder / name).is_file() for name in ENSEMBLE.headers)
 
     @property
     def stepper(self) -> Stepper:
@@ -84,16 +92,12 @@ class LoadedModel(Functions):
         CompileError
             The compiler failed.
         """
-        return self._driver("plain", Stepper, lambda compiler: compile_stepper(self.folder, self.manifest, compiler))
+        return self._driver(Stepper, PLAIN)
 
     @property
     def differentiating_stepper(self) -> Stepper:
         """The stepper with the derivatives of its steps, compiled when first asked for; errors as for `stepper`."""
-        return self._driver(
-            "differentiating",
-            Stepper,
-            lambda compiler: compile_stepper(self.folder, self.manifest, compiler, sensitivities=True),
-        )
+        return self._driver(Stepper, DIFFERENTIATING)
 
     @property
     def locating_stepper(self) -> Stepper:
@@ -104,34 +108,31 @@ class LoadedModel(Functions):
         ArtefactError
             The folder does not say where the kinks are.
         """
-        if "locating" not in self._drivers and not (self.folder / SWITCHES).is_file():
+        if LOCATING not in self._drivers and not (self.folder / SWITCHES).is_file():
             raise ArtefactError(
                 f"{self.folder}: has no {SWITCHES}, which says where the laws have kinks. Write the folder again with "
                 "`ballpass derive`, or leave kinks stepped-over."
             )
-        return self._driver(
-            "locating", Stepper, lambda compiler: compile_locating_stepper(self.folder, self.manifest, compiler)
-        )
+        return self._driver(Stepper, LOCATING)
 
     @property
     def ensemble_driver(self) -> EnsembleDriver:
         """The driver of ensembles and reductions, compiled when first asked for; errors as for `stepper`."""
-        return self._driver(
-            "ensemble", EnsembleDriver, lambda compiler: compile_ensemble(self.folder, self.manifest, compiler)
-        )
+        return self._driver(EnsembleDriver, ENSEMBLE)
 
-    def _driver(self, name: str, kind: type[_Driver], make: Callable[[Compiler], CompiledLibrary]) -> _Driver:
-        """A driver by name, compiled once, however many threads ask for it."""
+    def _driver(self, kind: type[_Driver], sources: DriverSources) -> _Driver:
+        """A driver, compiled once, however many threads ask for it."""
         with self._making:
-            if name not in self._drivers:
+            if sources not in self._drivers:
                 compiler = find_compiler(self._compiler) if self.has_stepper else None
                 if compiler is None:
                     raise RequestError(
                         "method stepper: it needs a C compiler and the kernels in the generated folder. Install gcc or "
                         "clang, write the folder again, or take another method."
                     )
-                self._drivers[name] = kind(make(compiler), self.manifest)
-            found = self._drivers[name]
+                library = compile_driver(self.folder, self.manifest, compiler, sources)
+                self._drivers[sources] = kind(library, self.manifest)
+            found = self._drivers[sources]
             assert isinstance(found, kind)
             return found
 

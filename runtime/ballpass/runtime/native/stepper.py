@@ -10,20 +10,14 @@ import ctypes
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from enum import IntEnum
-from pathlib import Path
 
 import numpy as np
 
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.native.compile import CompiledLibrary
-from ballpass.runtime.native.compilers import Compiler
 from ballpass.runtime.native.driver_library import (
-    ENSEMBLE_HEADERS,
-    HEADERS,
-    LOCATING_HEADERS,
     address,
     check_sizes,
-    compile_driver,
     input_columns,
     open_driver,
     padded,
@@ -191,37 +185,6 @@ class Tangents:
     outputs: np.ndarray
     weight: np.ndarray | None = None
     rtol: float = 0.0
-
-
-def compile_stepper(
-    folder: Path, manifest: Manifest, compiler: Compiler, *, sensitivities: bool = False
-) -> CompiledLibrary:
-    """Library of driver and kernels of a generated folder: with reductions, or with the derivatives of its steps.
-
-    Reductions cost a run that does not ask for them nothing that can be measured, and the compiler a sixth more time.
-
-    Raises
-    ------
-    CompileError
-        The compiler failed.
-    """
-    headers: tuple[str, ...] = HEADERS if sensitivities else ENSEMBLE_HEADERS
-    flags = ("-DBALLPASS_SENSITIVITIES" if sensitivities else "-DBALLPASS_REDUCTIONS",)
-    return compile_driver(folder, manifest, compiler, ("stepper.c",), kind="stepper", headers=headers, flags=flags)
-
-
-def compile_locating_stepper(folder: Path, manifest: Manifest, compiler: Compiler) -> CompiledLibrary:
-    """Library of the driver whose steps end on the kinks of the laws, with reductions.
-
-    Raises
-    ------
-    CompileError
-        The compiler failed.
-    """
-    flags = ("-DBALLPASS_LOCATED", "-DBALLPASS_REDUCTIONS")
-    return compile_driver(
-        folder, manifest, compiler, ("stepper.c",), kind="locating", headers=LOCATING_HEADERS, flags=flags
-    )
 
 
 class Stepper:

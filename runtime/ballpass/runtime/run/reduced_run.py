@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +18,10 @@ from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
-from ballpass.runtime.native.stepper import End, Family, Outcome, Segments, Stepper
+from ballpass.runtime.native.stepper import End, Family, Segments, Stepper
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.failure_location import Whereabouts, whereabouts
-from ballpass.runtime.run.limits import Allowance, allowance
+from ballpass.runtime.run.limits import allowance
 from ballpass.runtime.run.locating import LOCATED, choose_kinks, has_kinks
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
 from ballpass.runtime.run.reductions import Reductions, channel_names, reductions_of
@@ -161,12 +161,33 @@ def integrate_reduced(
             if rest is None:
                 continue
             left = rest
-        calls = _calls(stepper, model, numbers, family, tolerance, state, row, left, allowed)
-        for outcome in calls:
+        held, taken = stepper.hold(), 0
+        while True:
+            outcome = stepper.run(
+                family=family,
+                tolerance=tolerance,
+                p=numbers.p,
+                c=numbers.c,
+                x=state,
+                segments=left,
+                output_times=np.zeros(0),
+                output_states=None,
+                reduction=row,
+                max_steps=taken + min(STEPS_A_CALL, allowed.left),
+                held=held,
+            )
+            more = outcome.steps + outcome.rejected - taken  # an outcome counts those of all calls
+            taken += more
+            gives_up = allowed.spend(more, outcome.time)
+            if outcome.end is not End.DONE and (gives_up or outcome.end is not End.TOO_MANY_STEPS):
+                place = whereabouts(model.manifest, numbers, outcome.time, state)
+                raise RunFailed(outcome.end, outcome.time, outcome.step, place)
             if progress is not None:
                 progress(outcome.time / duration)
             if stop is not None and stop.value:
                 return steps + outcome.steps, rejected + outcome.rejected
+            if outcome.end is End.DONE:
+                break
         steps += outcome.steps
         rejected += outcome.rejected
     return steps, rejected
@@ -178,45 +199,6 @@ class Begun:
 
     time: float = 0.0
     steps: int = 0
-
-
-def _calls(
-    stepper: Stepper,
-    model: LoadedModel,
-    numbers: Numbers,
-    family: Family,
-    tolerance: np.ndarray,
-    state: np.ndarray,
-    row: np.ndarray,
-    segments: Segments,
-    allowed: Allowance,
-) -> Iterator[Outcome]:
-    """Integrate over segments; what each call tells of all so far.  Errors as for `integrate_reduced`."""
-    held = stepper.hold()
-    taken = 0
-    while True:
-        outcome = stepper.run(
-            family=family,
-            tolerance=tolerance,
-            p=numbers.p,
-            c=numbers.c,
-            x=state,
-            segments=segments,
-            output_times=np.zeros(0),
-            output_states=None,
-            reduction=row,
-            max_steps=taken + min(STEPS_A_CALL, allowed.left),
-            held=held,
-        )
-        more = outcome.steps + outcome.rejected - taken
-        taken += more
-        gives_up = allowed.spend(more, outcome.time)
-        if outcome.end is not End.DONE and (gives_up or outcome.end is not End.TOO_MANY_STEPS):
-            place = whereabouts(model.manifest, numbers, outcome.time, state)
-            raise RunFailed(outcome.end, outcome.time, outcome.step, place)
-        yield outcome
-        if outcome.end is End.DONE:
-            return
 
 
 class RunFailed(SimulationError):

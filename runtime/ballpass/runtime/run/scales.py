@@ -98,6 +98,8 @@ class Groups:
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
+# numbers that overflow end a search or a run further down, with words
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def find_scales(
     rhs: Field,
     jacobian: Field,
@@ -118,20 +120,6 @@ def find_scales(
     groups : which coordinates share a magnitude
     masses : of the coordinates [kg].  Default: equal ones
     """
-    # numbers that overflow end a search or a run further down, with words
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _find_scales(rhs, jacobian, inputs, initial, horizon, groups, masses)
-
-
-def _find_scales(
-    rhs: Field,
-    jacobian: Field,
-    inputs: Sequence[np.ndarray],
-    initial: np.ndarray,
-    horizon: float,
-    groups: Groups,
-    masses: Sequence[float] | None,
-) -> Scales:
     half = len(initial) // 2
     rest = np.concatenate([initial[:half], np.zeros(half)])
     accelerations = np.abs([rhs(u, rest)[half:] for u in inputs])

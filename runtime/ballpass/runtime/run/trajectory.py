@@ -124,21 +124,9 @@ def start_trajectory(
 
 
 def evaluate_outputs(
-    model: LoadedModel,
-    numbers: Numbers,
-    trajectory: Trajectory,
-    names: Sequence[str],
-    *,
-    lean: bool = True,
+    model: LoadedModel, numbers: Numbers, trajectory: Trajectory, names: Sequence[str]
 ) -> dict[str, np.ndarray]:
-    """Outputs at the finished samples: shape (samples,), or (samples, balls).
-
-    Parameters
-    ----------
-    names : of the outputs wanted
-    lean : evaluate nothing else, by a function of these outputs alone that is compiled when they are first asked for;
-        False: all are evaluated, and the others dropped
-    """
+    """Outputs of these names at the finished samples: shape (samples,), or (samples, balls)."""
     done = trajectory.finished
     states = {state.name: k for k, state in enumerate(model.manifest.states)}
     sizes = {info.name: info.size for info in model.manifest.outputs}
@@ -154,7 +142,7 @@ def evaluate_outputs(
             "p": numbers.p,
             "c": numbers.c,
         }
-        samples = model.sample_outputs(done, values, computed, lean=lean)
+        samples = model.sample_outputs(done, values, computed)
     found = {}
     for name in names:
         if name in states:  # the very numbers, not a copy that rounding might touch
