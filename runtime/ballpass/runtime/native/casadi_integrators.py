@@ -32,6 +32,9 @@ GRID = 64
 #: Gives the integrator of a plugin over so many output intervals.
 Maker = Callable[[str, int], casadi.Function]
 
+#: CasADi's integrators end the process where two threads are in one of them, and count steps in one place for all.
+_ONE_AT_A_TIME = threading.Lock()
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frozen:
@@ -85,8 +88,9 @@ class VirtualIntegrator:
             The method could not go on.
         """
         function = self._make(self._plugin, intervals)
-        samples = _call(function, {"x0": state / frozen.scale, "p": frozen.pack(start, step)})
-        statistics = function.stats()
+        with _ONE_AT_A_TIME:
+            samples = _call(function, {"x0": state / frozen.scale, "p": frozen.pack(start, step)})
+            statistics = function.stats()
         self.steps += int(statistics[self.counters[0]])
         self.rejected += int(statistics[self.counters[1]])
         return np.asarray(samples.reshape(len(state), intervals).T * frozen.scale)
