@@ -6,7 +6,6 @@ to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 t
 
 from __future__ import annotations
 
-import json
 import math
 from importlib.metadata import version
 from pathlib import Path
@@ -15,33 +14,25 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
+from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.explain import explain
 from ballpass.runtime.app.commands.jacobian import jacobian, linearize
-from ballpass.runtime.app.commands.options import (
-    Cycles,
-    Duration,
-    Figures,
-    Json,
-    ResultsFolder,
-    SceneFile,
-    Settings,
-    Tolerance,
-)
 from ballpass.runtime.app.commands.sensitivity import sensitivity
 from ballpass.runtime.app.commands.shared import (
     Asked,
     Stages,
     check_folder,
     checked_kinks,
+    command,
     complain,
-    faults_of,
     faults_of_turns,
     load_model,
     note,
     read_asked,
     read_duration,
-    reported,
-    warnings_shown,
+    results_folder,
+    show,
+    show_json,
 )
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import read_error, trade
@@ -82,14 +73,14 @@ def _common(
 
 @app.command()
 def run(
-    scene: SceneFile,
-    cycles: Cycles = None,
-    duration: Duration = None,
+    scene: options.SceneFile,
+    cycles: options.Cycles = None,
+    duration: options.Duration = None,
     transient: Annotated[
         float | None, typer.Option(metavar="N", help="Turns at the start that summary and figures leave out.")
     ] = None,
-    set_: Settings = None,
-    rtol: Tolerance = None,
+    set_: options.Settings = None,
+    rtol: options.Tolerance = None,
     method: Annotated[
         str | None,
         typer.Option(
@@ -117,25 +108,23 @@ def run(
         list[str] | None,
         typer.Option("--of", metavar="Q", help="Quantity that --error is about: peak_ball_force. May be repeated."),
     ] = None,
-    out: ResultsFolder = None,
-    json_: Json = False,
-    figures: Figures = True,
+    out: options.ResultsFolder = None,
+    json_: options.Json = False,
+    figures: options.Figures = True,
 ) -> None:
     """Simulate a scene; write solution, summary and figures.
 
     Derives and compiles what is stale in generated/<scene>. What is not given here is as the scene's run table says.
     """
-    with reported(), warnings_shown(), Stages() as stages:
+    with command(scene) as stages:
         stages("read")
         seconds = read_duration(duration, cycles)
-        asked = read_asked(scene, set_ or [], seconds, transient)
+        asked = read_asked(scene, set_, seconds, transient)
         _check_request(asked, cycles, transient, rtol, method)
         at_kinks = checked_kinks(kinks, method or asked.run.method, error)
         target = read_error(error, of, method, rtol)
-        folder = out if out is not None else Path("results") / asked.name
-        check_folder(folder)
-        with faults_of(scene):
-            model = load_model(scene, stages, method or asked.run.method, kinks, rtol, overrides=asked.overrides)
+        folder = results_folder(out, scene)
+        model = load_model(scene, stages, method or asked.run.method, kinks, rtol, overrides=asked.overrides)
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,
@@ -149,25 +138,25 @@ def run(
             error=target,
             of=of,
         )
-        _note_size(solution)
+        if solution.nbytes > LARGE:
+            size = _size(solution.nbytes)
+            note(f"{len(solution)} samples, about {size}; fewer with samples_per_cycle, none with Model.reduce.")
         summary, files = _write_results(model, solution, folder, stages, figures=figures)
+    if json_:
+        show_json(summary)
+        return
     from ballpass.runtime.app.summary import render_summary
 
-    if json_:
-        typer.echo(json.dumps(summary, indent=2, allow_nan=False))
-    else:
-        console = Console()
-        console.print(render_summary(summary))
-        if solution.accuracy is not None:
-            console.print(solution.accuracy.words, highlight=False, soft_wrap=True, markup=False)
-        size = _size((folder / "solution.nc").stat().st_size)
-        told = f"results in {folder}: {', '.join(files)} (solution.nc: {size})"
-        console.print(told, highlight=False, soft_wrap=True, markup=False)
+    Console().print(render_summary(summary))
+    if solution.accuracy is not None:
+        show(solution.accuracy.words)
+    size = _size((folder / "solution.nc").stat().st_size)
+    show(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")
 
 
 @app.command()
 def derive(
-    scene: SceneFile,
+    scene: options.SceneFile,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder to write; generated/<scene> if not given.")
     ] = None,
@@ -178,7 +167,7 @@ def derive(
     """Derive the equations of a scene and generate its C, functions, manifest and EQUATIONS.md."""
     from ballpass import derive as deriving
 
-    with reported(), warnings_shown(), Stages() as stages, faults_of(scene):
+    with command(scene) as stages:
         if check:
             stages("check")
             result = deriving.check(scene, out)
@@ -188,26 +177,26 @@ def derive(
         typer.echo(str(folder))
     elif result.stale:
         state = f"is stale: {', '.join(result.stale)}" if result.folder.is_dir() else "does not exist"
-        command = f"ballpass derive {scene}" + (f" --out {out}" if out is not None else "")
-        complain(f"{result.folder} {state}. Run: {command}")
+        remedy = f"ballpass derive {scene}" + (f" --out {out}" if out is not None else "")
+        complain(f"{result.folder} {state}. Run: {remedy}")
         raise typer.Exit(1)
     else:
         typer.echo(f"{result.folder} is up to date")
 
 
 @app.command()
-def equations(scene: SceneFile) -> None:
+def equations(scene: options.SceneFile) -> None:
     """Print the derived equations of a scene as Markdown with LaTeX."""
     from ballpass import derive as deriving
 
-    with reported(), faults_of(scene):
+    with command(scene):
         text = deriving.equations(deriving.derive(deriving.read_scene(scene)))
     typer.echo(text, nl=False)
 
 
 @app.command()
 def export(
-    scene: SceneFile,
+    scene: options.SceneFile,
     c: Annotated[
         bool, typer.Option("--c", help="A C99 program with the model, the stepper, a Makefile and a main.")
     ] = False,
@@ -218,29 +207,24 @@ def export(
     """Write a scene as a program that runs without Python: make, and it prints the motion as CSV."""
     from ballpass.derive import generate, read_scene
 
-    with reported(), warnings_shown():
+    with command(scene) as stages:
         if not c:
             raise RequestError("export: no format was given. Allowed: --c, a program in C99.")
-        with Stages() as stages, faults_of(scene):
-            stages("read")
-            read = read_scene(scene)
-            folder = out if out is not None else Path("export") / read.name
-            check_folder(folder)
-            generated = generate(read, progress=stages)
-            stages("export")
-            # here, for it brings CasADi
-            from ballpass.runtime.export.c_program import export_c
+        stages("read")
+        read = read_scene(scene)
+        folder = out if out is not None else Path("export") / read.name
+        check_folder(folder)
+        generated = generate(read, progress=stages)
+        stages("export")
+        # here, for it brings CasADi
+        from ballpass.runtime.export.c_program import export_c
 
-            export_c(generated, folder)
+        export_c(generated, folder)
     typer.echo(str(folder))
 
 
-app.command()(explain)
-app.command()(jacobian)
-app.command()(linearize)
-app.command()(sensitivity)
-app.command()(sweep)
-app.command()(trade)
+for _command in (explain, jacobian, linearize, sensitivity, sweep, trade):
+    app.command()(_command)
 
 
 def _check_request(
@@ -279,15 +263,6 @@ def _check_request(
             f"The run of {turns:g} turns lies within its {dropped:g} transient turns: nothing is left to report. "
             f"Allowed: fewer transient turns than turns. Simulate more (--cycles {dropped + 2:g}) or drop fewer "
             "(--transient 0)."
-        )
-
-
-def _note_size(solution: Solution) -> None:
-    """Say so before a file is written that is larger than most people expect."""
-    if solution.nbytes > LARGE:
-        note(
-            f"{len(solution)} samples, about {_size(solution.nbytes)}; fewer with samples_per_cycle, none with "
-            "Model.reduce."
         )
 
 

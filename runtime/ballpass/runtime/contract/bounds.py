@@ -6,32 +6,50 @@ checked by whoever reads it; these are the same bounds, for numbers given in Pyt
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest, ParameterInfo
+from ballpass.runtime.contract import Manifest
+
+#: Name of a bound, how a message says it, and what a value must be to it.
+_BOUNDS: tuple[tuple[str, str, Callable[[Any, float], Any]], ...] = (
+    ("above", "above", operator.gt),
+    ("least", "from", operator.ge),
+    ("most", "to", operator.le),
+    ("below", "below", operator.lt),
+)
 
 
-def allowed(info: ParameterInfo) -> str:
+class Bounded(Protocol):
+    """What has bounds; None bounds nothing."""
+
+    @property
+    def above(self) -> float | None: ...
+    @property
+    def least(self) -> float | None: ...
+    @property
+    def most(self) -> float | None: ...
+    @property
+    def below(self) -> float | None: ...
+
+
+def allowed(info: Bounded) -> str:
     """The values a parameter may have, in words; empty where it may have any."""
-    words = (("above", info.above), ("from", info.least), ("to", info.most), ("below", info.below))
-    return " ".join(f"{word} {bound:g}" for word, bound in words if bound is not None)
+    bounds = ((word, getattr(info, name)) for name, word, _ in _BOUNDS)
+    return " ".join(f"{word} {bound:g}" for word, bound in bounds if bound is not None)
 
 
-def outside(info: ParameterInfo, values: np.ndarray | float) -> np.ndarray:
-    """Whether each value violates the parameter's bounds; of the shape of `values`."""
-    given = np.asarray(values, dtype=float)
-    bad = np.zeros(given.shape, dtype=bool)
-    if info.above is not None:
-        bad |= ~(given > info.above)
-    if info.least is not None:
-        bad |= ~(given >= info.least)
-    if info.most is not None:
-        bad |= ~(given <= info.most)
-    if info.below is not None:
-        bad |= ~(given < info.below)
-    return bad
+def outside(info: Bounded, values: Any) -> Any:
+    """Whether a number violates the bounds, or each of an array; NaN violates any."""
+    within: Any = True if isinstance(values, float) else np.ones(np.shape(values), dtype=bool)
+    for name, _, fulfils in _BOUNDS:
+        bound = getattr(info, name)
+        if bound is not None:
+            within = within & fulfils(values, bound)
+    return not within if isinstance(values, float) else ~within
 
 
 def violations(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) -> Iterator[tuple[np.ndarray, str]]:
@@ -42,23 +60,11 @@ def violations(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) ->
     columns : values of all parameters by name: numbers, or arrays of one shape
     """
     for info in manifest.parameters:
-        given = columns[info.name]
+        bad = outside(info, columns[info.name])
         # an array for each of forty numbers would take longer than a short run
-        if isinstance(given, float) and not _number_outside(info, given):
-            continue
-        bad = outside(info, given)
-        if bad.any():
-            yield bad, f"{info.name}: allowed is a number {allowed(info)} [{info.unit}]"
+        if bad if isinstance(bad, bool) else bad.any():
+            yield np.asarray(bad), f"{info.name}: allowed is a number {allowed(info)} [{info.unit}]"
     for name, factor, other in manifest.relations:
         bad = ~(np.asarray(columns[name], dtype=float) > factor * np.asarray(columns[other], dtype=float))
         if bad.any():
             yield bad, f"{name}: allowed is a number above {factor:.9g} times {other}"
-
-
-def _number_outside(info: ParameterInfo, value: float) -> bool:
-    return not (
-        (info.above is None or value > info.above)
-        and (info.least is None or value >= info.least)
-        and (info.most is None or value <= info.most)
-        and (info.below is None or value < info.below)
-    )

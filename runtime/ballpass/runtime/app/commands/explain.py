@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Sequence
@@ -10,14 +9,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
 from rich.console import Console, Group
 from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
 
-from ballpass.runtime.app.commands.options import Json, SceneFile, Settings
-from ballpass.runtime.app.commands.shared import Stages, faults_of, load_model, read_with_settings, reported
+from ballpass.runtime.app.commands import options
+from ballpass.runtime.app.commands.shared import command, load_model, read_with_settings, show_json
+from ballpass.runtime.app.tables import plain_table
 from ballpass.runtime.contract.smoothness import WORDS
 
 if TYPE_CHECKING:
@@ -40,27 +39,22 @@ _NEVER = (
 )
 
 
-def explain(
-    scene: SceneFile,
-    set_: Settings = None,
-    json_: Json = False,
-) -> None:
+def explain(scene: options.SceneFile, set_: options.Settings = None, json_: options.Json = False) -> None:
     """Say what a scene models and which of its lines asked for it, what it does not, the cost of each part, and the
     time scales that decide about the method. Simulates nothing."""
     from ballpass.derive.features import cost
 
-    with reported(), Stages() as stages:
+    with command(scene) as stages:
         stages("read")
-        read, _, overrides = read_with_settings(scene, set_ or [])
-        with faults_of(scene):
-            model = load_model(read, stages, "erk", overrides=overrides)
-            stages("counting operations")
-            counted = cost(read)
+        read, _, overrides = read_with_settings(scene, set_)
+        model = load_model(scene, stages, "erk", overrides=overrides)
+        stages("counting operations")
+        counted = cost(read)
         stages("looking at time scales")
         said = model.explain(overrides)
     report = _report(scene, read, counted, said, model.manifest)
     if json_:
-        typer.echo(json.dumps(report, indent=2, allow_nan=False))
+        show_json(report)
     else:
         Console().print(_render(report), highlight=False)
 
@@ -72,21 +66,21 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
 
     lines = index_lines(path.read_text(encoding="utf-8"))
     kernels = {k.removeprefix("kernel."): v for k, v in counted.functions.items() if k.startswith("kernel.")}
-    parts: list[dict[str, Any]] = []
     named = features(scene)
-    for feature in named:
-        added = counted.added.get(feature.name)
-        rest = None
-        if added is None and feature.path == "bearing.contact" and "rhs" in counted.functions:
-            rest = _rest([(f.path, counted.added[f.name]["rhs"]) for f in named if f.name in counted.added], counted)
+    # operations that the parts do not add by themselves are those of the contacts
+    shares = [(part.path, counted.added[part.name]["rhs"]) for part in named if part.name in counted.added]
+    parts: list[dict[str, Any]] = []
+    for part in named:
+        added = counted.added.get(part.name)
+        contacts = added is None and part.path == "bearing.contact" and "rhs" in counted.functions
         parts.append(
             {
-                "name": feature.name,
-                "path": feature.path,
-                "line": lines.find(tuple(feature.path.split("."))),
-                "what": feature.modelled,
+                "name": part.name,
+                "path": part.path,
+                "line": lines.find(tuple(part.path.split("."))),
+                "what": part.modelled,
                 "operations": None if added is None else {k: v for k, v in added.items() if v},
-                "rest": rest,
+                "rest": _rest(shares, counted) if contacts else None,
             }
         )
     return {
@@ -162,58 +156,9 @@ def _number(value: float) -> float | None:
 
 
 def _render(report: dict[str, Any]) -> Group:
-    share = "share of rhs"
-    total = report["functions"].get("rhs", {}).get("operations", 0)
-    modelled = Table("part", "line", "what", share, title="Modelled", title_justify="left", box=None, pad_edge=False)
-    modelled.columns[3].justify = "right"
-    for part in report["modelled"]:
-        counts, name = part["operations"], part["name"]
-        added = part["rest"] if counts is None else counts.get("rhs", 0)
-        if part["rest"] is not None:
-            name = "rest: ball contacts and rings"
-        cell = "" if added is None or not total else f"{added} ({100 * added / total:.0f} %)"
-        line = "" if part["line"] is None else str(part["line"])
-        modelled.add_row(escape(name), line, escape(part["what"]), cell)
-
-    functions = Table(
-        "function", "operations", "what", title="Generated functions", title_justify="left", box=None, pad_edge=False
-    )
-    functions.columns[1].justify = "right"
-    queries = 0
-    for name, info in report["functions"].items():
-        if _DERIVATIVE.search(name):
-            queries += 1
-        elif info["operations"]:
-            functions.add_row(name, str(info["operations"]), escape(info["what"]))
-    functions.add_row("for derivatives", "", f"{queries} functions, compiled when a query first needs them (--json)")
-
-    angle = "crank angle" if report["mechanism"] else "shaft angle"
-    scales = Table(
-        *("at", angle, "fastest decay", "fastest frequency f", "slowest rate", "decay / (2π f)"),
-        title="Time scales of small motions",
-        caption="decay / (2π f): of a single mode, up to 1, its damping ratio; above 3 decay bounds explicit steps",
-        title_justify="left",
-        caption_justify="left",
-        box=None,
-        pad_edge=False,
-    )
-    for entry in report["time_scales"]:
-        stiffness = entry["stiffness"]
-        scales.add_row(
-            entry["name"],
-            f"{entry['angle_deg']:.0f}°",
-            f"{entry['decay']:.3g} 1/s",
-            f"{entry['frequency'] / math.tau:.3g} Hz",
-            f"{entry['slowest']:.3g} 1/s",
-            "" if stiffness is None else f"{stiffness:.2g}",
-        )
-
-    blocks: list[Any] = [f"[bold]{escape(report['title'])}[/]", "", modelled, ""]
-    blocks += [
-        "[italic]Not modelled[/]",
-        *(Padding(f"- {escape(text)}", (0, 0, 0, 2)) for text in report["not_modelled"]),
-    ]
-    blocks += ["", f"[italic]States[/] {', '.join(report['states']) or 'none'}", "", functions]
+    blocks: list[Any] = [f"[bold]{escape(report['title'])}[/]", "", _modelled(report), "", "[italic]Not modelled[/]"]
+    blocks += [Padding(f"- {escape(text)}", (0, 0, 0, 2)) for text in report["not_modelled"]]
+    blocks += ["", f"[italic]States[/] {', '.join(report['states']) or 'none'}", "", _functions(report)]
     if report["step"]:
         parts = ", ".join(f"{name} {count}" for name, count in report["step"].items() if name != "all")
         blocks += ["", f"[italic]One evaluation in the stepper[/] {report['step']['all']} operations: {parts}"]
@@ -222,7 +167,50 @@ def _render(report: dict[str, Any]) -> Group:
     laws = "; ".join(f"{entry['law']}: {entry['words']}" for entry in report["smoothness"]) or "no contact laws"
     blocks += [f"[italic]Smoothness[/] {escape(laws)}"]
     if report["time_scales"]:
-        blocks += ["", scales]
+        blocks += ["", _scales(report)]
     blocks += [f"no equilibrium at {escape(text)}" for text in report["without_equilibrium"]]
     blocks += ["", f"[italic]Method[/] auto takes {report['method']['auto']}: {escape(report['method']['reason'])}"]
     return Group(*blocks)
+
+
+def _modelled(report: dict[str, Any]) -> Table:
+    """The parts of the model, and how much of the right-hand side each one is."""
+    table = plain_table("Modelled", ("part", "line", "what", "share of rhs"), right=("share of rhs",))
+    total = report["functions"].get("rhs", {}).get("operations", 0)
+    for part in report["modelled"]:
+        counts, rest = part["operations"], part["rest"]
+        name = part["name"] if rest is None else "rest: ball contacts and rings"
+        added = rest if counts is None else counts.get("rhs", 0)
+        cell = "" if added is None or not total else f"{added} ({100 * added / total:.0f} %)"
+        table.add_row(escape(name), str(part["line"] or ""), escape(part["what"]), cell)
+    return table
+
+
+def _functions(report: dict[str, Any]) -> Table:
+    table = plain_table("Generated functions", ("function", "operations", "what"), right=("operations",))
+    queries = sum(_DERIVATIVE.search(name) is not None for name in report["functions"])
+    for name, info in report["functions"].items():
+        if info["operations"] and not _DERIVATIVE.search(name):
+            table.add_row(name, str(info["operations"]), escape(info["what"]))
+    table.add_row("for derivatives", "", f"{queries} functions, compiled when a query first needs them (--json)")
+    return table
+
+
+def _scales(report: dict[str, Any]) -> Table:
+    angle = "crank angle" if report["mechanism"] else "shaft angle"
+    table = plain_table(
+        "Time scales of small motions",
+        ("at", angle, "fastest decay", "fastest frequency f", "slowest rate", "decay / (2π f)"),
+        caption="decay / (2π f): of a single mode, up to 1, its damping ratio; above 3 decay bounds explicit steps",
+    )
+    for entry in report["time_scales"]:
+        stiffness = entry["stiffness"]
+        table.add_row(
+            entry["name"],
+            f"{entry['angle_deg']:.0f}°",
+            f"{entry['decay']:.3g} 1/s",
+            f"{entry['frequency'] / math.tau:.3g} Hz",
+            f"{entry['slowest']:.3g} 1/s",
+            "" if stiffness is None else f"{stiffness:.2g}",
+        )
+    return table

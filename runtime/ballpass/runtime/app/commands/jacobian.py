@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import json
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
-from ballpass.runtime.app.commands.options import Json, SceneFile, Settings
+from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.shared import (
     Stages,
+    command,
     complain,
-    faults_of,
     load_model,
     read_asked,
-    reported,
-    warnings_shown,
+    read_quantity,
+    show,
+    show_json,
 )
+from ballpass.runtime.app.tables import simple_table
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ _TIME = Annotated[str | None, typer.Option("--time", metavar="TIME", help='The i
 
 
 def jacobian(
-    scene: SceneFile,
+    scene: options.SceneFile,
     of: Annotated[
         list[str],
         typer.Option(help='What to differentiate: rhs, a quantity, a pattern as "reaction.A.*". May be repeated.'),
@@ -51,27 +51,23 @@ def jacobian(
     state: Annotated[
         str, typer.Option(help="Where the rings are: equilibrium (static, under the load of that instant) or initial.")
     ] = "equilibrium",
-    set_: Settings = None,
+    set_: options.Settings = None,
     check: Annotated[
         bool, typer.Option("--check/--no-check", help="Compare each derivative with extrapolated differences.")
     ] = True,
-    json_: Json = False,
+    json_: options.Json = False,
 ) -> None:
     """Derivatives of quantities at one instant, from generated code, each with a second opinion.
 
     Exit code 1 where the two disagree."""
-    with reported(), warnings_shown(), Stages() as stages:
+    with command(scene) as stages:
         if state not in ("equilibrium", "initial"):
             raise RequestError(f"--state: {state!r} is none of the choices. Allowed: equilibrium, initial.")
-        stages("read")
-        overrides = read_asked(scene, set_ or []).overrides
-        angle, seconds = _instant(at_angle, time)
-        with faults_of(scene):
-            model = load_model(scene, stages, "none", overrides=overrides)
+        model, overrides, angle, seconds = _model_at(scene, stages, set_, at_angle, time)
         stages("differentiate")
         result = _checked(model, overrides, of, wrt, angle, seconds, state, check=check)
     if json_:
-        typer.echo(json.dumps(result.to_dict(), indent=2, allow_nan=False))
+        show_json(result.to_dict())
     else:
         _show(result)
     from ballpass.runtime.certify.certificate import Verdict
@@ -82,23 +78,19 @@ def jacobian(
 
 
 def linearize(
-    scene: SceneFile,
+    scene: options.SceneFile,
     at_angle: _ANGLE = None,
     time: _TIME = None,
-    set_: Settings = None,
-    json_: Json = False,
+    set_: options.Settings = None,
+    json_: options.Json = False,
 ) -> None:
     """Matrices, natural frequencies and modes of small vibrations about the static equilibrium of an instant."""
-    with reported(), warnings_shown(), Stages() as stages:
-        stages("read")
-        overrides = read_asked(scene, set_ or []).overrides
-        angle, seconds = _instant(at_angle, time)
-        with faults_of(scene):
-            model = load_model(scene, stages, "none", overrides=overrides)
+    with command(scene) as stages:
+        model, overrides, angle, seconds = _model_at(scene, stages, set_, at_angle, time)
         stages("linearize")
         result = model.linearize(seconds, crank_angle=angle, parameters=overrides)
     if json_:
-        typer.echo(json.dumps(result.to_dict(), indent=2, allow_nan=False))
+        show_json(result.to_dict())
         return
     from ballpass.runtime.point.linearize import render_linearization, render_matrices
 
@@ -107,27 +99,18 @@ def linearize(
     console.print(render_matrices(result), highlight=False)
 
 
-def _instant(at_angle: str | None, time: str | None) -> tuple[float | None, float | None]:
-    """Angle [rad] and time [s] of the options, at most one of them."""
+def _model_at(
+    scene: Path, stages: Stages, settings: list[str] | None, at_angle: str | None, time: str | None
+) -> tuple[Model, dict[str, float], float | None, float | None]:
+    """The model, numbers of ``--set`` [SI], and angle [rad] or time [s] of the options, at most one of the two."""
+    stages("read")
+    overrides = read_asked(scene, settings).overrides
     if at_angle is not None and time is not None:
         raise RequestError("--at-angle and --time: both were given. Allowed: one of the two.")
-    angle = _quantity("--at-angle", at_angle, "rad")
-    # the unit was written out, so that many turns are meant as such
-    return None if angle is None else math.fmod(angle, math.tau), _quantity("--time", time, "s")
-
-
-def _quantity(option: str, text: str | None, unit: str) -> float | None:
-    from ballpass.derive.scene.units import QuantityError, parse_quantity
-
-    if text is None:
-        return None
-    try:
-        value = parse_quantity(text, unit)
-    except QuantityError as error:
-        raise RequestError(f"{option}: {error}") from None
-    if not math.isfinite(value):
-        raise RequestError(f"{option}: {text!r} is no finite quantity.")
-    return value
+    angle, seconds = read_quantity("--at-angle", at_angle, "rad"), read_quantity("--time", time, "s")
+    if angle is not None:
+        angle = math.fmod(angle, math.tau)  # the unit was written out, so that many turns are meant as such
+    return load_model(scene, stages, "none", overrides=overrides), overrides, angle, seconds
 
 
 def _checked(
@@ -164,47 +147,26 @@ def _checked(
 
 
 def _show(result: CheckedJacobian) -> None:
-    """Print the table as wide as its names are, and below it what is left out and the notes."""
-    console = Console()
-    table, still = _render(result)
-    wide = Console(width=10_000).measure(table).maximum
-    Console(width=max(console.width, wide)).print(table, highlight=False)
-    below = ([f"{still} more are zero."] if still else []) + list(result.notes)
-    for text in below:
-        console.print(text, highlight=False, markup=False)
-
-
-def _render(result: CheckedJacobian) -> tuple[Table, int]:
-    """Entries with their second opinion; what does not depend at all is left out, and counted."""
+    """Entries with their second opinion, and the notes; what does not depend at all is left out, and counted."""
     from ballpass.runtime.certify.certificate import Verdict
 
-    table = Table(
-        title=f"Derivatives at t = {result.time:.6g} s: {result.verdict.value}",
-        title_justify="left",
-        header_style="bold",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
+    entries = result.to_dict()["jacobian"]
+    shown = [
+        entry
+        for entry in entries
+        if entry["verdict"] == Verdict.DISAGREES.value or entry["value"] != 0.0 or len(result.rows) == 1
+    ]
+    table = simple_table(
+        f"Derivatives at t = {result.time:.6g} s: {result.verdict.value}",
+        ("of", "wrt", "derivative", "by differences", "unit", "verdict"),
+        right=("derivative", "by differences"),
     )
-    for head in ("of", "wrt"):
-        table.add_column(head, no_wrap=True)
-    for head in ("derivative", "by differences"):
-        table.add_column(head, justify="right", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
-    still = 0
-    for entry, check in zip(
-        result.to_dict()["jacobian"], (check for row in result.checks for check in row), strict=True
-    ):
-        if check.verdict is not Verdict.DISAGREES and entry["value"] == 0.0 and len(result.rows) > 1:
-            still += 1
-            continue
-        second = "" if entry["second"] is None else f"{entry['second']:.7g}"
-        table.add_row(
-            entry["of"],
-            entry["wrt"],
-            "not finite" if entry["value"] is None else f"{entry['value']:.7g}",
-            second,
-            entry["unit"],
-            entry["verdict"],
-        )
-    return table, still
+    for entry in shown:
+        value, second = (None if entry[key] is None else f"{entry[key]:.7g}" for key in ("value", "second"))
+        table.add_row(entry["of"], entry["wrt"], value or "not finite", second or "", entry["unit"], entry["verdict"])
+    console = Console()
+    wide = Console(width=10_000).measure(table).maximum  # as wide as its names are
+    Console(width=max(console.width, wide)).print(table, highlight=False)
+    still = len(entries) - len(shown)
+    for text in ([f"{still} more are zero."] if still else []) + list(result.notes):
+        show(text)

@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ballpass.runtime.app.commands.shared import refuse_run_setting
+from ballpass.runtime.contract.bounds import allowed as bounds_text
+from ballpass.runtime.contract.bounds import outside
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:
@@ -84,15 +87,10 @@ def read_ranges(scene: Scene, texts: Sequence[str], settings: Mapping[str, float
         path = text.partition("=")[0].strip()
         if path in settings or path in seen:
             other = f"--vary {seen[path]}" if path in seen else f"--set {path}"
-            faults.append(
-                Fault(
-                    key=path,
-                    problem="the number is given twice",
-                    given=f"--vary {text} and {other}",
-                    allowed="one range or one value for a number",
-                    remedy="leave one of them away",
-                )
-            )
+            given = f"--vary {text} and {other}"
+            allowed, remedy = "one range or one value for a number", "leave one of them away"
+            problem = "the number is given twice"
+            faults.append(Fault(key=path, problem=problem, given=given, allowed=allowed, remedy=remedy))
             continue
         seen[path] = text
         try:
@@ -119,88 +117,45 @@ def grid(ranges: Sequence[Range]) -> dict[str, np.ndarray]:
 def _read_range(scene: Scene, text: str) -> Range:
     from ballpass.derive import SceneError
     from ballpass.derive.reading.read import parse_override
+    from ballpass.derive.reading.values import check_path, value_bounds
     from ballpass.derive.scene.errors import Fault
     from ballpass.derive.scene.units import parse_quantity
 
     path, equals, written = (part.strip() for part in text.partition("="))
     parts = [part.strip() for part in written.split(":")]
 
-    def fault(problem: str, allowed: str, remedy: str) -> SceneError:
-        return SceneError([Fault(key=path, problem=problem, given=text, allowed=allowed, remedy=remedy)])
+    def require(holds: bool, problem: str, allowed: str, remedy: str) -> None:
+        if not holds:
+            raise SceneError([Fault(key=path, problem=problem, given=text, allowed=allowed, remedy=remedy)])
 
-    # an unknown path, or what is no number, before anything else
-    _check_path(scene, path)
+    # structure and settings of the run are no numbers of the model
+    refuse_run_setting(path)
+    check_path(scene, path)
     logarithmic = len(parts) == 4 and parts[3] == "log"
-    if not equals or not (len(parts) == 3 or logarithmic):
-        raise fault("this is no range", "PATH=A:B:N or PATH=A:B:N:log", f"write it as in {_EXAMPLE}")
-    first, last = (parse_override(scene, f"{path}={end}")[1] for end in parts[:2])
-    if re.fullmatch(r"[0-9]{1,9}", parts[2]) is None or int(parts[2]) < 2:
-        raise fault(
-            "the count of values is wrong",
-            "a whole number from 2 on",
-            f"write a count behind the ends, as in {_EXAMPLE}",
-        )
-    if first == last:
-        raise fault("both ends are the same", "two ends that differ", f'for one value write --set {path}="{parts[0]}"')
-    if logarithmic and not min(first, last) > 0.0:
-        raise fault(
-            "numbers from zero down have no logarithm", "two ends above zero", 'leave ":log" away: equal steps instead'
-        )
-    count = int(parts[2])
-    if count > MOST:
-        raise fault("these are too many values", f"at most {MOST}", "take fewer values")
-    _check_ends(scene, path, text, (first, last))
+    whole = bool(equals) and (len(parts) == 3 or logarithmic)
+    require(whole, "this is no range", "PATH=A:B:N or PATH=A:B:N:log", f"write it as in {_EXAMPLE}")
+    ends = tuple(parse_override(scene, f"{path}={end}")[1] for end in parts[:2])
+    count = int(parts[2]) if re.fullmatch(r"[0-9]{1,9}", parts[2]) else 0
+    remedy = f"write a count behind the ends, as in {_EXAMPLE}"
+    require(count >= 2, "the count of values is wrong", "a whole number from 2 on", remedy)
+    remedy = f'for one value write --set {path}="{parts[0]}"'
+    require(ends[0] != ends[1], "both ends are the same", "two ends that differ", remedy)
+    remedy = 'leave ":log" away: equal steps instead'
+    positive = not logarithmic or min(ends) > 0.0
+    require(positive, "numbers from zero down have no logarithm", "two ends above zero", remedy)
+    require(count <= MOST, "these are too many values", f"at most {MOST}", "take fewer values")
+    bounds = value_bounds(scene).get(path)
+    if bounds is not None:  # what lies between the ends is then within them as well
+        problem, allowed = "an end lies outside the bounds of this number", f"numbers {bounds_text(bounds)}"
+        require(not outside(bounds, np.array(ends)).any(), problem, allowed, "give other ends")
     unit = next(quantity.unit for quantity in scene.quantities if quantity.path == path)
     shown = _NUMBER.sub("", parts[0], count=1).strip() or "1"
     space = np.geomspace if logarithmic else np.linspace
     return Range(
         path=path,
         unit=unit,
-        values=np.asarray(space(first, last, count), dtype=float),
+        values=np.asarray(space(ends[0], ends[1], count), dtype=float),
         shown_unit=shown,
         factor=parse_quantity(f"1 {shown}", unit) if shown != "1" else 1.0,
         logarithmic=logarithmic,
     )
-
-
-def _check_path(scene: Scene, path: str) -> None:
-    """Refuse what is no number: structure decides what is derived, and a setting of the run is no parameter."""
-    from ballpass.derive import SceneError
-    from ballpass.derive.reading.values import check_path
-    from ballpass.runtime.app.commands.shared import run_setting
-
-    misplaced = run_setting(path)
-    if misplaced is not None:
-        raise SceneError([misplaced])
-    check_path(scene, path)
-
-
-def _check_ends(scene: Scene, path: str, text: str, ends: tuple[float, float]) -> None:
-    """Refuse ends that a scene file could not have there; what lies between is then within the bounds as well."""
-    from ballpass.derive import SceneError
-    from ballpass.derive.reading.values import value_bounds
-    from ballpass.derive.scene.errors import Fault
-
-    bounds = value_bounds(scene).get(path)
-    if bounds is None:
-        return
-    words = (("above", bounds.above), ("from", bounds.least), ("to", bounds.most), ("below", bounds.below))
-    low, high = min(ends), max(ends)
-    if (
-        (bounds.above is not None and not low > bounds.above)
-        or (bounds.least is not None and not low >= bounds.least)
-        or (bounds.most is not None and not high <= bounds.most)
-        or (bounds.below is not None and not high < bounds.below)
-    ):
-        allowed = " ".join(f"{word} {limit:g}" for word, limit in words if limit is not None)
-        raise SceneError(
-            [
-                Fault(
-                    key=path,
-                    problem="an end lies outside the bounds of this number",
-                    given=text,
-                    allowed=f"numbers {allowed}",
-                    remedy="give other ends",
-                )
-            ]
-        )

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
-from ballpass.runtime.app.commands.options import Cycles, Json, SceneFile, Settings, Transient
+from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.shared import (
-    Stages,
     check_folder,
+    command,
     complain,
-    faults_of,
+    json_text,
     load_model,
     read_asked,
-    reported,
-    warnings_shown,
+    show,
+    show_json,
 )
 
 #: Rows of a table on the terminal.
@@ -26,7 +25,7 @@ ROWS = 15
 
 
 def sensitivity(
-    scene: SceneFile,
+    scene: options.SceneFile,
     of: Annotated[
         list[str] | None,
         typer.Option(
@@ -44,9 +43,9 @@ def sensitivity(
             "given.",
         ),
     ] = None,
-    set_: Settings = None,
-    cycles: Cycles = None,
-    transient: Transient = None,
+    set_: options.Settings = None,
+    cycles: options.Cycles = None,
+    transient: options.Transient = None,
     rtol: Annotated[
         float | None, typer.Option(metavar="R", help="Tolerance of the states; tight if not given.")
     ] = None,
@@ -60,19 +59,18 @@ def sensitivity(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for report and charts; none are written if not given.")
     ] = None,
-    json_: Json = False,
+    json_: options.Json = False,
 ) -> None:
     """Differentiate quantities of interest by parameters, and check every derivative by a second route.
 
     Exit code 1 where the two routes disagree; both numbers are told. Charts rank what moves a quantity most.
     """
-    with reported(), warnings_shown(), Stages() as stages:
+    with command(scene) as stages:
         stages("read")
-        overrides = read_asked(scene, set_ or []).overrides
+        overrides = read_asked(scene, set_).overrides
         if out is not None:
             check_folder(out)
-        with faults_of(scene):
-            model = load_model(scene, stages, method, overrides=overrides)
+        model = load_model(scene, stages, method, overrides=overrides)
         begun: list[str] = []
 
         def progress(words: str, fraction: float) -> None:
@@ -100,18 +98,16 @@ def sensitivity(
             stages("draw")
             out.mkdir(parents=True, exist_ok=True)
             place = out / "sensitivity.json"
-            place.write_text(json.dumps(report.to_json(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+            place.write_text(json_text(report.to_json()), encoding="utf-8")
             written = [place, *draw_tornados(report, out)]
-    from ballpass.runtime.certify.sensitivity_report import render_report
-
     if json_:
-        typer.echo(json.dumps(report.to_json(), indent=2, allow_nan=False))
+        show_json(report.to_json())
     else:
-        console = Console()
-        console.print(render_report(report, top=ROWS))
+        from ballpass.runtime.certify.sensitivity_report import render_report
+
+        Console().print(render_report(report, top=ROWS))
         if written:
-            names = ", ".join(path.name for path in written)
-            console.print(f"results in {out}: {names}", highlight=False, soft_wrap=True, markup=False)
+            show(f"results in {out}: {', '.join(path.name for path in written)}")
     if report.disagreements:
         first = report.disagreements[0]
         complain(

@@ -8,6 +8,7 @@ interrupted.
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 import os
 import sys
@@ -16,7 +17,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 from rich.console import Console
@@ -28,11 +29,12 @@ from ballpass.runtime.contract.errors import BallpassError, RequestError
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
-    from ballpass.derive.scene.errors import Fault
     from ballpass.derive.scene.records import Run
     from ballpass.runtime.contract import Manifest, RunInfo
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.locating import Kinks
+
+_Run = TypeVar("_Run", bound="Run | RunInfo")
 
 errors_console = Console(stderr=True, emoji=False)  # A:B:N is no picture
 
@@ -61,11 +63,22 @@ STAGES = {
 
 
 @contextlib.contextmanager
-def reported() -> Iterator[None]:
-    """Turn errors raised on purpose into a message and an exit code; everything else is a defect and shows itself."""
+def command(scene: Path) -> Iterator[Stages]:
+    """The stages of a command; its warnings as messages, and its errors as messages with an exit code.
+
+    Parameters
+    ----------
+    scene : named in faults that a later stage than reading finds
+    """
     try:
-        yield
+        with warnings.catch_warnings(), Stages() as stages:
+            warnings.showwarning = warn
+            yield stages
     except BallpassError as error:
+        from ballpass.derive.scene.errors import SceneError
+
+        if isinstance(error, SceneError) and error.source is None:
+            error = SceneError(error.faults, source=scene)
         complain(str(error))
         raise typer.Exit(2 if isinstance(error, ValueError) else 1) from None
     except BrokenPipeError:  # the reader has seen enough, as in `ballpass equations SCENE | head`
@@ -95,12 +108,19 @@ def note(message: str) -> None:
     errors_console.print(f"[bold]note[/]: {escape(message)}", soft_wrap=True, highlight=False)
 
 
-@contextlib.contextmanager
-def warnings_shown() -> Iterator[None]:
-    """Print warnings within as a command prints them."""
-    with warnings.catch_warnings():
-        warnings.showwarning = warn
-        yield
+def show(text: str) -> None:
+    """Print a line of results on stdout."""
+    Console(emoji=False).print(text, highlight=False, soft_wrap=True, markup=False)
+
+
+def show_json(result: Any) -> None:
+    """Print results as one JSON object on stdout."""
+    typer.echo(json_text(result), nl=False)
+
+
+def json_text(result: Any) -> str:
+    """Results as JSON for people and programs."""
+    return json.dumps(result, indent=2, allow_nan=False) + "\n"
 
 
 class Stages:
@@ -151,19 +171,6 @@ class Stages:
             self._progress.update(self._task, total=1.0, completed=done)
 
 
-@contextlib.contextmanager
-def faults_of(source: Path | str) -> Iterator[None]:
-    """Say whose faults they are, where a later stage than reading finds them."""
-    from ballpass.derive.scene.errors import SceneError
-
-    try:
-        yield
-    except SceneError as error:
-        if error.source is not None:
-            raise
-        raise SceneError(error.faults, source=source) from None
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
     """What a command needs of a scene before it has a model.
@@ -181,14 +188,11 @@ class Asked:
     overrides: dict[str, float]
     speed: float
 
-    @property
-    def name(self) -> str:
-        """Name of the scene."""
-        return self.path.stem
 
-
-def read_asked(path: Path, settings: list[str], duration: float | None = None, transient: float | None = None) -> Asked:
-    """What is asked of a scene; arguments as for `read_with_settings`.
+def read_asked(
+    path: Path, settings: list[str] | None, duration: float | None = None, transient: float | None = None
+) -> Asked:
+    """What is asked of a scene by ``--set``, ``--duration`` [s] and ``--transient`` [turns].
 
     Where the generated folder is fresh its manifest tells all that is needed; the scene is read where it is not, and
     where something is wrong, to say so in the scene's words.
@@ -196,40 +200,42 @@ def read_asked(path: Path, settings: list[str], duration: float | None = None, t
     from ballpass.derive.emit.signature import fresh_manifest
 
     manifest = fresh_manifest(path)
-    overrides = _plain_overrides(manifest, settings) if manifest is not None else None
+    overrides = _plain_overrides(manifest, settings or []) if manifest is not None else None
     if manifest is not None and overrides is not None:
         run: Run | RunInfo = manifest.run
         names = [m.speed for m in (manifest.mechanism,) if m] + [b.shaft_speed for b in manifest.bearings]
         values = {info.name: info.default for info in manifest.parameters} | overrides
         speed = values.get(names[0], 0.0) if names else 0.0
     else:
-        _, scene, overrides = read_with_settings(path, settings)
+        _, scene, overrides = read_with_settings(path, settings, duration, transient)
         run = scene.run
         shaft = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
         speed = shaft.value if shaft is not None else 0.0
-    if duration is not None:
-        dropped = run.transient_cycles if transient is None else transient
-        run = replace(run, cycles=None, duration=duration, transient_cycles=dropped)
-    return Asked(path=path, run=run, overrides=overrides, speed=speed)
+    return Asked(path=path, run=_asked_run(run, duration, transient), overrides=overrides, speed=speed)
+
+
+def _asked_run(run: _Run, duration: float | None, transient: float | None) -> _Run:
+    """Run settings with a duration, where one was asked for."""
+    if duration is None:
+        return run
+    dropped = run.transient_cycles if transient is None else transient
+    return replace(run, cycles=None, duration=duration, transient_cycles=dropped)
 
 
 def _plain_overrides(manifest: Manifest, settings: list[str]) -> dict[str, float] | None:
     """Numbers of ``--set`` by path, where the manifest's bounds alone tell that they are right; else None."""
-    from ballpass.derive.scene.units import QuantityError, parse_quantity
+    from ballpass.derive.scene.units import parse_quantity
     from ballpass.runtime.contract.parameters import resolve_parameters
 
     units = {info.name: info.unit for info in manifest.parameters}
     found: dict[str, float] = {}
-    for text in settings:
-        path, _, value = (part.strip() for part in text.partition("="))
-        # ends of windows and knots of tables are checked against each other when a scene is read
-        if path not in units or path in found or ".window" in path or path.startswith("load."):
-            return None
-        try:
-            found[path] = parse_quantity(value, units[path])
-        except QuantityError:
-            return None
     try:
+        for text in settings:
+            path, _, value = (part.strip() for part in text.partition("="))
+            # ends of windows and knots of tables are checked against each other when a scene is read
+            if path not in units or path in found or ".window" in path or path.startswith("load."):
+                return None
+            found[path] = parse_quantity(value, units[path])
         resolve_parameters(manifest, found)
     except RequestError:
         return None
@@ -237,46 +243,58 @@ def _plain_overrides(manifest: Manifest, settings: list[str]) -> dict[str, float
 
 
 def read_with_settings(
-    path: Path, settings: list[str], duration: float | None = None, transient: float | None = None
+    path: Path, settings: list[str] | None, duration: float | None = None, transient: float | None = None
 ) -> tuple[Scene, Scene, dict[str, float]]:
-    """The scene as the file has it, the scene as asked for, and the overrides in SI; checked as if in the file.
-
-    Parameters
-    ----------
-    duration : length of the run instead of the file's cycles or duration [s]
-    transient : turns at its start that do not count, beside a duration
-    """
+    """The scene as the file has it, the scene as asked for, and the overrides in SI; checked as if in the file."""
     from ballpass.derive import SceneError, read_scene
     from ballpass.derive.reading.read import parse_override, with_values
+    from ballpass.derive.scene.errors import Fault
 
     read = read_scene(path)
     faults: list[Fault] = []
-    overrides: dict[str, float] = {}
     texts: dict[str, str] = {}
-    for text in settings:
-        misplaced = run_setting(text)
-        if misplaced is not None:
-            faults.append(misplaced)
-            continue
+    overrides: dict[str, float] = {}
+    for text in settings or []:
         try:
+            refuse_run_setting(text)
             name, value = parse_override(read, text)
         except SceneError as error:
             faults += error.faults
             continue
+        given = text.partition("=")[2].strip()
         if name in overrides:
-            faults.append(_given_twice(name, texts[name], text))
-        overrides[name], texts[name] = value, text
+            faults.append(
+                Fault(
+                    key=name,
+                    problem="the number is set twice",
+                    given=f"{texts[name]} and {given}",
+                    allowed="one value for a number",
+                    remedy="leave one --set away",
+                )
+            )
+        overrides[name], texts[name] = value, given
     if faults:
         raise SceneError(faults, source="--set")
-    asked = read
-    if duration is not None:
-        dropped = read.run.transient_cycles if transient is None else transient
-        asked = replace(read, run=replace(read.run, cycles=None, duration=duration, transient_cycles=dropped))
-    if not overrides:
-        return read, asked, {}
-    with faults_of("--set"):
-        asked = with_values(asked, overrides)
-    return read, asked, overrides
+    asked = replace(read, run=_asked_run(read.run, duration, transient))
+    try:
+        return read, with_values(asked, overrides) if overrides else asked, overrides
+    except SceneError as error:
+        raise SceneError(error.faults, source="--set") from None
+
+
+def read_quantity(option: str, text: str | None, unit: str) -> float | None:
+    """A finite quantity of an option [unit], None where it was not given."""
+    from ballpass.derive.scene.units import QuantityError, parse_quantity
+
+    if text is None:
+        return None
+    try:
+        value = parse_quantity(text, unit)
+    except QuantityError as error:
+        raise RequestError(f"{option}: {error}") from None
+    if not math.isfinite(value):
+        raise RequestError(f"{option}: {text!r} is no finite quantity.")
+    return value
 
 
 def read_duration(text: str | None, cycles: float | None) -> float | None:
@@ -293,12 +311,7 @@ def read_duration(text: str | None, cycles: float | None) -> float | None:
         raise RequestError(
             f"--cycles {cycles:g} and --duration {text!r} were both given. Allowed: one of them. Leave one away."
         )
-    from ballpass.derive.scene.units import QuantityError, parse_quantity
-
-    try:
-        seconds = parse_quantity(text, "s")
-    except QuantityError as error:
-        raise RequestError(f"--duration: {error}") from None
+    seconds = read_quantity("--duration", text, "s") or 0.0
     if not seconds > 0.0:
         raise RequestError(
             f'--duration: {text!r} cannot be simulated. Allowed: a time above 0, as in --duration "0.5 s".'
@@ -316,39 +329,33 @@ def faults_of_turns(cycles: float | None, transient: float | None) -> list[str]:
     return faults
 
 
-def _given_twice(path: str, first: str, second: str) -> Fault:
-    """A fault where ``--set`` names a number twice: nobody can tell which value is meant."""
-    from ballpass.derive.scene.errors import Fault
-
-    values = [text.partition("=")[2].strip() for text in (first, second)]
-    return Fault(
-        key=path,
-        problem="the number is set twice",
-        given=f"{values[0]} and {values[1]}",
-        allowed="one value for a number",
-        remedy="leave one --set away",
-    )
-
-
-def run_setting(text: str) -> Fault | None:
-    """A fault where ``--set`` names a line of the run table, which holds no parameters of the model."""
-    from ballpass.derive.scene.errors import Fault
+def refuse_run_setting(text: str) -> None:
+    """Refuse ``--set`` of a line of the run table, which holds no parameters of the model."""
+    from ballpass.derive.scene.errors import Fault, SceneError
 
     path, _, value = (part.strip() for part in text.partition("="))
     if not path.startswith("run."):
-        return None
+        return
     option = RUN_OPTIONS.get(path)
     if option is not None:
         remedy = f"`ballpass run` has {option} for it, as in {option} {value or 'VALUE'}"
     else:
         remedy = f"`ballpass run` has {', '.join(RUN_OPTIONS.values())}; for the rest edit [run] in the scene"
-    return Fault(
+    fault = Fault(
         key=path,
         problem="is a setting of the run, not a parameter of the model",
         given=text,
         allowed="paths of numbers of mechanism, shaft, load and bearing",
         remedy=remedy,
     )
+    raise SceneError([fault])
+
+
+def results_folder(out: Path | None, scene: Path) -> Path:
+    """Folder of a scene's results; one that cannot be written is refused."""
+    folder = out if out is not None else Path("results") / scene.stem
+    check_folder(folder)
+    return folder
 
 
 def check_folder(folder: Path) -> None:
@@ -377,13 +384,13 @@ def checked_kinks(kinks: str | None, method: str, error: str | None = None) -> K
 
 
 def load_model(
-    scene: Path | Scene,
+    scene: Path,
     stages: Stages,
     method: str,
     kinks: str | None = None,
     rtol: float | None = None,
     *,
-    overrides: Mapping[str, float] | None = None,
+    overrides: Mapping[str, float],
 ) -> Model:
     """The scene's model, derived and compiled where it is stale; with the stepper that a run of these will take.
 
@@ -399,12 +406,11 @@ def load_model(
     folder = generate(scene, progress=stages)
     stages("compile")
     model = load(folder)
-    if any(path.startswith("mechanism.") for path in overrides or {}):
+    if any(path.startswith("mechanism.") for path in overrides):
         model.check_assembly(overrides)
     if model.has_stepper and method in ("auto", *STEPPERS):
         _ = model.stepper  # compiled here, where it is announced
         tolerance = model.manifest.run.rtol if rtol is None else rtol
-        _ = stepper_for(
-            model, choose_kinks(kinks, "stepper" if method == "auto" else method, model.manifest, tolerance)
-        )
+        chosen = choose_kinks(kinks, "stepper" if method == "auto" else method, model.manifest, tolerance)
+        _ = stepper_for(model, chosen)
     return model

@@ -6,46 +6,29 @@ what ran (JSON).
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.console import Console
 
-from ballpass.runtime.app.commands.options import (
-    Cycles,
-    Duration,
-    Figures,
-    Json,
-    ResultsFolder,
-    SceneFile,
-    Settings,
-    Tolerance,
-    Transient,
-)
+from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.shared import (
-    Stages,
-    check_folder,
     checked_kinks,
+    command,
     complain,
-    faults_of,
     faults_of_turns,
     load_model,
     note,
     read_duration,
     read_with_settings,
-    reported,
+    results_folder,
+    show,
+    show_json,
     warn,
-    warnings_shown,
 )
 from ballpass.runtime.app.interrupted import INTERRUPTED
 from ballpass.runtime.contract.errors import RequestError
-
-if TYPE_CHECKING:
-    from ballpass.derive import Scene
 
 #: Members that the terminal shows one by one; of more, the extremes.
 ROWS = 24
@@ -55,7 +38,7 @@ NAMED = 5
 
 
 def sweep(
-    scene: SceneFile,
+    scene: options.SceneFile,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -72,11 +55,11 @@ def sweep(
             "be repeated. Peak ball force and motion of the inner ring if none is given.",
         ),
     ] = None,
-    set_: Settings = None,
-    cycles: Cycles = None,
-    duration: Duration = None,
-    transient: Transient = None,
-    rtol: Tolerance = None,
+    set_: options.Settings = None,
+    cycles: options.Cycles = None,
+    duration: options.Duration = None,
+    transient: options.Transient = None,
+    rtol: options.Tolerance = None,
     method: Annotated[
         str | None, typer.Option(metavar="NAME", help="auto, or a stepper's name as in ballpass run.")
     ] = None,
@@ -91,9 +74,9 @@ def sweep(
     threads: Annotated[
         int | None, typer.Option(metavar="N", help="Threads; as many as processors if not given.")
     ] = None,
-    out: ResultsFolder = None,
-    json_: Json = False,
-    figures: Figures = True,
+    out: options.ResultsFolder = None,
+    json_: options.Json = False,
+    figures: options.Figures = True,
 ) -> None:
     """Run a scene for all values of one or more of its numbers; write table, grid and figures.
 
@@ -101,23 +84,25 @@ def sweep(
     """
     import numpy as np
 
-    from ballpass.runtime.app.commands import sweep_results as results
     from ballpass.runtime.app.commands.ranges import grid, read_ranges
+    from ballpass.runtime.app.commands.sweep_results import TABLE, Sweep
     from ballpass.runtime.certify.whole_run import default_observables
 
-    with reported(), warnings_shown(), Stages() as stages:
+    with command(scene) as stages:
         stages("read")
         seconds = read_duration(duration, cycles)
         _check_request(cycles, transient, rtol, threads)
-        read, asked, overrides = read_with_settings(scene, set_ or [], seconds, transient)
+        read, asked, overrides = read_with_settings(scene, set_, seconds, transient)
         ranges = read_ranges(asked, vary or [], overrides)
-        _check_scene(asked)
+        if asked.bearing is None:
+            raise RequestError(
+                "This scene has no bearing: nothing is integrated, and there are no quantities of an ensemble. Add a "
+                "[bearing], or loop over `Model.simulate` in Python."
+            )
         at_kinks = checked_kinks(kinks, method or read.run.method)
-        folder = out if out is not None else Path("results") / read.name
-        check_folder(folder)
-        with faults_of(scene):
-            model = load_model(read, stages, method or read.run.method, at_kinks, rtol, overrides=overrides)
-            _ = model.ensemble_driver  # compiled here, where it is announced
+        folder = results_folder(out, scene)
+        model = load_model(scene, stages, method or read.run.method, at_kinks, rtol, overrides=overrides)
+        _ = model.ensemble_driver  # compiled here, where it is announced
 
         varied = grid(ranges)
         count = math.prod(len(one.values) for one in ranges)
@@ -139,37 +124,28 @@ def sweep(
         if len(refused) == count:
             raise RequestError(f"--vary: none of the {count} members can be simulated. The first: {refused[0].message}")
         stages("write")
-        dataset = results.to_grid(result, ranges, overrides)
-        report = results.report(result, dataset, ranges, overrides)
-        files = results.write(folder, result, dataset, report, ranges, figures=figures)
+        swept = Sweep(result=result, ranges=ranges, fixed=overrides)
+        files = swept.write(folder, figures=figures)
     if figures and len(ranges) > 2:
-        note(
-            f"no figure: a figure shows one or two varied parameters, and {len(ranges)} vary. Numbers are in "
-            f"{results.TABLE}."
-        )
+        note(f"no figure: a figure shows one or two varied parameters, and {len(ranges)} vary. Numbers are in {TABLE}.")
     if json_:
-        typer.echo(json.dumps(report, indent=2, allow_nan=False))
+        show_json(swept.report())
     else:
-        console = Console(emoji=False)
-        console.print(results.members(dataset, ranges) if count <= ROWS else results.extremes(dataset, ranges))
-        told = f"{count} members, {len(result.failures)} without results. In {folder}: {_listed(files)}"
-        console.print(told, highlight=False, soft_wrap=True, markup=False)
+        Console(emoji=False).print(swept.all_members() if count <= ROWS else swept.extremes())
+        drawn = sum(name.endswith(".png") for name in files)
+        told = [name for name in files if not name.endswith(".png")]
+        told += [f"{drawn} figure{'s' if drawn > 1 else ''}"] if drawn else []
+        show(f"{count} members, {len(result.failures)} without results. In {folder}: {', '.join(told)}")
     for failure in result.failures[:NAMED]:
-        warn(f"{results.place(ranges, failure.member)}: {failure.status}: {failure.message}")
+        warn(f"{swept.place(failure.member)}: {failure.status}: {failure.message}")
     if len(result.failures) > NAMED:
-        warn(f"and {len(result.failures) - NAMED} more members without results; {results.TABLE} names all.")
+        warn(f"and {len(result.failures) - NAMED} more members without results; {TABLE} names all.")
     if result.interrupted:
         complain(INTERRUPTED)
         raise typer.Exit(130)
     if len(result.failures) == count:
         complain(f"none of the {count} members has results: {result.failures[0].message}")
         raise typer.Exit(1)
-
-
-def _listed(files: Sequence[str]) -> str:
-    figures = sum(name.endswith(".png") for name in files)
-    told = [name for name in files if not name.endswith(".png")]
-    return ", ".join(told + ([f"{figures} figure{'s' if figures > 1 else ''}"] if figures else []))
 
 
 def _check_request(cycles: float | None, transient: float | None, rtol: float | None, threads: int | None) -> None:
@@ -183,11 +159,3 @@ def _check_request(cycles: float | None, transient: float | None, rtol: float | 
         raise RequestError("\n".join(faults))
     if rtol is not None:
         tolerance("--rtol", rtol)
-
-
-def _check_scene(scene: Scene) -> None:
-    if scene.bearing is None:
-        raise RequestError(
-            "This scene has no bearing: nothing is integrated, and there are no quantities of an ensemble. Add a "
-            "[bearing], or loop over `Model.simulate` in Python."
-        )

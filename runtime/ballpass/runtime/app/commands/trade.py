@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from pathlib import Path
@@ -12,15 +11,15 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from ballpass.runtime.app.commands.options import Figures, Json, ResultsFolder, SceneFile, Settings
+from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.shared import (
     Stages,
-    check_folder,
-    faults_of,
+    command,
     load_model,
     read_asked,
-    reported,
-    warnings_shown,
+    results_folder,
+    show,
+    show_json,
 )
 from ballpass.runtime.contract.errors import RequestError
 
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def trade(
-    scene: SceneFile,
+    scene: options.SceneFile,
     of: Annotated[
         list[str] | None,
         typer.Option(
@@ -39,37 +38,40 @@ def trade(
             "repeated.",
         ),
     ] = None,
-    set_: Settings = None,
+    set_: options.Settings = None,
     members: Annotated[
         int | None, typer.Option(metavar="N", help="Parameter sets around the scene's; 40 if not given.")
     ] = None,
-    out: ResultsFolder = None,
-    json_: Json = False,
-    figures: Figures = True,
+    out: options.ResultsFolder = None,
+    json_: options.Json = False,
+    figures: options.Figures = True,
 ) -> None:
     """Measure error against time for methods and tolerances on a scene, with kinks located or not."""
     from ballpass.runtime.certify.trade import MEMBERS, measure_trade
-    from ballpass.runtime.certify.trade_report import to_plain, words
+    from ballpass.runtime.certify.trade_report import table, to_plain, words
 
-    with reported(), warnings_shown(), Stages() as stages, faults_of(scene):
+    with command(scene) as stages:
         stages("read")
-        asked = read_asked(scene, set_ or [])
-        folder = out if out is not None else Path("results") / asked.name
-        check_folder(folder)
-        model = load_model(scene, stages, "stepper", overrides=asked.overrides)
+        overrides = read_asked(scene, set_).overrides
+        folder = results_folder(out, scene)
+        model = load_model(scene, stages, "stepper", overrides=overrides)
         stages("measuring")
         count = MEMBERS if members is None else members
-        measured = measure_trade(model, of, parameters=asked.overrides, members=count, progress=stages.fraction)
+        measured = measure_trade(model, of, parameters=overrides, members=count, progress=stages.fraction)
         files = _draw(measured, folder, stages) if figures else []
     if json_:
-        typer.echo(json.dumps(to_plain(measured), indent=2, allow_nan=False))
+        show_json(to_plain(measured))
         return
-    console = Console()
-    console.print(_table(measured))
+    heads, rows = table(measured, measured.quantities[0])
+    title = f"{measured.title}: {measured.quantities[0]}, what no other way beats"
+    shown = Table(*heads, title=title, title_justify="left")
+    for row in rows:
+        shown.add_row(*row)
+    Console().print(shown)
     for line in words(measured):
-        console.print(line, highlight=False, soft_wrap=True)
+        show(line)
     if files:
-        console.print(f"in {folder}: {', '.join(files)}", highlight=False, soft_wrap=True, markup=False)
+        show(f"in {folder}: {', '.join(files)}")
 
 
 def read_error(text: str | None, of: list[str] | None, method: str | None, rtol: float | None) -> float | None:
@@ -110,16 +112,3 @@ def _draw(measured: Trade, folder: Path, stages: Stages) -> list[str]:
         save(draw_trade(measured, quantity), folder / name)
         names.append(name)
     return names
-
-
-def _table(measured: Trade) -> Table:
-    from ballpass.runtime.certify.trade_report import table
-
-    quantity = measured.quantities[0]
-    head, rows = table(measured, quantity)
-    shown = Table(title=f"{measured.title}: {quantity}, what no other way beats", title_justify="left")
-    for name in head:
-        shown.add_column(name)
-    for row in rows:
-        shown.add_row(*row)
-    return shown
