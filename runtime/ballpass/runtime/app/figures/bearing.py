@@ -14,7 +14,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.patches import Annulus, Circle
 
-from ballpass.runtime.app.figures.canvas import INK, SIGNAL
+from ballpass.runtime.app.figures.canvas import INK, SIGNAL, arrow, write
 from ballpass.runtime.app.figures.record import Array, Record
 
 #: White for unloaded, dark for the highest load: the order survives greyscale.
@@ -42,14 +42,12 @@ def draw_bearing(axes: Axes, record: Record, sample: int) -> float:
     look: dict[str, Any] = {"facecolor": "#ced4da", "edgecolor": INK, "linewidth": 1.2}
     axes.add_patch(Annulus((0.0, 0.0), outer_raceway + wall, wall, **look))
     axes.add_patch(Annulus((float(inner[0]), float(inner[1])), inner_raceway, wall, **look))
-    shaft = Circle(tuple(inner), inner_raceway - wall, facecolor="#f8f9fa", edgecolor="none")
-    axes.add_patch(shaft)
+    axes.add_patch(Circle(tuple(inner), inner_raceway - wall, facecolor="#f8f9fa", edgecolor="none"))
 
     highest = max(float(np.max(force)), 1e-12)
     scale = Normalize(0.0, highest)
-    for number, (angle, load) in enumerate(
-        zip(record.ball_angles(float(record.t[sample])), force, strict=True), start=1
-    ):
+    angles = record.ball_angles(float(record.t[sample]))
+    for number, (angle, load) in enumerate(zip(angles, force, strict=True), start=1):
         direction = np.array([np.cos(angle), np.sin(angle)])
         # a ball touches both raceways where it is loaded: half-way between them
         radius = (_reach(inner, inner_raceway, direction) + _reach(outer, outer_raceway, direction)) / 2.0
@@ -57,19 +55,11 @@ def draw_bearing(axes: Axes, record: Record, sample: int) -> float:
         colour = _LOAD_COLOURS(float(scale(max(load, 0.0))))
         axes.add_patch(Circle(tuple(centre), ball / 2.0, facecolor=colour, edgecolor="black", linewidth=0.9, zorder=3))
         bright = float(np.dot(colour[:3], (0.2126, 0.7152, 0.0722))) > 0.45
-        axes.text(
-            centre[0],
-            centre[1],
-            str(number),
-            ha="center",
-            va="center",
-            fontsize=8.5,
-            color="black" if bright else "white",
-            zorder=4,
-        )
+        contrast = "black" if bright else "white"
+        write(axes, centre, str(number), fontsize=8.5, color=contrast, zorder=4)
         if load > 0.02 * highest:
             place = (outer_raceway + wall + 0.42 * ball) * direction + outer
-            axes.text(place[0], place[1], _newton(load), ha="center", va="center", fontsize=8, color="#212529")
+            write(axes, place, _newton(load), fontsize=8, color="#212529")
     _draw_load(axes, record, sample, inner, 0.92 * (inner_raceway - wall))
     reach = outer_raceway + wall + 0.85 * ball
     axes.set_xlim(-reach, reach)
@@ -77,9 +67,8 @@ def draw_bearing(axes: Axes, record: Record, sample: int) -> float:
     axes.set_aspect("equal")
     axes.axis("off")
     assert axes.figure is not None  # the axes were made by a figure
-    bar = axes.figure.colorbar(
-        ScalarMappable(scale, _LOAD_COLOURS), ax=axes, shrink=0.6, pad=0.01, aspect=25, panchor=False
-    )
+    colours = ScalarMappable(scale, _LOAD_COLOURS)
+    bar = axes.figure.colorbar(colours, ax=axes, shrink=0.6, pad=0.01, aspect=25, panchor=False)
     bar.set_label("contact load [N]", fontsize=9)
     return factor
 
@@ -113,27 +102,13 @@ def _draw_load(axes: Axes, record: Record, sample: int, centre: Array, length: f
     size = float(np.hypot(*load))
     if size == 0.0:
         return
-    start, end = centre - 0.9 * length * load / size, centre + 0.9 * length * load / size
-    axes.annotate(
-        "",
-        xy=tuple(end),
-        xytext=tuple(start),
-        arrowprops={"arrowstyle": "-|>", "color": SIGNAL, "linewidth": 3, "mutation_scale": 20},
-    )
+    way = 0.9 * length * load / size
+    arrow(axes, centre - way, centre + way, SIGNAL, width=3.0)
     # beside the arrow, as far as the words' half width and half height ask for
     normal = np.array([load[1], -load[0]]) / size
     normal = normal if normal[0] > 0.0 else -normal
     place = centre + (0.46 * abs(normal[0]) + 0.22 * abs(normal[1]) + 0.06) * length * normal
-    axes.text(
-        place[0],
-        place[1],
-        f"load\n{_newton(size)}",
-        ha="center",
-        va="center",
-        fontsize=9,
-        color=SIGNAL,
-        fontweight="bold",
-    )
+    write(axes, place, f"load\n{_newton(size)}", fontsize=9, color=SIGNAL, fontweight="bold")
 
 
 def _newton(value: float) -> str:

@@ -7,15 +7,18 @@ Nothing here touches pyplot or leaves matplotlib's settings changed.
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
 from typing import Any, Literal, ParamSpec
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
+from numpy.typing import NDArray
 
 #: 1200 pixels wide.
 DPI = 150
@@ -57,14 +60,21 @@ _CAPTION: dict[str, Any] = {"fontsize": 8, "color": "#495057"}
 P = ParamSpec("P")
 
 
+@contextmanager
+def settings() -> Iterator[None]:
+    """Settings of this module within, whatever the user's are."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_SETTINGS)
+        yield
+
+
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Draw with the settings of this module, whatever the user's are, and put the user's back."""
+    """Draw with the settings of this module, and put the user's back."""
 
     @wraps(draw)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> Figure:
-        with matplotlib.rc_context():
-            matplotlib.rcdefaults()
-            matplotlib.rcParams.update(_SETTINGS)
+        with settings():
             return draw(*args, **kwargs)
 
     return wrapped
@@ -110,16 +120,37 @@ def caption(figure: Figure, title: str, text: str) -> None:
     figure.supxlabel(wrapped, x=0.012, ha="left", **_CAPTION)
 
 
-def degree_axis(axes: Axes, *, end: float = 360.0) -> None:
-    """Crank angle from 0 to `end` [deg] along x."""
-    axes.set_xlim(0.0, end)
-    axes.xaxis.set_major_locator(MultipleLocator(60.0 if end <= 360.0 else 90.0))
+def degree_axis(axes: Axes) -> None:
+    """A turn of the crank [deg] along x."""
+    axes.set_xlim(0.0, 360.0)
+    axes.xaxis.set_major_locator(MultipleLocator(60.0))
+
+
+def shade_windows(axes: Axes, windows: Iterable[tuple[float, float]], turns: Iterable[int]) -> None:
+    """Shade windows of the crank angle [rad] in some turns of an axis in degrees."""
+    for start, end in np.degrees(list(windows)):
+        for turn in turns:
+            axes.axvspan(start + 360.0 * turn, end + 360.0 * turn, color=PALE, linewidth=0, zorder=0)
+
+
+def legend_above(figure: Figure, *args: Any, **kwargs: Any) -> None:
+    """A legend in the corner right of the title; arguments as for `Figure.legend`."""
+    figure.legend(*args, **kwargs, loc="upper right", ncols=2, bbox_to_anchor=(0.995, 0.995))
+
+
+def arrow(axes: Axes, foot: NDArray[np.float64], tip: NDArray[np.float64], colour: str, *, width: float = 2.6) -> None:
+    """An arrow between two places of the axes."""
+    look = {"arrowstyle": "-|>", "color": colour, "linewidth": width, "mutation_scale": 17, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", xy=(tip[0], tip[1]), xytext=(foot[0], foot[1]), arrowprops=look, zorder=7)
+
+
+def write(axes: Axes, at: NDArray[np.float64], words: str, **look: Any) -> None:
+    """Words centred at a place of the axes; `look` as for `Axes.text`."""
+    axes.text(float(at[0]), float(at[1]), words, **({"ha": "center", "va": "center"} | look))
 
 
 def save(figure: Figure, path: Path) -> Path:
     """Write a PNG whose bytes depend on the drawing alone: no date, no version of the software."""
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_SETTINGS)
+    with settings():
         figure.savefig(path, format="png", dpi=DPI, metadata={"Software": None})
     return path

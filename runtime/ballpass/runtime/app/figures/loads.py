@@ -10,11 +10,12 @@ from ballpass.runtime.app.figures.canvas import (
     FIRST,
     GREY,
     INK,
-    PALE,
     SECOND,
     degree_axis,
     frame,
+    legend_above,
     new_figure,
+    shade_windows,
     styled,
 )
 from ballpass.runtime.app.figures.record import Array, Record
@@ -43,13 +44,15 @@ def load_curve(record: Record) -> Figure:
     figure = new_figure(1.3 + 1.9 * rows, layout=None)
     grid = figure.add_gridspec(rows, 2)
     angle, order = _last_turn(record)
+    mechanism = record.manifest.mechanism
+    bodies = {item[0]: (item[2], item[4]) for item in mechanism.joints} if mechanism is not None else {}
     panels: list[Axes] = []
     for row, joint in enumerate(joints):
         for column, axis in enumerate("xy"):
             axes = figure.add_subplot(grid[row, column])
             title = axis
             if joint:
-                first, second = _bodies(record, joint)
+                first, second = bodies[joint]
                 title = f"{axis} at {joint}: {second} on {first}"
                 _curve(axes, angle, record.values(f"reaction.{joint}.{axis}")[order], FIRST, "reaction of the joint")
             if ring_load is not None and row == 0:
@@ -68,15 +71,13 @@ def load_curve(record: Record) -> Figure:
     for axes in panels:
         degree_axis(axes)
         axes.axhline(0.0, color=GREY, linewidth=0.6)
-        for start, end in windows:
-            for shift in (0.0, -360.0):
-                axes.axvspan(np.degrees(start) + shift, np.degrees(end) + shift, color=PALE, linewidth=0, zorder=0)
+        shade_windows(axes, windows, (0, -1))
         low, high = axes.get_ylim()
         axes.set_ylim(low, high + 0.05 * (high - low))
     for axes in panels[-1:] if with_torque else panels[-2:]:
         axes.set_xlabel("crank angle [°]")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="upper right", ncols=2, bbox_to_anchor=(0.995, 0.995))
+    legend_above(figure, handles, labels)
     shaded = " Shaded: an applied load acts." if windows else ""
     frame(
         figure,
@@ -107,12 +108,6 @@ def _last_turn(record: Record) -> tuple[Array, Array]:
     return angle[order], index[order]
 
 
-def _bodies(record: Record, joint: str) -> tuple[str, str]:
-    mechanism = record.manifest.mechanism
-    assert mechanism is not None  # a joint's name comes from it
-    return next((item[2], item[4]) for item in mechanism.joints if item[0] == joint)
-
-
 def _curve(axes: Axes, angle: Array, values: Array, look: dict[str, object], label: str) -> None:
     # close the turn: the curve starts and ends at the frame of the axes
     closed_angle = np.concatenate((angle[-1:] - 360.0, angle, angle[:1] + 360.0))
@@ -133,6 +128,7 @@ def ball_loads(record: Record) -> Figure:
         label = "crank angle [°]" if record.manifest.mechanism is not None else "angle of the shaft [°]"
     else:
         along, label = record.t[window] * 1e3, "time [ms]"
+    windows = record.gate_windows() if record.turns else ()
     top = max(float(np.max(force)), 1e-12)
     bottom = min(float(np.min(force)), 0.0)
     figure = new_figure(1.5 + max(0.5 * balls, 2.0), layout=None)
@@ -140,10 +136,7 @@ def ball_loads(record: Record) -> Figure:
     for number, axes in enumerate(strips, start=1):
         axes.fill_between(along, 0.0, force[:, number - 1], color=INK, alpha=0.35, linewidth=0)
         axes.plot(along, force[:, number - 1], color=INK, linewidth=0.9)
-        for start, end in record.gate_windows() if record.turns else ():
-            first, last = np.degrees(start), np.degrees(end)
-            for turn in range(-1, int(along.max() // 360.0) + 1):
-                axes.axvspan(first + 360.0 * turn, last + 360.0 * turn, color=PALE, linewidth=0, zorder=0)
+        shade_windows(axes, windows, range(-1, int(along.max() // 360.0) + 1))
         axes.set_ylim(min(1.1 * bottom, 0.0), 1.1 * top)
         axes.locator_params(axis="y", nbins=2)
         axes.text(1.01, 0.4, f"ball {number}", transform=axes.transAxes, fontsize=9, va="center")
@@ -154,7 +147,7 @@ def ball_loads(record: Record) -> Figure:
     strips[-1].set_xlabel(label)
     figure.supylabel("contact load [N]", fontsize=9.5)
     shown = "last two turns" if len(record.turns) >= 2 else "last turn" if record.turns else "the whole record"
-    shaded = " Shaded: an applied load acts." if record.gate_windows() and record.turns else ""
+    shaded = " Shaded: an applied load acts." if windows else ""
     frame(
         figure,
         "Contact load of every ball",

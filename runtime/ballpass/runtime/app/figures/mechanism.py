@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
-from ballpass.runtime.app.figures.canvas import GREY, INK, SAND, SIGNAL
+from ballpass.runtime.app.figures.canvas import GREY, INK, SAND, SIGNAL, arrow, write
 from ballpass.runtime.app.figures.record import FRAME, Array, Record
 
 #: Positions in which the paths of moving joints are traced.
@@ -21,9 +23,7 @@ def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
     assert mechanism is not None  # drawn of scenes with a mechanism only
     now = record.points(float(record.t[sample]))
     trace = _traces(record, sample)
-    used = list(
-        dict.fromkeys((body, point) for _, _, b, p, c, q in mechanism.joints for body, point in ((b, p), (c, q)))
-    )
+    used = list(dict.fromkeys(key for _, _, b, p, c, q in mechanism.joints for key in ((b, p), (c, q))))
     everything = np.vstack([trace[key] for key in used])
     low, high = everything.min(axis=0), everything.max(axis=0)
     size = max(float(np.max(high - low)), 1e-9)
@@ -32,22 +32,23 @@ def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
         path = trace[key]
         if float(np.max(np.ptp(path, axis=0))) > 1e-9 * size:
             axes.plot(path[:, 0], path[:, 1], color="#adb5bd", linewidth=0.9, linestyle=(0, (3, 2)), zorder=1)
+    busy: list[tuple[Array, Array]] = []  # a place, and a way from there along which something is drawn
     for _, kind, first, guide, second, block in mechanism.joints:
         if kind == "prismatic":
             direction = _guide_direction(record, now, trace, (first, guide), (second, block))
             _draw_guide(axes, trace[second, block], now[second, block], direction, size, fixed=first == FRAME)
+            busy += [(now[second, block], direction * size), (now[second, block], -direction * size)]
     _draw_links(axes, used, now, size)
     for _, kind, first, point, second, _ in mechanism.joints:
         if kind == "revolute":
             if FRAME in (first, second):
                 _draw_ground(axes, now[first, point], size)
-            axes.add_patch(
-                Circle(
-                    tuple(now[first, point]), 0.017 * size, facecolor="white", edgecolor=INK, linewidth=1.5, zorder=6
-                )
+            pin = Circle(
+                tuple(now[first, point]), 0.017 * size, facecolor="white", edgecolor=INK, linewidth=1.5, zorder=6
             )
+            axes.add_patch(pin)
     arrows = _draw_forces(axes, record, now, sample, size)
-    _draw_names(axes, record, now, _busy(record, used, now, trace, size) + arrows, size)
+    _draw_names(axes, record, now, busy + arrows, size)
     corners = np.vstack([everything, *((at + way)[None, :] for at, way in arrows)])
     margin = 0.16 * size
     axes.set_xlim(corners[:, 0].min() - margin, corners[:, 0].max() + margin)
@@ -59,12 +60,8 @@ def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
 def _traces(record: Record, sample: int) -> _Points:
     """Positions of every point through a turn: (body, point) -> (_TRACE + 1, 2) [m]."""
     length = record.cycle_length
-    times = (
-        [float(record.t[sample])]
-        if length is None
-        else [float(t) for t in record.t[sample] + np.linspace(0.0, length, _TRACE + 1)]
-    )
-    poses = [record.points(t) for t in times]
+    times = record.t[sample] + (np.zeros(1) if length is None else np.linspace(0.0, length, _TRACE + 1))
+    poses = [record.points(float(t)) for t in times]
     return {key: np.array([pose[key] for pose in poses]) for key in poses[0]}
 
 
@@ -82,9 +79,8 @@ def _draw_links(axes: Axes, used: list[tuple[str, str]], now: _Points, size: flo
         elif len(joints) > 2:
             centre = corners.mean(axis=0)
             order = np.argsort(np.arctan2(*(corners - centre).T[::-1]))
-            axes.add_patch(
-                Polygon(corners[order], facecolor="#8fa3bf", edgecolor=INK, linewidth=1.6, joinstyle="round", zorder=3)
-            )
+            look: dict[str, Any] = {"facecolor": "#8fa3bf", "edgecolor": INK, "linewidth": 1.6, "joinstyle": "round"}
+            axes.add_patch(Polygon(corners[order], zorder=3, **look))
         center = now.get((body, "center_of_mass"))
         if center is not None:
             axes.plot(*center, marker="o", markersize=6, color="white", markeredgecolor=INK, zorder=4)
@@ -93,34 +89,17 @@ def _draw_links(axes: Axes, used: list[tuple[str, str]], now: _Points, size: flo
 
 def _draw_ground(axes: Axes, at: Array, size: float) -> None:
     """Pin on a hatched base."""
-    half, height = 0.05 * size, 0.07 * size
-    base = at[1] - height
-    axes.add_patch(
-        Polygon(
-            np.array([at, (at[0] - half, base), (at[0] + half, base)]),
-            facecolor="#e9ecef",
-            edgecolor=INK,
-            linewidth=1.3,
-            zorder=2,
-        )
-    )
-    _hatched_wall(
-        axes, np.array([at[0] - 1.5 * half, base]), np.array([at[0] + 1.5 * half, base]), np.array([0.0, -1.0]), size
-    )
+    half, base = 0.05 * size, at - np.array([0.0, 0.07 * size])
+    across = np.array([half, 0.0])
+    triangle = np.array([at, base - across, base + across])
+    axes.add_patch(Polygon(triangle, facecolor="#e9ecef", edgecolor=INK, linewidth=1.3, zorder=2))
+    _hatched_wall(axes, base - 1.5 * across, base + 1.5 * across, np.array([0.0, -1.0]), size)
 
 
 def _hatched_wall(axes: Axes, start: Array, end: Array, outward: Array, size: float) -> None:
     depth = 0.022 * size * outward
-    axes.add_patch(
-        Polygon(
-            [start, end, end + depth, start + depth],
-            facecolor="white",
-            edgecolor=GREY,
-            hatch="/////",
-            linewidth=0.0,
-            zorder=0.8,
-        )
-    )
+    corners = [start, end, end + depth, start + depth]
+    axes.add_patch(Polygon(corners, facecolor="white", edgecolor=GREY, hatch="/////", linewidth=0.0, zorder=0.8))
     axes.plot(*np.array([start, end]).T, color=INK, linewidth=1.5, zorder=2)
 
 
@@ -141,9 +120,8 @@ def _draw_guide(axes: Axes, path: Array, at: Array, direction: Array, size: floa
     """Slider block between the two walls of its guide."""
     normal = np.array([-direction[1], direction[0]])
     half_length, half_width = 0.085 * size, 0.055 * size
-    corners = [
-        at + a * half_length * direction + b * half_width * normal for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    ]
+    signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    corners = [at + a * half_length * direction + b * half_width * normal for a, b in signs]
     axes.add_patch(Polygon(corners, facecolor=SAND, edgecolor=INK, linewidth=1.5, alpha=1.0, zorder=2.5))
     if not fixed:
         ends = np.array([at - 3.0 * half_length * direction, at + 3.0 * half_length * direction])
@@ -157,66 +135,32 @@ def _draw_guide(axes: Axes, path: Array, at: Array, direction: Array, size: floa
 
 
 def _draw_names(axes: Axes, record: Record, now: _Points, busy: list[tuple[Array, Array]], size: float) -> None:
-    """Names of the joints, those at one place together, where the drawing is empty.
-
-    `busy` : pairs of a place and a direction in which something is drawn from it.
-    """
+    """Names of the joints, those at one place together, on the side where fewest links and forces leave the place."""
     mechanism = record.manifest.mechanism
     assert mechanism is not None
     places: list[tuple[Array, list[str]]] = []
     for name, _, _, _, body, point in mechanism.joints:
         at = now[body, point]
-        shared = [names for place, names in places if _close(place, at, size)]
-        if shared:
-            shared[0].append(name)
-        else:
+        shared = next((names for place, names in places if np.hypot(*(place - at)) < 0.01 * size), None)
+        if shared is None:
             places.append((at, [name]))
+        else:
+            shared.append(name)
+    ends = {key for item in mechanism.joints for key in (item[2:4], item[4:6])}
+    links = {key: place for key, place in now.items() if key in ends or key[1] == "center_of_mass"}
     blocks = [now[item[4], item[5]] for item in mechanism.joints if item[1] == "prismatic"]
     compass = [np.array([np.cos(angle), np.sin(angle)]) for angle in np.radians(np.arange(0.0, 360.0, 45.0))]
-    for place, names in places:
-        taken = [way / np.hypot(*way) for at, way in busy if _close(at, place, size) and np.hypot(*way) > 0.0]
+    for at, names in places:
+        bodies = {key[0] for key, place in links.items() if np.hypot(*(place - at)) < 0.01 * size}
+        ways = [place - at for (body, _), place in links.items() if body in bodies - {FRAME}]
+        ways += [way for foot, way in busy if np.hypot(*(foot - at)) < 0.01 * size]
+        ways += [np.array([0.0, -size])] if FRAME in bodies else []  # its base or guide
+        taken = [way / np.hypot(*way) for way in ways if np.hypot(*way) > 1e-6 * size]
         # the direction whose nearest neighbour is farthest; the first of equals
-        free = min(compass, key=lambda way: round(max((float(way @ other) for other in taken), default=0.0), 9))
-        distance = 0.15 if any(_close(block, place, size) for block in blocks) else 0.052
-        axes.text(
-            place[0] + distance * size * free[0],
-            place[1] + distance * size * free[1],
-            ", ".join(names),
-            ha="center",
-            va="center",
-            fontsize=10,
-            fontweight="bold",
-            color="#212529",
-            zorder=8,
-        )
-
-
-def _close(one: Array, other: Array, size: float) -> bool:
-    return float(np.hypot(*(one - other))) < 0.01 * size
-
-
-def _busy(
-    record: Record, used: list[tuple[str, str]], now: _Points, trace: _Points, size: float
-) -> list[tuple[Array, Array]]:
-    """Where links, bases and guides run: pairs of a place and a direction."""
-    mechanism = record.manifest.mechanism
-    assert mechanism is not None
-    busy = [
-        (now[key], now[other] - now[key])
-        for key in used
-        for other in used
-        if key[0] == other[0] != FRAME and key != other
-    ]
-    # a centre of mass is in the way where it lies beside a joint
-    marks = [(now[key], now[key[0], "center_of_mass"] - now[key]) for key in used if (key[0], "center_of_mass") in now]
-    busy += [(at, way) for at, way in marks if float(np.hypot(*way)) < 0.08 * size]
-    for _, kind, first, point, second, block in mechanism.joints:
-        if kind == "prismatic":
-            direction = _guide_direction(record, now, trace, (first, point), (second, block))
-            busy += [(now[second, block], direction), (now[second, block], -direction)]
-        elif FRAME in (first, second):
-            busy.append((now[first, point], np.array([0.0, -1.0])))
-    return busy
+        free = min(compass, key=lambda way: round(max((float(way @ other) for other in taken), default=0.0), 6))
+        distance = 0.15 if any(np.hypot(*(block - at)) < 0.01 * size for block in blocks) else 0.052
+        place = at + distance * size * free
+        write(axes, place, ", ".join(names), fontsize=10, fontweight="bold", color="#212529", zorder=8)
 
 
 def _draw_forces(axes: Axes, record: Record, now: _Points, sample: int, size: float) -> list[tuple[Array, Array]]:
@@ -228,26 +172,23 @@ def _draw_forces(axes: Axes, record: Record, now: _Points, sample: int, size: fl
     """
     reactions = _reactions(record, now, sample)
     applied = [(name, now[key], force) for name, key, force in record.applied_forces(float(record.t[sample]))]
-    everything = [force for _, force in reactions] + [force for _, _, force in applied]
-    greatest = max((float(np.hypot(*force)) for force in everything), default=0.0)
+    # a reaction pulls at its place; an applied force pushes: its tip is where it acts
+    forces = [("", at, force, 1.0) for at, force in reactions]
+    forces += [(f"{name}\n", at, force, -1.0) for name, at, force in applied]
+    greatest = max((float(np.hypot(*force)) for _, _, force, _ in forces), default=0.0)
     drawn: list[tuple[Array, Array]] = []
-    for at, force in reactions:
+    for name, at, force, side in forces:
         strength = float(np.hypot(*force))
         if strength <= 0.02 * greatest:
             continue
-        tip = at + _arrow_length(strength / greatest, size) * force / strength
-        _draw_arrow(axes, at, tip, SIGNAL)
-        _write_force(axes, tip, force[0] >= 0.0, f"{strength:.0f} N", SIGNAL, size)
-        drawn.append((at, tip - at))
-    for name, at, force in applied:
-        strength = float(np.hypot(*force))
-        if strength <= 0.02 * greatest:
-            continue
-        # it pushes: its tip is where it acts
-        foot = at - _arrow_length(strength / greatest, size) * force / strength
-        _draw_arrow(axes, foot, at, INK)
-        _write_force(axes, foot, force[0] <= 0.0, f"{name}\n{strength:.0f} N", INK, size)
-        drawn.append((at, foot - at))
+        end = at + side * (0.08 + 0.24 * strength / greatest) * size * force / strength
+        colour = SIGNAL if side > 0.0 else INK
+        arrow(axes, *((at, end) if side > 0.0 else (end, at)), colour)
+        right = side * force[0] >= 0.0
+        place = end + np.array([0.02 * size if right else -0.02 * size, 0.0])
+        look: dict[str, Any] = {"color": colour, "fontweight": "bold", "fontsize": 9.5, "zorder": 8}
+        write(axes, place, f"{name}{strength:.0f} N", ha="left" if right else "right", **look)
+        drawn.append((at, end - at))
     return drawn
 
 
@@ -257,50 +198,9 @@ def _reactions(record: Record, now: _Points, sample: int) -> list[tuple[Array, A
     assert mechanism is not None
     found: list[tuple[Array, Array]] = []
     for name, kind, first, point, second, _ in mechanism.joints:
-        if (
-            kind != "revolute"
-            or FRAME not in (first, second)
-            or not record.has(f"reaction.{name}.x", f"reaction.{name}.y")
-        ):
-            continue
-        # the reaction is the force of the second body on the first
-        sign = 1.0 if first == FRAME else -1.0
-        force = sign * np.array([record.values(f"reaction.{name}.{axis}")[sample] for axis in "xy"])
-        found.append((now[first, point], force))
+        outputs = [f"reaction.{name}.{axis}" for axis in "xy"]
+        if kind == "revolute" and FRAME in (first, second) and record.has(*outputs):
+            # the reaction is the force of the second body on the first
+            sign = 1.0 if first == FRAME else -1.0
+            found.append((now[first, point], sign * np.array([record.values(one)[sample] for one in outputs])))
     return found
-
-
-def _arrow_length(share: float, size: float) -> float:
-    """Length of the arrow of a force [m], for its share of the greatest one."""
-    return (0.08 + 0.24 * share) * size
-
-
-def _draw_arrow(axes: Axes, foot: Array, tip: Array, colour: str) -> None:
-    axes.annotate(
-        "",
-        xy=tuple(tip),
-        xytext=tuple(foot),
-        arrowprops={
-            "arrowstyle": "-|>",
-            "color": colour,
-            "linewidth": 2.6,
-            "mutation_scale": 17,
-            "shrinkA": 0.0,
-            "shrinkB": 0.0,
-        },
-        zorder=7,
-    )
-
-
-def _write_force(axes: Axes, at: Array, right: bool, words: str, colour: str, size: float) -> None:
-    axes.text(
-        at[0] + (0.02 if right else -0.02) * size,
-        at[1],
-        words,
-        ha="left" if right else "right",
-        va="center",
-        color=colour,
-        fontweight="bold",
-        fontsize=9.5,
-        zorder=8,
-    )

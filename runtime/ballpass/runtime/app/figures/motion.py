@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import StrMethodFormatter
 
-from ballpass.runtime.app.figures.canvas import GREY, INK, SAND, SIGNAL, frame, new_figure, styled
+from ballpass.runtime.app.figures.canvas import GREY, INK, SAND, SIGNAL, frame, legend_above, new_figure, styled
 from ballpass.runtime.app.figures.record import Array, Record
 from ballpass.runtime.ask.observables import hermite, orbits, stroboscopic_points
 from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
 
 #: Points drawn between two samples where velocities are known: a resonance has but ten samples a period.
 _FINER = 8
+
+#: How crank harmonics and multiples of the ball-pass frequency are marked.
+_HARMONICS: dict[str, Any] = {"color": "#adb5bd", "linestyle": (0, (1, 1.5)), "linewidth": 0.7}
+_BALL_PASS: dict[str, Any] = {"color": SIGNAL, "linestyle": (0, (6, 2)), "linewidth": 1.2}
 
 #: Ratio of the extents from which equal scales would leave a sliver.
 _SLIVER = 4.0
@@ -46,9 +52,8 @@ def orbit(record: Record) -> Figure:
     x, y = 1e6 * x, 1e6 * y
     axes.plot(x, y, color=INK, linewidth=1.1, label="last turn" if record.turns else "path")
     _highlight_windows(axes, record, t, x, y)
-    axes.plot(
-        x[0], y[0], "o", color="white", markeredgecolor=INK, markersize=8, label="start of the last turn", zorder=4
-    )
+    start: dict[str, Any] = {"color": "white", "markeredgecolor": INK, "markersize": 8}
+    axes.plot(x[0], y[0], "o", label="start of the last turn", zorder=4, **start)
     axes.plot(x[-1], y[-1], "s", color=INK, markersize=4, label="end of the last turn", zorder=5)
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     wide, high = (max(float(np.ptp(record.values(f"inner.{axis}"))), 1e-15) for axis in "xy")
@@ -60,10 +65,8 @@ def orbit(record: Record) -> Figure:
     scales = "Equal scales." if equal else "Each axis has a scale of its own."
     gap = ""
     if record.cycle_length is not None and record.turns:
-        path = orbits(record.t, record.values("inner.x"), record.values("inner.y"), cycle_length=record.cycle_length)[
-            -1
-        ]
-        gap = f" Start and end of the last turn are {1e6 * path.gap:.3g} µm apart."
+        path = orbits(record.t, record.values("inner.x"), record.values("inner.y"), cycle_length=record.cycle_length)
+        gap = f" Start and end of the last turn are {1e6 * path[-1].gap:.3g} µm apart."
     frame(figure, "Orbit of the inner ring's centre", f"{scales}{gap} {record.settings()}.", left=0.9, right=2.1)
     return figure
 
@@ -89,6 +92,7 @@ def spectra(record: Record) -> Figure:
         for axis in "xy"
     }
     marks = record.frequencies()
+    frequencies = (marks.shaft, marks.ball_pass_outer) if marks is not None and marks.shaft > 0.0 else ()
     figure = new_figure(5.6, layout=None)
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     peak = max(float(np.max(s.amplitude)) for s in lines.values())
@@ -97,15 +101,14 @@ def spectra(record: Record) -> Figure:
     for axes, (axis, spectrum), letter in zip(panels, lines.items(), "ab", strict=True):
         shown = (spectrum.frequency > 0.0) & (spectrum.frequency <= limit)
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))  # not by mathtext, which is slow
+        axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))  # not by mathtext, which is slow
         axes.minorticks_off()
         axes.set_ylim(floor, 4.0 * peak)
-        if marks is not None and marks.shaft > 0.0:
-            _mark(axes, marks.shaft, limit, color="#adb5bd", style=(0, (1, 1.5)), width=0.7)
-            _mark(axes, marks.ball_pass_outer, limit, color=SIGNAL, style=(0, (6, 2)), width=1.2)
-        axes.vlines(
-            spectrum.frequency[shown], floor, np.maximum(spectrum.amplitude[shown], floor), color=INK, linewidth=1.2
-        )
+        for frequency, look in zip(frequencies, (_HARMONICS, _BALL_PASS), strict=False):
+            every = frequency * np.arange(1, int(limit / frequency) + 1)
+            axes.vlines(every, 0.0, 1.0, transform=axes.get_xaxis_transform(), zorder=0.5, **look)
+        tops = np.maximum(spectrum.amplitude[shown], floor)
+        axes.vlines(spectrum.frequency[shown], floor, tops, color=INK, linewidth=1.2)
         dots = shown & (spectrum.amplitude > floor)
         axes.plot(spectrum.frequency[dots], spectrum.amplitude[dots], "o", color=INK, markersize=2.6)
         axes.grid(visible=False, axis="x")
@@ -114,39 +117,18 @@ def spectra(record: Record) -> Figure:
     panels[-1].set_xlim(0.0, limit)
     panels[-1].set_xlabel("frequency [Hz]")
     spectrum = lines["x"]
-    cycles = (
-        "the whole record"
-        if spectrum.cycles is None
-        else f"{spectrum.cycles} whole turn{'s' if spectrum.cycles != 1 else ''}"
-    )
+    whole = f"{spectrum.cycles} whole turn{'s' if spectrum.cycles != 1 else ''}"
+    cycles = "the whole record" if spectrum.cycles is None else whole
     weighting = "no window" if window == "boxcar" else "Hann window"
     text = f"Amplitude, mean removed, {cycles}, {weighting}, lines {spectrum.resolution:.3g} Hz apart."
-    if marks is not None and marks.shaft > 0.0:
+    if frequencies:
+        shaft, ball_pass = frequencies
         crank = "crank" if record.manifest.mechanism is not None else "shaft"
-        figure.legend(
-            handles=[
-                Line2D([], [], color="#868e96", linestyle=(0, (1, 1.5)), linewidth=1.2),
-                Line2D([], [], color=SIGNAL, linestyle=(0, (6, 2)), linewidth=1.4),
-            ],
-            labels=[
-                f"{crank} harmonics, {marks.shaft:.4g} Hz",
-                f"ball pass (BPFO) and multiples, {marks.ball_pass_outer:.4g} Hz",
-            ],
-            loc="upper right",
-            ncols=2,
-            bbox_to_anchor=(0.995, 0.995),
-        )
-        text += _unresolved(marks.ball_pass_outer, marks.shaft, spectrum.resolution, crank)
+        words = f"{crank} harmonics, {shaft:.4g} Hz", f"ball pass (BPFO) and multiples, {ball_pass:.4g} Hz"
+        legend_above(figure, [Line2D([], [], **look | {"linewidth": 1.4}) for look in (_HARMONICS, _BALL_PASS)], words)
+        text += _unresolved(ball_pass, shaft, spectrum.resolution, crank)
     frame(figure, "Displacement spectra", f"{text} {record.settings()}.", hspace=0.25)
     return figure
-
-
-def _mark(
-    axes: Axes, frequency: float, limit: float, *, color: str, style: tuple[float, tuple[float, ...]], width: float
-) -> None:
-    marks = frequency * np.arange(1, int(limit / frequency) + 1)
-    across = axes.get_xaxis_transform()
-    axes.vlines(marks, 0.0, 1.0, transform=across, color=color, linestyle=style, linewidth=width, zorder=0.5)
 
 
 def _shown_range(spectra: list[AmplitudeSpectrum], *, shaft: float) -> float:
@@ -184,26 +166,16 @@ def phase_portrait(record: Record) -> Figure:
         points = stroboscopic_points(
             record.t, record.values("inner.x"), record.values("inner.vx"), cycle_length=record.cycle_length
         )
-        axes.plot(
-            points.position * 1e6,
-            points.velocity * 1e3,
-            "o",
-            color=SAND,
-            markeredgecolor="black",
-            markeredgewidth=0.9,
-            markersize=7.5,
-            label="stroboscopic points, once a turn",
-            zorder=5,
-        )
-        count = points.time.size
-        angle = (
-            np.degrees(record.parameter(record.manifest.mechanism.start_angle)) if record.manifest.mechanism else 0.0
-        )
-        what = "crank" if record.manifest.mechanism else "shaft"
+        look: dict[str, Any] = {"color": SAND, "markeredgecolor": "black", "markeredgewidth": 0.9, "markersize": 7.5}
+        label = "stroboscopic points, once a turn"
+        axes.plot(1e6 * points.position, 1e3 * points.velocity, "o", label=label, zorder=5, **look)
+        count, mechanism = points.time.size, record.manifest.mechanism
+        angle = np.degrees(record.parameter(mechanism.start_angle)) if mechanism else 0.0
+        what = "crank" if mechanism else "shaft"
         text = f"{count} stroboscopic point{'' if count == 1 else 's'}, at {what} angle {angle % 360.0:g}°."
     axes.axhline(0.0, color=GREY, linewidth=0.6)
     axes.set_xlabel("x of the inner ring's centre [µm]")
     axes.set_ylabel("velocity along x [mm/s]")
-    figure.legend(loc="upper right", ncols=2, bbox_to_anchor=(0.995, 0.995))
+    legend_above(figure)
     frame(figure, "Phase portrait along x", f"{text} {record.settings()}.", left=0.9)
     return figure

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, withStroke
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+from matplotlib.ticker import MaxNLocator, NullFormatter, StrMethodFormatter
 
 from ballpass.runtime.app.figures.canvas import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
 from ballpass.runtime.contract.errors import RequestError
@@ -83,7 +83,7 @@ def draw_sweep(
         panel.set_ylabel(f"{quantity} [{unit}]")
     else:
         mesh = _map(panel, axes[0], axes[1], values)
-        figure.colorbar(mesh, ax=panel, label=f"{quantity} [{unit}]", format=FuncFormatter(_plain))
+        figure.colorbar(mesh, ax=panel, label=f"{quantity} [{unit}]", format=StrMethodFormatter("{x:g}"))
     missing = int(np.count_nonzero(~np.isfinite(values)))
     lost = f" Crosses mark {missing} of {values.size} without a result." if missing else ""
     caption(figure, f"{title}: {quantity}", f"{values.size} parameter sets. {text}{lost}")
@@ -93,14 +93,8 @@ def draw_sweep(
 def _line(panel: Axes, varied: VariedAxis, values: np.ndarray) -> None:
     panel.plot(varied.values, values, color=INK, marker="o", markersize=4, linewidth=1.4)
     missing = ~np.isfinite(values)
-    panel.plot(
-        varied.values[missing],
-        np.full(np.count_nonzero(missing), 0.02),
-        transform=panel.get_xaxis_transform(),
-        linestyle="none",
-        marker="x",
-        color=SIGNAL,
-    )
+    places = varied.values[missing]
+    panel.plot(places, np.full(places.size, 0.02), "x", transform=panel.get_xaxis_transform(), color=SIGNAL)
     _scale(panel, "x", varied)
 
 
@@ -114,7 +108,7 @@ def _map(panel: Axes, first: VariedAxis, second: VariedAxis, values: np.ndarray)
         halo: list[AbstractPathEffect] = [withStroke(linewidth=2.4, foreground=PALE)]
         lines = panel.contour(first.values, second.values, shown, levels=levels, colors="black", linewidths=0.8)
         lines.set_path_effects(halo)
-        for label in panel.clabel(lines, fmt=_plain, fontsize=8):
+        for label in panel.clabel(lines, fmt="%g", fontsize=8):
             label.set_path_effects(halo)
     across, up = np.meshgrid(first.values, second.values)
     missing = np.ma.getmaskarray(shown)
@@ -139,11 +133,7 @@ def _scale(panel: Axes, axis: str, varied: VariedAxis) -> None:
         return
     panel.set(**{f"{axis}scale": "log"})
     ruler = panel.xaxis if axis == "x" else panel.yaxis
-    ruler.set_major_formatter(FuncFormatter(_plain))
+    ruler.set_major_formatter(StrMethodFormatter("{x:g}"))
     # within a decade there is hardly a power of ten to read
     decades = math.log10(float(np.max(varied.values) / np.min(varied.values)))
-    ruler.set_minor_formatter(FuncFormatter(_plain) if decades < 1.2 else NullFormatter())
-
-
-def _plain(value: float, _: object = None) -> str:
-    return f"{value:g}"
+    ruler.set_minor_formatter(StrMethodFormatter("{x:g}") if decades < 1.2 else NullFormatter())

@@ -50,34 +50,22 @@ def tornado(report: SensitivityReport, quantity: str) -> Figure:
         raise RequestError(f"tornado: no parameter of this report moves {quantity}: there is nothing to draw.")
     figure = new_figure(1.6 + 0.3 * len(pairs))
     axes = figure.add_subplot()
-    longest = max(abs(pair.dimensionless) for pair in pairs)
+    bars = [pair.dimensionless for pair in pairs]
     for row, pair in enumerate(pairs):
         colour, hatch, _ = _LOOKS[pair.check.verdict]
-        axes.barh(row, pair.dimensionless, height=0.66, color=colour, hatch=hatch, edgecolor="#212529", linewidth=0.6)
-        beyond = math.copysign(0.012 * longest, pair.dimensionless)
-        axes.text(
-            pair.dimensionless + beyond,
-            row,
-            f"{pair.dimensionless:+.3g}".replace("-", "−"),
-            ha="left" if pair.dimensionless > 0.0 else "right",
-            va="center",
-            fontsize=8.5,
-        )
+        bar = axes.barh(row, bars[row], height=0.66, color=colour, hatch=hatch, edgecolor="#212529", linewidth=0.6)
+        axes.bar_label(bar, [f"{bars[row]:+.3g}".replace("-", "−")], padding=3, fontsize=8.5)
     axes.set_yticks(range(len(pairs)), [pair.parameter for pair in pairs], fontsize=8.5)
     axes.set_ylim(len(pairs) - 0.4, -0.6)
-    left = min(0.0, *(pair.dimensionless for pair in pairs))
-    right = max(0.0, *(pair.dimensionless for pair in pairs))
+    left, right = min(0.0, *bars), max(0.0, *bars)
     room = 0.14 * (right - left)
     axes.set_xlim(left - (room if left < 0.0 else 0.02 * right), right + (room if right > 0.0 else -0.02 * left))
     axes.axvline(0.0, color=GREY, linewidth=1.0)
     axes.grid(visible=False, axis="y")
     axes.set_xlabel("change of the quantity per change of the parameter, (p/Q) dQ/dp  [% per %]")
-    present = dict.fromkeys(pair.check.verdict for pair in pairs)
-    handles = [
-        Patch(facecolor=_LOOKS[verdict][0], hatch=_LOOKS[verdict][1], edgecolor="#212529", label=_LOOKS[verdict][2])
-        for verdict in Verdict
-        if verdict in present
-    ]
+    present = {pair.check.verdict for pair in pairs}
+    looks = [_LOOKS[verdict] for verdict in Verdict if verdict in present]
+    handles = [Patch(facecolor=c, hatch=hatch, edgecolor="#212529", label=words) for c, hatch, words in looks]
     axes.legend(handles=handles, loc="lower right" if right >= -left else "lower left")
     zero = sum(not math.isfinite(pair.dimensionless) for pair in report.of(quantity))
     hidden = len(report.parameters) - len(pairs) - zero

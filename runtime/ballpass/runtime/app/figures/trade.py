@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from ballpass.runtime.app.figures.canvas import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
 from ballpass.runtime.certify.trade import Measured, Trade
@@ -32,36 +34,26 @@ def draw_trade(trade: Trade, quantity: str | None = None) -> Figure:
     axes = figure.add_subplot()
     groups: dict[tuple[str, str], list[Measured]] = {}
     for one in trade.measured:
-        if math.isfinite(one.time) and math.isfinite(trade.error(one, quantity)) and trade.error(one, quantity) > 0.0:
+        if math.isfinite(one.time) and 0.0 < trade.error(one, quantity) < math.inf:
             groups.setdefault((one.way.method, one.way.kinks), []).append(one)
     for (method, kinks), ones in groups.items():
         ones.sort(key=lambda m: -m.way.rtol)
         marker, colour = _METHODS[method]
+        located = kinks == LOCATED
         axes.plot(
-            [1e3 * m.time for m in ones],
-            [100.0 * trade.error(m, quantity) for m in ones],
+            *_points(trade, quantity, ones),
             marker=marker,
             markersize=6,
             color=colour,
-            markerfacecolor="white" if kinks == LOCATED else colour,
-            markeredgecolor=colour if kinks == LOCATED else INK,
-            markeredgewidth=1.0,
+            markerfacecolor="white" if located else colour,
+            markeredgecolor=colour if located else INK,
             linestyle=":",
             linewidth=0.7,
-            label=method + (", kinks located" if kinks == LOCATED else ""),
+            label=method + (", kinks located" if located else ""),
             zorder=3,
         )
-    front = trade.front(quantity)
-    axes.plot(
-        [1e3 * m.time for m in front],
-        [100.0 * trade.error(m, quantity) for m in front],
-        color=INK,
-        linewidth=5.0,
-        alpha=0.18,
-        solid_capstyle="round",
-        zorder=2,
-        label="best of all",
-    )
+    front: dict[str, Any] = {"color": INK, "linewidth": 5.0, "alpha": 0.18, "solid_capstyle": "round", "zorder": 2}
+    axes.plot(*_points(trade, quantity, trade.front(quantity)), label="best of all", **front)
     floor = 100.0 * (max(trade.uncertainty.values()) if quantity is None else trade.uncertainty[quantity])
     shaded = _axes(axes, floor)
     name = "the worst of all quantities" if quantity is None else quantity
@@ -76,6 +68,12 @@ def draw_trade(trade: Trade, quantity: str | None = None) -> Figure:
     return figure
 
 
+def _points(trade: Trade, quantity: str | None, ones: Iterable[Measured]) -> tuple[list[float], list[float]]:
+    """Times [ms] and errors [%]."""
+    pairs = [(1e3 * one.time, 100.0 * trade.error(one, quantity)) for one in ones]
+    return [time for time, _ in pairs], [error for _, error in pairs]
+
+
 def _axes(axes: Axes, floor: float) -> bool:
     """Scales, ticks and legend; whether the part below the reference's uncertainty [%] is shown."""
     axes.set_xscale("log")
@@ -84,7 +82,7 @@ def _axes(axes: Axes, floor: float) -> bool:
     axes.set_ylabel("relative error [%]")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(LogLocator(10.0, numticks=20))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axis.set_minor_formatter(NullFormatter())
     low, high = axes.get_ylim()
     shown = bool(floor > low * 10.0**-_DECADES)
