@@ -6,6 +6,7 @@ and ``margins.c``.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -38,10 +39,7 @@ def margins_of(manifest: Manifest) -> tuple[MarginInfo, ...]:
 
 def filled(template: Path, **values: str) -> str:
     """Text of a template with values in place of ``@NAME@``."""
-    text = template.read_text(encoding="utf-8")
-    for name, value in values.items():
-        text = text.replace(f"@{name}@", value)
-    return text
+    return re.sub("@([A-Z]+)@", lambda found: values[found[1]], template.read_text(encoding="utf-8"))
 
 
 def scene_header(manifest: Manifest) -> str:
@@ -83,42 +81,23 @@ def scene_source(manifest: Manifest) -> str:
     ]
     relations = [f"    {{{place[name]}, {place[other]}, {factor!r}}}," for name, factor, other in manifest.relations]
     indices, inputs = _inputs(manifest.inputs, place)
-    return "\n".join(
-        [
-            NOTE,
-            "/* The scene's numbers. */",
-            '#include "scene.h"',
-            "",
-            "#include <math.h>",
-            "#include <stddef.h>",
-            "",
-            f"const char *const scene_title = {_string(manifest.title)};",
-            "",
-            "const scene_parameter scene_parameters[] = {",
-            *parameters,
-            "};",
-            "",
-            "const scene_relation scene_relations[] = {",
-            *(relations or ["    {0, 0, 0.0}, /* none */"]),  # C has no arrays of length zero
-            "};",
-            "",
-            f"const char *const scene_constant_names[] = {{{_listed(_string(c.name) for c in manifest.constants)}}};",
-            "",
-            f"const char *const scene_states[] = {{{_listed(_string(s.name) for s in manifest.states)}}};",
-            f"const int scene_initial[] = {{{_listed(str(place[name]) for name in manifest.initial)}}};",
-            f"const int scene_speed = {speed};",
-            "",
-            *_linkage(manifest, place),
-            *indices,
-            f"const schedule_input scene_inputs[] = {{\n{inputs}\n}};",
-            "",
-            f"const double scene_cycles = {float(run.cycles or 0.0)!r};",
-            f"const double scene_duration = {float(run.duration or 0.0)!r};",
-            f"const double scene_rtol = {run.rtol!r};",
-            f"const long scene_samples = {run.samples_per_cycle};",
-            f"const char *const scene_method = {_string(method)};",
-            "",
-        ]
+    return filled(
+        STANDALONE / "scene.c.in",
+        TITLE=_string(manifest.title),
+        PARAMETERS="\n".join(parameters),
+        RELATIONS="\n".join(relations) or "    {0, 0, 0.0}, /* none */",  # C has no arrays of length zero
+        CONSTANTS=_listed(_string(info.name) for info in manifest.constants),
+        STATES=_listed(_string(info.name) for info in manifest.states),
+        INITIAL=_listed(str(place[name]) for name in manifest.initial),
+        SPEED=str(speed),
+        LINKAGE="".join(f"{line}\n" for line in _linkage(manifest, place)),
+        PLACES="".join(f"{line}\n" for line in indices),
+        INPUTS=inputs,
+        CYCLES=repr(float(run.cycles or 0.0)),
+        DURATION=repr(float(run.duration or 0.0)),
+        RTOL=repr(run.rtol),
+        SAMPLES=str(run.samples_per_cycle),
+        METHOD=_string(method),
     )
 
 
@@ -185,28 +164,20 @@ def _behind(what: str, function: casadi.Function, name: str, given: Sequence[tup
     # C has no arrays of length zero
     sizes = [max(size, 1) for size in (function.sz_arg(), function.sz_res(), function.sz_iw(), function.sz_w())]
     arguments = "\n".join(f"    arguments[{k}] = {address};" for k, (_, address) in enumerate(given))
-    return f"""{NOTE}
-/* {what}, as CasADi writes them, and {name} at the end, which calls them. */
-#include "scene.h"
-
-#if defined(__GNUC__)
-/* CasADi's calling convention has arguments that this function does not need */
-#pragma GCC diagnostic ignored "-Wunused-parameter"
-#endif
-
-{generator.dump().strip()}
-
-void {name}({", ".join(declaration for declaration, _ in given)}, double *{result})
-{{
-    const casadi_real *arguments[{sizes[0]}];
-    casadi_real *results[{sizes[1]}];
-    casadi_int iw[{sizes[2]}];
-    casadi_real w[{sizes[3]}];
-{arguments}
-    results[0] = {result};
-    {function.name()}(arguments, results, iw, w, 0);
-}}
-"""
+    return filled(
+        STANDALONE / "casadi_function.c.in",
+        WHAT=what,
+        NAME=name,
+        GIVEN=", ".join(declaration for declaration, _ in given),
+        RESULT=result,
+        ARGUMENTS=str(sizes[0]),
+        RESULTS=str(sizes[1]),
+        INTEGERS=str(sizes[2]),
+        REALS=str(sizes[3]),
+        ADDRESSES=arguments,
+        FUNCTION=function.name(),
+        CODE=generator.dump().strip(),
+    )
 
 
 def _string(text: str) -> str:
