@@ -29,9 +29,10 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
 from ballpass.runtime.run.printed import printed
-from ballpass.runtime.run.reduced_run import check_rtol, check_span, choose_family
+from ballpass.runtime.run.reduced_run import check_span, choose_family
 from ballpass.runtime.run.reductions import channel_names, observable_aliases, observe
 from ballpass.runtime.run.request import check_memory
+from ballpass.runtime.run.request import tolerance as relative_tolerance
 
 if TYPE_CHECKING:
     import xarray
@@ -158,7 +159,7 @@ def simulate_many(
     chosen = _observables(observables, aliases)
     asked = method or manifest.run.method
     family = choose_family(asked)
-    tolerance = check_rtol(manifest.run.rtol if rtol is None else rtol)
+    tolerance = relative_tolerance("rtol", manifest.run.rtol if rtol is None else rtol)
     at_kinks = choose_kinks(kinks, "stepper" if asked == "auto" else asked, manifest, tolerance)
     workers = _threads(threads)
     # the table first: a wrong one is told before the driver is compiled

@@ -152,22 +152,28 @@ def compile_sources(
     folder = _writable_cache_folder()
     _clear(folder)
     started = time.perf_counter()
-    made = Path(tempfile.mkdtemp(dir=folder, prefix=f".{name}-", suffix=".tmp"))
-    try:
+    with tempfile.TemporaryDirectory(
+        dir=folder, prefix=f".{name}-", suffix=".tmp", ignore_cleanup_errors=True
+    ) as temporary:
+        made = Path(temporary)
         _write_copies(made, contents)
         copies = tuple(str(made / path.name) for path in sources)
         places = tuple(f"-I{path}" for path in include)
         library = made / f"library{_suffix()}"
         library.touch()
         command = (*compiler.command, *compiler.flags, *places, *copies, "-o", str(library), "-lm")
-        shown = (*compiler.command, *compiler.flags, *places, *map(str, sources), "-o", library.name, "-lm")
-        run_compiler(command, made, shlex.join(shown))
+        shown = shlex.join((*compiler.command, *compiler.flags, *places, *map(str, sources), "-o", library.name, "-lm"))
+        run_compiler(command, made, shown)
+        library.chmod(0o755)
         target = folder / f"{name}-{_digest(library)}{_suffix()}"
-        os.chmod(library, 0o755)
-        _place(library, target)
-        _open(target, shlex.join(shown))
-    finally:
-        shutil.rmtree(made, ignore_errors=True)
+        try:
+            os.replace(library, target)
+        except IsADirectoryError:
+            raise CompileError(
+                f"The folder {target} is in the way of a compiled library. Delete it, or set {CACHE_VARIABLE} to "
+                "another folder."
+            ) from None
+        _open(target, shown)
     seconds = time.perf_counter() - started
     return CompiledLibrary(path=target, key=key, compiler=compiler.identity, cached=False, seconds=seconds)
 
@@ -220,16 +226,6 @@ def _find(folder: Path, name: str) -> Path | None:
             path.unlink()
     places = (folder, _private_folder()) if _private_folder.cache_info().currsize else (folder,)
     return next((path for path in _opened if path.parent in places and path.name.startswith(f"{name}-")), None)
-
-
-def _place(temporary: Path, target: Path) -> None:
-    try:
-        os.replace(temporary, target)
-    except IsADirectoryError:
-        raise CompileError(
-            f"The folder {target} is in the way of a compiled library. Delete it, or set {CACHE_VARIABLE} to another "
-            "folder."
-        ) from None
 
 
 def _open(path: Path, command: str) -> None:

@@ -110,7 +110,24 @@ class Loop:
     def __call__(
         self, count: int, values: Mapping[str, Any], wanted: Collection[str] | None = None
     ) -> dict[str, Array]:
-        """Outputs at `count` points, as `ballpass.runtime.native.loops.PointLoop` says."""
+        """Outputs at `count` points.
+
+        Parameters
+        ----------
+        count : number of points
+        values : inputs by name; those that vary of shape (count,) or (count, rows), the others of shape (rows,);
+            further keys are ignored
+        wanted : names of outputs.  Default: all
+
+        Returns
+        -------
+        dict from output name to array, shape (count, rows)
+
+        Raises
+        ------
+        EvaluationError
+            The function reports failure.
+        """
         # columns of CasADi's matrices are points: rows of NumPy's
         blocks = {
             name: memory.reshape(BLOCK, -1 if memory.size else 0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import casadi
 import numpy as np
@@ -17,39 +17,10 @@ import numpy as np
 from ballpass.runtime.native.compile import compile_sources
 from ballpass.runtime.native.compilers import Compiler
 from ballpass.runtime.native.driver_library import DRIVER
-from ballpass.runtime.native.kernel import Array, EvaluationError
+from ballpass.runtime.native.kernel import Array, EvaluationError, Loop
 
 _Pointers = ctypes.POINTER(ctypes.c_void_p)
 _Longs = ctypes.POINTER(ctypes.c_long)
-
-
-class PointLoop(Protocol):
-    """A function at many points: `kernel.Loop` in the virtual machine, `CompiledLoop` in C."""
-
-    @property
-    def function(self) -> casadi.Function: ...
-
-    def __call__(
-        self, count: int, values: Mapping[str, Any], wanted: Collection[str] | None = None
-    ) -> dict[str, Array]:
-        """Outputs at `count` points.
-
-        Parameters
-        ----------
-        count : number of points
-        values : inputs by name; those that vary of shape (count,) or (count, rows), the others of shape (rows,);
-            further keys are ignored
-        wanted : names of outputs.  Default: all
-
-        Returns
-        -------
-        dict from output name to array, shape (count, rows)
-
-        Raises
-        ------
-        EvaluationError
-            The function reports failure.
-        """
 
 
 class LoopDriver:
@@ -99,7 +70,7 @@ class CompiledLoop:
     def __call__(
         self, count: int, values: Mapping[str, Any], wanted: Collection[str] | None = None
     ) -> dict[str, Array]:
-        """Outputs at `count` points, as `PointLoop` says; one call of C."""
+        """Outputs at `count` points, as `Loop` says; one call of C."""
         held = [
             _entry(name, values[name], (count, rows) if varies else (rows,))
             for name, rows, varies in zip(self._names, self._rows, self._varying, strict=True)
@@ -126,6 +97,10 @@ class CompiledLoop:
         if done != count:
             raise EvaluationError(f"{self.function.name()} reported failure at point {done}")
         return results
+
+
+#: A function at many points: in the virtual machine, or in C.
+PointLoop = Loop | CompiledLoop
 
 
 def _dense_rows(function: casadi.Function, name: str, place: int, *, out: bool = False) -> int:

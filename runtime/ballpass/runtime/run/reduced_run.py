@@ -22,7 +22,7 @@ from ballpass.runtime.native.stepper import End, Family, Segments, Stepper
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.failure_location import Whereabouts, whereabouts
 from ballpass.runtime.run.limits import allowance
-from ballpass.runtime.run.locating import LOCATED, choose_kinks, has_kinks
+from ballpass.runtime.run.locating import choose_kinks, stepper_for
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
 from ballpass.runtime.run.reductions import Reductions, channel_names, reductions_of
 from ballpass.runtime.run.request import Request, run_length, start_state, tolerance
@@ -58,11 +58,6 @@ def check_span(duration: float, turn: float, transient: float) -> float:
     return start
 
 
-def check_rtol(rtol: float) -> float:
-    """A tolerance that the methods can keep."""
-    return tolerance("rtol", rtol)
-
-
 def choose_family(asked: str) -> Family:
     """Family of the driver for a method's name.
 
@@ -92,7 +87,8 @@ def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reduct
         The computation failed.
     """
     run = model.manifest.run
-    method, rtol = request.method or run.method, run.rtol if request.rtol is None else request.rtol
+    method = request.method or run.method
+    rtol = tolerance("rtol", run.rtol if request.rtol is None else request.rtol)
     initial = start_state(model, numbers, request.initial)
     turn = clock.period(model.manifest, numbers.values)
     duration = run_length(model, request, turn)
@@ -100,15 +96,14 @@ def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reduct
     start = check_span(duration, turn, transient)
     family = choose_family(method)
     named = "stepper" if method == "auto" else method
-    chosen = choose_kinks(request.kinks, named, model.manifest, check_rtol(rtol))
+    chosen = choose_kinks(request.kinks, named, model.manifest, rtol)
     looked_at = min(duration, SCALED_TURNS * turn)
-    tolerance = check_rtol(rtol) * stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn)
+    allowed = rtol * stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn)
     names = channel_names(model.manifest)
     row = reduction_rows(model.manifest).empty(1, start, names)[0]
     state = initial.copy()
-    stepper = model.locating_stepper if chosen == LOCATED and has_kinks(model.manifest) else model.stepper
     steps, rejected = integrate_reduced(
-        *(model, stepper, numbers, family, tolerance, state, row, (duration, turn, start)),
+        *(model, stepper_for(model, chosen), numbers, family, allowed, state, row, (duration, turn, start)),
         progress=request.progress,
     )
     found = reductions_of(model.manifest, row, names, end=state, steps=steps, rejected=rejected, turn=turn)

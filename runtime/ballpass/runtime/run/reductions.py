@@ -176,10 +176,8 @@ def joined(first: Reductions | None, second: Reductions | None) -> Reductions | 
 def _joined(first: Reduction, second: Reduction, share: float, rest: float) -> Reduction:
     high = first if first.maximum > second.maximum else second
     low = first if first.minimum < second.minimum else second
-    return Reduction(
-        maximum=high.maximum,
-        maximum_time=high.maximum_time,
-        maximum_ball=high.maximum_ball,
+    return replace(
+        high,
         minimum=low.minimum,
         minimum_time=low.minimum_time,
         minimum_ball=low.minimum_ball,
