@@ -102,7 +102,7 @@ def simulate_to_error(
     found = meet_target(run, target, names, request.progress)
     solution = simulate(model, numbers, replace(request, method=found.method, rtol=found.rtol, kinks=found.kinks))
     return replace(
-        solution, accuracy=found, statistics=replace(solution.statistics, reason=f"for an error of {target:g}")
+        solution, accuracy=found, statistics=replace(solution.statistics, reason=f"for an error of {found.target:g}")
     )
 
 
