@@ -92,26 +92,21 @@ def _load(home: Path) -> Results:
             f"{home / SUMMARY}: it does not tell the digests of the run's files: not written by `ballpass run` of this "
             "version, or edited. Run the scene again."
         ) from None
-    strange = [name for name, digest in digests.items() if Path(name).name == name and _differs(home / name, digest)]
-    if strange:
-        raise RequestError(
-            f"{home}: {', '.join(strange)}: not of the run that {SUMMARY} tells of: edited, or of another run. Run the "
-            "scene again, or read the solution alone with load_solution."
-        )
-    try:
-        content = (home / SOLUTION).read_bytes()
-    except OSError as fault:
-        raise RequestError(f"{home / SOLUTION}: cannot be read ({fault.strerror}). Run the scene again.") from None
-    if hashlib.sha256(content).hexdigest() != digests.get(SOLUTION):
-        raise RequestError(f"{home / SOLUTION}: not of the run that {SUMMARY} tells of. Run the scene again.")
-    return Results(solution=read_bytes(home / SOLUTION, content), summary=summary)
-
-
-def _differs(path: Path, digest: str) -> bool:
-    """Whether a file is there and is another one; the user may have deleted it."""
-    try:
-        return file_digest(path) != digest
-    except FileNotFoundError:
-        return False
-    except OSError as fault:
-        raise RequestError(f"{path}: cannot be read ({fault.strerror}). Run the scene again.") from None
+    solution = b""
+    for name in dict.fromkeys((SOLUTION, *digests)):
+        if Path(name).name != name:
+            continue
+        try:
+            content = (home / name).read_bytes()
+        except OSError as fault:
+            if isinstance(fault, FileNotFoundError) and name != SOLUTION:
+                continue  # the user may have deleted a figure
+            raise RequestError(f"{home / name}: cannot be read ({fault.strerror}). Run the scene again.") from None
+        if hashlib.sha256(content).hexdigest() != digests.get(name):
+            raise RequestError(
+                f"{home}: {name}: not of the run that {SUMMARY} tells of: edited, or of another run. Run the "
+                "scene again, or read the solution alone with load_solution."
+            )
+        if name == SOLUTION:
+            solution = content
+    return Results(solution=read_bytes(home / SOLUTION, solution), summary=summary)

@@ -11,14 +11,15 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping
+from dataclasses import asdict
 from importlib.metadata import version
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich import box
 from rich.table import Table
 
+from ballpass.runtime.app.tables import simple_table
 from ballpass.runtime.ask.observables import drive_work, kinematic_frequencies, statistics, turns
 from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks
 from ballpass.runtime.contract import Manifest
@@ -45,31 +46,11 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
 
     Returns
     -------
-    mapping with, as far as the scene has them and their outputs were asked for:
-
-    ``scene``, ``title``, ``status``, ``method``, ``compiled``, ``damping_law``, ``versions``
-        words
-    ``steps``, ``located_kinks`` (where they were located), ``wall_time``, ``rtol``, ``transient_cycles_dropped``,
-    ``steady_cycles``, ``samples``, ``cycle_length``
-        ``{"value": , "unit": }``
-    ``reaction.<joint>.x`` and other reactions, ``drive_torque``, ``load.x``, ``load.y``
-        ``{"min": , "max": , "unit": }``
-    ``drive_work``
-        work of the drive in a turn, mean over the steady turns: ``{"value": , "unit": "J"}``
-    ``reaction_condition``
-        largest condition number of the matrix of Eq. (1) in a turn (see `ballpass.runtime.point.conditioning`):
-        ``{"unscaled": , "scaled": , "unit": "1"}``; beside them ``crank_angle`` with the same two keys and a unit
-    ``peak_ball_force``
-        highest force of any ball, also between samples: ``{"elastic": , "total": , "unit": "N"}``; beside them, with
-        the same two keys and a unit each, ``time`` and ``ball`` of the peak (balls are counted from 1), and
-        ``sampled``, what the samples alone show; and ``searched``, where was looked, in words (see
-        `ballpass.runtime.ask.peaks.Peak`)
-    ``inner.x`` and other motions of the rings
-        ``{"min": , "max": , "mean": , "rms": , "std": , "unit": }``
-    ``k_b`` and other derived constants
-        ``{"value": , "unit": }``
-    ``frequencies``
-        ``{"shaft": , "cage": , "ball_pass_outer": , "ball_pass_inner": , "ball_spin": , "unit": "Hz"}``
+    mapping with words (``scene``, ``status``, ``method``, ``versions`` ...) and objects with numbers and their
+    ``unit``, as far as the scene has them and their outputs were asked for: of the run (``steps``, ``wall_time`` ...);
+    extremes of reactions, loads and ``drive_torque``; ``drive_work`` a turn; ``reaction_condition``, the largest
+    condition number of the matrix of Eq. (1) in a turn; ``peak_ball_force`` with time and ball; extremes and means of
+    the rings' motions; derived constants; kinematic ``frequencies``.  The page of outputs lists them all.
 
     Raises
     ------
@@ -86,16 +67,17 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
         "status": sol.status.name.lower(),
         "method": statistic.method,
         "compiled": statistic.compiled,
-        "rtol": _value(statistic.rtol, "1", "rtol"),
+        "rtol": _numbers("rtol", "1", value=statistic.rtol),
         "steps": {"value": statistic.steps, "unit": "1"},
         **({"located_kinks": {"value": statistic.located, "unit": "1"}} if statistic.located is not None else {}),
-        "wall_time": _value(statistic.wall_time, "s", "wall_time"),
-        "transient_cycles_dropped": _value(sol.transient_cycles, "1", "transient cycles"),
+        "wall_time": _numbers("wall_time", "s", value=statistic.wall_time),
+        "transient_cycles_dropped": _numbers("transient cycles", "1", value=sol.transient_cycles),
         "samples": {"value": len(steady.t), "unit": "1"},
     }
     if steady.cycle_length is not None:
-        summary["cycle_length"] = _value(steady.cycle_length, "s", "cycle_length")
-        summary["steady_cycles"] = _value((steady.t[-1] - steady.t[0]) / steady.cycle_length, "1", "steady_cycles")
+        turns_run = (steady.t[-1] - steady.t[0]) / steady.cycle_length
+        summary["cycle_length"] = _numbers("cycle_length", "s", value=steady.cycle_length)
+        summary["steady_cycles"] = _numbers("steady_cycles", "1", value=turns_run)
     peaks = _peaks(model, steady)
     summary |= _forces(steady, peaks)
     summary |= _conditioning(model, steady)
@@ -126,11 +108,7 @@ def _forces(sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, 
     for info in sol.manifest.outputs:
         if (info.name, "min") in peaks:
             low, high = peaks[info.name, "min"], peaks[info.name, "max"]
-            found[info.name] = {
-                "min": _finite(low.value, info.name),
-                "max": _finite(high.value, info.name),
-                "unit": info.unit,
-            }
+            found[info.name] = _numbers(info.name, info.unit, min=low.value, max=high.value)
     mechanism = sol.manifest.mechanism
     length = sol.cycle_length
     if mechanism is not None and "drive_torque" in found and length is not None and turns(sol.t, length):
@@ -142,7 +120,7 @@ def _forces(sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, 
             cycle_length=length,
             steps=breakpoints(sol.manifest.inputs, values, float(sol.t[0]), float(sol.t[-1])),
         )
-        found["drive_work"] = _value(np.mean(work), "J", "drive_torque")
+        found["drive_work"] = _numbers("drive_torque", "J", value=np.mean(work))
     return found
 
 
@@ -164,11 +142,9 @@ def _balls(manifest: Manifest, found_peaks: Mapping[tuple[str, Kind], Peak]) -> 
         peaks = {key: found_peaks[name] for key, name in names.items() if name in found_peaks}
         if not peaks:
             continue
-        found: dict[str, Any] = {key: _finite(peak.value, "ball.force") for key, peak in peaks.items()}
-        found["unit"] = "N"
-        found["time"] = {**{key: peak.time for key, peak in peaks.items()}, "unit": "s"}
-        found["ball"] = {**{key: peak.ball for key, peak in peaks.items()}, "unit": "1"}
-        found["sampled"] = {**{key: peak.sampled for key, peak in peaks.items()}, "unit": "N"}
+        found: dict[str, Any] = _numbers("ball.force", "N", **{key: peak.value for key, peak in peaks.items()})
+        for part, unit in (("time", "s"), ("ball", "1"), ("sampled", "N")):
+            found[part] = {**{key: getattr(peak, part) for key, peak in peaks.items()}, "unit": unit}
         found["searched"] = {key: peak.searched for key, peak in peaks.items()}
         told[f"{bearing.prefix}peak_ball_force"] = found
     return told
@@ -180,14 +156,15 @@ def _motions(sol: Solution) -> dict[str, Any]:
     for info in sol.manifest.states:
         reduced = None if sol.reductions is None else sol.reductions.get(info.name)
         values = reduced or statistics(sol.t, sol[info.name])
-        found[info.name] = {
-            "min": _finite(values.minimum, info.name),
-            "max": _finite(values.maximum, info.name),
-            "mean": _finite(values.mean, info.name),
-            "rms": _finite(values.rms, info.name),
-            "std": _finite(values.std, info.name),
-            "unit": info.unit,
-        }
+        found[info.name] = _numbers(
+            info.name,
+            info.unit,
+            min=values.minimum,
+            max=values.maximum,
+            mean=values.mean,
+            rms=values.rms,
+            std=values.std,
+        )
     return found
 
 
@@ -199,21 +176,14 @@ def _constants(sol: Solution) -> dict[str, Any]:
         for key in ("k_i", "k_o", "k_b", "c_b", "m_ei", "cage_ratio"):
             name = f"{bearing.path}.{key}"
             if name in units:
-                found[bearing.prefix + key] = _value(sol.constants[name], units[name], name)
+                found[bearing.prefix + key] = _numbers(name, units[name], value=sol.constants[name])
         frequencies = kinematic_frequencies(
             bearing.balls,
             sol.parameters[f"{bearing.path}.ball_diameter"],
             sol.parameters[f"{bearing.path}.pitch_diameter"],
             sol.parameters[bearing.shaft_speed],
         )
-        found[f"{bearing.prefix}frequencies"] = {
-            "shaft": frequencies.shaft,
-            "cage": frequencies.cage,
-            "ball_pass_outer": frequencies.ball_pass_outer,
-            "ball_pass_inner": frequencies.ball_pass_inner,
-            "ball_spin": frequencies.ball_spin,
-            "unit": "Hz",
-        }
+        found[f"{bearing.prefix}frequencies"] = asdict(frequencies) | {"unit": "Hz"}
         found[f"{bearing.prefix}damping_law"] = bearing.damping_law
     return found
 
@@ -224,18 +194,15 @@ def _versions(sol: Solution) -> dict[str, Any]:
     return {"generated_with": dict(sol.manifest.versions), "run_with": running}
 
 
-def _value(value: float | np.floating[Any], unit: str, name: str) -> dict[str, Any]:
-    return {"value": _finite(value, name), "unit": unit}
-
-
-def _finite(value: float | np.floating[Any], name: str) -> float:
-    number = float(value)
-    if not isfinite(number):
-        raise SimulationError(
-            f"{name} holds {number}; allowed: finite values; the run diverged or a parameter is out of range: "
-            "check the scene"
-        )
-    return number
+def _numbers(name: str, unit: str, **values: float | np.floating[Any]) -> dict[str, Any]:
+    """Numbers with their unit; `name` is told where one is not finite."""
+    for value in values.values():
+        if not isfinite(value):
+            raise SimulationError(
+                f"{name} holds {value}; allowed: finite values; the run diverged or a parameter is out of range: "
+                "check the scene"
+            )
+    return {**{key: float(value) for key, value in values.items()}, "unit": unit}
 
 
 #: Unit of a number in the file -> factor and unit in the table, so that six digits of a displacement are six digits.
@@ -262,19 +229,8 @@ def render_summary(summary: Mapping[str, Any]) -> Table:
     summary : what `summarize` gave
     """
     columns = ("value", "min", "max", "rms")
-    table = Table(
-        title=f"{summary['title']}: {summary['method']}",
-        caption=_caption(summary),
-        title_justify="left",
-        caption_justify="left",
-        header_style="bold",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-    )
-    table.add_column("quantity", no_wrap=True)
-    for key in columns:
-        table.add_column(key, justify="right", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
+    heads = ("quantity", *columns, "unit")
+    table = simple_table(f"{summary['title']}: {summary['method']}", heads, right=columns, caption=_caption(summary))
     for name, item in summary.items():
         if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
             continue

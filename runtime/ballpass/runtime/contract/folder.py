@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import importlib.metadata
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,7 +27,8 @@ def read_artefact(folder: str | Path, *, verify: bool = True) -> Manifest:
     place = Path(folder)
     if not verify:
         manifest = read_manifest(folder, verify=False)
-        return replace(manifest, files=tuple(_present(place, [name for name, _ in manifest.files])))
+        present = [name for name, _ in manifest.files if (place / name).exists()]
+        return replace(manifest, files=tuple((name, file_digest(place / name)) for name in present))
 
     def consistent() -> Manifest:
         manifest = read_manifest(folder)
@@ -39,13 +38,6 @@ def read_artefact(folder: str | Path, *, verify: bool = True) -> Manifest:
     manifest = read_whole(place, consistent, ArtefactError)
     _check_version(folder, manifest)
     return manifest
-
-
-def _present(place: Path, names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Names and digests of the files that are there."""
-    for name in names:
-        with contextlib.suppress(FileNotFoundError):
-            yield name, file_digest(place / name)
 
 
 def _check_version(folder: str | Path, manifest: Manifest) -> None:
@@ -104,14 +96,12 @@ def check_files(folder: str | Path, manifest: Manifest) -> None:
     for name, digest in manifest.files:
         try:
             found = file_digest(Path(folder) / name)
-        except FileNotFoundError:
-            faults.append(f"{name}: missing")
-            continue
         except OSError as fault:
-            faults.append(f"{name}: cannot be read ({fault.strerror})")
-            continue
-        if found != digest:
-            faults.append(f"{name}: sha256 {found[:12]}... found, {digest[:12]}... expected: edited or cut short")
+            missing = isinstance(fault, FileNotFoundError)
+            faults.append(f"{name}: " + ("missing" if missing else f"cannot be read ({fault.strerror})"))
+        else:
+            if found != digest:
+                faults.append(f"{name}: sha256 {found[:12]}... found, {digest[:12]}... expected: edited or cut short")
     if faults:
         raise ArtefactError(
             f"{folder}: the files are not those the manifest describes:\n"

@@ -151,9 +151,8 @@ class Record:
         mechanism = self.manifest.mechanism
         assert mechanism is not None  # drawn of scenes with a mechanism only
         parameters = self.solution.parameters
-        inputs = dict(
-            zip((i.name for i in self.manifest.inputs), self.model.inputs_at(t, parameters), strict=True),
-        )
+        values = self.model.inputs_at(t, parameters)
+        inputs = {info.name: value for info, value in zip(self.manifest.inputs, values, strict=True)}
         acting = []
         for name, body, point, gate in mechanism.forces:
             if gate and inputs[gate] == 0.0:
