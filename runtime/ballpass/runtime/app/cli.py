@@ -15,21 +15,18 @@ import typer
 from rich.console import Console
 
 from ballpass.runtime.app.commands import options
+from ballpass.runtime.app.commands.asked import Asked, faults_of_numbers, read_asked, read_duration
 from ballpass.runtime.app.commands.explain import explain
 from ballpass.runtime.app.commands.jacobian import jacobian, linearize
 from ballpass.runtime.app.commands.sensitivity import sensitivity
 from ballpass.runtime.app.commands.shared import (
-    Asked,
     Stages,
     check_folder,
     checked_kinks,
     command,
     complain,
-    faults_of_turns,
     load_model,
     note,
-    read_asked,
-    read_duration,
     results_folder,
     show,
     show_json,
@@ -234,18 +231,12 @@ def _check_request(
     from ballpass.runtime.contract.parameters import unknown_name
     from ballpass.runtime.native.casadi_integrators import METHODS
     from ballpass.runtime.native.stepper import METHODS as STEPPERS
-    from ballpass.runtime.run.request import TOLERANCES
 
     faults = []
     known = ("auto", *STEPPERS, *METHODS)
     if method is not None and method not in known:
         faults.append(f"--method: {unknown_name('method', method, known)}")
-    if rtol is not None and not TOLERANCES[0] <= rtol <= TOLERANCES[1]:
-        faults.append(
-            f"--rtol: {rtol:g} lies outside its bounds. Allowed: {TOLERANCES[0]:g} to {TOLERANCES[1]:g}. "
-            "Take 1e-6 where nothing speaks for another value."
-        )
-    faults += faults_of_turns(cycles, transient)
+    faults += faults_of_numbers(cycles, transient, rtol)
     if faults:
         raise RequestError("\n".join(faults))
     speed = abs(asked.speed)

@@ -15,7 +15,8 @@ from rich.padding import Padding
 from rich.table import Table
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.shared import command, load_model, read_with_settings, show_json
+from ballpass.runtime.app.commands.asked import read_with_settings
+from ballpass.runtime.app.commands.shared import command, load_model, show_json
 from ballpass.runtime.app.tables import plain_table
 from ballpass.runtime.contract.smoothness import WORDS
 

@@ -10,16 +10,8 @@ import typer
 from rich.console import Console
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.shared import (
-    Stages,
-    command,
-    complain,
-    load_model,
-    read_asked,
-    read_quantity,
-    show,
-    show_json,
-)
+from ballpass.runtime.app.commands.asked import read_asked, read_quantity
+from ballpass.runtime.app.commands.shared import Stages, command, complain, load_model, show, show_json
 from ballpass.runtime.app.tables import simple_table
 from ballpass.runtime.contract.errors import RequestError
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ballpass.runtime.app.commands.shared import refuse_run_setting
+from ballpass.runtime.app.commands.asked import refuse_run_setting
 from ballpass.runtime.contract.bounds import allowed as bounds_text
 from ballpass.runtime.contract.bounds import outside
 from ballpass.runtime.contract.errors import RequestError

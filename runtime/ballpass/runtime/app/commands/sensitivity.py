@@ -9,16 +9,8 @@ import typer
 from rich.console import Console
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.shared import (
-    check_folder,
-    command,
-    complain,
-    json_text,
-    load_model,
-    read_asked,
-    show,
-    show_json,
-)
+from ballpass.runtime.app.commands.asked import read_asked
+from ballpass.runtime.app.commands.shared import check_folder, command, complain, json_text, load_model, show, show_json
 
 #: Rows of a table on the terminal.
 ROWS = 15

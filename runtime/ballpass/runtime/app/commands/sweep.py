@@ -13,15 +13,13 @@ import typer
 from rich.console import Console
 
 from ballpass.runtime.app.commands import options
+from ballpass.runtime.app.commands.asked import faults_of_numbers, read_duration, read_with_settings
 from ballpass.runtime.app.commands.shared import (
     checked_kinks,
     command,
     complain,
-    faults_of_turns,
     load_model,
     note,
-    read_duration,
-    read_with_settings,
     results_folder,
     show,
     show_json,
@@ -91,7 +89,13 @@ def sweep(
     with command(scene) as stages:
         stages("read")
         seconds = read_duration(duration, cycles)
-        _check_request(cycles, transient, rtol, threads)
+        faults = faults_of_numbers(cycles, transient, rtol)
+        if threads is not None and threads < 1:
+            faults.append(
+                f"--threads: {threads} threads cannot work. Allowed: a whole number from 1 on, or leave it away."
+            )
+        if faults:
+            raise RequestError("\n".join(faults))
         read, asked, overrides = read_with_settings(scene, set_, seconds, transient)
         ranges = read_ranges(asked, vary or [], overrides)
         if asked.bearing is None:
@@ -146,16 +150,3 @@ def sweep(
     if len(result.failures) == count:
         complain(f"none of the {count} members has results: {result.failures[0].message}")
         raise typer.Exit(1)
-
-
-def _check_request(cycles: float | None, transient: float | None, rtol: float | None, threads: int | None) -> None:
-    """Refuse what no ensemble can follow, before anything is derived or written."""
-    from ballpass.runtime.run.request import tolerance
-
-    faults = faults_of_turns(cycles, transient)
-    if threads is not None and threads < 1:
-        faults.append(f"--threads: {threads} threads cannot work. Allowed: a whole number from 1 on, or leave it away.")
-    if faults:
-        raise RequestError("\n".join(faults))
-    if rtol is not None:
-        tolerance("--rtol", rtol)

@@ -12,15 +12,8 @@ from rich.console import Console
 from rich.table import Table
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.shared import (
-    Stages,
-    command,
-    load_model,
-    read_asked,
-    results_folder,
-    show,
-    show_json,
-)
+from ballpass.runtime.app.commands.asked import read_asked
+from ballpass.runtime.app.commands.shared import Stages, command, load_model, results_folder, show, show_json
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:

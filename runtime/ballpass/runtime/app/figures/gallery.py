@@ -22,63 +22,49 @@ if TYPE_CHECKING:
     from ballpass.runtime.run.solution import Solution
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class FigureKind:
-    """A figure: name of its file, what it shows, whether a record has what it needs, and how it is drawn."""
+    """A figure: name of its file, whether a record has what it needs, how it is drawn, and what it shows."""
 
     name: str
-    description: str
     possible: Callable[[Record], bool]
     draw: Callable[[Record], Figure]
+    description: str
 
 
-def _load_curve_possible(record: Record) -> bool:
+def _has_load_curve(record: Record) -> bool:
     if record.manifest.mechanism is None or not record.turns:
         return False
     return record.ring_load() is not None or bool(loads.reaction_joints(record))
 
 
-def _spectra_possible(record: Record) -> bool:
-    return record.has("inner.x", "inner.y") and (record.cycle_length is None or bool(record.turns))
+def _has_orbit(record: Record) -> bool:
+    return record.has("inner.x", "inner.y")
 
 
-FIGURES: tuple[FigureKind, ...] = (
-    FigureKind(
-        name="load_curve",
-        description="joint reaction and load on the inner ring over the crank angle (Fig. 4)",
-        possible=_load_curve_possible,
-        draw=loads.load_curve,
-    ),
-    FigureKind(
-        name="orbit",
-        description="path of the inner ring's centre (Fig. 5)",
-        possible=lambda record: record.has("inner.x", "inner.y"),
-        draw=motion.orbit,
-    ),
-    FigureKind(
-        name="spectra",
-        description="displacement amplitude spectra along x and y (Fig. 6)",
-        possible=_spectra_possible,
-        draw=motion.spectra,
-    ),
-    FigureKind(
-        name="phase_portrait",
-        description="velocity over displacement along x with stroboscopic points (Fig. 7)",
-        possible=lambda record: record.has("inner.x", "inner.vx"),
-        draw=motion.phase_portrait,
-    ),
-    FigureKind(
-        name="ball_loads",
-        description="contact load of every ball over two turns (Fig. 8)",
-        possible=lambda record: record.has("ball.force") or record.has("ball.elastic_force"),
-        draw=loads.ball_loads,
-    ),
-    FigureKind(
-        name="peak_moment",
-        description="mechanism and loaded bearing at the moment of the highest ball force",
-        possible=lambda record: record.manifest.mechanism is not None or moment.can_draw_bearing(record),
-        draw=moment.peak_moment,
-    ),
+def _has_spectra(record: Record) -> bool:
+    return _has_orbit(record) and (record.cycle_length is None or bool(record.turns))
+
+
+def _has_phases(record: Record) -> bool:
+    return record.has("inner.x", "inner.vx")
+
+
+def _has_balls(record: Record) -> bool:
+    return record.has("ball.force") or record.has("ball.elastic_force")
+
+
+def _has_moment(record: Record) -> bool:
+    return record.manifest.mechanism is not None or moment.can_draw_bearing(record)
+
+
+FIGURES = (
+    FigureKind("load_curve", _has_load_curve, loads.load_curve, "reaction and load on the ring over an angle (Fig. 4)"),
+    FigureKind("orbit", _has_orbit, motion.orbit, "path of the inner ring's centre (Fig. 5)"),
+    FigureKind("spectra", _has_spectra, motion.spectra, "displacement amplitude spectra along x and y (Fig. 6)"),
+    FigureKind("phase_portrait", _has_phases, motion.phase_portrait, "velocity over displacement along x (Fig. 7)"),
+    FigureKind("ball_loads", _has_balls, loads.ball_loads, "contact load of every ball over two turns (Fig. 8)"),
+    FigureKind("peak_moment", _has_moment, moment.peak_moment, "mechanism and bearing at the highest ball force"),
 )
 
 

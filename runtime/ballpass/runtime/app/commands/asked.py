@@ -1,0 +1,218 @@
+"""What a command was asked for: numbers of ``--set`` and other options, checked before anything is derived.
+
+In: a scene file and texts.  Out: values in SI.  `ballpass.derive` is imported inside functions, where it is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from ballpass.runtime.contract.errors import RequestError
+
+if TYPE_CHECKING:
+    from ballpass.derive import Scene
+    from ballpass.derive.scene.errors import Fault
+    from ballpass.derive.scene.records import Run
+    from ballpass.runtime.contract import Manifest, RunInfo
+
+_Run = TypeVar("_Run", bound="Run | RunInfo")
+
+#: Lines of a scene's run table that have an option of ``ballpass run``.
+RUN_OPTIONS = {
+    "run.cycles": "--cycles",
+    "run.duration": "--duration",
+    "run.transient_cycles": "--transient",
+    "run.rtol": "--rtol",
+    "run.method": "--method",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Asked:
+    """What a command needs of a scene before it has a model.
+
+    Attributes
+    ----------
+    path : the scene file
+    run : its run settings, with what was asked for instead
+    overrides : numbers of ``--set`` by path [SI]
+    speed : of driver or shaft, with the overrides; 0 where nothing turns [rad/s]
+    """
+
+    path: Path
+    run: Run | RunInfo
+    overrides: dict[str, float]
+    speed: float
+
+
+def read_asked(
+    path: Path, settings: list[str] | None, duration: float | None = None, transient: float | None = None
+) -> Asked:
+    """What is asked of a scene by ``--set``, ``--duration`` [s] and ``--transient`` [turns].
+
+    Where the generated folder is fresh its manifest tells all that is needed; the scene is read where it is not, and
+    where something is wrong, to say so in the scene's words.
+    """
+    from ballpass.derive.emit.signature import fresh_manifest
+
+    manifest = fresh_manifest(path)
+    overrides = _plain_overrides(manifest, settings or []) if manifest is not None else None
+    if manifest is not None and overrides is not None:
+        run: Run | RunInfo = manifest.run
+        names = [m.speed for m in (manifest.mechanism,) if m] + [b.shaft_speed for b in manifest.bearings]
+        values = {info.name: info.default for info in manifest.parameters} | overrides
+        speed = values.get(names[0], 0.0) if names else 0.0
+    else:
+        _, scene, overrides = read_with_settings(path, settings, duration, transient)
+        run = scene.run
+        shaft = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
+        speed = shaft.value if shaft is not None else 0.0
+    return Asked(path=path, run=_asked_run(run, duration, transient), overrides=overrides, speed=speed)
+
+
+def _asked_run(run: _Run, duration: float | None, transient: float | None) -> _Run:
+    """Run settings with a duration, where one was asked for."""
+    if duration is None:
+        return run
+    dropped = run.transient_cycles if transient is None else transient
+    return replace(run, cycles=None, duration=duration, transient_cycles=dropped)
+
+
+def _plain_overrides(manifest: Manifest, settings: list[str]) -> dict[str, float] | None:
+    """Numbers of ``--set`` by path, where the manifest's bounds alone tell that they are right; else None."""
+    from ballpass.derive.scene.units import parse_quantity
+    from ballpass.runtime.contract.parameters import resolve_parameters
+
+    units = {info.name: info.unit for info in manifest.parameters}
+    found: dict[str, float] = {}
+    try:
+        for text in settings:
+            path, _, value = (part.strip() for part in text.partition("="))
+            # ends of windows and knots of tables are checked against each other when a scene is read
+            if path not in units or path in found or ".window" in path or path.startswith("load."):
+                return None
+            found[path] = parse_quantity(value, units[path])
+        resolve_parameters(manifest, found)
+    except RequestError:
+        return None
+    return found
+
+
+def read_with_settings(
+    path: Path, settings: list[str] | None, duration: float | None = None, transient: float | None = None
+) -> tuple[Scene, Scene, dict[str, float]]:
+    """The scene as the file has it, the scene as asked for, and the overrides in SI; checked as if in the file."""
+    from ballpass.derive import SceneError, read_scene
+    from ballpass.derive.reading.read import parse_override, with_values
+    from ballpass.derive.scene.errors import Fault
+
+    read = read_scene(path)
+    faults: list[Fault] = []
+    texts: dict[str, str] = {}
+    overrides: dict[str, float] = {}
+    for text in settings or []:
+        try:
+            refuse_run_setting(text)
+            name, value = parse_override(read, text)
+        except SceneError as error:
+            faults += error.faults
+            continue
+        given = text.partition("=")[2].strip()
+        if name in overrides:
+            faults.append(
+                Fault(
+                    key=name,
+                    problem="the number is set twice",
+                    given=f"{texts[name]} and {given}",
+                    allowed="one value for a number",
+                    remedy="leave one --set away",
+                )
+            )
+        overrides[name], texts[name] = value, given
+    if faults:
+        raise SceneError(faults, source="--set")
+    asked = replace(read, run=_asked_run(read.run, duration, transient))
+    try:
+        return read, with_values(asked, overrides) if overrides else asked, overrides
+    except SceneError as error:
+        raise SceneError(error.faults, source="--set") from None
+
+
+def read_quantity(option: str, text: str | None, unit: str) -> float | None:
+    """A finite quantity of an option [unit], None where it was not given."""
+    from ballpass.derive.scene.units import QuantityError, parse_quantity
+
+    if text is None:
+        return None
+    try:
+        value = parse_quantity(text, unit)
+    except QuantityError as error:
+        raise RequestError(f"{option}: {error}") from None
+    if not math.isfinite(value):
+        raise RequestError(f"{option}: {text!r} is no finite quantity.")
+    return value
+
+
+def read_duration(text: str | None, cycles: float | None) -> float | None:
+    """The time of ``--duration "0.5 s"`` [s].
+
+    Raises
+    ------
+    RequestError
+        No time above 0, or turns were given as well.
+    """
+    if text is None:
+        return None
+    if cycles is not None:
+        raise RequestError(
+            f"--cycles {cycles:g} and --duration {text!r} were both given. Allowed: one of them. Leave one away."
+        )
+    seconds = read_quantity("--duration", text, "s") or 0.0
+    if not seconds > 0.0:
+        raise RequestError(
+            f'--duration: {text!r} cannot be simulated. Allowed: a time above 0, as in --duration "0.5 s".'
+        )
+    return seconds
+
+
+def faults_of_numbers(cycles: float | None, transient: float | None, rtol: float | None) -> list[str]:
+    """What is wrong with ``--cycles``, ``--transient`` and ``--rtol``."""
+    from ballpass.runtime.run.request import TOLERANCES
+
+    least, most = TOLERANCES
+    faults = []
+    if rtol is not None and not least <= rtol <= most:
+        faults.append(
+            f"--rtol: {rtol:g} lies outside its bounds. Allowed: {least:g} to {most:g}. Take 1e-6 where nothing speaks "
+            "for another value."
+        )
+    if cycles is not None and not 0.0 < cycles < math.inf:
+        faults.append(f"--cycles: {cycles:g} turns cannot be simulated. Allowed: a number above 0, as in --cycles 4.")
+    if transient is not None and not 0.0 <= transient < math.inf:
+        faults.append(f"--transient: {transient:g} turns cannot be left out. Allowed: a number from 0 on.")
+    return faults
+
+
+def refuse_run_setting(text: str) -> None:
+    """Refuse ``--set`` of a line of the run table, which holds no parameters of the model."""
+    from ballpass.derive.scene.errors import Fault, SceneError
+
+    path, _, value = (part.strip() for part in text.partition("="))
+    if not path.startswith("run."):
+        return
+    option = RUN_OPTIONS.get(path)
+    if option is not None:
+        remedy = f"`ballpass run` has {option} for it, as in {option} {value or 'VALUE'}"
+    else:
+        remedy = f"`ballpass run` has {', '.join(RUN_OPTIONS.values())}; for the rest edit [run] in the scene"
+    fault = Fault(
+        key=path,
+        problem="is a setting of the run, not a parameter of the model",
+        given=text,
+        allowed="paths of numbers of mechanism, shaft, load and bearing",
+        remedy=remedy,
+    )
+    raise SceneError([fault])
