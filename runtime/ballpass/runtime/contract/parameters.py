@@ -46,15 +46,9 @@ class Parameters(Mapping[str, float]):
 
     def __repr__(self) -> str:
         rows = [("name", "value", "unit", "description")]
-        rows += [
-            (name, f"{value:.8g}", self._infos[name].unit, self._infos[name].description)
-            for name, value in self._values.items()
-        ]
-        widths = [max(len(row[k]) for row in rows) for k in range(3)]
-        lines = [
-            f"{name:<{widths[0]}}  {value:>{widths[1]}}  {unit:<{widths[2]}}  {text}".rstrip()
-            for name, value, unit, text in rows
-        ]
+        rows += [(name, f"{self[name]:.8g}", info.unit, info.description) for name, info in self._infos.items()]
+        names, values, units, _ = (max(map(len, column)) for column in zip(*rows, strict=True))
+        lines = [f"{a:<{names}}  {b:>{values}}  {c:<{units}}  {d}".rstrip() for a, b, c, d in rows]
         return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
 
 

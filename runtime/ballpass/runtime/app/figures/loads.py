@@ -44,8 +44,7 @@ def load_curve(record: Record) -> Figure:
     figure = new_figure(1.3 + 1.9 * rows, layout=None)
     grid = figure.add_gridspec(rows, 2)
     angle, order = _last_turn(record)
-    mechanism = record.manifest.mechanism
-    bodies = {item[0]: (item[2], item[4]) for item in mechanism.joints} if mechanism is not None else {}
+    bodies = {item[0]: (item[2], item[4]) for item in record.mechanism.joints}
     panels: list[Axes] = []
     for row, joint in enumerate(joints):
         for column, axis in enumerate("xy"):

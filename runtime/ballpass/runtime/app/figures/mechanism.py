@@ -19,10 +19,12 @@ _Points = dict[tuple[str, str], Array]
 
 def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
     """Draw the mechanism at a sample of the record, with the paths of its joints and the forces."""
-    mechanism = record.manifest.mechanism
-    assert mechanism is not None  # drawn of scenes with a mechanism only
+    mechanism = record.mechanism
     now = record.points(float(record.t[sample]))
-    trace = _traces(record, sample)
+    length = record.cycle_length
+    times = record.t[sample] + (np.zeros(1) if length is None else np.linspace(0.0, length, _TRACE + 1))
+    poses = [record.points(float(t)) for t in times]
+    trace: _Points = {key: np.array([pose[key] for pose in poses]) for key in now}  # (times, 2) [m]
     used = list(dict.fromkeys(key for _, _, b, p, c, q in mechanism.joints for key in ((b, p), (c, q))))
     everything = np.vstack([trace[key] for key in used])
     low, high = everything.min(axis=0), everything.max(axis=0)
@@ -43,10 +45,8 @@ def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
         if kind == "revolute":
             if FRAME in (first, second):
                 _draw_ground(axes, now[first, point], size)
-            pin = Circle(
-                tuple(now[first, point]), 0.017 * size, facecolor="white", edgecolor=INK, linewidth=1.5, zorder=6
-            )
-            axes.add_patch(pin)
+            look: dict[str, Any] = {"facecolor": "white", "edgecolor": INK, "linewidth": 1.5, "zorder": 6}
+            axes.add_patch(Circle(tuple(now[first, point]), 0.017 * size, **look))
     arrows = _draw_forces(axes, record, now, sample, size)
     _draw_names(axes, record, now, busy + arrows, size)
     corners = np.vstack([everything, *((at + way)[None, :] for at, way in arrows)])
@@ -55,14 +55,6 @@ def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
     axes.set_ylim(corners[:, 1].min() - margin, corners[:, 1].max() + margin)
     axes.set_aspect("equal")
     axes.axis("off")
-
-
-def _traces(record: Record, sample: int) -> _Points:
-    """Positions of every point through a turn: (body, point) -> (_TRACE + 1, 2) [m]."""
-    length = record.cycle_length
-    times = record.t[sample] + (np.zeros(1) if length is None else np.linspace(0.0, length, _TRACE + 1))
-    poses = [record.points(float(t)) for t in times]
-    return {key: np.array([pose[key] for pose in poses]) for key in poses[0]}
 
 
 def _draw_links(axes: Axes, used: list[tuple[str, str]], now: _Points, size: float) -> None:
@@ -136,8 +128,7 @@ def _draw_guide(axes: Axes, path: Array, at: Array, direction: Array, size: floa
 
 def _draw_names(axes: Axes, record: Record, now: _Points, busy: list[tuple[Array, Array]], size: float) -> None:
     """Names of the joints, those at one place together, on the side where fewest links and forces leave the place."""
-    mechanism = record.manifest.mechanism
-    assert mechanism is not None
+    mechanism = record.mechanism
     places: list[tuple[Array, list[str]]] = []
     for name, _, _, _, body, point in mechanism.joints:
         at = now[body, point]
@@ -194,8 +185,7 @@ def _draw_forces(axes: Axes, record: Record, now: _Points, sample: int, size: fl
 
 def _reactions(record: Record, now: _Points, sample: int) -> list[tuple[Array, Array]]:
     """Places of the frame's revolute joints whose reaction is an output [m], and the forces on the frame there [N]."""
-    mechanism = record.manifest.mechanism
-    assert mechanism is not None
+    mechanism = record.mechanism
     found: list[tuple[Array, Array]] = []
     for name, kind, first, point, second, _ in mechanism.joints:
         outputs = [f"reaction.{name}.{axis}" for axis in "xy"]

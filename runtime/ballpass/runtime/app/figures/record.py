@@ -15,7 +15,7 @@ from ballpass.runtime.ask.observables import KinematicFrequencies, ball_angles, 
 from ballpass.runtime.contract import force_components
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import BearingInfo, Manifest
+    from ballpass.runtime.contract import BearingInfo, Manifest, MechanismInfo
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.solution import Solution
 
@@ -47,6 +47,12 @@ class Record:
     def manifest(self) -> Manifest:
         """Of the model that ran."""
         return self.solution.manifest
+
+    @property
+    def mechanism(self) -> MechanismInfo:
+        """Of a scene that has one."""
+        assert self.manifest.mechanism is not None  # figures of a mechanism are drawn of such scenes only
+        return self.manifest.mechanism
 
     @property
     def t(self) -> Array:
@@ -148,13 +154,11 @@ class Record:
 
     def applied_forces(self, t: float) -> tuple[tuple[str, tuple[str, str], Array], ...]:
         """Applied forces that act at a time: name, (body, point), components (2,) [N]."""
-        mechanism = self.manifest.mechanism
-        assert mechanism is not None  # drawn of scenes with a mechanism only
         parameters = self.solution.parameters
         values = self.model.inputs_at(t, parameters)
         inputs = {info.name: value for info, value in zip(self.manifest.inputs, values, strict=True)}
         acting = []
-        for name, body, point, gate in mechanism.forces:
+        for name, body, point, gate in self.mechanism.forces:
             if gate and inputs[gate] == 0.0:
                 continue
             cartesian, (magnitude, direction) = force_components(name)
@@ -168,8 +172,6 @@ class Record:
 
     def points(self, t: float) -> dict[tuple[str, str], Array]:
         """Coordinates of the mechanism's points at a time: (body, point) -> (2,) [m]."""
-        mechanism = self.manifest.mechanism
-        assert mechanism is not None  # drawn of scenes with a mechanism only
         given = {
             "t": 0.0,  # time since the reference time of the inputs' phases, which is t itself
             "u": self.model.inputs_at(t, self.solution.parameters),
@@ -179,7 +181,7 @@ class Record:
         signature = self.manifest.function("geometry").inputs
         flat = self.model.function("geometry")(*(given[name] for name, _ in signature))
         pairs = np.array(flat, dtype=float).reshape(-1, 2)
-        return {(info.body, info.point): pairs[k] for k, info in enumerate(mechanism.points)}
+        return {(info.body, info.point): pairs[k] for k, info in enumerate(self.mechanism.points)}
 
     def settings(self) -> str:
         """What a caption says of the run: transient cycles dropped, method, clearance, damping law."""
