@@ -12,7 +12,7 @@ import pytest
 from ballpass.derive import SceneError, generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.records import Scene
-from ballpass.runtime import Model, load
+from ballpass.runtime import Model, load, load_solution
 
 #: What the right bearing has other than the left one: law, number of balls, clearance, a fixed outer ring.
 OTHER = (
@@ -102,3 +102,12 @@ def test_bearings_in_two_places_are_refused(scene_text: Callable[..., str], tmp_
         refused(text.replace("[run]", one.replace("[bearing", "[bearings.other") + "[run]"))
     with pytest.raises(SceneError, match=r"bearings\.left\.clearance"):
         refused(pair_text(scene_text).replace('clearance = "10 um"', 'clearance = "10 s"'))
+
+
+def test_a_solution_keeps_the_balls_of_each_bearing(pair: Model, tmp_path: Path) -> None:
+    run = pair.simulate(cycles=0.05, transient=0, samples_per_cycle=200)
+    kept = load_solution(run.save(tmp_path / "pair.nc"))
+    labelled = kept.to_xarray()
+    for name, balls in (("left", 8), ("right", 9)):
+        assert np.array_equal(kept[f"{name}.ball.force"], run[f"{name}.ball.force"])
+        assert labelled[f"{name}.ball.force"].sel({f"{name}.ball": balls}).shape == run.t.shape

@@ -181,7 +181,8 @@ class Solution:
         import xarray
 
         variables, facts = _contents(self)
-        coordinates = {name: variables.pop(name) for name in ("time", "ball") if name in variables}
+        axes = ("time", *(f"{bearing.prefix}ball" for bearing in self.manifest.bearings))
+        coordinates = {name: variables.pop(name) for name in axes if name in variables}
         return xarray.Dataset(variables, coords=coordinates, attrs=facts)
 
     def save(self, path: str | Path) -> Path:
@@ -244,13 +245,15 @@ def _contents(solution: Solution) -> tuple[dict[str, _Variable], dict[str, Any]]
     found: dict[str, _Variable] = {
         state.name: (("time",), solution.x[:, k], _attributes(state)) for k, state in enumerate(manifest.states)
     }
-    for name, samples in solution.outputs.items():
-        found[name] = (("time", "ball")[: samples.ndim], samples, _attributes(infos[name]))
     found["time"] = (("time",), solution.t, {"units": "s", "long_name": "time"})
-    balls = max((samples.shape[1] for samples in solution.outputs.values() if samples.ndim == 2), default=0)
-    if balls:
-        numbers = np.arange(1, balls + 1)
-        found["ball"] = (("ball",), numbers, {"units": "1", "long_name": "number of the ball"})
+    for name, samples in solution.outputs.items():
+        if samples.ndim == 1:
+            found[name] = (("time",), samples, _attributes(infos[name]))
+            continue
+        balls = _ball_dimension(manifest, name)
+        found[name] = (("time", balls), samples, _attributes(infos[name]))
+        numbers = np.arange(1, samples.shape[1] + 1)
+        found[balls] = ((balls,), numbers, {"units": "1", "long_name": "number of the ball"})
     facts: dict[str, Any] = {
         "title": manifest.title,
         "scene": manifest.scene,
@@ -268,6 +271,12 @@ def _contents(solution: Solution) -> tuple[dict[str, _Variable], dict[str, Any]]
         "ballpass_manifest": manifest.to_json(),
     }
     return found, facts
+
+
+def _ball_dimension(manifest: Manifest, output: str) -> str:
+    """Axis of an output that has a value for each ball: ``ball``, or ``<name>.ball`` where bearings have names."""
+    prefix = next((b.prefix for b in manifest.bearings if output.startswith(b.prefix)), "")
+    return f"{prefix}ball"
 
 
 def _netcdf(solution: Solution) -> bytes:
