@@ -10,10 +10,8 @@ import re
 import subprocess
 import sys
 import textwrap
-import weakref
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -208,40 +206,3 @@ def test_results_of_ensembles_have_the_layout_of_those_of_single_runs() -> None:
     for field in ensemble_driver.RESULT.names:
         assert ensemble_driver.RESULT.fields is not None
         assert ensemble_driver.RESULT.fields[field][1] == getattr(stepper._Result, field).offset
-
-
-@pytest.mark.parametrize("what", ["run", "magnitudes"])
-def test_arrays_live_as_long_as_c_reads_them(monkeypatch: pytest.MonkeyPatch, what: str) -> None:
-    """A pointer keeps nothing alive: of a model without inputs C once read a column of zeros that was freed."""
-    given: list[weakref.ref[np.ndarray]] = []
-    real = ensemble_driver._pointer
-
-    def pointer(array: np.ndarray) -> ctypes.c_void_p:
-        given.append(weakref.ref(array))
-        return real(array)
-
-    def reading(*_: object) -> int:
-        assert all(reference() is not None for reference in given)
-        return 0
-
-    monkeypatch.setattr(ensemble_driver, "_pointer", pointer)
-    driver = object.__new__(ensemble_driver.EnsembleDriver)
-    driver._inputs = 1
-    driver._code = SimpleNamespace(
-        ballpass_ensemble=reading, ballpass_ensemble_magnitudes=reading, ballpass_ensemble_work=lambda _: 8
-    )
-    states, moments = np.zeros((3, 4)), np.arange(4)
-    members = ensemble_driver.MemberArrays(
-        p=np.zeros((3, 2)),
-        c=np.zeros((3, 2)),
-        first=moments,
-        times=np.zeros(3),
-        inputs=np.zeros((3, 0)),
-        restarts=np.zeros(3),
-    )
-    if what == "run":
-        family = ensemble_driver.LANE_FAMILIES[0]
-        driver.run(family, members, states, np.ones((3, 4)), None, ctypes.c_int(0))
-    else:
-        driver.magnitudes(members, states, moments, np.zeros((3, 0)), np.ones(3))
-    assert len(given) >= 7

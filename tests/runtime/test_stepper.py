@@ -332,7 +332,7 @@ def test_faulty_calls_are_refused(rotor: Model) -> None:
             assert np.array_equal(found.end, rotor.initial())
     with pytest.raises(RequestError, match="stepper-rodas4"):
         rotor.simulate(1, method="stepper-euler")
-    with pytest.raises(TypeError, match="float64"):
+    with pytest.raises(ctypes.ArgumentError, match="float64"):
         run(rotor, numbers, Segments(times=np.array([0, 1, 2]), inputs=good.inputs, restarts=good.restarts),
             family=Family.DP54, tolerance=1e-9)  # fmt: skip
 
@@ -375,10 +375,8 @@ def test_counts_below_zero_are_refused(rotor: Model, segments: int, outputs: int
     result = stepping._Result(status=-1, steps=-1, written=-1)
     inputs, restarts = np.zeros((2, max(len(rotor.manifest.inputs), 1))), np.ones(2, dtype=np.uint8)
     one = np.array([0.005, 0.006])
-    vectors = (vector.ctypes.data for vector in (numbers.p, numbers.c, x))
-    given = (array.ctypes.data for array in (times, inputs, restarts))
-    end = rotor.stepper._run(
-        *(ctypes.byref(options), *vectors, segments, *given, outputs, one.ctypes.data, states.ctypes.data),
+    end = rotor.stepper._code.ballpass_run(
+        *(ctypes.byref(options), numbers.p, numbers.c, x, segments, times, inputs, restarts, outputs, one, states),
         ctypes.byref(result),
     )
     assert (End(end), End(result.status)) == (End.BAD_ARGUMENT, End.BAD_ARGUMENT)

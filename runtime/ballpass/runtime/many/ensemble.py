@@ -190,7 +190,7 @@ def simulate_many(
         lanes=in_lanes,
         reducing=bool(reduced),
         end=members.initial.copy(),
-        rows=driver.reductions(len(members), span.starts, reduced),
+        rows=driver.rows.empty(len(members), span.starts, reduced),
         results={
             member: MemberFailure(member=member, status="REFUSED", time=0.0, message=message)
             for member, message in members.refused.items()

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import copy
 import ctypes
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +16,13 @@ import numpy as np
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.driver_library import (
+    BYTES,
+    DOUBLES,
+    LONGS,
+    ArrayOf,
+    address,
     check_sizes,
+    declare,
     input_columns,
     open_driver,
     padded,
@@ -112,8 +117,14 @@ class EnsembleDriver:
         self._inputs = input_columns(manifest)
         self._code = code
         self.schedule = MemberSchedule(code, manifest)
-        code.ballpass_ensemble_work.restype = ctypes.c_long
-        code.ballpass_ensemble.restype = ctypes.c_int
+        integer, long = ctypes.c_int, ctypes.c_long
+        states = (DOUBLES, DOUBLES, DOUBLES)
+        declare(code, "ballpass_ensemble_work", long, long)
+        declare(code, "ballpass_ensemble_magnitudes", None, long, *states, LONGS, DOUBLES, DOUBLES, DOUBLES)
+        segments = (LONGS, DOUBLES, DOUBLES, BYTES)
+        told = (DOUBLES, DOUBLES, ArrayOf(RESULT))
+        options = ctypes.POINTER(_Options)
+        declare(code, "ballpass_ensemble", integer, options, long, *states, DOUBLES, *segments, *told)
 
     def with_stepper(self, stepper: Stepper) -> EnsembleDriver:
         """The same with another driver of single runs, which must have reductions."""
@@ -121,13 +132,9 @@ class EnsembleDriver:
         found.stepper = stepper
         return found
 
-    def reductions(self, members: int, start: np.ndarray | float, channels: Collection[str]) -> np.ndarray:
-        """Empty rows of reductions of these channels that count from `start` on [s], shape (members, row)."""
-        return self.rows.empty(members, start, channels)
-
     def carry(self, members: int) -> Carried:
         """What so many members carry, before their first call."""
-        size = self._code.ballpass_ensemble_work(ctypes.c_long(members))
+        size = self._code.ballpass_ensemble_work(members)
         return Carried(results=np.zeros(members, dtype=RESULT), work=np.empty(size // 8 + 1))
 
     def run(
@@ -168,21 +175,15 @@ class EnsembleDriver:
         options = _Options(
             method=int(family),
             resume=int(carried.begun),
-            max_steps=_pointer(limits),
+            max_steps=address(limits, ctypes.c_long),
             stop=ctypes.pointer(stop),
-            reached=None if reached is None else _pointer(reached),
+            reached=address(reached),
         )
         carried.begun = True
-        inputs = padded(members.inputs, self._inputs)
-        arrays = (members.p, members.c, tolerance, x, members.first, members.times, inputs)
         self._code.ballpass_ensemble(
-            ctypes.byref(options),
-            ctypes.c_long(count),
-            *(_pointer(array) for array in arrays),
-            _pointer(members.restarts),
-            None if reductions is None else _pointer(reductions),
-            _pointer(carried.work),
-            _pointer(carried.results),
+            *(ctypes.byref(options), count, members.p, members.c, tolerance, x, members.first, members.times),
+            *(padded(members.inputs, self._inputs), members.restarts.view(np.uint8)),
+            *(reductions, carried.work, carried.results),
         )
         return carried.results
 
@@ -204,14 +205,8 @@ class EnsembleDriver:
         horizons : a turn, or the run, of each member [s]
         """
         found = np.empty_like(initial)
-        # named, for a pointer does not keep alive what it points to
-        arrays = (members.p, members.c, initial, first, padded(inputs, self._inputs), horizons, found)
-        pointers = [_pointer(array) for array in arrays]
-        self._code.ballpass_ensemble_magnitudes(ctypes.c_long(len(initial)), *pointers)
+        moments = padded(inputs, self._inputs)
+        self._code.ballpass_ensemble_magnitudes(
+            len(initial), members.p, members.c, initial, first, moments, horizons, found
+        )
         return found
-
-
-def _pointer(array: np.ndarray) -> ctypes.c_void_p:
-    if not array.flags.c_contiguous:
-        raise TypeError(f"a C-contiguous array is expected, not one with strides {array.strides}")
-    return ctypes.c_void_p(array.ctypes.data)

@@ -189,14 +189,12 @@ class Functions:
         self._require(name)
         library = self._library(name)
         try:
-            function = casadi.external(name, str(library.path))
+            return casadi.external(name, str(library.path))
         except RuntimeError as fault:
             raise CompileError(
                 f"{library.path}: function {name!r} cannot be loaded. "
                 f"Delete this file, and it is compiled anew.\n{fault}"
             ) from fault
-        _check_signature(function, self.manifest)
-        return function
 
 
 def _read_functions(path: Path) -> dict[str, casadi.Function]:
@@ -220,15 +218,3 @@ def _differentiate(graph: casadi.Function, name: str, along: str | None) -> casa
     moved = casadi.jtimes(value, casadi.vertcat(*arguments.values()), casadi.vertcat(*directions.values()))
     both = {**arguments, **directions}
     return casadi.Function(name, [*both.values()], [casadi.cse(casadi.densify(moved))], [*both], [f"d{result}"])
-
-
-def _check_signature(function: casadi.Function, manifest: Manifest) -> None:
-    """Refuse a function whose arguments are not those of the manifest."""
-    info = manifest.function(function.name())
-    names = function.name_in()
-    for name, rows in info.inputs:
-        if name not in names or function.size1_in(name) != rows:
-            raise ArtefactError(
-                f"{function.name()}: the manifest has the argument {name} with {rows} rows, the compiled code has "
-                f"{', '.join(f'{n} ({function.size1_in(n)})' for n in names)}. Write the folder again."
-            )

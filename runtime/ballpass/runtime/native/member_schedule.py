@@ -12,7 +12,7 @@ import ctypes
 import numpy as np
 
 from ballpass.runtime.contract import Manifest
-from ballpass.runtime.native.driver_library import address
+from ballpass.runtime.native.driver_library import DOUBLES, LONGS, address, declare
 
 #: Kinds of inputs in the order of schedule.h.
 KINDS = ("phase", "gate", "table", "table_rate")
@@ -80,17 +80,20 @@ class MemberSchedule:
                 for item in manifest.inputs
             )
         )
-        code.ballpass_schedule_edges.restype = ctypes.c_double
-        code.ballpass_schedule_moments.restype = ctypes.c_long
+        schedule, long, double = ctypes.POINTER(_Schedule), ctypes.c_long, ctypes.c_double
+        spans, windows = (DOUBLES, DOUBLES, DOUBLES), (double, long, long)
+        declare(code, "ballpass_schedule_edges", double, schedule, *spans, *windows, double, LONGS, DOUBLES)
+        declare(code, "ballpass_schedule_inputs", None, schedule, long, LONGS, DOUBLES, DOUBLES, DOUBLES)
+        declare(code, "ballpass_schedule_moments", long, schedule, LONGS, DOUBLES, DOUBLES, LONGS, DOUBLES)
 
     def _of(self, values: np.ndarray) -> ctypes.Structure:
         members, columns = values.shape
         inputs = ctypes.addressof(self._inputs)
-        return _Schedule(inputs, self._count, columns, members, address("values", values))
+        return _Schedule(inputs, self._count, columns, members, address(values))
 
     def most(self, values: np.ndarray, spans: tuple[np.ndarray, np.ndarray, np.ndarray], *windows: int) -> float:
         """The most segments that `edges` may give."""
-        return float(self._edges(values, spans, windows, 0.0, None, None))
+        return float(self._code.ballpass_schedule_edges(self._of(values), *spans, *windows, 0.0, None, None))
 
     def edges(
         self,
@@ -114,32 +117,10 @@ class MemberSchedule:
         """
         members = len(values)
         first, times = np.zeros(members + 1, dtype=ctypes.c_long), np.empty(int(most) + 2 * members)
-        count = self._edges(values, spans, windows, most, first.ctypes.data, address("times", times))
+        count = self._code.ballpass_schedule_edges(self._of(values), *spans, *windows, most, first, times)
         if count < 0.0:
             raise MemoryError(f"Segments of {members} members")
         return first, times[: int(count) + members].copy()
-
-    def _edges(
-        self,
-        values: np.ndarray,
-        spans: tuple[np.ndarray, np.ndarray, np.ndarray],
-        windows: tuple[int, ...],
-        room: float,
-        first: int | None,
-        times: int | None,
-    ) -> float:
-        turns_a_window, begin, count = windows
-        found: float = self._code.ballpass_schedule_edges(
-            ctypes.byref(self._of(values)),
-            *(ctypes.c_void_p(address("spans", span)) for span in spans),
-            ctypes.c_double(turns_a_window),
-            ctypes.c_long(begin),
-            ctypes.c_long(count),
-            ctypes.c_double(room),
-            ctypes.c_void_p(first),
-            ctypes.c_void_p(times),
-        )
-        return found
 
     def inputs(self, values: np.ndarray, owner: np.ndarray, t: np.ndarray, inside: np.ndarray) -> np.ndarray:
         """Inputs of segments that start at `t`, shape (n, inputs).
@@ -152,12 +133,7 @@ class MemberSchedule:
         """
         found = np.empty((len(t), self._count))
         owners = np.ascontiguousarray(owner, dtype=ctypes.c_long)
-        self._code.ballpass_schedule_inputs(
-            ctypes.byref(self._of(values)),
-            ctypes.c_long(len(t)),
-            ctypes.c_void_p(owners.ctypes.data),
-            *(ctypes.c_void_p(address("times", times)) for times in (t, inside, found)),
-        )
+        self._code.ballpass_schedule_inputs(self._of(values), len(t), owners, t, inside, found)
         return found
 
     def moments(
@@ -173,11 +149,5 @@ class MemberSchedule:
         """
         rows = np.zeros(len(values) + 1, dtype=ctypes.c_long)
         found = np.empty((2 * MOMENTS * len(values), max(self._count, 1)))
-        count = self._code.ballpass_schedule_moments(
-            ctypes.byref(self._of(values)),
-            ctypes.c_void_p(first.ctypes.data),
-            *(ctypes.c_void_p(address("times", given)) for given in (times, horizons)),
-            ctypes.c_void_p(rows.ctypes.data),
-            ctypes.c_void_p(address("inputs", found)),
-        )
+        count = self._code.ballpass_schedule_moments(self._of(values), first, times, horizons, rows, found)
         return rows, np.ascontiguousarray(found[:count, : self._count])

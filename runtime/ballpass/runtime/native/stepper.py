@@ -7,7 +7,7 @@ any number of segments; the interpreter is free meanwhile, and calls from severa
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from enum import IntEnum
 
@@ -16,8 +16,11 @@ import numpy as np
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.driver_library import (
+    BYTES,
+    DOUBLES,
     address,
     check_sizes,
+    declare,
     input_columns,
     open_driver,
     padded,
@@ -209,14 +212,16 @@ class Stepper:
         check_sizes(library, "states, inputs, parameters and constants", sizes[:4], expected)
         self.lanes, self._work = sizes[5:]
         self._code = code
-        self._run = code.ballpass_run
-        self._run.restype = ctypes.c_int
-        # addresses as numbers: making typed pointers would take as long as a hundred steps
-        pointer, long = ctypes.c_void_p, ctypes.c_long
-        self._run.argtypes = (
-            *(ctypes.POINTER(_Options), pointer, pointer, pointer, long, pointer, pointer, pointer),
-            *(long, pointer, pointer, ctypes.POINTER(_Result)),
+        integer, long, result = ctypes.c_int, ctypes.c_long, ctypes.POINTER(_Result)
+        run = (
+            *(ctypes.POINTER(_Options), DOUBLES, DOUBLES, DOUBLES, long, DOUBLES, DOUBLES, BYTES),
+            *(long, DOUBLES, DOUBLES),
         )
+        declare(code, "ballpass_run", integer, *run, result)
+        declare(code, "ballpass_run_tangents", integer, *run, ctypes.POINTER(_Tangents), result)
+        declare(code, "ballpass_tangent_work", long, long)
+        magnitudes = (DOUBLES, DOUBLES, DOUBLES, long, DOUBLES, ctypes.c_double, DOUBLES)
+        declare(code, "ballpass_magnitudes", None, *magnitudes)
 
     def hold(self) -> Held:
         """What a run in several calls is kept in, before its first."""
@@ -261,31 +266,31 @@ class Stepper:
         """
         inputs = padded(segments.inputs, self._inputs)
         restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
-        reduced = None if reduction is None else address("reduction", reduction)
         options = _Options(
-            *(family, max_steps, first_step, smallest_step, largest_step, address("tolerance", tolerance), reduced)
+            *(family, max_steps, first_step, smallest_step, largest_step, address(tolerance), address(reduction)),
+            before=address(before),
         )
-        if before is not None:
-            options.before = address("before", before)
         result = _Result()
         if held is not None:
-            result, options.work, options.resume = held.result, address("work", held.work), int(held.begun)
+            result, options.work, options.resume = held.result, address(held.work), int(held.begun)
             held.begun = True
-        call = self._run if tangents is None else self._differentiated(tangents)
-        call(
-            ctypes.byref(options),
-            address("p", p),
-            address("c", c),
-            address("x", x),
-            len(restarts),
-            address("times", segments.times),
-            address("inputs", inputs),
-            restarts.ctypes.data,
-            len(output_times),
-            address("output_times", output_times),
-            None if output_states is None else address("output_states", output_states),
-            ctypes.byref(result),
+        given = (
+            *(ctypes.byref(options), p, c, x, len(restarts), segments.times, inputs, restarts),
+            *(len(output_times), output_times, output_states),
         )
+        if tangents is None:
+            self._code.ballpass_run(*given, ctypes.byref(result))
+        else:
+            blocks = len(tangents.x)
+            work = np.empty(self._code.ballpass_tangent_work(blocks) // 8 + 8)
+            names = ("p", "c", "u", "shift", "x", "outputs", "weight")
+            directions = _Tangents(
+                blocks=blocks,
+                work=address(work),
+                rtol=tangents.rtol,
+                **{name: address(getattr(tangents, name)) for name in names},
+            )
+            self._code.ballpass_run_tangents(*given, ctypes.byref(directions), ctypes.byref(result))
         told = {name: getattr(result, name) for name in _TOLD}
         return Outcome(end=End(result.status), family=Family(result.method), **told)
 
@@ -304,35 +309,5 @@ class Stepper:
         """
         moments = padded(inputs, self._inputs)
         found = np.empty_like(initial)
-        magnitudes, pointer = self._code.ballpass_magnitudes, ctypes.c_void_p
-        magnitudes.restype = None
-        magnitudes.argtypes = (pointer, pointer, pointer, ctypes.c_long, pointer, ctypes.c_double, pointer)
-        magnitudes(
-            *(address(name, array) for name, array in (("p", p), ("c", c), ("initial", initial))),
-            len(moments),
-            address("inputs", moments),
-            horizon,
-            address("found", found),
-        )
+        self._code.ballpass_magnitudes(p, c, initial, len(moments), moments, horizon, found)
         return found
-
-    def _differentiated(self, tangents: Tangents) -> Callable[..., int]:
-        """The driver's call with derivatives, the directions bound."""
-        fields = ("p", "c", "u", "shift", "x", "outputs")
-        pointers = {name: address(name, getattr(tangents, name)) for name in fields}
-        blocks = len(tangents.x)
-        self._code.ballpass_tangent_work.restype = ctypes.c_long
-        work = np.empty(self._code.ballpass_tangent_work(ctypes.c_long(blocks)) // 8 + 8)
-        weight = None if tangents.weight is None else address("weight", tangents.weight)
-        bound = _Tangents(blocks=blocks, work=work.ctypes.data, weight=weight, rtol=tangents.rtol, **pointers)
-        run = self._code.ballpass_run_tangents
-        run.restype = ctypes.c_int
-        run.argtypes = (*self._run.argtypes[:-1], ctypes.POINTER(_Tangents), self._run.argtypes[-1])
-
-        def call(*arguments: object) -> int:
-            *given, result = arguments
-            done: int = run(*given, ctypes.byref(bound), result)
-            assert work.size  # the driver's memory lives until here
-            return done
-
-        return call
