@@ -16,10 +16,10 @@ c   derived constants in the order of `Manifest.constants`, from ``constants(p)`
 
 from ballpass.runtime.contract.folder import (
     check_files,
-    check_unchanged,
     file_digest,
     read_artefact,
     read_manifest,
+    read_unchanged,
     write,
 )
 from ballpass.runtime.contract.manifest import (
@@ -63,11 +63,11 @@ __all__ = [
     "RunInfo",
     "VariableInfo",
     "check_files",
-    "check_unchanged",
     "digest_of",
     "file_digest",
     "force_components",
     "read_artefact",
     "read_manifest",
+    "read_unchanged",
     "write",
 ]

@@ -110,29 +110,24 @@ def check_files(folder: str | Path, manifest: Manifest) -> None:
         )
 
 
-def check_unchanged(path: Path, digest: str, content: bytes | None = None) -> None:
-    """Refuse a file that is not the one its manifest describes, though it was when the model was loaded.
-
-    Parameters
-    ----------
-    path : a file of a generated folder
-    digest : sha256 that the manifest gives it
-    content : its bytes, where they were read
+def read_unchanged(path: Path, digest: str) -> bytes:
+    """Content of a file of a generated folder with the sha256 that its manifest gives it.
 
     Raises
     ------
     ArtefactError
-        The folder was written anew, or edited, meanwhile.
+        The folder was written anew, or edited, since the model was loaded.
     """
     try:
-        found = file_digest(path) if content is None else hashlib.sha256(content).hexdigest()
+        content = path.read_bytes()
     except OSError as fault:
         raise ArtefactError(f"{path}: cannot be read ({fault.strerror}). Write the folder again.") from fault
-    if found != digest:
+    if hashlib.sha256(content).hexdigest() != digest:
         raise ArtefactError(
             f"{path}: the file is not the one that its manifest described when the model was loaded: it was written "
             "anew or edited since. Load the folder again."
         )
+    return content
 
 
 def file_digest(path: str | Path) -> str:

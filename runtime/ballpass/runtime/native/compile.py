@@ -30,7 +30,7 @@ from pathlib import Path
 
 import platformdirs
 
-from ballpass.runtime.contract import Manifest, check_unchanged
+from ballpass.runtime.contract import Manifest, read_unchanged
 from ballpass.runtime.contract.errors import CompileError, RequestError
 from ballpass.runtime.native.compilers import Compiler, find_compiler, run_compiler
 
@@ -179,13 +179,12 @@ def compile_sources(
 
 
 def _content(path: Path, digests: Mapping[Path, str]) -> bytes:
+    if path in digests:
+        return read_unchanged(path, digests[path])
     try:
-        content = path.read_bytes()
+        return path.read_bytes()
     except OSError as fault:
         raise CompileError(f"{path}: cannot be read ({fault.strerror}). Write the folder again.") from fault
-    if path in digests:
-        check_unchanged(path, digests[path], content)
-    return content
 
 
 def _write_copies(folder: Path, contents: Mapping[Path, bytes]) -> None:

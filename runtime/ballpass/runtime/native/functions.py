@@ -14,7 +14,7 @@ from typing import Any
 
 import casadi
 
-from ballpass.runtime.contract import MODEL, Manifest, check_unchanged
+from ballpass.runtime.contract import MODEL, Manifest, read_unchanged
 from ballpass.runtime.contract.errors import ArtefactError, CompileError, RequestError
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.casadi_integrators import make_integrator
@@ -134,7 +134,7 @@ class Functions:
         path = self.folder / f"{where}.casadi"
         with self._making:
             if where not in self._read:
-                self._symbolic |= self._read_file(path)
+                self._symbolic |= _read_functions(path, dict(self.manifest.files)[path.name])
                 self._read.add(where)
             if name not in self._symbolic:
                 # derivatives are generated to C only; here they are made from what they belong to
@@ -143,14 +143,6 @@ class Functions:
                     raise ArtefactError(f"{path}: has no function {name!r}. Write the folder again.")
                 self._symbolic[name] = _differentiate(self.symbolic(derivative["of"]), name, derivative["along"])
             return self._symbolic[name]
-
-    def _read_file(self, path: Path) -> dict[str, casadi.Function]:
-        # before, for CasADi does not survive every torn file; behind, for it reads by name
-        digest = dict(self.manifest.files)[path.name]
-        check_unchanged(path, digest)
-        functions = _read_functions(path)
-        check_unchanged(path, digest)
-        return functions
 
     def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function:
         """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `casadi_integrators`)."""
@@ -197,11 +189,12 @@ class Functions:
             ) from fault
 
 
-def _read_functions(path: Path) -> dict[str, casadi.Function]:
+def _read_functions(path: Path, digest: str) -> dict[str, casadi.Function]:
+    content = read_unchanged(path, digest)  # CasADi does not survive every torn file
     try:
-        stored = casadi.FileDeserializer(str(path))
+        stored = casadi.StringDeserializer(content.decode("ascii"))
         functions = [stored.unpack() for _ in range(int(stored.unpack()))]
-    except (RuntimeError, SystemError) as fault:
+    except (RuntimeError, SystemError, UnicodeError) as fault:
         raise ArtefactError(f"{path}: no functions can be read from it. Write the folder again.\n{fault}") from fault
     return {function.name(): function for function in functions}
 
