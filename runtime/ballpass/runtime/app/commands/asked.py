@@ -36,13 +36,11 @@ class Asked:
 
     Attributes
     ----------
-    path : the scene file
     run : its run settings, with what was asked for instead
     overrides : numbers of ``--set`` by path [SI]
     speed : of driver or shaft, with the overrides; 0 where nothing turns [rad/s]
     """
 
-    path: Path
     run: Run | RunInfo
     overrides: dict[str, float]
     speed: float
@@ -70,7 +68,7 @@ def read_asked(
         run = scene.run
         shaft = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
         speed = shaft.value if shaft is not None else 0.0
-    return Asked(path=path, run=_asked_run(run, duration, transient), overrides=overrides, speed=speed)
+    return Asked(run=_asked_run(run, duration, transient), overrides=overrides, speed=speed)
 
 
 def _asked_run(run: _Run, duration: float | None, transient: float | None) -> _Run:

@@ -17,7 +17,6 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
 #: 1200 pixels wide.
@@ -118,12 +117,6 @@ def caption(figure: Figure, title: str, text: str) -> None:
     figure.suptitle(title, x=0.012, ha="left", fontsize=12, fontweight="bold")
     wrapped = "\n".join(textwrap.wrap(text, 124, break_on_hyphens=False))
     figure.supxlabel(wrapped, x=0.012, ha="left", **_CAPTION)
-
-
-def degree_axis(axes: Axes) -> None:
-    """A turn of the crank [deg] along x."""
-    axes.set_xlim(0.0, 360.0)
-    axes.xaxis.set_major_locator(MultipleLocator(60.0))
 
 
 def shade_windows(axes: Axes, windows: Iterable[tuple[float, float]], turns: Iterable[int]) -> None:

@@ -11,7 +11,6 @@ from ballpass.runtime.app.figures.canvas import (
     GREY,
     INK,
     SECOND,
-    degree_axis,
     frame,
     legend_above,
     new_figure,
@@ -68,7 +67,8 @@ def load_curve(record: Record) -> Figure:
     _flatten_noise(panels[: 2 * len(joints)])
     windows = record.gate_windows()
     for axes in panels:
-        degree_axis(axes)
+        axes.set_xlim(0.0, 360.0)
+        axes.set_xticks(np.arange(0.0, 361.0, 60.0))
         axes.axhline(0.0, color=GREY, linewidth=0.6)
         shade_windows(axes, windows, (0, -1))
         low, high = axes.get_ylim()
