@@ -21,7 +21,7 @@ from ballpass.runtime.native.casadi_integrators import make_integrator
 from ballpass.runtime.native.compile import CompiledLibrary, compile_sources, digests_of
 from ballpass.runtime.native.compilers import Compiler, find_compiler
 from ballpass.runtime.native.kernel import Array, Kernel, Loop
-from ballpass.runtime.native.loops import CompiledLoop, LoopDriver, PointLoop
+from ballpass.runtime.native.loops import CompiledLoop, PointLoop
 
 #: Arguments of a function of outputs that change from sample to sample.
 _MOVING = ("t", "x", "u")
@@ -64,7 +64,6 @@ class Functions:
         self._own = _OwnMemory()
         # what is shared is made once: re-entrant, for one function is made from another
         self._making = threading.RLock()
-        self._loop_driver: LoopDriver | None = None
         self._symbolic: dict[str, casadi.Function] = {}
         self._integrators: dict[tuple[str, int], casadi.Function] = {}
 
@@ -98,10 +97,7 @@ class Functions:
             if self.library is None:
                 loop: PointLoop = Loop(function, varying)
             else:
-                with self._making:
-                    if self._loop_driver is None:
-                        self._loop_driver = LoopDriver(self._find_compiler("loop.c"))
-                loop = CompiledLoop(self._loop_driver, self._library(name).path, function, varying)
+                loop = CompiledLoop(self._find_compiler("loop.c"), self._library(name).path, function, varying)
             self._own.loops[name, varying] = loop
         return self._own.loops[name, varying]
 

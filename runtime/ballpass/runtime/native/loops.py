@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Collection, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,25 +17,22 @@ import numpy as np
 
 from ballpass.runtime.native.compile import compile_sources
 from ballpass.runtime.native.compilers import Compiler
-from ballpass.runtime.native.driver_library import DRIVER
+from ballpass.runtime.native.driver_library import DRIVER, declare
 from ballpass.runtime.native.kernel import Array, EvaluationError, Loop
 
 _Pointers = ctypes.POINTER(ctypes.c_void_p)
 _Longs = ctypes.POINTER(ctypes.c_long)
 
 
-class LoopDriver:
-    """The compiled `driver/loop.c`: one library for all models."""
-
-    def __init__(self, compiler: Compiler) -> None:
-        self.library = compile_sources((DRIVER / "loop.c",), compiler, label="ballpass-loop")
-        code = ctypes.CDLL(str(self.library.path))
-        self.run = code.ballpass_loop
-        self.run.restype = ctypes.c_long
-        self.run.argtypes = (
-            *(ctypes.c_void_p, ctypes.c_long, ctypes.c_long, _Pointers, _Longs, ctypes.c_long, _Pointers, _Longs),
-            *(_Pointers, _Pointers, ctypes.c_void_p, ctypes.c_void_p),
-        )
+@cache
+def _loop(compiler: Compiler) -> Any:
+    """The compiled `driver/loop.c`: one function for all models."""
+    code = ctypes.CDLL(str(compile_sources((DRIVER / "loop.c",), compiler, label="ballpass-loop").path))
+    declare(
+        *(code, "ballpass_loop", ctypes.c_long, ctypes.c_void_p, ctypes.c_long, ctypes.c_long, _Pointers, _Longs),
+        *(ctypes.c_long, _Pointers, _Longs, _Pointers, _Pointers, ctypes.c_void_p, ctypes.c_void_p),
+    )
+    return code.ballpass_loop
 
 
 class CompiledLoop:
@@ -45,10 +43,10 @@ class CompiledLoop:
     function : the CasADi function of one point
     """
 
-    def __init__(self, driver: LoopDriver, library: Path, function: casadi.Function, varying: Collection[str]) -> None:
+    def __init__(self, compiler: Compiler, library: Path, function: casadi.Function, varying: Collection[str]) -> None:
         """`varying` names the inputs that change from point to point."""
         self.function = function
-        self._driver = driver
+        self._loop = _loop(compiler)
         self._code = ctypes.CDLL(str(library))  # kept: the function's address lives as long as the library
         name = function.name()
         self._address = ctypes.cast(getattr(self._code, name), ctypes.c_void_p)
@@ -80,7 +78,7 @@ class CompiledLoop:
         }
         # memory of this call: another thread may be in another one
         integers, reals = np.empty(self._integers + 1, dtype=np.int64), np.empty(self._reals + 1)
-        done = self._driver.run(
+        done = self._loop(
             self._address,
             count,
             len(held),
