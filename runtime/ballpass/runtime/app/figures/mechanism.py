@@ -25,7 +25,8 @@ def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
     times = record.t[sample] + (np.zeros(1) if length is None else np.linspace(0.0, length, _TRACE + 1))
     poses = [record.points(float(t)) for t in times]
     trace: _Points = {key: np.array([pose[key] for pose in poses]) for key in now}  # (times, 2) [m]
-    used = list(dict.fromkeys(key for _, _, b, p, c, q in mechanism.joints for key in ((b, p), (c, q))))
+    joined = [key for _, _, b, p, c, q in mechanism.joints for key in ((b, p), (c, q))]
+    used = list(dict.fromkeys([*joined, *((body, point) for _, body, point, _ in mechanism.forces)]))
     everything = np.vstack([trace[key] for key in used])
     low, high = everything.min(axis=0), everything.max(axis=0)
     size = max(float(np.max(high - low)), 1e-9)
