@@ -126,8 +126,8 @@ class Model(PointModel):
         times : times of the samples instead, increasing, within the run; where neither cycles nor duration is given,
             the run ends at the last one.  The stepper takes the same steps however a run of one length is sampled; the
             other methods go from sample to sample [s]
-        outputs : names of the outputs to evaluate, none of them for ``[]``; the others cost nothing.  Default: all of
-            the scene.  A new choice is compiled when first asked for, in a fraction of a second
+        outputs : names of the outputs to keep, none of them for ``[]``, where none is evaluated.  Default: all of the
+            scene
         initial : state at the start, shape (states,)
         transient : turns at the start that `Solution.steady` leaves out
         kinks : ``stepped-over`` leaves kinks of the laws to error control; with ``located`` steps of the project's own
