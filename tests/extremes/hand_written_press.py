@@ -149,7 +149,7 @@ class Machine:
             cage_speed=cage,
             clearance=p["bearing.clearance"],
             stiffness=c["bearing.k_b"],
-            law=info.damping_law,
+            law=info.damping.law,
             coefficient=c.get("bearing.c_b", 0.0),
             inner_mass=c["bearing.m_ei"],
             inner_damping=p.get("bearing.inner_ring.damping", 0.0),

@@ -12,7 +12,8 @@ import pytest
 from ballpass.derive import SceneError, generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.records import Scene
-from ballpass.runtime import Model, load, load_solution
+from ballpass.runtime import KinkWarning, Model, load, load_solution
+from ballpass.runtime.run.failure_location import whereabouts
 
 #: What the right bearing has other than the left one: law, number of balls, clearance, a fixed outer ring.
 OTHER = (
@@ -89,6 +90,19 @@ def test_the_manifest_lists_them_and_their_coordinates(pair: Model) -> None:
         *(f"right.inner.{axis}" for axis in "xy"),
     ]
     assert len(pair.states) == 12
+
+
+def test_messages_name_the_bearing_they_speak_of(pair: Model) -> None:
+    """The left one's law has a corner at rest, the right one's has none; the right one's balls are pressed."""
+    with pytest.warns(KinkWarning, match=r"bearings\.left\.damping\.smoothing") as caught:
+        pair.linearize(x=np.zeros(12))
+    assert not any("bearings.right" in str(item.message) for item in caught)
+    state = np.zeros(12)
+    state[4] = 2e-5  # right.inner.x
+    place = whereabouts(pair.manifest, pair.numbers(), 0.0, state)
+    assert (place.bearing, place.ball) == ("right", 1)
+    assert place.deflection == pytest.approx(2e-5 - 3e-6, rel=1e-12)  # less half its clearance, Eq. (6)
+    assert "ball 1 of right" in place.words
 
 
 def refused(text: str) -> Scene:

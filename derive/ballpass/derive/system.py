@@ -131,7 +131,9 @@ def derive(scene: Scene) -> System:
         bearings=tuple(bearings),
         quantities=tuple(quantities),
         outputs=select_outputs(quantities, scene.outputs),
-        smoothness=tuple(pair for bearing in bearings for pair in bearing.smoothness),
+        smoothness=tuple(
+            (f"{bearing.names.prefix}{name}", law.anywhere) for bearing in bearings for name, law in bearing.laws
+        ),
         events=events_of(inputs, bearings),
     )
 

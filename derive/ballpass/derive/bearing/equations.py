@@ -19,9 +19,9 @@ from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.bearing.laws.contact import Contact, Rest
 from ballpass.derive.bearing.own_terms import OwnTerms, own_terms
 from ballpass.derive.bearing.stiffness import stiffness_constants
-from ballpass.derive.bearing.switching import Switching, find_switching, smoothness_of
+from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
 from ballpass.derive.scene.records import Bearing
-from ballpass.derive.terms import TIME, Definition, Names, Smoothness, symbol_of
+from ballpass.derive.terms import TIME, Definition, Names, symbol_of
 from ballpass.derive.variables import Coordinate
 
 Pair = tuple[sp.Expr, sp.Expr]
@@ -69,7 +69,7 @@ class BearingModel:
     load: Pair
     mass: sp.ImmutableMatrix
     forcing: sp.ImmutableMatrix
-    smoothness: tuple[tuple[str, Smoothness], ...]
+    laws: tuple[tuple[str, LawSmoothness], ...]  # elastic, and damping where there is some
 
 
 def derive_bearing(
@@ -116,8 +116,8 @@ def derive_bearing(
         load=load,
         mass=matrix,
         forcing=forcing,
-        smoothness=tuple(
-            (f"{bearing.prefix}{name}", smoothness_of(part, ball.deflection, ball.deflection_rate))
+        laws=tuple(
+            (name, smoothness_of(part, ball.deflection, ball.deflection_rate))
             for name, part in zip(("elastic", "damping"), parts, strict=False)
         ),
     )

@@ -80,13 +80,31 @@ class _Place:
         return self.order <= KINK_ORDER
 
 
-def smoothness_of(force: sp.Expr, deflection: sp.Symbol, rate: sp.Symbol) -> Smoothness:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LawSmoothness:
+    """How often a force may be differentiated: where the deflection decides, where the rate does, and anywhere."""
+
+    in_deflection: Smoothness
+    in_rate: Smoothness
+    anywhere: Smoothness
+
+
+def smoothness_of(force: sp.Expr, deflection: sp.Symbol, rate: sp.Symbol) -> LawSmoothness:
     """How often a force may be differentiated, found at each of its case distinctions."""
-    order = math.inf
+    orders = {False: math.inf, True: math.inf}
     for condition in sp.ordered(force.atoms(Relational)):
         of_rate, start = _border(condition, deflection, rate)
         decides, other = (rate, deflection) if of_rate else (deflection, rate)
-        order = min(order, _look(force, condition, decides, start, other, paired=False).order)
+        order = _look(force, condition, decides, start, other, paired=False).order
+        orders[of_rate] = min(orders[of_rate], order)
+    return LawSmoothness(
+        in_deflection=_in_words(orders[False]),
+        in_rate=_in_words(orders[True]),
+        anywhere=_in_words(min(orders.values())),
+    )
+
+
+def _in_words(order: float) -> Smoothness:
     if order > KINK_ORDER:
         return Smoothness.TWICE_SMOOTH
     if order > 1.0:

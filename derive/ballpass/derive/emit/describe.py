@@ -122,6 +122,7 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
 def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
     scene = system.scene
     speed = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
+    laws = [dict(bearing.laws).get("damping") for bearing in system.bearings]
     return tuple(
         mf.BearingInfo(
             name=bearing.name,
@@ -131,7 +132,11 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             joint=bearing.joint or "",
             shaft_speed=speed.path if speed is not None else "",
             outer_ring=bearing.outer is not None,
-            damping_law=bearing.damping.law,
+            damping=mf.DampingInfo(law=bearing.damping.law)
+            if law is None
+            else mf.DampingInfo(
+                law=bearing.damping.law, in_deflection=law.in_deflection.value, in_rate=law.in_rate.value
+            ),
         )
-        for bearing in scene.bearings
+        for bearing, law in zip(scene.bearings, laws, strict=True)
     )

@@ -184,7 +184,7 @@ def _constants(sol: Solution) -> dict[str, Any]:
             sol.parameters[bearing.shaft_speed],
         )
         found[f"{bearing.prefix}frequencies"] = asdict(frequencies) | {"unit": "Hz"}
-        found[f"{bearing.prefix}damping_law"] = bearing.damping_law
+        found[f"{bearing.prefix}damping_law"] = bearing.damping.law
     return found
 
 

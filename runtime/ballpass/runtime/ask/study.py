@@ -249,7 +249,7 @@ class Study:
             nodes.segment,
             [signals[name].value for name in deflections],
             [signals[name].value for name in sorted(ranked)],
-            one_sided=any(bearing.damping_law == "one-sided" for bearing in bearings),
+            one_sided=any(bearing.damping.corner_at_rest for bearing in bearings),
             length=edges.window.duration,
             edges=edges.times,
         )

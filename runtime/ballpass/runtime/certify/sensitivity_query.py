@@ -356,7 +356,7 @@ def _grazing(model: LoadedModel, numbers: Numbers, course: Course, tolerance: fl
             track.nodes.segment[order],
             signals[name].value[order],
             angles,
-            one_sided=bearing.damping_law == "one-sided",
+            one_sided=bearing.damping.corner_at_rest,
             tolerance=tolerance,
             bearing=bearing.name,
         )

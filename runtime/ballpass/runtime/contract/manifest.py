@@ -11,7 +11,7 @@ from typing import Any, Literal
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.json_text import from_plain
 
-SCHEMA = 3
+SCHEMA = 4
 FILE_NAME = "manifest.json"
 
 #: Last key of the file: sha256 of its text without this key.
@@ -150,6 +150,28 @@ class RunInfo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DampingInfo:
+    """A damping law's name, and how smooth its force is along deflection and rate; both empty without a force.
+
+    The words are those of `Manifest.smoothness`.
+    """
+
+    law: str
+    in_deflection: str = ""
+    in_rate: str = ""
+
+    @property
+    def acts(self) -> bool:
+        """Whether there is a damping force."""
+        return bool(self.in_rate)
+
+    @property
+    def corner_at_rest(self) -> bool:
+        """Whether the force has a corner where the deflection's rate passes zero."""
+        return self.in_rate == "kinked"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BearingInfo:
     """What observables need of a bearing: balls, and the names of its kinematic parameters and constants.
 
@@ -164,7 +186,7 @@ class BearingInfo:
     joint: str
     shaft_speed: str
     outer_ring: bool
-    damping_law: str
+    damping: DampingInfo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -223,22 +223,25 @@ def _modes(mass: Array, damping: Array, stiffness: Array) -> tuple[Mode, ...]:
 
 def kink_notes(model: LoadedModel, numbers: Numbers, t: float, x: Array) -> tuple[str, ...]:
     """Where the damping law has no derivative at this state, in words; empty where it has one."""
-    smoothness = dict(model.manifest.smoothness).get("damping")
-    if smoothness not in ("kinked", "discontinuous"):
-        return ()
-    return tuple(note for bearing in model.manifest.bearings for note in _kink_notes(model, bearing, numbers, t, x))
+    rough = [
+        bearing
+        for bearing in model.manifest.bearings
+        if {bearing.damping.in_deflection, bearing.damping.in_rate} & {"kinked", "discontinuous"}
+    ]
+    return tuple(note for bearing in rough for note in _kink_notes(model, bearing, numbers, t, x))
 
 
 def _kink_notes(model: LoadedModel, bearing: BearingInfo, numbers: Numbers, t: float, x: Array) -> list[str]:
     """The same of one bearing."""
-    law = bearing.damping_law
+    law = bearing.damping.law
+    jumps = bearing.damping.in_deflection == "discontinuous"
     deflection, rate, speed = _deflections(model, bearing, numbers, t, x)
     length = max(float(np.max(np.abs(deflection))), 1e-12)
     at_onset = np.flatnonzero(np.abs(deflection) <= ON_THE_KINK * length).tolist()
     at_rest = np.flatnonzero(np.abs(rate) <= ON_THE_KINK * max(speed, 1e-12)).tolist()
     notes = []
-    if law.startswith("one-sided"):
-        resting = [k for k in at_rest if not law.endswith("gated") or deflection[k] > 0.0]
+    if bearing.damping.corner_at_rest:
+        resting = [k for k in at_rest if not jumps or deflection[k] > 0.0]
         if resting:
             notes.append(
                 f"the law {law} has a kink where the deflection's rate is zero, as at {_balls(resting)}: damping is "
@@ -246,8 +249,8 @@ def _kink_notes(model: LoadedModel, bearing: BearingInfo, numbers: Numbers, t: f
                 f"{numbers.values[f'{bearing.path}.c_b']:.6g} N*s/m along its direction. Give "
                 f"{bearing.path}.damping.smoothing, and there is one derivative."
             )
-    if law.endswith("gated") or law == "tangent":
-        touching = [k for k in at_onset if abs(rate[k]) > 0.0 or law.endswith("gated")]
+    if bearing.damping.in_deflection in ("kinked", "discontinuous"):
+        touching = [k for k in at_onset if abs(rate[k]) > 0.0 or jumps]
         if touching:
             notes.append(
                 f"the law {law} has no derivative at contact onset, where {_balls(touching)} stands: the derivative is "

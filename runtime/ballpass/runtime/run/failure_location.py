@@ -11,7 +11,9 @@ import numpy as np
 from ballpass.runtime.run import inputs as clock
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import Manifest
+    from collections.abc import Mapping
+
+    from ballpass.runtime.contract import CoordinateInfo, Manifest
     from ballpass.runtime.contract.parameters import Numbers
 
 
@@ -22,12 +24,14 @@ class Whereabouts:
     Attributes
     ----------
     crank_angle : angle of driver or shaft, in [0, 2 pi) [rad]
+    bearing : the bearing of that ball, empty for the scene's only one
     ball : the ball with the largest deflection, counted from 1; None without a bearing or a finite state
     ball_angle : its angle, in [0, 2 pi) [rad]
     deflection : its deflection, Eq. (6); negative where no ball touches [m]
     """
 
     crank_angle: float
+    bearing: str
     ball: int | None
     ball_angle: float
     deflection: float
@@ -38,7 +42,8 @@ class Whereabouts:
         if self.ball is None:
             return ""
         angle = math.degrees(self.ball_angle)
-        return f"Most deflected there: ball {self.ball} at {angle:.2f} deg, by {1e6 * self.deflection:.4g} um."
+        ball = f"ball {self.ball}" + (f" of {self.bearing}" if self.bearing else "")
+        return f"Most deflected there: {ball} at {angle:.2f} deg, by {1e6 * self.deflection:.4g} um."
 
 
 def whereabouts(manifest: Manifest, numbers: Numbers, time: float, state: np.ndarray) -> Whereabouts:
@@ -51,14 +56,28 @@ def whereabouts(manifest: Manifest, numbers: Numbers, time: float, state: np.nda
     """
     values = numbers.values
     crank = clock.crank_angle(manifest, values, time)
-    if manifest.bearing is None or not np.all(np.isfinite(state)) or not len(state):
-        return Whereabouts(crank_angle=crank, ball=None, ball_angle=math.nan, deflection=math.nan)
-    count = manifest.bearing.balls
-    first = values["bearing.ball_angle"] + (values["bearing.cage_speed"] * time) % clock.TURN
-    angles = (first + clock.TURN * np.arange(count) / count) % clock.TURN
-    x, y = state[:2] - state[2:4] if manifest.bearing.outer_ring else state[:2]
-    deflections = x * np.cos(angles) + y * np.sin(angles) - 0.5 * values["bearing.clearance"]  # Eq. (6)
-    ball = int(np.argmax(deflections))
-    return Whereabouts(
-        crank_angle=crank, ball=ball + 1, ball_angle=float(angles[ball]), deflection=float(deflections[ball])
-    )
+    found = Whereabouts(crank_angle=crank, bearing="", ball=None, ball_angle=math.nan, deflection=-math.inf)
+    if not np.all(np.isfinite(state)):
+        return found
+    at = {coordinate.name: k for k, coordinate in enumerate(manifest.coordinates)}
+    for bearing in manifest.bearings:
+        first = values[f"{bearing.path}.ball_angle"] + (values[f"{bearing.path}.cage_speed"] * time) % clock.TURN
+        angles = (first + clock.TURN * np.arange(bearing.balls) / bearing.balls) % clock.TURN
+        x, y = (_relative(manifest.coordinates[at[f"{bearing.prefix}inner.{axis}"]], at, state) for axis in "xy")
+        deflections = x * np.cos(angles) + y * np.sin(angles) - 0.5 * values[f"{bearing.path}.clearance"]  # Eq. (6)
+        ball = int(np.argmax(deflections))
+        if deflections[ball] > found.deflection:
+            found = Whereabouts(
+                crank_angle=crank,
+                bearing=bearing.name,
+                ball=ball + 1,
+                ball_angle=float(angles[ball]),
+                deflection=float(deflections[ball]),
+            )
+    return found
+
+
+def _relative(coordinate: CoordinateInfo, at: Mapping[str, int], state: np.ndarray) -> float:
+    """A coordinate, less its partner's where it has one."""
+    value = state[at[coordinate.name]]
+    return float(value - state[at[coordinate.partner]] if coordinate.partner else value)

@@ -49,7 +49,7 @@ def has_kinks(manifest: Manifest) -> bool:
     motion: the generated folder tells.  Hertz's law always has one.
     """
     written = any(name == SWITCHES for name, _ in manifest.files)
-    return written or any(name == "elastic" and word != "twice smooth" for name, word in manifest.smoothness)
+    return written or any(name.endswith("elastic") and word != "twice smooth" for name, word in manifest.smoothness)
 
 
 def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float) -> Kinks:

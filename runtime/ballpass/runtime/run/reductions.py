@@ -98,7 +98,7 @@ def channel_names(manifest: Manifest) -> tuple[str, ...]:
         bearing.prefix + name
         for bearing in manifest.bearings or ()
         for name in BALL_CHANNELS
-        if bearing.damping_law != "none" or name != "ball.damping_force"
+        if bearing.damping.acts or name != "ball.damping_force"
     ]
     return (*(state.name for state in manifest.states), *balls)
 

@@ -143,7 +143,7 @@ def _absent(scene: Scene) -> list[str]:
     if bearing is None:
         out.append("a bearing: forces of the mechanism only ([bearing])")
         return out
-    if bearing.damping.law == "none":
+    if not bearing.damping.numbers:
         out.append("damping at the balls (bearing.damping)")
     if bearing.inner.damping is None:
         out.append("viscous damping of the inner ring to the frame (bearing.inner_ring.damping)")

@@ -133,7 +133,7 @@ class Record:
         """Name and values of the ball force to show: total where asked for, else elastic, (n, balls) [N]."""
         bearing = self.bearing
         if self.has("ball.force"):
-            damped = bearing is not None and bearing.damping_law != "none"
+            damped = bearing is not None and bearing.damping.acts
             return "elastic and damping force" if damped else "elastic force", self.values("ball.force")
         return "elastic force", self.values("ball.elastic_force")
 
@@ -193,7 +193,7 @@ class Record:
         if self.bearing is not None:
             # a no-break space keeps number and unit on one line
             parts.append(f"diametral clearance {self.parameter('bearing.clearance') * 1e6:g}\u00a0µm")
-            parts.append(f"damping law {self.bearing.damping_law}")
+            parts.append(f"damping law {self.bearing.damping.law}")
             if self.bearing.name:
                 parts.append(f"bearing {self.bearing.name}")
         return ", ".join(parts)
