@@ -32,7 +32,9 @@ from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.locating import tight_below
 from ballpass.runtime.run.segments import segment_edges
 
-SCENES = ("punching_press", "punching_press_tangent", "four_bar", "offset_slider", "varying_compliance")
+SHORT, LONG = ("punching_press", "varying_compliance"), ("punching_press_tangent", "four_bar", "offset_slider")
+SCENES = (*SHORT, *LONG)
+MOST_OF_THEM_LONG = (*SHORT, *(pytest.param(name, marks=pytest.mark.long) for name in LONG))
 WARNINGS = "-Wall -Wextra -Wconversion -Wshadow -pedantic -Werror"
 
 pytestmark = pytest.mark.skipif(
@@ -96,7 +98,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[...,
 # numbers
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", MOST_OF_THEM_LONG)
 def test_program_prints_the_numbers_of_the_model_and_compiles_without_warnings(
     exported: Callable[..., Program], scene: str
 ) -> None:
@@ -362,7 +364,7 @@ def test_segments_and_their_inputs_are_those_of_python_to_the_last_bit(
 # code
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", MOST_OF_THEM_LONG)
 def test_program_runs_clean_under_the_sanitizers(exported: Callable[..., Program], tmp_path: Path, scene: str) -> None:
     program = exported(scene)
     probe = tmp_path / "probe.c"

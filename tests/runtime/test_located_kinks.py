@@ -240,7 +240,14 @@ VARIED = {
 
 
 @pytest.mark.parametrize(
-    "scene", ["punching_press", "punching_press_tangent", "varying_compliance", "four_bar", "offset_slider"]
+    "scene",
+    [
+        *("varying_compliance", "four_bar"),
+        *(
+            pytest.param(name, marks=pytest.mark.long)
+            for name in ("punching_press", "punching_press_tangent", "offset_slider")
+        ),
+    ],
 )
 def test_machines_of_all_kinds_end_and_agree_with_a_second_method(make_model: Make, scene: str) -> None:
     """Random members of each shipped scene: at any tolerance a run ends, and at a tight one it is right.

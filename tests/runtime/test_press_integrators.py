@@ -165,6 +165,7 @@ def needs(model: Model, method: str) -> None:
         pytest.skip(f"{method} needs a C compiler")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", LAWS.values())
 def test_reference_does_not_depend_on_its_method(law: str) -> None:
     # multistep methods in Fortran against a Runge-Kutta method; the tangent law multiplies differences by a hundred
