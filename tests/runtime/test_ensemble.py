@@ -56,7 +56,10 @@ def same(a: EnsembleResult, b: EnsembleResult, rows: np.ndarray | slice = slice(
 @pytest.mark.parametrize("law", ["one-sided", "stiff", "one-sided-gated", "tangent"])
 @pytest.mark.parametrize(
     "method",
-    ["auto", "stepper-dp54", *(pytest.param(f"stepper-{name}", marks=pytest.mark.long) for name in ("rodas5p", "rodas4"))],
+    [
+        *("auto", "stepper-dp54"),
+        *(pytest.param(f"stepper-{name}", marks=pytest.mark.long) for name in ("rodas5p", "rodas4")),
+    ],
 )
 def test_members_equal_single_runs_within_the_tolerance(make_model: ModelMaker, law: str, method: str) -> None:
     """Stepped over, as lanes do; single runs of ``auto`` locate kinks at these tolerances."""

@@ -33,7 +33,6 @@ from ballpass.runtime.run.locating import tight_below
 from ballpass.runtime.run.segments import segment_edges
 
 SHORT, LONG = ("punching_press", "varying_compliance"), ("punching_press_tangent", "four_bar", "offset_slider")
-SCENES = (*SHORT, *LONG)
 MOST_OF_THEM_LONG = (*SHORT, *(pytest.param(name, marks=pytest.mark.long) for name in LONG))
 WARNINGS = "-Wall -Wextra -Wconversion -Wshadow -pedantic -Werror"
 
