@@ -92,6 +92,23 @@ def test_the_manifest_lists_them_and_their_coordinates(pair: Model) -> None:
     assert len(pair.states) == 12
 
 
+@pytest.mark.parametrize("smooth_first", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_kinks_are_located_beside_a_bearing_that_has_none(
+    scene_text: Callable[..., str], alone: dict[str, Model], tmp_path: Path, smooth_first: bool
+) -> None:
+    smoothing = ("[bearings.right.contact]\n", '[bearings.right.contact]\nsmoothing = "0.05 um"\n')
+    text = pair_text(scene_text).replace(*smoothing)
+    if smooth_first:  # in the order of their tables
+        start, middle, end = (text.index(mark) for mark in ("[bearings.left]", "[bearings.right]", "[run]"))
+        text = text[:start] + text[middle:end] + text[start:middle] + text[end:]
+    model = load(generate(scene_from_text(text, "pair"), tmp_path / "pair"))
+    assert [b.name for b in model.manifest.bearings] == sorted(("left", "right"), reverse=smooth_first)
+    both = model.simulate(cycles=0.15, transient=0, rtol=1e-9)
+    own = alone["left"].simulate(cycles=0.15, transient=0, rtol=1e-9)
+    assert both.statistics.located
+    assert np.max(np.abs(both["left.ball.force"] - own["ball.force"])) < 1e-5 * np.max(own["ball.force"])
+
+
 def test_messages_name_the_bearing_they_speak_of(pair: Model) -> None:
     """The left one's law has a corner at rest, the right one's has none; the right one's balls are pressed."""
     with pytest.warns(KinkWarning, match=r"bearings\.left\.damping\.smoothing") as caught:

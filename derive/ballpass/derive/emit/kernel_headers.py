@@ -180,6 +180,12 @@ def tangents_header(kernels: Kernels) -> str:
     return _header("TANGENTS", parts)
 
 
+_WITHOUT_SWITCHES = """/* Laws without switches: nothing to look at, no side to hold. */
+#define bp_{b}_switches_lanes(co, si, r, k, rows) ((void)0)
+#define bp_{b}_held_forces_lanes(co, si, r, k, border, rows) bp_{b}_forces_lanes(co, si, r, k, rows)
+#define bp_{b}_held_slopes_lanes(co, si, r, k, border, rows) bp_{b}_slopes_lanes(co, si, r, k, rows)"""
+
+
 def switches_header(system: System, kernels: Kernels) -> str | None:
     """Text of switches.h; None where no law has a kink.
 
@@ -202,7 +208,10 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
             "held_forces": "Summands of the forces, sides held",
             "held_slopes": "The same, and of their slopes",
         }
-        parts += [_of_balls(own.over_numbers[key], index, text) for key, text in words.items() if switches]
+        if switches:
+            parts += [_of_balls(own.over_numbers[key], index, text) for key, text in words.items()]
+        else:
+            parts.append(_WITHOUT_SWITCHES.format(b=index))
     if not flags["of_rate"]:
         return None
     tables = "\n".join(print_array(f"bp_{name}", values) for name, values in flags.items())
