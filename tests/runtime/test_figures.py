@@ -270,6 +270,33 @@ def test_applied_force_has_the_components_of_the_scene(
     assert force == pytest.approx(expected)
 
 
+def test_a_force_by_a_table_is_drawn_as_large_as_the_table_says(make_model: Callable[..., Model]) -> None:
+    """On a lug of the slider, and as the table falls from 1000 N at 0 to -1000 N at 180 degrees, to the other side."""
+    table = 'table = { angle = ["0 deg", "180 deg"], force = ["1000 N", "-1000 N"] }\ndirection = "30 deg"'
+    model = make_model(
+        "punching_press",
+        ('force = ["0 N", "8964.8 N"]', table),
+        ('window = { start = "237 deg", end = "267 deg" }', ""),
+        ('point = "C"', 'point = "lug"'),
+        ('points = { C = "origin" }', 'points = { C = "origin", lug = ["40 mm", "0 mm"] }'),
+    )
+    record = gather(model, model.simulate(cycles=2, transient=1))
+    angles = np.degrees(record.crank_angle()) % 360.0
+    for angle, amount in ((45.0, 500.0), (135.0, -500.0), (225.0, -500.0), (300.0, 1000.0 / 3.0)):
+        sample = int(np.argmin(np.abs(angles - angle)))
+        t = float(record.t[sample])
+        ((name, place, force),) = record.applied_forces(t)
+        assert (name, place) == ("punch", ("slider", "lug"))
+        assert force == pytest.approx(amount * np.array([np.sqrt(0.75), 0.5]), abs=5.0)
+        axes = Figure().add_subplot()
+        draw_mechanism(axes, record, sample)
+        lug = record.points(t)["slider", "lug"]
+        assert arrows(axes)[-1].xy == pytest.approx(lug)
+        assert any(text.get_text() == f"punch\n{np.hypot(*force):.0f} N" for text in axes.texts)
+        bars = [line.get_xydata() for line in axes.get_lines() if line.get_linewidth() == 8]
+        assert any(np.allclose(end, lug) for bar in bars for end in bar)
+
+
 def luminance(colour: tuple[float, float, float]) -> float:
     """CIE lightness L* of an sRGB colour (IEC 61966-2-1, CIE 15)."""
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]

@@ -43,6 +43,7 @@ from ballpass.runtime.contract.manifest import (
     VariableInfo,
     digest_of,
     force_components,
+    table_direction,
 )
 
 __all__ = [
@@ -71,5 +72,6 @@ __all__ = [
     "read_artefact",
     "read_manifest",
     "read_unchanged",
+    "table_direction",
     "write",
 ]

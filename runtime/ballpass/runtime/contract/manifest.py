@@ -194,7 +194,8 @@ class MechanismInfo:
     """What observables need of the linkage: driver joint, names of its parameters, joints, points for drawing.
 
     The components of an applied force are the parameters ``mechanism.forces.<name>.force.x`` and ``.y``, or
-    ``.magnitude`` and ``.direction`` (see `force_components`).
+    ``.magnitude`` and ``.direction`` (see `force_components`).  Where its input is a table, that holds the amount, and
+    the parameter ``mechanism.forces.<name>.direction`` the direction.
     """
 
     driver_joint: str
@@ -203,7 +204,7 @@ class MechanismInfo:
     joints: tuple[tuple[str, str, str, str, str, str], ...]  # name, kind, body, point, body, point
     points: tuple[PointInfo, ...]
     margins: tuple[MarginInfo, ...]
-    forces: tuple[tuple[str, str, str, str], ...] = ()  # name, body, point, input that gates it or "": acts always
+    forces: tuple[tuple[str, str, str, str], ...] = ()  # name, body, point, input: gate, table or ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -296,6 +297,11 @@ def force_components(name: str) -> tuple[tuple[str, str], tuple[str, str]]:
     """Names of the parameters that hold an applied force: x and y [N], or magnitude [N] and direction [rad]."""
     path = f"mechanism.forces.{name}.force"
     return (f"{path}.x", f"{path}.y"), (f"{path}.magnitude", f"{path}.direction")
+
+
+def table_direction(name: str) -> str:
+    """Name of the parameter that holds the direction [rad] of an applied force whose amount is a table's."""
+    return f"mechanism.forces.{name}.direction"
 
 
 def digest_of(document: Mapping[str, Any]) -> str:

@@ -9,7 +9,7 @@ from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Setting
 from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.linkage import Linkage
-from ballpass.derive.scene.records import Mechanism
+from ballpass.derive.scene.records import Force, Mechanism
 from ballpass.derive.terms import Definition
 from ballpass.derive.variables import Input, Output
 
@@ -40,9 +40,16 @@ def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Force
 
 
 def drawn_forces(mechanism: Mechanism) -> tuple[tuple[str, str, str, str], ...]:
-    """Forces whose components are parameters: name, body, point, and input that gates it or "" (acts always)."""
+    """Forces on points: name, body, point, and input that gates it or holds its amount, or "" (acts always)."""
     return tuple(
-        (force.name, force.pathway.body, force.pathway.point, f"gate.{force.name}" if force.law.key else "")
+        (force.name, force.pathway.body, force.pathway.point, _input(force))
         for force in mechanism.forces
-        if isinstance(force.pathway, PointForce) and force.law.factor
+        if isinstance(force.pathway, PointForce)
     )
+
+
+def _input(force: Force) -> str:
+    """Name of the input that gates a force or holds its amount; empty where it acts always."""
+    if not force.law.factor:
+        return force.label
+    return f"gate.{force.name}" if force.law.key else ""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.ask.observables import KinematicFrequencies, ball_angles, kinematic_frequencies, turns
-from ballpass.runtime.contract import force_components
+from ballpass.runtime.contract import force_components, table_direction
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract import BearingInfo, Manifest, MechanismInfo
@@ -158,15 +158,16 @@ class Record:
         values = self.model.inputs_at(t, parameters)
         inputs = {info.name: value for info, value in zip(self.manifest.inputs, values, strict=True)}
         acting = []
-        for name, body, point, gate in self.mechanism.forces:
-            if gate and inputs[gate] == 0.0:
+        for name, body, point, given in self.mechanism.forces:
+            if given and inputs[given] == 0.0:
                 continue
             cartesian, (magnitude, direction) = force_components(name)
             if cartesian[0] in parameters:
                 force = np.array([parameters[component] for component in cartesian])
+            elif magnitude in parameters:
+                force = parameters[magnitude] * _unit(parameters[direction])
             else:
-                angle = parameters[direction]
-                force = parameters[magnitude] * np.array([np.cos(angle), np.sin(angle)])
+                force = inputs[given] * _unit(parameters[table_direction(name)])
             acting.append((name, (body, point), force))
         return tuple(acting)
 
@@ -197,6 +198,11 @@ class Record:
             if self.bearing.name:
                 parts.append(f"bearing {self.bearing.name}")
         return ", ".join(parts)
+
+
+def _unit(angle: float) -> Array:
+    """Unit vector at an angle [rad] from +x, (2,)."""
+    return np.array([np.cos(angle), np.sin(angle)])
 
 
 def gather(model: Model, solution: Solution, bearing: BearingInfo | None = None) -> Record:
