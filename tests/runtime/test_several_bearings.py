@@ -12,7 +12,7 @@ import pytest
 from ballpass.derive import SceneError, generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.records import Scene
-from ballpass.runtime import KinkWarning, Model, load, load_solution
+from ballpass.runtime import KinkWarning, Model, RequestError, load, load_solution
 from ballpass.runtime.run.failure_location import whereabouts
 
 #: What the right bearing has other than the left one: law, number of balls, clearance, a fixed outer ring.
@@ -120,6 +120,20 @@ def test_messages_name_the_bearing_they_speak_of(pair: Model) -> None:
     assert (place.bearing, place.ball) == ("right", 1)
     assert place.deflection == pytest.approx(2e-5 - 3e-6, rel=1e-12)  # less half its clearance, Eq. (6)
     assert "ball 1 of right" in place.words
+
+
+def test_a_static_quantity_is_of_the_bearing_it_names(pair: Model, alone: dict[str, Model]) -> None:
+    kinds = ("deflection", "peak_ball_force")
+    for name, model in alone.items():
+        asked = [f"static_{name}_{kind}@240deg" for kind in kinds]
+        both = pair.sensitivity(asked, f"bearings.{name}.clearance", check=False)
+        own = model.sensitivity([f"static_{kind}@240deg" for kind in kinds], "bearing.clearance", check=False)
+        for mine, other in zip(both.pairs, own.pairs, strict=True):
+            assert mine.value == pytest.approx(other.value, rel=1e-9)
+            assert mine.derivative == pytest.approx(other.derivative, rel=1e-6)
+        assert [item.ball for item in both.quantities] == [item.ball for item in own.quantities]
+    with pytest.raises(RequestError, match="static_left_deflection or static_right_deflection"):
+        pair.sensitivity("static_deflection@240deg", "bearings.left.clearance", check=False)
 
 
 def refused(text: str) -> Scene:

@@ -57,13 +57,18 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
     aliases = _aliases(channels)
     form = _FORM.fullmatch(aliases.get(text, text))
     bare, _, instant = text.partition("@")
-    kind = KINDS.get(bare)
+    statics = _statics(manifest)
+    static, bearing = statics.get(bare, (bare, ""))
+    kind = KINDS.get(static)
     if kind is not None and kind.static:
         if not manifest.bearings:
             raise RequestError(f"{text}: this scene has no bearing. Ask for another quantity.")
+        if bare not in statics:
+            allowed = " or ".join(name for name, (meant, _) in statics.items() if meant == bare)
+            raise RequestError(f"{text}: the scene has several bearings, and this names none. Write {allowed}.")
         if instant:
             _check_place(manifest, text, kind, bare, instant)
-        asked = Quantity(name=text, kind=bare, channel="", ball=None, place=instant, unit=kind.unit)
+        asked = Quantity(name=text, kind=static, channel=bearing, ball=None, place=instant, unit=kind.unit)
         check_first_turns(asked)
         return asked
     if kind is not None and kind.channel and not instant:
@@ -123,6 +128,16 @@ def _aliases(channels: Mapping[str, tuple[int, str]]) -> dict[str, str]:
     }
 
 
+def _statics(manifest: Manifest) -> dict[str, tuple[str, str]]:
+    """Names of the static quantities, ``static_left_deflection`` of one bearing of several; -> (kind, prefix)."""
+    return {
+        name.replace("_", f"_{bearing.name}_", 1) if bearing.name else name: (name, bearing.prefix)
+        for name, kind in KINDS.items()
+        if kind.static
+        for bearing in manifest.bearings
+    }
+
+
 def _usable(manifest: Manifest, channels: Mapping[str, tuple[int, str]]) -> list[str]:
     """Names that can be asked for as they stand, for suggestions."""
     open_ = [name for name, kind in KINDS.items() if not kind.place and not kind.unit]
@@ -131,9 +146,6 @@ def _usable(manifest: Manifest, channels: Mapping[str, tuple[int, str]]) -> list
     return [
         *(alias for alias, meant in _aliases(channels).items() if not meant.startswith(counted)),
         *(f"{name}:{channel}" for name in open_ for channel in channels),
-        *(
-            name
-            for name, kind in alone.items()
-            if (bool(manifest.bearings) if kind.static else kind.channel in channels)
-        ),
+        *(name for name, kind in alone.items() if not kind.static and kind.channel in channels),
+        *_statics(manifest),
     ]

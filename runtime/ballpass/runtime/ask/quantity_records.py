@@ -28,7 +28,7 @@ class Quantity:
     ----------
     name : as written
     kind : entry of `kinds.KINDS`
-    channel : state or output, "" for a quantity that names none
+    channel : state or output, "" for a quantity that names none; of a static one the prefix of its bearing
     ball : which ball, counted from 1; None for the most loaded one, and for outputs without balls
     place : what stands behind ``@``
     unit : of the value

@@ -40,14 +40,17 @@ def at_rest(model: LoadedModel, numbers: Numbers, quantity: Quantity, chain: Cha
     rest = static_equilibrium(model, numbers, t=time)
     names = [] if chain is None else [*chain.names, "time"]
     if quantity.kind == "static_deflection":
-        inner = [rest.coordinates.index(f"{model.manifest.bearings[0].prefix}inner.{axis}") for axis in "xy"]
+        inner = [rest.coordinates.index(f"{quantity.channel}inner.{axis}") for axis in "xy"]
         place = rest.positions[inner]
         value, ball = float(np.hypot(*place)), None
         rows = rest.derivative("positions", names)[inner] if names else np.zeros((2, 1))
         slope = place @ rows / value if value else np.zeros(rows.shape[1])
     else:
-        best = int(np.argmax(rest.ball_force))
-        value, ball = float(rest.ball_force[best]), best + 1
-        forces = [f"{bearing.prefix}ball.elastic_force" for bearing in model.manifest.bearings]
-        slope = rest.derivative(forces, names)[best] if names else np.zeros(1)
+        bearings = model.manifest.bearings
+        k = [bearing.prefix for bearing in bearings].index(quantity.channel)
+        first = sum(bearing.balls for bearing in bearings[:k])
+        forces = rest.ball_force[first : first + bearings[k].balls]
+        best = int(np.argmax(forces))
+        value, ball = float(forces[best]), best + 1
+        slope = rest.derivative(f"{quantity.channel}ball.elastic_force", names)[best] if names else np.zeros(1)
     return Estimate(value=value, slope=slope[:-1] + slope[-1] * moved, time=time, ball=ball)
