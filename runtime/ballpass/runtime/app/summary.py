@@ -251,6 +251,11 @@ def _caption(summary: Mapping[str, Any]) -> str:
         for key, words in _RUN.items()
         if key in summary and summary[key]["value"] is not None
     ]
-    law = [f"damping law {summary['damping_law']}"] if "damping_law" in summary else []
+    laws = ", ".join(
+        f"{key.removesuffix('damping_law').replace('.', ' ')}{law}"
+        for key, law in summary.items()
+        if key == "damping_law" or key.endswith(".damping_law")
+    )
+    law = [f"damping law {laws}"] if laws else []
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
     return f"{', '.join(run + law)}.\n{', '.join(tools)}."
