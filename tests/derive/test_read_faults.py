@@ -387,6 +387,13 @@ def test_single_mistakes_give_single_faults() -> None:
             assert len(error.faults) == 1, f"{label}: {error}"
 
 
+@pytest.mark.parametrize("name", ["reaction", "body", "spring", "torsion_spring", "load", "phase"])
+def test_a_bearing_is_not_named_like_a_group_of_outputs(name: str) -> None:
+    error = faults(PRESS.replace("[bearing", f"[bearings.{name}"))
+    assert [fault.key for fault in error.faults] == [f"bearings.{name}"]
+    assert "another name" in error.faults[0].remedy
+
+
 def test_all_faults_of_a_file_are_raised_together() -> None:
     text = edited(PRESS, '"0.3567 kg"', '"-0.3567 kg"')
     text = edited(text, 'clearance = "10 um"', "clearance = 10")

@@ -40,6 +40,8 @@ METHODS = (
 )
 #: Largest file that is read [bytes]; the largest sensible one is a table of loads.
 MAX_FILE_SIZE = 8_000_000
+#: First parts of the names of a mechanism's variables and of inputs: a bearing's names may not begin so.
+RESERVED = ("body", "driver", "gate", "input", "joint", "load", "phase", "reaction", "spring", "torsion_spring")
 _TABLES = ("mechanism", "shaft", "load", "bearing", "bearings", "run")
 
 
@@ -202,6 +204,14 @@ def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None)
     bearings = []
     with root.table("bearings") as several:
         for name in several.names("bearing"):
+            if name in RESERVED:
+                several.fault(
+                    name,
+                    "other outputs and variables have names that begin so",
+                    given=show(name),
+                    allowed=f"a name that is none of {listing(RESERVED)}",
+                    remedy="give the bearing another name",
+                )
             bearing = read_bearing(several.table(name), mechanism, driven, name)
             names = Names(prefix=bearing.prefix, path=bearing.path)
             # several bearings have the same symbols: their name tells them apart
