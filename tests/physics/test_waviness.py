@@ -101,8 +101,13 @@ def test_orders_are_structure_and_amplitudes_numbers(held: Model, scene_text: Ca
     assert scene_from_text(scene_text("varying_compliance", WAVY), "plain").structure() != plain.structure()
 
 
-@pytest.mark.parametrize("key", ["0", "x", "1000"])
+@pytest.mark.parametrize("key", ["0", "x", "1000", "08"])
 def test_an_order_that_is_none_is_refused(scene_text: Callable[..., str], tmp_path: Path, key: str) -> None:
     text = scene_text("varying_compliance", (WAVY[0], f"[bearing.outer_waviness]\n{key} = {{}}\n{WAVY[0]}"))
     with pytest.raises(SceneError, match="no order of waviness"):
         generate(scene_from_text(text, "wavy"), tmp_path)
+
+
+def test_a_negative_amplitude_is_refused(scene_text: Callable[..., str]) -> None:
+    with pytest.raises(SceneError, match=r"outer_waviness\.2\.amplitude[\s\S]*turn the phase by 180 deg"):
+        scene_from_text(scene_text("varying_compliance", (WAVY[0], WAVY[1].replace('"0 um"', '"-1 um"', 1))), "wavy")

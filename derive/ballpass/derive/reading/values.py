@@ -12,6 +12,7 @@ from dataclasses import fields, is_dataclass, replace
 from difflib import get_close_matches
 from typing import Any, cast
 
+from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.errors import Fault, SceneError
@@ -286,6 +287,8 @@ def _check_bearing(checker: Checker, bearing: Bearing) -> None:
     law = LAWS[bearing.damping.law]
     for number in bearing.damping.numbers:
         checker.within(number, law.bounds(number.path.rpartition(".")[2]))
+    for effect in bearing.effects:
+        EFFECTS[effect.kind].check(effect, checker)
     if isinstance(bearing.inner.mass, EquivalentMass):
         checker.positive(bearing.inner.mass.ring)
         # Zero is a crankpin whose mass is part of the crank's.

@@ -8,6 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
+from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import BallEffect
 from ballpass.derive.scene.schema import Table
 
@@ -23,6 +24,9 @@ class Effect(ABC):
     @abstractmethod
     def read(self, table: Table) -> BallEffect:
         """The effect out of its table; faults are noted."""
+
+    def check(self, effect: BallEffect, checker: Checker) -> None:  # noqa: B027  an effect may take any number
+        """Note faults of its numbers."""
 
     @abstractmethod
     def term(self, effect: BallEffect, angle: sp.Expr) -> sp.Expr:

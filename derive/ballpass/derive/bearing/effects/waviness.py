@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.effects.effect import Effect
+from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import BallEffect
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.scene.units import show
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Highest order: more waves than this are roughness.
 MOST_WAVES = 200
+#: Orders as their keys; an order has one key, 8 and not 08.
+ORDERS = [str(order) for order in range(1, MOST_WAVES + 1)]
 
 
 class OuterWaviness(Effect):
@@ -30,12 +33,12 @@ class OuterWaviness(Effect):
         with table:
             for key in list(table.data):
                 table.know(key)
-                if not (key.isdecimal() and 1 <= int(key) <= MOST_WAVES):
+                if key not in ORDERS:
                     table.fault(
                         key,
                         "this is no order of waviness",
                         given=show(key),
-                        allowed=f"whole numbers of waves around the raceway, from 1 to {MOST_WAVES}",
+                        allowed=f"whole numbers of waves around the raceway, from 1 to {MOST_WAVES}, without leading 0",
                         remedy='write for example 8 = { amplitude = "1 um" }',
                     )
                     continue
@@ -59,6 +62,10 @@ class OuterWaviness(Effect):
                         ),
                     ]
         return BallEffect(kind=self.name, structure=tuple(orders), numbers=tuple(numbers))
+
+    def check(self, effect: BallEffect, checker: Checker) -> None:
+        for amplitude in effect.numbers[::2]:
+            checker.not_negative(amplitude, "give the amount, and turn the phase by 180 deg")
 
     def term(self, effect: BallEffect, angle: sp.Expr) -> sp.Expr:
         import sympy as sp
