@@ -184,6 +184,13 @@ def test_faults_of_springs_are_named(
     assert remedy in fault.remedy
 
 
+def test_a_spring_between_the_points_of_a_hinge_is_refused(scene_text: Callable[..., str]) -> None:
+    hinged = SPRING.replace('["frame", "lever"]', '["crank", "block"]').replace('["hook", "tip"]', '["B", "B"]')
+    scene = scene_from_text(scene_text("crank_shaper", *changes(hinged)), "shaper")
+    with pytest.raises(SceneError, match=r"joint \w+ keeps the two points together"):
+        derive(scene)
+
+
 def test_a_spring_without_stiffness_and_damping_is_refused(scene_text: Callable[..., str]) -> None:
     nothing = '[mechanism.springs.return]\nbodies = ["frame", "lever"]\npoints = ["hook", "tip"]\npreload = "20 N"\n\n'
     with pytest.raises(SceneError, match="neither stiffness nor damping"):

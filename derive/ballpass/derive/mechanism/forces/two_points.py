@@ -11,7 +11,8 @@ from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Law, Measure, Pathway, Points, Setting
 from ballpass.derive.mechanism.kinematics import body_point, dot, scale, subscript, subtract
 from ballpass.derive.scene.body_keys import read_pair, read_two_bodies, refuse_unknown_point
-from ballpass.derive.scene.records import FRAME, Force
+from ballpass.derive.scene.errors import Fault, LinkageError
+from ballpass.derive.scene.records import FRAME, Force, Mechanism
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.variables import Output
 
@@ -38,6 +39,7 @@ class TwoPoints(Pathway):
     def act(self, force: Force, setting: Setting) -> Action:
         """Length, its rate and the direction of the line."""
         mechanism, ledger, label, mark = setting.mechanism, setting.ledger, force.label, subscript(force.name)
+        self._refuse_hinge(force, mechanism)
         places = [body_point(mechanism, *end) for end in zip(self.bodies, self.points, strict=True)]
         one, two = (setting.linkage.pose(body).motion(place) for body, place in zip(self.bodies, places, strict=True))
         words, unit = f"the line between the points of {force.name}", "m"
@@ -54,6 +56,20 @@ class TwoPoints(Pathway):
             return tuple(Load(body=body, point=place, force=on) for body, place, on in ends if body != FRAME)
 
         return Action(loads=loads, excess=lambda free: length - free, rate=rate)
+
+    def _refuse_hinge(self, force: Force, mechanism: Mechanism) -> None:
+        """A line between the points that a revolute joint keeps together has no direction."""
+        ends = set(zip(self.bodies, self.points, strict=True))
+        for joint in mechanism.joints:
+            if joint.kind == "revolute" and set(zip(joint.bodies, joint.points, strict=True)) == ends:
+                fault = Fault(
+                    key=f"mechanism.{force.table}.{force.name}.points",
+                    problem=f"joint {joint.name} keeps the two points together: the line between them has no direction",
+                    given=" and ".join(".".join(end) for end in sorted(ends)),
+                    allowed="two points at a distance",
+                    remedy="give another point of one body; for a spring that turns, [mechanism.torsion_springs.NAME]",
+                )
+                raise LinkageError([fault])
 
     def words(self) -> str:
         """The two points."""
