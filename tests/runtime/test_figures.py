@@ -297,6 +297,26 @@ def test_a_force_by_a_table_is_drawn_as_large_as_the_table_says(make_model: Call
         assert any(np.allclose(end, lug) for bar in bars for end in bar)
 
 
+def test_a_load_by_a_table_is_shaded_where_it_is_not_zero(make_virtual: Callable[..., Model]) -> None:
+    """Also over the start of the turn; a table that nowhere stays zero is not shaded."""
+    rows = 'angle = ["20 deg", "100 deg", "150 deg", "200 deg", "300 deg"]'
+    table = f'table = {{ {rows}, force = ["0 N", "0 N", "7 N", "0 N", "0 N"] }}\ndirection = "90 deg"'
+    always = ('window = { start = "237 deg", end = "267 deg" }', "")
+    model = make_virtual("punching_press", ('force = ["0 N", "8964.8 N"]', table), always)
+    solution = model.simulate(cycles=0.01, transient=0)
+    assert np.degrees(gather(model, solution).load_windows()) == pytest.approx(np.array([[100.0, 200.0]]))
+    value = "mechanism.forces.punch.table.force"
+    names = [info.name for info in model.manifest.parameters if info.name.startswith(value)]
+    for changed, expected in (
+        ({names[4]: 3.0}, [[100.0, 380.0]]),
+        ({names[0]: 3.0}, [[300.0, 560.0]]),
+        ({names[0]: 3.0, names[2]: 0.0}, [[300.0, 460.0]]),
+        ({names[0]: 3.0, names[3]: 3.0}, []),
+    ):
+        other = gather(model, model.simulate(cycles=0.01, transient=0, parameters=changed))
+        assert np.degrees(other.load_windows()).tolist() == [pytest.approx(window) for window in expected], changed
+
+
 def luminance(colour: tuple[float, float, float]) -> float:
     """CIE lightness L* of an sRGB colour (IEC 61966-2-1, CIE 15)."""
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]

@@ -65,7 +65,7 @@ def load_curve(record: Record) -> Figure:
         axes.set_ylabel("torque [N·m]")
         panels.append(axes)
     _flatten_noise(panels[: 2 * len(joints)])
-    windows = record.gate_windows()
+    windows = record.load_windows()
     for axes in panels:
         axes.set_xlim(0.0, 360.0)
         axes.set_xticks(np.arange(0.0, 361.0, 60.0))
@@ -127,7 +127,7 @@ def ball_loads(record: Record) -> Figure:
         label = "crank angle [°]" if record.manifest.mechanism is not None else "angle of the shaft [°]"
     else:
         along, label = record.t[window] * 1e3, "time [ms]"
-    windows = record.gate_windows() if record.turns else ()
+    windows = record.load_windows() if record.turns else ()
     top = max(float(np.max(force)), 1e-12)
     bottom = min(float(np.min(force)), 0.0)
     figure = new_figure(1.5 + max(0.5 * balls, 2.0), layout=None)

@@ -75,7 +75,7 @@ def _highlight_windows(axes: Axes, record: Record, t: Array, x: Array, y: Array)
     """The part of the path on which an applied load acts, thick."""
     angle = record.crank_angle(t)
     label = "an applied load acts"
-    for start, end in record.gate_windows():
+    for start, end in record.load_windows():
         inside = (angle - start) % (2.0 * np.pi) < end - start
         axes.plot(np.where(inside, x, np.nan), np.where(inside, y, np.nan), color=SIGNAL, linewidth=1.9, label=label)
         label = "_nolegend_"

@@ -5,6 +5,7 @@ In: a `Model` and its `Solution`.  Out: a frozen `Record`: the steady part, its 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from ballpass.runtime.ask.observables import KinematicFrequencies, ball_angles, 
 from ballpass.runtime.contract import force_components, table_direction
 
 if TYPE_CHECKING:
-    from ballpass.runtime.contract import BearingInfo, Manifest, MechanismInfo
+    from ballpass.runtime.contract import BearingInfo, InputInfo, Manifest, MechanismInfo
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.solution import Solution
 
@@ -96,12 +97,16 @@ class Record:
             return self.parameter(bearing.shaft_speed) * time
         return np.zeros_like(time)
 
-    def gate_windows(self) -> tuple[tuple[float, float], ...]:
-        """Windows of the crank angle in which some load acts, start in [0, 2 pi), end behind it [rad]."""
+    def load_windows(self) -> tuple[tuple[float, float], ...]:
+        """Windows of the crank angle in which some load acts, start in [0, 2 pi), end behind it [rad].
+
+        A load that acts all the turn has none.
+        """
         full = 2.0 * np.pi
         found = []
         for item in self.manifest.inputs:
-            for start, end in item.windows:
+            turning = item.kind == "table" and item.rate
+            for start, end in _acting_rows(item, self.parameter) if turning else item.windows:
                 first = self.parameter(start)
                 found.append((first % full, first % full + (self.parameter(end) - first) % full))
         return tuple(found)
@@ -198,6 +203,16 @@ class Record:
             if self.bearing.name:
                 parts.append(f"bearing {self.bearing.name}")
         return ", ".join(parts)
+
+
+def _acting_rows(table: InputInfo, parameter: Callable[[str], float]) -> list[tuple[str, str]]:
+    """Where a periodic table is not zero, from knot to knot: pairs of parameters; none where it nowhere stays zero."""
+    count = len(table.times)
+    zero = [parameter(name) == 0.0 for name in table.values]
+    rests = [zero[k] and zero[(k + 1) % count] for k in range(count)]  # from knot k to the next one
+    starts = [k for k in range(count) if rests[k - 1] and not rests[k]]
+    ends = (next(k % count for k in range(start, start + count) if rests[k % count]) for start in starts)
+    return [(table.times[start], table.times[end]) for start, end in zip(starts, ends, strict=True)]
 
 
 def _unit(angle: float) -> Array:
