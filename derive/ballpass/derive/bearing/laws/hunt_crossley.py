@@ -34,12 +34,18 @@ class HuntCrossley(DampingLaw):
         table.know(*keys)
         present = tuple(key for key in keys if key in table.data)
         if present not in (keys[:1], keys[1:]):
+            problem, remedy = "the damping factor is missing", 'add hysteresis = "0.2 s/m"'
+            if "hysteresis" in present:
+                problem, remedy = "the damping factor is given twice", "delete hysteresis, or the other two"
+            elif present:
+                problem = "half of what gives the damping factor is missing"
+                remedy = 'add impact_speed = "0.1 m/s"' if "restitution" in present else "add restitution = 0.8"
             table.fault(
                 "",
-                "the damping factor is given twice" if "hysteresis" in present else "the damping factor is missing",
-                given=listing(present) or "neither",
+                problem,
+                given=listing(present) if present else "neither",
                 allowed='hysteresis (as in "0.2 s/m"), or restitution (as in 0.8) and impact_speed (as in "0.1 m/s")',
-                remedy="delete hysteresis, or the other two" if present else 'add hysteresis = "0.2 s/m"',
+                remedy=remedy,
             )
         numbers = []
         if "hysteresis" in present:
