@@ -160,5 +160,5 @@ def _show(result: CheckedJacobian) -> None:
     wide = Console(width=10_000).measure(table).maximum  # as wide as its names are
     Console(width=max(console.width, wide)).print(table, highlight=False)
     still = len(entries) - len(shown)
-    for text in ([f"{still} more are zero."] if still else []) + list(result.notes):
+    for text in ([f"{still} more {'is' if still == 1 else 'are'} zero."] if still else []) + list(result.notes):
         show(text)
