@@ -80,7 +80,9 @@ def load_curve(record: Record) -> Figure:
     shaded = " Shaded: an applied load acts." if windows else ""
     frame(
         figure,
-        "Load curve of the inner ring" if record.bearing is not None else "Joint reactions and drive torque",
+        record.title(
+            "Load curve of the inner ring" if record.bearing is not None else "Joint reactions and drive torque"
+        ),
         f"One turn; x and y have their own scales.{shaded} Counter-clockwise torque is positive. {record.settings()}.",
         left=0.85,
         wspace=0.3,
@@ -149,7 +151,7 @@ def ball_loads(record: Record) -> Figure:
     shaded = " Shaded: an applied load acts." if windows else ""
     frame(
         figure,
-        "Contact load of every ball",
+        record.title("Contact load of every ball"),
         f"{words.capitalize()}, {shown}; all strips at one scale, highest sample {top:.4g} N.{shaded} "
         f"{record.settings()}.",
         right=0.8,

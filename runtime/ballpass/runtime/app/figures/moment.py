@@ -54,7 +54,7 @@ def peak_moment(record: Record) -> Figure:
     if with_mechanism:
         when += f", crank angle {np.degrees(record.crank_angle()[sample]) % 360.0:.1f}°"
     subject = "Mechanism and bearing" if with_mechanism and with_bearing else "Bearing" if with_bearing else "Mechanism"
-    title = f"{subject} at the {reason}" + (_between_samples(record) if with_bearing else "")
+    title = record.title(f"{subject} at the {reason}") + (_between_samples(record) if with_bearing else "")
     frame(figure, title, f"{when}. {text}{record.settings()}.", left=0.2, right=0.3, below=0.1)
     return figure
 

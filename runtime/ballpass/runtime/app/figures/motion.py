@@ -67,7 +67,8 @@ def orbit(record: Record) -> Figure:
     if record.cycle_length is not None and record.turns:
         path = orbits(record.t, record.values("inner.x"), record.values("inner.y"), cycle_length=record.cycle_length)
         gap = f" Start and end of the last turn are {1e6 * path[-1].gap:.3g} µm apart."
-    frame(figure, "Orbit of the inner ring's centre", f"{scales}{gap} {record.settings()}.", left=0.9, right=2.1)
+    title = record.title("Orbit of the inner ring's centre")
+    frame(figure, title, f"{scales}{gap} {record.settings()}.", left=0.9, right=2.1)
     return figure
 
 
@@ -127,7 +128,7 @@ def spectra(record: Record) -> Figure:
         words = f"{crank} harmonics, {shaft:.4g} Hz", f"ball pass (BPFO) and multiples, {ball_pass:.4g} Hz"
         legend_above(figure, [Line2D([], [], **look | {"linewidth": 1.4}) for look in (_HARMONICS, _BALL_PASS)], words)
         text += _unresolved(ball_pass, shaft, spectrum.resolution, crank)
-    frame(figure, "Displacement spectra", f"{text} {record.settings()}.", hspace=0.25)
+    frame(figure, record.title("Displacement spectra"), f"{text} {record.settings()}.", hspace=0.25)
     return figure
 
 
@@ -177,5 +178,5 @@ def phase_portrait(record: Record) -> Figure:
     axes.set_xlabel("x of the inner ring's centre [µm]")
     axes.set_ylabel("velocity along x [mm/s]")
     legend_above(figure)
-    frame(figure, "Phase portrait along x", f"{text} {record.settings()}.", left=0.9)
+    frame(figure, record.title("Phase portrait along x"), f"{text} {record.settings()}.", left=0.9)
     return figure

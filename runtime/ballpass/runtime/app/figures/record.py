@@ -189,6 +189,10 @@ class Record:
         pairs = np.array(flat, dtype=float).reshape(-1, 2)
         return {(info.body, info.point): pairs[k] for k, info in enumerate(self.mechanism.points)}
 
+    def title(self, words: str) -> str:
+        """Title of a figure: these words and, on a line of its own, the bearing's name if it has one."""
+        return f"{words}\nbearing {self.bearing.name}" if self.bearing is not None and self.bearing.name else words
+
     def settings(self) -> str:
         """What a caption says of the run: transient cycles dropped, method, clearance, damping law."""
         statistics = self.solution.statistics
@@ -200,8 +204,6 @@ class Record:
             # a no-break space keeps number and unit on one line
             parts.append(f"diametral clearance {self.parameter('bearing.clearance') * 1e6:g}\u00a0µm")
             parts.append(f"damping law {self.bearing.damping.law}")
-            if self.bearing.name:
-                parts.append(f"bearing {self.bearing.name}")
         return ", ".join(parts)
 
 
