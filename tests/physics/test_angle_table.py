@@ -171,3 +171,16 @@ def test_a_table_costs_two_inputs_however_many_rows_it_has(scene_text: Callable[
     assert len(derive(scene).inputs) == len(derive(scene_from_text(scene_text("crank_shaper"), "shaper")).inputs) + 1
     (cut,) = (f for f in features(scene) if f.name == "force cut")
     assert cut.modelled == "force on lever.tip, by a table of 5 driver angles"
+
+
+@pytest.mark.parametrize("direction", ['direction = "10 deg"\n', ""])
+@pytest.mark.parametrize("change", [CHANGES[0], ('"0 N"]\nwindow', f'"0 N"]\ntable = {{ {ANGLE}, {FORCE} }}\nwindow')])
+def test_a_window_and_a_table_exclude_each_other(
+    scene_text: Callable[..., str], change: tuple[str, str], direction: str
+) -> None:
+    text = scene_text("crank_shaper", change).replace('direction = "10 deg"\n', direction)
+    with pytest.raises(SceneError) as caught:
+        scene_from_text(text, "shaper")
+    (fault,) = caught.value.faults
+    assert fault.key == "mechanism.forces.cut.table"
+    assert "delete one of the two" in fault.remedy

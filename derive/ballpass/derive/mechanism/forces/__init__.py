@@ -17,7 +17,7 @@ from ballpass.derive.mechanism.forces.windows import Windows
 __all__ = ["FORCE_TABLES", "BodyTorque", "Constant", "ForceTable", "Forces", "Law", "Pathway", "PointForce", "Windows"]
 __all__ += ["derive_forces", "drawn_forces"]
 
-#: In the order in which their numbers are listed; of the laws of a table the first whose key is there is taken.
+#: In the order in which their numbers are listed; of the laws of a table the one whose key is there, else the last.
 FORCE_TABLES: tuple[ForceTable, ...] = (
     ForceTable("forces", "force", "body, point and force", PointForce, (Windows, AngleTable, Constant)),
     ForceTable("torques", "torque", "body and torque", BodyTorque, (Windows, AngleTable, Constant)),

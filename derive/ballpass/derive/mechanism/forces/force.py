@@ -23,7 +23,7 @@ from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import Force, Mechanism
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.schema import Table, listing
 from ballpass.derive.variables import Input, Output
 
 #: Names of the points of every body and of the frame.
@@ -142,7 +142,19 @@ class ForceTable:
 
     def read(self, data: Table, name: str, points: Points) -> Force:
         """One force of the table."""
-        law = next(law for law in self.laws if not law.key or data.has(law.key))
+        asked = [law for law in self.laws if law.key and data.has(law.key)]
+        law = asked[0] if asked else self.laws[-1]
+        if len(asked) > 1:
+            keys, column = [law.key for law in asked], self.pathway.column
+            data.fault(
+                keys[-1],
+                f"{' and '.join(keys)} exclude each other",
+                given=listing(keys),
+                allowed=f"either {column} with a window, or a table",
+                remedy="delete one of the two; rows of a table may be zero",
+            )
+            data.missing = True  # which keys are missing depends on what stays
+            law = next(law for law in asked if law.factor == (column in data.data))
         return Force(
             name=name,
             table=self.key,
