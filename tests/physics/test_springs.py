@@ -168,7 +168,7 @@ def test_springs_are_features_that_cost_the_linkage_alone(scene_text: Callable[.
         (('"frame", "lever"', '"lever", "lever"'), "mechanism.springs.return.bodies", "name the other body"),
         (('"frame", "lever"', '"frame", "rod"'), "mechanism.springs.return.bodies", "rod"),
         (('"hook", "tip"', '"hook", "end"'), "mechanism.springs.return.points", "end"),
-        (('free_length = "150 mm"\n', ""), "mechanism.springs.return.free_length", "add free_length"),
+        (('free_length = "150 mm"\n', ""), "mechanism.springs.return.free_length", 'add free_length = "40 mm"'),
         (('stiffness = "2 N/mm"\n', ""), "mechanism.springs.return.free_length", "delete it"),
         (('"2 N/mm"', '"-2 N/mm"'), "mechanism.springs.return.stiffness", "positive"),
         (('"2 N/mm"', '"2 N*m"'), "mechanism.springs.return.stiffness", "N/m"),

@@ -44,10 +44,11 @@ class Setting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measure:
-    """What a pathway measures, "length" in "m", and the amount that acts along it, "tension" in "N"."""
+    """What a pathway measures, "length" in "m" as "40 mm", and the amount that acts along it, "tension" in "N"."""
 
     size: str
     size_unit: str
+    example: str
     amount: str
     amount_unit: str
 

@@ -37,7 +37,7 @@ class SpringDamper(Law):
         stiffness = data.optional_quantity("stiffness", f"{unit}/{size_unit}", f"Stiffness of {name}", f"k_{{{index}}}")
         free_size = None
         if stiffness is not None:
-            words, example = f"{measure.size.capitalize()} of {name} without force", f"0 {size_unit}"
+            words, example = f"{measure.size.capitalize()} of {name} without force", measure.example
             free_size = data.quantity(free, size_unit, words, f"L_{{0,{index}}}", example=example)
         damping = data.optional_quantity("damping", f"{unit}*s/{size_unit}", f"Damping of {name}", f"c_{{{index}}}")
         if stiffness is None and damping is None:

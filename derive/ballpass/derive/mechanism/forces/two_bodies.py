@@ -22,7 +22,9 @@ class TwoBodies(Pathway):
     The angle is that of ``bodies[1]`` in the axes of ``bodies[0]``; its excess over a free one lies within half a turn.
     """
 
-    measure: ClassVar[Measure] = Measure(size="angle", size_unit="rad", amount="torque", amount_unit="N*m")
+    measure: ClassVar[Measure] = Measure(
+        size="angle", size_unit="rad", example="90 deg", amount="torque", amount_unit="N*m"
+    )
 
     bodies: tuple[str, str]
 

@@ -21,7 +21,9 @@ from ballpass.derive.variables import Output
 class TwoPoints(Pathway):
     """A tension pulls ``points[0]`` of ``bodies[0]`` and ``points[1]`` of ``bodies[1]`` towards each other."""
 
-    measure: ClassVar[Measure] = Measure(size="length", size_unit="m", amount="tension", amount_unit="N")
+    measure: ClassVar[Measure] = Measure(
+        size="length", size_unit="m", example="40 mm", amount="tension", amount_unit="N"
+    )
 
     bodies: tuple[str, str]
     points: tuple[str, str]
