@@ -35,7 +35,8 @@ def own_terms(
     multiples = _Multiples(cos, sin, names)
     expressions = [_over_direction(e, angle, multiples) for e in steps]
     symbols = [names.variable(f"ball.own_{n}") for n in ("deflection", "rate", "acceleration")]
-    words = ("Taken from the deflection of ball j by its effects", "Rate of that", "Second time derivative of that")
+    reduction = "reduction of the deflection of ball j, as by the waviness of a raceway"
+    words = (reduction.capitalize(), f"Rate of the {reduction}", f"Second time derivative of the {reduction}")
     named = [
         names.define(symbol, expression, unit, text, latex)
         for symbol, expression, unit, text, latex in zip(
