@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from ballpass.derive import SceneError, generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.records import Scene
 from ballpass.runtime import KinkWarning, Model, RequestError, load, load_solution
+from ballpass.runtime.app.cli import app
 from ballpass.runtime.run.failure_location import whereabouts
 
 #: What the right bearing has other than the left one: law, number of balls, clearance, a fixed outer ring.
@@ -156,3 +159,16 @@ def test_a_solution_keeps_the_balls_of_each_bearing(pair: Model, tmp_path: Path)
     for name, balls in (("left", 8), ("right", 9)):
         assert np.array_equal(kept[f"{name}.ball.force"], run[f"{name}.ball.force"])
         assert labelled[f"{name}.ball.force"].sel({f"{name}.ball": balls}).shape == run.t.shape
+
+
+def test_explain_says_of_each_bearing_what_is_not_modelled(
+    scene_text: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pair.toml").write_text(pair_text(scene_text), encoding="utf-8")
+    done = CliRunner().invoke(app, ["explain", "pair.toml", "--json"])
+    told = "\n".join(json.loads(done.stdout)["not_modelled"])
+    assert "bearings.right.outer_ring" in told
+    assert "bearings.left.outer_ring" not in told
+    for name in ("left", "right"):
+        assert f"waviness of the outer raceway (bearings.{name}.outer_waviness)" in told

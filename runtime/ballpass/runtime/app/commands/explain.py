@@ -132,7 +132,7 @@ def _step(kernels: dict[str, int], bearings: Sequence[Bearing]) -> dict[str, int
 def _absent(scene: Scene) -> list[str]:
     """What this scene could name and does not, and how it would."""
     out = []
-    mechanism, bearing = scene.mechanism, scene.bearing
+    mechanism = scene.mechanism
     if mechanism is None:
         out.append("a mechanism: the load is given ([mechanism])")
     else:
@@ -140,15 +140,18 @@ def _absent(scene: Scene) -> list[str]:
             out.append("weight of the mechanism's bodies (mechanism.gravity)")
         if not mechanism.forces:
             out.append("forces, torques and springs ([mechanism.forces.NAME], torques, springs, torsion_springs)")
-    if bearing is None:
+    if not scene.bearings:
         out.append("a bearing: forces of the mechanism only ([bearing])")
-        return out
-    if not bearing.damping.numbers:
-        out.append("damping at the balls (bearing.damping)")
-    if bearing.inner.damping is None:
-        out.append("viscous damping of the inner ring to the frame (bearing.inner_ring.damping)")
-    if bearing.outer is None:
-        out.append('motion of the outer ring (bearing.outer_ring, support = "elastic")')
+    for bearing in scene.bearings:
+        path = bearing.path
+        if not bearing.damping.numbers:
+            out.append(f"damping at the balls ({path}.damping)")
+        if bearing.inner.damping is None:
+            out.append(f"viscous damping of the inner ring to the frame ({path}.inner_ring.damping)")
+        if bearing.outer is None:
+            out.append(f'motion of the outer ring ({path}.outer_ring, support = "elastic")')
+        if all(effect.kind != "outer_waviness" for effect in bearing.effects):
+            out.append(f"waviness of the outer raceway ({path}.outer_waviness)")
     return out
 
 
