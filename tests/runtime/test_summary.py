@@ -14,6 +14,7 @@ from rich.console import Console
 
 from ballpass.runtime import Model, Solution
 from ballpass.runtime.app.summary import render_summary, summarize
+from ballpass.runtime.app.tables import simple_table, wide_console
 from ballpass.runtime.contract.errors import SimulationError
 
 
@@ -133,6 +134,17 @@ def test_table_fits_a_terminal_and_shows_micrometres(summary: dict[str, Any]) ->
     assert row.split()[-1] == "µm"
     assert "2 transient cycles" in " ".join(text.split())
     assert "one-sided" in text
+
+
+def test_a_table_that_does_not_fit_a_terminal_is_wider(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "20")
+    table = simple_table("T", ("quantity", "value"), right=("value",))
+    table.add_row("left.frequencies.ball_pass_outer", "-2.575e-13")
+    console = wide_console(table)
+    with console.capture() as text:
+        console.print(table)
+    assert "-2.575e-13" in text.get()
+    assert "ball_pass_outer" in text.get()
 
 
 def test_a_run_with_some_outputs_has_the_summary_of_these(

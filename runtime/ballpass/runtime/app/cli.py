@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import Asked, faults_of_numbers, read_asked, read_duration
@@ -143,8 +142,10 @@ def run(
         show_json(summary)
         return
     from ballpass.runtime.app.summary import render_summary
+    from ballpass.runtime.app.tables import wide_console
 
-    Console().print(render_summary(summary))
+    table = render_summary(summary)
+    wide_console(table).print(table)
     if solution.accuracy is not None:
         show(solution.accuracy.words)
     size = _size((folder / "solution.nc").stat().st_size)

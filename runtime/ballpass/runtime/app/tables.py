@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from rich import box
+from rich.console import Console, RenderableType
 from rich.table import Table
 
 
@@ -35,3 +36,10 @@ def plain_table(title: str, heads: Sequence[str], *, right: Collection[str] = ()
     for head in heads:
         table.add_column(head, justify="right" if head in right else "left")
     return table
+
+
+def wide_console(table: RenderableType) -> Console:
+    """The terminal, made as wide as the table where that is wider: a number that lost its exponent would be wrong."""
+    terminal = Console(emoji=False)
+    wide = Console(width=10_000).measure(table).maximum
+    return Console(emoji=False, width=max(terminal.width, wide))

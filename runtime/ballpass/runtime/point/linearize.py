@@ -105,7 +105,8 @@ class Linearization:
         return f"Linearization({where} at t = {self.time:.6g} s; natural frequencies {frequencies} Hz)"
 
     def __str__(self) -> str:
-        return printed(Group(render_linearization(self), render_matrices(self)))
+        # no terminal's width: numbers are not cut, and the notes are as wide as the tables
+        return printed(Group(render_linearization(self), render_matrices(self)), width=10_000)
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked, read_quantity
 from ballpass.runtime.app.commands.shared import Stages, command, complain, load_model, show, show_json
-from ballpass.runtime.app.tables import simple_table
+from ballpass.runtime.app.tables import simple_table, wide_console
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:
@@ -86,9 +85,8 @@ def linearize(
         return
     from ballpass.runtime.point.linearize import render_linearization, render_matrices
 
-    console = Console()
-    console.print(render_linearization(result), highlight=False)
-    console.print(render_matrices(result), highlight=False)
+    for table in (render_linearization(result), render_matrices(result)):
+        wide_console(table).print(table, highlight=False)
 
 
 def _model_at(
@@ -156,9 +154,7 @@ def _show(result: CheckedJacobian) -> None:
     for entry in shown:
         value, second = (None if entry[key] is None else f"{entry[key]:.7g}" for key in ("value", "second"))
         table.add_row(entry["of"], entry["wrt"], value or "not finite", second or "", entry["unit"], entry["verdict"])
-    console = Console()
-    wide = Console(width=10_000).measure(table).maximum  # as wide as its names are
-    Console(width=max(console.width, wide)).print(table, highlight=False)
+    wide_console(table).print(table, highlight=False)
     still = len(entries) - len(shown)
     for text in ([f"{still} more {'is' if still == 1 else 'are'} zero."] if still else []) + list(result.notes):
         show(text)

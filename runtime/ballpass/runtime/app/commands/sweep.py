@@ -10,7 +10,6 @@ import math
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import faults_of_numbers, read_duration, read_with_settings
@@ -26,6 +25,7 @@ from ballpass.runtime.app.commands.shared import (
     warn,
 )
 from ballpass.runtime.app.interrupted import INTERRUPTED
+from ballpass.runtime.app.tables import wide_console
 from ballpass.runtime.contract.errors import RequestError
 
 #: Members that the terminal shows one by one; of more, the extremes.
@@ -135,7 +135,8 @@ def sweep(
     if json_:
         show_json(swept.report())
     else:
-        Console(emoji=False).print(swept.all_members() if count <= ROWS else swept.extremes())
+        table = swept.all_members() if count <= ROWS else swept.extremes()
+        wide_console(table).print(table)
         drawn = sum(name.endswith(".png") for name in files)
         told = [name for name in files if not name.endswith(".png")]
         told += [f"{drawn} figure{'s' if drawn > 1 else ''}"] if drawn else []
