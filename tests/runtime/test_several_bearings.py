@@ -139,6 +139,18 @@ def test_a_static_quantity_is_of_the_bearing_it_names(pair: Model, alone: dict[s
         pair.sensitivity("static_deflection@240deg", "bearings.left.clearance", check=False)
 
 
+def test_a_peak_is_asked_for_as_the_summary_names_it(pair: Model) -> None:
+    run = {"cycles": 0.05, "transient": 0}
+    names = ["left.peak_ball_force", "peak_left_ball_force"]
+    many = pair.simulate_many({"bearings.left.clearance": [10e-6]}, names, **run)
+    report = pair.sensitivity(names, "bearings.left.clearance", check=False, **run)
+    assert many[names[0]] == many[names[1]]
+    assert report.quantities[0].value == report.quantities[1].value
+    for ask in (lambda of: pair.sensitivity(of, check=False), lambda of: pair.simulate_many({}, of)):
+        with pytest.raises(RequestError, match=r"peak_left_ball_force.*peak_right_ball_force"):
+            ask("peak_ball_force")
+
+
 def refused(text: str) -> Scene:
     return scene_from_text(text, "pair")
 

@@ -125,6 +125,11 @@ def _aliases(channels: Mapping[str, tuple[int, str]]) -> dict[str, str]:
         f"{kind}_{channel.replace('.', '_')}": f"{kind}:{channel}"
         for channel in channels
         for kind in (*kinds, *_SYNONYMS, *_COUNTED)
+    } | {
+        # as the summary names it, with the bearing first
+        f"{channel.removesuffix('ball.force')}peak_ball_force": f"max:{channel}"
+        for channel in channels
+        if channel.endswith(".ball.force")
     }
 
 

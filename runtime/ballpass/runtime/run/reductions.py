@@ -197,6 +197,9 @@ def observable_aliases(channels: Sequence[str]) -> dict[str, tuple[str, str]]:
             found[f"{kind}:{channel}"] = (kind, channel)
             found[f"{kind}_{plain}"] = (kind, channel)
         found[f"peak:{channel}"] = found[f"peak_{plain}"] = ("max", channel)
+        if channel.endswith(".ball.force"):
+            # as the summary names it, with the bearing first
+            found[f"{channel.removesuffix('ball.force')}peak_ball_force"] = ("max", channel)
     return found
 
 
