@@ -53,7 +53,9 @@ def same(a: EnsembleResult, b: EnsembleResult, rows: np.ndarray | slice = slice(
     return all(np.array_equal(a[name][rows], b[name], equal_nan=True) for name in b)
 
 
-@pytest.mark.parametrize("law", ["one-sided", "stiff", "one-sided-gated", "tangent"])
+@pytest.mark.parametrize(
+    "law", ["one-sided", *(pytest.param(k, marks=pytest.mark.long) for k in ("stiff", "one-sided-gated")), "tangent"]
+)
 @pytest.mark.parametrize(
     "method",
     [
@@ -159,7 +161,7 @@ def test_members_of_smoothed_laws_have_no_kinks_to_locate(make_model: ModelMaker
     assert same(located, model.simulate_many(columns, ["rms:inner.y"], cycles=1, transient=0, lanes=False))
 
 
-@pytest.mark.parametrize("method", ["stepper-dp54", "stepper-rodas5p"])
+@pytest.mark.parametrize("method", [pytest.param("stepper-dp54", marks=pytest.mark.long), "stepper-rodas5p"])
 def test_lanes_serve_balls_without_an_opposite_one(make_model: ModelMaker, method: str) -> None:
     """An odd number of balls has no pairs that share a direction."""
     model, columns = make_model("punching_press", ("balls = 8 ", "balls = 7 ")), table(3)

@@ -146,7 +146,13 @@ def models(scene_text: Callable[..., str], tmp_path_factory: pytest.TempPathFact
 CLEARANCES = {"a": 0.0, "b": 1e-6, "c": 2e-6}
 
 
-@pytest.mark.parametrize("method", ["stepper-dp54", "stepper-dop853", "stepper-rodas4", "stepper-rodas5p"])
+@pytest.mark.parametrize(
+    "method",
+    [
+        *("stepper-dp54", "stepper-rodas5p"),
+        *(pytest.param(f"stepper-{name}", marks=pytest.mark.long) for name in ("dop853", "rodas4")),
+    ],
+)
 def test_bearings_that_do_not_know_each_other_move_as_each_alone(models: tuple[Model, Model], method: str) -> None:
     three, one = models
     given = {f"bearings.{name}.clearance": value for name, value in CLEARANCES.items()}

@@ -52,7 +52,10 @@ def alone(make_model: Callable[..., Model]) -> dict[str, Model]:
     return {"left": make_model("punching_press"), "right": make_model("punching_press", *fixed)}
 
 
-@pytest.mark.parametrize(("method", "bound"), [("stepper", 1e-5), ("stepper-rodas5p", 1e-4), ("cvodes", 1e-3)])
+@pytest.mark.parametrize(
+    ("method", "bound"),
+    [("stepper", 1e-5), ("stepper-rodas5p", 1e-4), pytest.param("cvodes", 1e-3, marks=pytest.mark.long)],
+)
 def test_each_moves_as_it_does_alone(pair: Model, alone: dict[str, Model], method: str, bound: float) -> None:
     both = pair.simulate(cycles=0.15, transient=0, method=method, rtol=1e-9)
     for name, model in alone.items():
