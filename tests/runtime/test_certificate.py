@@ -179,6 +179,7 @@ def test_laws_whose_force_jumps_are_refused_with_what_is_allowed(make_model: Cal
         jumping.sensitivity("rms:inner.y", "bearing.clearance", 1, transient=0)
 
 
+@pytest.mark.long
 def test_a_smoothed_contact_makes_a_gated_law_differentiable(make_model: Callable[..., Model]) -> None:
     """Contacts open and close in this run: with Hertz's own onset the force would jump there."""
     smooth = ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n')
