@@ -164,7 +164,6 @@ def manifest(
         ),
         smoothness=(),
         mechanism=mf.MechanismInfo(
-            driver_joint="A",
             speed="driver.speed",
             start_angle="driver.start_angle",
             joints=(),

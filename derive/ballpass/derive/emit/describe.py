@@ -109,7 +109,6 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
     if mechanism is None or linkage is None:
         return None
     return mf.MechanismInfo(
-        driver_joint=mechanism.driver.joint,
         speed=mechanism.driver.speed.path,
         start_angle=mechanism.driver.start_angle.path,
         joints=tuple((j.name, j.kind, j.bodies[0], j.points[0], j.bodies[1], j.points[1]) for j in mechanism.joints),

@@ -191,14 +191,13 @@ class BearingInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MechanismInfo:
-    """What observables need of the linkage: driver joint, names of its parameters, joints, points for drawing.
+    """What observables need of the linkage: names of the parameters of its driver, joints, points for drawing.
 
     The components of an applied force are the parameters ``mechanism.forces.<name>.force.x`` and ``.y``, or
     ``.magnitude`` and ``.direction`` (see `force_components`).  Where its input is a table, that holds the amount, and
     the parameter ``mechanism.forces.<name>.direction`` the direction.
     """
 
-    driver_joint: str
     speed: str
     start_angle: str
     joints: tuple[tuple[str, str, str, str, str, str], ...]  # name, kind, body, point, body, point
