@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 
 from ballpass.runtime import Model
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.certify import jacobian_check
 from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.certify.differences import richardson
 from ballpass.runtime.certify.jacobian_check import checked_jacobian
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.point import slopes
 from ballpass.runtime.point.jacobian import Directions, directions_of, output_tangents, quantity_values
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -241,8 +241,8 @@ def test_a_wrong_derivative_disagrees(make_model: Callable[..., Model], monkeypa
     x = loaded_state(model, t)
     arguments = (model, model.numbers(), "ball.elastic_force", ["inner.x", "bearing.clearance"])
     assert checked_jacobian(*arguments, t=t, x=x).verdict is Verdict.VERIFIED
-    right = jacobian_check.contract
-    monkeypatch.setattr(jacobian_check, "contract", lambda *a: 1.00001 * right(*a))
+    right = slopes.contract
+    monkeypatch.setattr(slopes, "contract", lambda *a: 1.00001 * right(*a))
     assert checked_jacobian(*arguments, t=t, x=x).verdict is Verdict.DISAGREES
     assert checked_jacobian(*arguments, t=t, x=x, check=False).verdict is Verdict.NOT_CHECKED
 
@@ -260,8 +260,8 @@ def test_command_prints_both_numbers_and_fails_where_they_disagree(
     k_b, delta = 13.34e9, report["state"][0]  # given in the scene; zero clearance, ball 1 on the load's line
     assert entry["value"] == pytest.approx(1.5 * k_b * math.sqrt(delta), rel=1e-12)
     assert entry["unit"] == "N/m"
-    right = jacobian_check.contract
-    monkeypatch.setattr(jacobian_check, "contract", lambda *a: 1.1 * right(*a))
+    right = slopes.contract
+    monkeypatch.setattr(slopes, "contract", lambda *a: 1.1 * right(*a))
     bad = CliRunner().invoke(app, [*words, "--json"])
     assert bad.exit_code == 1
     entry = json.loads(bad.stdout)["jacobian"][0]

@@ -114,14 +114,77 @@ def test_unrestrained_rings_have_rigid_modes_only(rotor: Model) -> None:
     assert all(mode.rigid for mode in result.modes)
 
 
-def test_a_kink_at_rest_is_said_with_the_side_that_is_given(make_virtual: Callable[..., Model]) -> None:
-    """One-sided damping at zero rate: the derivative is that of parting, which resists nothing."""
-    model = make_virtual("punching_press")
-    with pytest.warns(KinkWarning, match="parting side"):
-        result = model.linearize(x=np.zeros(8))
-    assert result.notes
-    c_p = model.parameters["bearing.outer_ring.damping"]
-    assert result.damping == pytest.approx(np.diag([0.0, 0.0, c_p, c_p]), abs=1e-9)
+def damped_rotor(make_virtual: Callable[..., Model], balls: int) -> Model:
+    """The rotor without damping to the frame, which one-sided damping of its balls stops."""
+    return make_virtual(
+        "varying_compliance",
+        ('law = "none"', 'law = "one-sided"\ncoefficient = "2e3 N*s/m"'),
+        ("balls = 8", f"balls = {balls}"),
+        ('damping = "200 N*s/m"', 'damping = "0 N*s/m"'),
+    )
+
+
+def differences_of_one_side(model: Model, x: np.ndarray, state: int, step: float) -> np.ndarray:
+    """Slope of the right-hand side on the side of the step's sign, extrapolated."""
+    numbers, u = model.numbers(AT_REST), model.inputs_at(0.0, AT_REST)
+
+    def rate(h: float) -> np.ndarray:
+        moved = x.copy()
+        moved[state] += h
+        return model.kernel("rhs")({"t": 0.0, "x": moved, "u": u, "p": numbers.p, "c": numbers.c})
+
+    one, two = ((rate(h) - rate(0.0)) / h for h in (step, 2.0 * step))
+    slope: np.ndarray = 2.0 * one - two
+    return slope
+
+
+def logarithmic_decrement(model: Model, x: np.ndarray, frequency: float, turns: int) -> float:
+    """Damping ratio of a free decay from a nanometre beside the equilibrium, by its highest displacements."""
+    start = x.copy()
+    start[0] += 1e-9
+    times = np.linspace(0.0, (turns + 0.3) / frequency, 1001)
+    run = model.simulate(times=times, parameters=AT_REST, initial=start, rtol=1e-6, method="erk")
+    speed = run["inner.vx"]
+    k = np.flatnonzero((speed[:-1] > 0.0) & (speed[1:] <= 0.0))
+    tops = run["inner.x"][k] - x[0]
+    decrement = math.log(tops[0] / tops[-1]) / (len(tops) - 1)
+    return decrement / math.hypot(decrement, 2.0 * math.pi)
+
+
+def test_opposite_balls_at_rest_are_a_linear_dashpot(make_virtual: Callable[..., Model]) -> None:
+    """Z/4 c_b each way, and no word about a kink: the sum over the balls has a derivative where no ball's force has."""
+    model = damped_rotor(make_virtual, 8)
+    result = model.linearize(parameters=AT_REST)
+    c_b = 2e3
+    assert result.notes == ()
+    assert result.damping == pytest.approx(2.0 * c_b * np.eye(2), rel=1e-9, abs=1e-9 * c_b)
+    for state in (2, 3):
+        expected = model.jacobian("rhs", model.states[state], x=result.x, parameters=AT_REST)
+        for step in (1e-4, -1e-4):
+            found = differences_of_one_side(model, result.x, state, step)
+            assert found == pytest.approx(expected, rel=1e-6, abs=1e-6 * np.max(np.abs(expected)))
+    along = max(result.modes, key=lambda m: abs(m.shape[0]) - abs(m.shape[1]))
+    decay = logarithmic_decrement(model, result.x, along.damped_frequency, 3)
+    assert along.damping_ratio == pytest.approx(decay, rel=1e-3)
+
+
+def test_an_odd_number_of_balls_at_rest_has_two_slopes_and_decays_by_their_mean(
+    make_virtual: Callable[..., Model],
+) -> None:
+    """The sum has a corner as well: both sides are told, those of differences, and a decay goes by their mean."""
+    model = damped_rotor(make_virtual, 5)
+    with pytest.warns(KinkWarning, match="Damping on either side"):
+        result = model.linearize(parameters=AT_REST)
+    sides = [-20.0 * differences_of_one_side(model, result.x, 2, step)[2] for step in (-1e-4, 1e-4)]
+    told = result.notes[0].split("inner.x ")[1].rstrip(".").split(";")[0].split(" or ")
+    assert [float(side) for side in told] == pytest.approx(sides, rel=1e-5)
+    assert abs(sides[0] - sides[1]) > 200.0
+    assert result.damping[0, 0] == pytest.approx(sum(sides) / 2.0, rel=1e-9)
+    along = max(result.modes, key=lambda m: abs(m.shape[0]) - abs(m.shape[1]))
+    decay = logarithmic_decrement(model, result.x, along.damped_frequency, 3)
+    assert along.damping_ratio == pytest.approx(decay, rel=2e-3)
+    with pytest.warns(KinkWarning, match="mean of both sides"):
+        model.jacobian("ball.damping_force", "states", x=result.x, parameters=AT_REST)
 
 
 def test_command_prints_frequencies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rotor: Model) -> None:

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from ballpass.runtime.point.equilibrium import FreeRingWarning, StaticEquilibrium
     from ballpass.runtime.point.explain import Explanation
     from ballpass.runtime.point.jacobian_function import JacobianFunction
-    from ballpass.runtime.point.linearize import KinkWarning, Linearization, Mode
+    from ballpass.runtime.point.linearize import Linearization, Mode
+    from ballpass.runtime.point.slopes import KinkWarning
     from ballpass.runtime.run.integration_error import IntegrationError
     from ballpass.runtime.run.reductions import Reduction, Reductions
     from ballpass.runtime.run.sensitivity import Sensitivities
@@ -100,7 +101,7 @@ _HOME = {
     "StaticEquilibrium": "point.equilibrium",
     "Explanation": "point.explain",
     "JacobianFunction": "point.jacobian_function",
-    "KinkWarning": "point.linearize",
+    "KinkWarning": "point.slopes",
     "Linearization": "point.linearize",
     "Mode": "point.linearize",
     "IntegrationError": "run.integration_error",

@@ -9,7 +9,7 @@ computed anew, the derived constants, phases and tables included.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,13 +24,13 @@ from ballpass.runtime.point.jacobian import (
     CRANK_ANGLE,
     TIME,
     Rows,
-    contract,
     directions_of,
     rows_of,
     turning_speed,
     values_of_rows,
 )
-from ballpass.runtime.point.linearize import kink_notes
+from ballpass.runtime.point.linearize import onset_notes
+from ballpass.runtime.point.slopes import slopes
 from ballpass.runtime.run import inputs as clock
 
 Array = NDArray[np.float64]
@@ -56,7 +56,10 @@ class CheckedJacobian:
     ----------
     rows, columns : labels
     row_units, column_units : SI units
-    value : derivatives, shape (rows, columns) [row's unit / column's unit]
+    value : derivatives, or the mean of both sides where these differ, shape (rows, columns) [row's unit / column's
+        unit]
+    below, above : one-sided derivatives, same shape
+    differ : where they are not one, same shape
     at : values of the rows, shape (rows,)
     checks : one for each entry, row by row; all `UNCHECKED` where the check was turned off
     notes : where the laws have no derivative at this state, in words
@@ -68,6 +71,9 @@ class CheckedJacobian:
     row_units: tuple[str, ...]
     column_units: tuple[str, ...]
     value: Array
+    below: Array
+    above: Array
+    differ: NDArray[np.bool_]
     at: Array
     checks: tuple[tuple[Check, ...], ...]
     notes: tuple[str, ...]
@@ -94,6 +100,7 @@ class CheckedJacobian:
                         "of": row,
                         "wrt": column,
                         "value": _number(self.value[i, j]),
+                        "sides": [self.below[i, j], self.above[i, j]] if self.differ[i, j] else None,
                         "unit": _quotient(self.row_units[i], self.column_units[j]),
                         "second": check.value,
                         "second_uncertainty": check.uncertainty,
@@ -135,7 +142,8 @@ def checked_jacobian(
     directions = directions_of(model, numbers, wrt, t)
     there = point(model, numbers, t, x)
     state = np.asarray(there["x"], dtype=float)
-    value = np.concatenate([contract(model, part, directions, there) for part in parts])
+    found = slopes(model, parts, directions, there)
+    value, differ = found.value, found.differ
     at = values_of_rows(model, parts, there)
     columns = []
     for j, (label, unit) in enumerate(zip(directions.labels, directions.units, strict=True)):
@@ -143,19 +151,21 @@ def checked_jacobian(
             columns.append([UNCHECKED] * len(at))
             continue
         base, step, moved = _motion(model, numbers, parts, label, unit, t, state)
-        found = richardson(moved, base, step)
+        second = richardson(moved, base, step)
         quantum = NOTHING * np.maximum(np.abs(at), 1e-3 * float(np.max(np.abs(at), initial=0.0))) / step
         columns.append(
             [
                 compare(
                     float(value[i, j]),
                     0.0,
-                    float(found.value[i]),
-                    float(found.error[i]),
+                    float(second.value[i]),
+                    float(second.error[i]),
                     route="differences",
                     quantum=float(quantum[i]),
                     agreement=AGREEMENT,
                 )
+                if not differ[i, j]
+                else replace(UNCHECKED, reason="there is no derivative: the sides differ")
                 for i in range(len(at))
             ]
         )
@@ -165,9 +175,12 @@ def checked_jacobian(
         row_units=tuple(unit for part in parts for unit in part.units),
         column_units=directions.units,
         value=value,
+        below=found.below,
+        above=found.above,
+        differ=differ,
         at=at,
         checks=tuple(tuple(column[i] for column in columns) for i in range(len(at))),
-        notes=kink_notes(model, numbers, t, state) if model.states else (),
+        notes=(*found.notes(), *onset_notes(model, there)),
         time=t,
         x=state,
     )

@@ -19,7 +19,8 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.equilibrium import static_equilibrium
 from ballpass.runtime.point.evaluate import point
-from ballpass.runtime.point.jacobian import jacobian, rows_of
+from ballpass.runtime.point.jacobian import rows_of
+from ballpass.runtime.point.slopes import jacobian
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.run.simulate import STIFF_RATIO, choose_method

@@ -7,8 +7,9 @@ time, the crank's angle, or a parameter, which moves the derived constants (groo
 stiffness), the phases and the tables as well.  Gates are flat: they jump at the edges of their windows, where no
 derivative exists.  Derivatives along parameters are taken at fixed states.
 
-`jacobian` evaluates the sparse blocks of ``jacobians.c`` and contracts them with the directions; `output_tangents` runs
-the generated derivative along a direction for many samples; `jacobian_function` prepares one query for many states.
+`contract` evaluates the sparse blocks of ``jacobians.c`` and contracts them with the directions (`slopes` does so on
+both sides of a corner); `output_tangents` runs the generated derivative along a direction for many samples;
+`jacobian_function` prepares one query for many states.
 """
 
 from __future__ import annotations
@@ -198,28 +199,6 @@ def turning_speed(model: LoadedModel, numbers: Numbers) -> float:
             "by the driver's start angle, which turns the linkage alone and holds the balls."
         )
     return speed
-
-
-def jacobian(
-    model: LoadedModel,
-    numbers: Numbers,
-    of: str | Sequence[str],
-    wrt: str | Sequence[str],
-    *,
-    t: float,
-    x: Sequence[float] | np.ndarray | None,
-) -> Array:
-    """Derivatives at one time and state; see `ballpass.runtime.Model.jacobian`."""
-    time = checked_time(t)
-    rows = rows_of(model, of)
-    directions = directions_of(model, numbers, wrt, time)
-    there = point(model, numbers, time, x)
-    dense = np.concatenate([contract(model, part, directions, there) for part in rows])
-    if isinstance(of, str) and of != RHS and sum(len(part.labels) for part in rows) == 1:
-        dense = dense[0]
-    if isinstance(wrt, str) and wrt != STATES:
-        dense = dense[..., 0]
-    return np.asarray(dense, dtype=float)
 
 
 def contract(model: LoadedModel, rows: Rows, directions: Directions, there: Mapping[str, object]) -> Array:

@@ -24,11 +24,11 @@ from rich.console import Group
 from rich.table import Table
 
 from ballpass.runtime.contract.errors import RequestError, SimulationError
-from ballpass.runtime.contract.manifest import BearingInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
-from ballpass.runtime.point.jacobian import rows_of
+from ballpass.runtime.point.jacobian import RHS, STATES, directions_of, rows_of
+from ballpass.runtime.point.slopes import Deflections, KinkWarning, Point, Slopes, named, slopes
 from ballpass.runtime.run.magnitudes import moved_masses
 from ballpass.runtime.run.printed import printed
 
@@ -36,13 +36,6 @@ Array = NDArray[np.float64]
 
 #: Eigenvalues below this fraction of the largest are zero but for rounding [1].
 RIGID = 1e-7
-
-#: A ball whose deflection or rate is below this fraction of the rings' motion stands on the kink.
-ON_THE_KINK = 1e-9
-
-
-class KinkWarning(UserWarning):
-    """The damping law has no derivative at this state; one of two one-sided ones is given."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,13 +158,14 @@ def linearize(
     there = point(model, numbers, t, x)
     count = len(model.states)
     half = count // 2
-    jacobian = model.kernel("rhs_jac_x")(there).reshape(count, count)
+    found = slopes(model, rows_of(model, RHS), directions_of(model, numbers, STATES, t), there)
+    jacobian = found.value
     if not np.all(np.isfinite(jacobian)):
         raise SimulationError("linearize: the derivatives at this state are not finite. Check state and parameters.")
     mass = np.diag(moved_masses(model.manifest, numbers))
     stiffness, damping = -mass @ jacobian[half:, :half], -mass @ jacobian[half:, half:]
     state = np.asarray(there["x"], dtype=float)
-    notes = kink_notes(model, numbers, t, state)
+    notes = (*_sides(found, mass, model.states[:half]), *onset_notes(model, there))
     for note in notes:
         warnings.warn(f"linearize: {note}", KinkWarning, stacklevel=3)
     return Linearization(
@@ -222,60 +216,31 @@ def _modes(mass: Array, damping: Array, stiffness: Array) -> tuple[Mode, ...]:
     return tuple(sorted(modes, key=lambda m: (m.natural_frequency, m.eigenvalue.imag)))
 
 
-def kink_notes(model: LoadedModel, numbers: Numbers, t: float, x: Array) -> tuple[str, ...]:
-    """Where the damping law has no derivative at this state, in words; empty where it has one."""
-    rough = [
-        bearing
-        for bearing in model.manifest.bearings
-        if {bearing.damping.in_deflection, bearing.damping.in_rate} & {"kinked", "discontinuous"}
-    ]
-    return tuple(note for bearing in rough for note in _kink_notes(model, bearing, numbers, t, x))
+def _sides(found: Slopes, mass: Array, coordinates: Sequence[str]) -> tuple[str, ...]:
+    """That the sides of the derivatives differ, with the damping on each; empty where they agree."""
+    half = len(mass)
+    below, above = (-np.diag(mass @ side[half:, half:]) for side in (found.below, found.above))
+    pairs = "; ".join(f"{n} {a:.6g} or {b:.6g}" for n, a, b in zip(coordinates, below, above, strict=True) if a != b)
+    words = f"A harmonic vibration loses energy by the mean. Damping on either side, N*s/m: {pairs}."
+    return tuple(f"{note} {words}" for note in found.notes())
 
 
-def _kink_notes(model: LoadedModel, bearing: BearingInfo, numbers: Numbers, t: float, x: Array) -> list[str]:
-    """The same of one bearing."""
-    law = bearing.damping.law
-    jumps = bearing.damping.in_deflection == "discontinuous"
-    deflection, rate, speed = _deflections(model, bearing, numbers, t, x)
-    length = max(float(np.max(np.abs(deflection))), 1e-12)
-    at_onset = np.flatnonzero(np.abs(deflection) <= ON_THE_KINK * length).tolist()
-    at_rest = np.flatnonzero(np.abs(rate) <= ON_THE_KINK * max(speed, 1e-12)).tolist()
+def onset_notes(model: LoadedModel, there: Point) -> tuple[str, ...]:
+    """Where balls stand at contact onset and the damping law has no derivative there, in words."""
     notes = []
-    if bearing.damping.corner_at_rest:
-        resting = [k for k in at_rest if not jumps or deflection[k] > 0.0]
-        if resting:
-            notes.append(
-                f"the law {law} has a kink where the deflection's rate is zero, as at {_balls(resting)}: damping is "
-                "that of the parting side, without resistance; on the approaching side each of these balls adds "
-                f"{numbers.values[f'{bearing.path}.c_b']:.6g} N*s/m along its direction. Give "
-                f"{bearing.path}.damping.smoothing, and there is one derivative."
-            )
-    if bearing.damping.in_deflection in ("kinked", "discontinuous"):
-        touching = [k for k in at_onset if abs(rate[k]) > 0.0 or jumps]
+    for bearing in model.manifest.bearings:
+        if bearing.damping.in_deflection not in ("kinked", "discontinuous"):
+            continue
+        found = Deflections(model, bearing, there)
+        jumps = bearing.damping.in_deflection == "discontinuous"
+        touching = [k for k in found.at_onset() if abs(found.rate[k]) > 0.0 or jumps]
         if touching:
             notes.append(
-                f"the law {law} has no derivative at contact onset, where {_balls(touching)} stands: the derivative is "
-                f"that of the free side. Give {bearing.path}.contact.smoothing, and there is one derivative."
+                f"the law {bearing.damping.law} has no derivative at contact onset, where {named(touching)} stands: "
+                f"the derivative is that of the free side. Give {bearing.path}.contact.smoothing, and there is one "
+                "derivative."
             )
-    return notes
-
-
-def _balls(indices: Sequence[int]) -> str:
-    return "ball " + ", ".join(str(k + 1) for k in indices)
-
-
-def _deflections(
-    model: LoadedModel, bearing: BearingInfo, numbers: Numbers, t: float, x: Array
-) -> tuple[Array, Array, float]:
-    """Deflection of each ball, its rate, and the largest speed in it [m], [m/s]."""
-    there = point(model, numbers, t, x)
-    (rows,) = rows_of(model, f"{bearing.prefix}ball.deflection")
-    half = len(x) // 2
-    value = model.kernel(rows.function)(there)[rows.indices]
-    by_states = model.kernel(f"{rows.function}_jac_x")(there).reshape(-1, len(x))[rows.indices]
-    by_time = model.kernel(f"{rows.function}_jac_t")(there)[rows.indices]
-    rate = by_states[:, :half] @ x[half:] + by_time
-    return value, rate, max(float(np.max(np.abs(x[half:]))), float(np.max(np.abs(by_time))))
+    return tuple(notes)
 
 
 def render_linearization(result: Linearization) -> Table:

@@ -12,9 +12,9 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.evaluate import checked_time, evaluate_point
-from ballpass.runtime.point.jacobian import jacobian
 from ballpass.runtime.point.jacobian_function import JacobianFunction
 from ballpass.runtime.point.second_derivatives import hessian
+from ballpass.runtime.point.slopes import jacobian
 from ballpass.runtime.run import inputs as clock
 
 if TYPE_CHECKING:
@@ -101,6 +101,12 @@ class PointModel(LoadedModel):
         -------
         array, shape (rows, columns); a single number as `of` has no rows, a single name as `wrt` no columns
 
+        Warns
+        -----
+        KinkWarning
+            Balls rest on the corner of a one-sided law, and what was asked for has two slopes there, of which the mean
+            is given.  Sums over balls, as "rhs", often have one all the same.
+
         Raises
         ------
         RequestError
@@ -116,7 +122,10 @@ class PointModel(LoadedModel):
         t: float = 0.0,
         parameters: Mapping[str, float] | None = None,
     ) -> JacobianFunction:
-        """The same, sparse and prepared for many states: ``J = model.jacobian_function("ball.force"); J(x)``."""
+        """The same, sparse and prepared for many states: ``J = model.jacobian_function("ball.force"); J(x)``.
+
+        Where balls rest on the corner of a one-sided law it gives the slope of the parting side, without a word.
+        """
         return JacobianFunction(self, self.numbers(parameters), of, wrt, t=t)
 
     def hessian(
@@ -191,7 +200,7 @@ class PointModel(LoadedModel):
         Warns
         -----
         KinkWarning
-            The damping law has no derivative at this state; the warning says which side is given.
+            The damping law has no derivative at this state; the warning says what is given.
         """
         from ballpass.runtime.point.equilibrium import instant, static_equilibrium
         from ballpass.runtime.point.linearize import linearize  # with SciPy

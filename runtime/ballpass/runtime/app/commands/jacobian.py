@@ -144,7 +144,10 @@ def _show(result: CheckedJacobian) -> None:
     shown = [
         entry
         for entry in entries
-        if entry["verdict"] == Verdict.DISAGREES.value or entry["value"] != 0.0 or len(result.rows) == 1
+        if entry["verdict"] == Verdict.DISAGREES.value
+        or entry["value"] != 0.0
+        or entry["sides"]
+        or len(result.rows) == 1
     ]
     table = simple_table(
         f"Derivatives at t = {result.time:.6g} s: {result.verdict.value}",
@@ -153,6 +156,8 @@ def _show(result: CheckedJacobian) -> None:
     )
     for entry in shown:
         value, second = (None if entry[key] is None else f"{entry[key]:.7g}" for key in ("value", "second"))
+        if entry["sides"]:
+            value = "{:.7g} or {:.7g}".format(*entry["sides"])
         table.add_row(entry["of"], entry["wrt"], value or "not finite", second or "", entry["unit"], entry["verdict"])
     wide_console(table).print(table, highlight=False)
     still = len(entries) - len(shown)
