@@ -12,7 +12,16 @@ from scene_texts import PRESS, ROTOR, SCENES, edited
 
 from ballpass.derive.reading.read import read_scene, scene_from_text
 from ballpass.derive.scene.errors import SceneError
+from ballpass.derive.system import derive
 from ballpass.runtime.contract.errors import BallpassError
+
+SPRING_ON_A_HINGE = """
+[mechanism.springs.s]
+bodies = ["crank", "rod"]
+points = ["B", "B"]
+stiffness = "1 N/mm"
+free_length = "10 mm"
+"""
 
 
 def faults(text: str, name: str = "press") -> SceneError:
@@ -514,3 +523,67 @@ def test_an_error_names_its_file(tmp_path: Path) -> None:
     with pytest.raises(SceneError) as caught:
         read_scene(path)
     assert caught.value.source == str(path)
+
+
+def test_faults_of_reading_of_values_and_of_topology_are_told_together_with_their_lines() -> None:
+    text = edited(PRESS, 'mass = "2.55 kg"', 'mas = "2.55 kg"')  # reading
+    text = edited(text, "share = 0.5", "share = 1.5")  # a value
+    text = edited(text, 'branch = "ahead"', "")  # assembly
+    lines = {fault.key: fault.line for fault in faults(text).faults}
+    given = text.split("\n")
+    assert set(lines) == {
+        *("mechanism.bodies.rod.mass", "mechanism.bodies.rod.mas"),
+        *("mechanism.joints.C.branch", "bearing.share"),
+    }
+    for key, words in (
+        ("mechanism.bodies.rod.mas", "mas ="),
+        ("mechanism.joints.C.branch", "[mechanism.joints.C]"),
+        ("bearing.share", "share = 1.5"),
+    ):
+        line = lines[key]
+        assert line is not None
+        assert given[line - 1].startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("changes", "found"),
+    [
+        (
+            (('B = "6 mm"', 'B = "160 mm"'), ('"drive_torque"]', '"drive_torq"]')),
+            {"mechanism.joints.C": "[mechanism.joints.C]", "run.outputs": "outputs ="},
+        ),
+        (
+            (
+                ('B = "6 mm"', 'B = "160 mm"'),
+                ('inertia = "7517.545 kg*mm^2"', ""),
+                ("[mechanism.joints.A]", f"{SPRING_ON_A_HINGE}\n[mechanism.joints.A]"),
+            ),
+            {
+                "mechanism.bodies.rod.inertia": "[mechanism.bodies.rod]",
+                "mechanism.springs.s.points": "points = [",
+                "mechanism.joints.C": "[mechanism.joints.C]",
+            },
+        ),
+    ],
+)
+def test_faults_that_deriving_finds_are_told_together_with_their_lines(
+    changes: tuple[tuple[str, str], ...], found: dict[str, str]
+) -> None:
+    text = PRESS
+    for old, new in changes:
+        text = edited(text, old, new)
+    scene = scene_from_text(text, "press")
+    with pytest.raises(SceneError) as caught:
+        derive(scene)
+    given = text.split("\n")
+    lines = {fault.key: given[(fault.line or 0) - 1] for fault in caught.value.faults}
+    assert lines.keys() == found.keys()
+    assert all(line.startswith(found[key]) for key, line in lines.items())
+
+
+def test_a_bearing_half_moved_to_bearings_is_one_fault() -> None:
+    start = PRESS.index("[bearing]")
+    end = PRESS.index("[run]")
+    moved = PRESS[start:end].replace("[bearing", "[bearings.left")
+    text = f"{PRESS[:start]}[bearing]\nballs = 8\n\n{moved}{PRESS[end:]}"
+    assert [fault.key for fault in faults(text).faults] == ["bearings"]

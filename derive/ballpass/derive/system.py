@@ -8,6 +8,8 @@ Only what the scene names is derived: no mechanism, no linkage equations; a fixe
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import sympy as sp
@@ -18,9 +20,10 @@ from ballpass.derive.bearing.ring_load import RingLoad, own_load, reaction_share
 from ballpass.derive.drive import constant_speed
 from ballpass.derive.events import Event, events_of
 from ballpass.derive.mechanism.forces import Forces, derive_forces
-from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
+from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
+from ballpass.derive.scene.errors import LinkageError, SceneError
 from ballpass.derive.scene.records import Bearing, Scene
 from ballpass.derive.terms import Definition, Names, Smoothness, symbol_of
 from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, phase
@@ -78,8 +81,28 @@ def derive(scene: Scene) -> System:
     Raises
     ------
     SceneError
-        Where the linkage's topology is wrong or an output is unknown; faults name joint, bodies or output.
+        Where the linkage's topology is wrong, its numbers lock it within a turn, or an output is unknown: all faults
+        that can be told together, with their lines; `LinkageError` where all are of the linkage.
     """
+    errors: list[SceneError] = []
+    system = _derive(scene, errors)
+    if errors:
+        kind = LinkageError if all(isinstance(error, LinkageError) for error in errors) else SceneError
+        raise kind(scene.lines.place(fault for error in errors for fault in error.faults))
+    assert system is not None
+    return system
+
+
+@contextmanager
+def _noted(errors: list[SceneError]) -> Iterator[None]:
+    """Note an error and go on: what does not depend on the failed stage is looked at as well."""
+    try:
+        yield
+    except SceneError as error:
+        errors.append(error)
+
+
+def _derive(scene: Scene, errors: list[SceneError]) -> System | None:
     inputs: list[Input] = []
     definitions: list[Definition] = []
     linkage: Linkage | None = None
@@ -88,14 +111,27 @@ def derive(scene: Scene) -> System:
     mechanism = scene.mechanism
     if mechanism is not None:
         drive = constant_speed(mechanism.driver)
-        linkage = derive_linkage(mechanism, drive)
-        forces = derive_forces(mechanism, linkage, drive)
-        moments = frozenset(
-            j.name
-            for j in mechanism.joints
-            if j.kind == "prismatic" and is_asked(scene.outputs, f"reaction.{j.name}.moment")
-        )
-        reactions = derive_reactions(mechanism, linkage, forces.loads, moments)
+        with _noted(errors):
+            linkage = derive_linkage(mechanism, drive)
+            with _noted(errors):
+                forces = derive_forces(mechanism, linkage, drive)
+            with _noted(errors):
+                check_assembly(linkage, {q.path: q.value for q in scene.quantities})
+            moments = frozenset(
+                j.name
+                for j in mechanism.joints
+                if j.kind == "prismatic" and is_asked(scene.outputs, f"reaction.{j.name}.moment")
+            )
+            reactions = derive_reactions(mechanism, linkage, forces.loads if forces is not None else (), moments)
+    masses = []
+    for bearing in scene.bearings:
+        with _noted(errors):
+            masses.append(inner_mass(bearing, mechanism))
+    if len(masses) < len(scene.bearings):
+        return None
+    if mechanism is not None:
+        if linkage is None or forces is None or reactions is None:
+            return None
         inputs += [drive.phase, *forces.inputs]
         definitions += [*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions]
 
@@ -103,14 +139,17 @@ def derive(scene: Scene) -> System:
     inputs += own.inputs
     definitions += own.definitions
     bearings = []
-    for bearing in scene.bearings:
+    for bearing, mass in zip(scene.bearings, masses, strict=True):
         load = reaction_share(scene, bearing, reactions).force if reactions is not None else own.force
-        model, cage = _bearing(scene, bearing, load)
+        model, cage = _bearing(scene, bearing, load, mass)
         bearings.append(model)
         inputs.append(cage)
     quantities = [output for bearing in bearings for output in bearing_outputs(bearing)]
     if mechanism is not None and linkage is not None and reactions is not None and forces is not None:
         quantities += [*mechanism_outputs(mechanism, linkage, reactions), *forces.outputs]
+    outputs: tuple[Output, ...] = ()
+    with _noted(errors):
+        outputs = select_outputs(quantities, scene.outputs)
     return System(
         scene=scene,
         parameters=tuple(
@@ -130,7 +169,7 @@ def derive(scene: Scene) -> System:
         reactions=reactions,
         bearings=tuple(bearings),
         quantities=tuple(quantities),
-        outputs=select_outputs(quantities, scene.outputs),
+        outputs=outputs,
         smoothness=tuple(
             (f"{bearing.names.prefix}{name}", law.anywhere) for bearing in bearings for name, law in bearing.laws
         ),
@@ -138,7 +177,9 @@ def derive(scene: Scene) -> System:
     )
 
 
-def _bearing(scene: Scene, bearing: Bearing, load: tuple[sp.Expr, sp.Expr]) -> tuple[BearingModel, Input]:
+def _bearing(
+    scene: Scene, bearing: Bearing, load: tuple[sp.Expr, sp.Expr], mass: sp.Expr
+) -> tuple[BearingModel, Input]:
     """A bearing on the driven body or the shaft, and the phase of its cage."""
     shaft = scene.mechanism.driver.speed if scene.mechanism is not None else scene.shaft.speed if scene.shaft else None
     assert shaft is not None  # the reader requires it
@@ -154,7 +195,7 @@ def _bearing(scene: Scene, bearing: Bearing, load: tuple[sp.Expr, sp.Expr]) -> t
         shaft_speed=symbol_of(shaft),
         cage_phase=cage.symbol,
         load=load,
-        inner_mass=inner_mass(bearing, scene.mechanism),
+        inner_mass=mass,
     )
     return model, cage
 

@@ -139,13 +139,10 @@ def _read(scene: str | Path | Scene) -> tuple[Scene, str]:
 
 def _derive_and_lower(scene: Scene, say: Callable[[str], None]) -> tuple[System, Functions]:
     from ballpass.derive.lower.functions import lower
-    from ballpass.derive.mechanism.linkage import check_assembly
     from ballpass.derive.system import derive
 
     say("derive")
     system = derive(scene)
-    if system.linkage is not None:
-        check_assembly(system.linkage, {q.path: q.value for q in scene.quantities})
     say("lower")
     return system, lower(system)
 
@@ -170,12 +167,9 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> N
     if updated == present:
         return
     if scene.mechanism is not None and updated.parameters != present.parameters:
-        from ballpass.derive.mechanism.linkage import check_assembly
         from ballpass.derive.system import derive
 
-        linkage = derive(scene).linkage
-        if linkage is not None:
-            check_assembly(linkage, values)
+        derive(scene)  # refuses a linkage that locks with its new numbers
     with locked(folder):
         mf.write(folder, updated)
 

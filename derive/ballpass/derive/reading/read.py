@@ -112,14 +112,19 @@ def _scene(text: str, name: str, source: str | None) -> Scene:
         )
         raise SceneError(collector.faults, source=source)
     scene = _read(Table(collector, (), data), name)
-    lines = collector.lines
-    collector.faults += [
-        replace(fault, line=lines.find(tuple(fault.key.split(".")))) for fault in value_faults(scene, collector.given)
-    ]
-    if collector.faults:
-        # In the order of the file; faults of the whole file first.
-        raise SceneError(sorted(collector.faults, key=lambda fault: fault.line or 0), source=source)
-    return scene
+    faults = [*collector.faults, *value_faults(scene, collector.given)]
+    if not faults:
+        return replace(scene, lines=collector.lines)
+    topology = ("mechanism.joints", "mechanism.driver")
+    if scene.mechanism is not None and not any(fault.key.startswith(topology) for fault in collector.faults):
+        # what deriving would find next is told together with the rest
+        from ballpass.derive.mechanism.assembly import assemble  # SymPy takes longer to read than most scenes
+
+        try:
+            assemble(scene.mechanism)
+        except SceneError as error:
+            faults += error.faults
+    raise SceneError(collector.lines.place(faults), source=source)
 
 
 def _parse(text: str, source: str | None) -> dict[str, Any]:
@@ -198,8 +203,8 @@ def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None)
             allowed="[bearing] for one, or [bearings.<name>] for several",
             remedy="move [bearing] to [bearings.<name>], with a name of its own",
         )
+        return ()  # what a half-moved bearing lacks would only hide this
     if root.has("bearing"):
-        root.know("bearings")
         return (read_bearing(root.table("bearing"), mechanism, driven),)
     bearings = []
     with root.table("bearings") as several:

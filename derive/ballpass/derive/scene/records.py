@@ -12,8 +12,10 @@ Frame: x right, y up, angles counter-clockwise from +x.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Literal
+
+from ballpass.derive.scene.toml_lines import LineIndex
 
 #: Name of the body that does not move.
 FRAME = "frame"
@@ -356,7 +358,7 @@ class Scene:
     """A checked scene.
 
     `outputs` are the patterns of the file (``"inner.*"``); `derive` resolves them.  `quantities` lists every number
-    in the order of the file's schema: the model's parameters.
+    in the order of the file's schema: the model's parameters.  `lines` says where its keys stand, for messages.
     """
 
     name: str
@@ -368,6 +370,7 @@ class Scene:
     outputs: tuple[str, ...]
     run: Run
     quantities: tuple[Quantity, ...]
+    lines: LineIndex = field(default=LineIndex(lines={}), repr=False, compare=False)
 
     @property
     def bearing(self) -> Bearing | None:

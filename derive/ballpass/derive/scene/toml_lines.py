@@ -7,8 +7,11 @@ it is enough to follow strings, comments and brackets; nothing is read a second 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from itertools import islice
+
+from ballpass.derive.scene.errors import Fault
 
 _HEADER = re.compile(r"\s*(\[\[?)([^\[\]]*?)\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"""\s*((?:"[^"]*"|'[^']*'|[A-Za-z0-9_-]+)(?:\s*\.\s*(?:"[^"]*"|'[^']*'|[A-Za-z0-9_-]+))*)\s*=""")
@@ -27,6 +30,13 @@ class LineIndex:
     """Lines of tables and keys, counted from 1; elements of arrays of tables are counted from 1 too."""
 
     lines: dict[tuple[str, ...], int]
+
+    def place(self, faults: Iterable[Fault]) -> list[Fault]:
+        """Faults with their lines, in the order of the file; those of the whole file first."""
+        placed = [
+            fault if fault.line else replace(fault, line=self.find(tuple(fault.key.split(".")))) for fault in faults
+        ]
+        return sorted(placed, key=lambda fault: fault.line or 0)
 
     def find(self, path: tuple[str, ...]) -> int | None:
         """Line of the key, or else of the innermost table around it; None where the file names none of them."""
