@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     )
     from ballpass.runtime.contract.parameters import Parameters
     from ballpass.runtime.contract.status import Status
+    from ballpass.runtime.contract.usual import UnusualWarning
     from ballpass.runtime.many.chunks import MemberFailure
     from ballpass.runtime.many.ensemble import EnsembleResult, EnsembleStatistics
     from ballpass.runtime.model import Model, load
@@ -69,6 +70,7 @@ __all__ = [
     "StaticEquilibrium",
     "Statistics",
     "Status",
+    "UnusualWarning",
     "load",
     "load_results",
     "load_solution",
@@ -89,6 +91,7 @@ _HOME = {
     "SimulationError": "contract.errors",
     "Parameters": "contract.parameters",
     "Status": "contract.status",
+    "UnusualWarning": "contract.usual",
     "MemberFailure": "many.chunks",
     "EnsembleResult": "many.ensemble",
     "EnsembleStatistics": "many.ensemble",

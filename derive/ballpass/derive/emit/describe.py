@@ -10,6 +10,7 @@ from dataclasses import asdict
 from ballpass.derive.emit.signature import run_info, signature, versions
 from ballpass.derive.lower.functions import Functions, operations
 from ballpass.derive.mechanism.forces import drawn_forces
+from ballpass.derive.reading.usual import usual_ranges
 from ballpass.derive.reading.values import value_bounds, value_relations
 from ballpass.derive.system import System
 from ballpass.derive.variables import Output
@@ -38,6 +39,7 @@ def describe(system: System, functions: Functions, source: str, files: tuple[tup
             for p in system.parameters
         ),
         relations=value_relations(scene),
+        usual=usual_ranges(scene),
         constants=tuple(
             mf.VariableInfo(name=c.name, unit=c.unit, description=c.description, latex=c.latex)
             for c in functions.constants

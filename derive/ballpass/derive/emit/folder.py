@@ -20,6 +20,8 @@ The same scene gives the same bytes on every run.
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -66,15 +68,18 @@ def _headers(system: System, functions: Functions) -> dict[str, str]:
 
 
 def _pack(path: Path, functions: Sequence[Described]) -> None:
-    pack = ca.FileSerializer(str(path))
+    pack = ca.StringSerializer()
     pack.pack(len(functions))
     for function, _ in functions:
         pack.pack(function)
-    del pack  # closes the file
+    path.write_bytes(pack.encode().encode("ascii"))  # CasADi itself opens files of UTF-8 paths only
 
 
 def _write_c(folder: Path, name: str, functions: Sequence[Described]) -> None:
     generator = ca.CodeGenerator(f"{name}.c", {"with_header": True})
     for function, _ in functions:
         generator.add(function)
-    generator.generate(f"{folder}{os.sep}")
+    with tempfile.TemporaryDirectory() as place:  # CasADi writes nothing, in silence, where a path is not UTF-8
+        generator.generate(f"{place}{os.sep}")
+        for ending in ("c", "h"):
+            shutil.copyfile(Path(place) / f"{name}.{ending}", folder / f"{name}.{ending}")

@@ -10,6 +10,7 @@ the deviation from the mean.
 from __future__ import annotations
 
 import platform
+import warnings
 from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.metadata import version
@@ -24,6 +25,7 @@ from ballpass.runtime.ask.observables import drive_work, kinematic_frequencies, 
 from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.contract.usual import UnusualWarning, unusual
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.run.inputs import breakpoints
 
@@ -36,6 +38,10 @@ _TOOLS = ("ballpass", "casadi", "numpy", "scipy")
 
 #: The ball forces of a bearing whose peaks are told, by the key they stand under.
 _BALL_FORCES = {"elastic": "ball.elastic_force", "total": "ball.force"}
+
+#: Largest usual deflection of a ball over its diameter [1]; work of the drive below zero that is none, over the work of
+#: the torque's amount [1].
+MOST_DEFLECTION, LEAST_WORK = 0.01, 1e-3
 
 #: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
 _COLUMNS = ("value", "min", "max", "mean", "rms", "std")
@@ -85,7 +91,36 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     summary |= _motions(steady)
     summary |= _constants(steady)
     summary["versions"] = _versions(steady)
+    found = _unusual(steady)
+    for text in found:
+        warnings.warn(text, UnusualWarning, stacklevel=2)
+    summary["warnings"] = [*unusual(manifest, sol.parameters), *found]
     return summary
+
+
+def _unusual(sol: Solution) -> list[str]:
+    """What of a run's results is unlike bearings and machines."""
+    said = []
+    for bearing in sol.manifest.bearings:
+        ball, clearance = (sol.parameters[f"{bearing.path}.{key}"] for key in ("ball_diameter", "clearance"))
+        outer = [sol[f"{bearing.prefix}outer.{axis}"] if bearing.outer_ring else 0.0 for axis in "xy"]
+        apart = np.hypot(*(sol[f"{bearing.prefix}inner.{axis}"] - o for axis, o in zip("xy", outer, strict=True)))
+        deflection = float(np.max(apart)) - clearance / 2.0
+        if deflection > MOST_DEFLECTION * ball:
+            said.append(
+                f"{bearing.path}: a ball is deflected by {1e6 * deflection:.4g} um, {100.0 * deflection / ball:.3g} % "
+                f"of its diameter: unusual. Usual is at most {100.0 * MOST_DEFLECTION:g} %: contacts are not elastic "
+                "beyond. Check loads, stiffness and their units."
+            )
+    length, mechanism = sol.cycle_length, sol.manifest.mechanism
+    if mechanism is not None and "drive_torque" in sol.outputs and length is not None and turns(sol.t, length):
+        work, gross = (_work(sol, torque) for torque in (sol["drive_torque"], np.abs(sol["drive_torque"])))
+        if work < -LEAST_WORK * abs(gross):
+            said.append(
+                f"the drive takes {-work:.4g} J a turn out of the mechanism: unusual. Usual is a drive that gives "
+                "work. Check the directions of forces and speed, and the windows."
+            )
+    return said
 
 
 def _peaks(model: Model, sol: Solution) -> dict[tuple[str, Kind], Peak]:
@@ -112,16 +147,26 @@ def _forces(sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, 
     mechanism = sol.manifest.mechanism
     length = sol.cycle_length
     if mechanism is not None and "drive_torque" in found and length is not None and turns(sol.t, length):
-        values = {**sol.parameters, **sol.constants}
-        work = drive_work(
-            sol.t,
-            sol["drive_torque"],
-            speed=sol.parameters[mechanism.speed],
-            cycle_length=length,
-            steps=breakpoints(sol.manifest.inputs, values, float(sol.t[0]), float(sol.t[-1])),
-        )
-        found["drive_work"] = _numbers("drive_torque", "J", value=np.mean(work))
+        found["drive_work"] = _numbers("drive_torque", "J", value=_work(sol, sol["drive_torque"]))
     return found
+
+
+def _work(sol: Solution, torque: np.ndarray) -> float:
+    """Work of a torque on the driven body, the mean over the turns of a run [J]."""
+    assert sol.manifest.mechanism is not None
+    assert sol.cycle_length is not None
+    values = {**sol.parameters, **sol.constants}
+    return float(
+        np.mean(
+            drive_work(
+                sol.t,
+                torque,
+                speed=sol.parameters[sol.manifest.mechanism.speed],
+                cycle_length=sol.cycle_length,
+                steps=breakpoints(sol.manifest.inputs, values, float(sol.t[0]), float(sol.t[-1])),
+            )
+        )
+    )
 
 
 def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:

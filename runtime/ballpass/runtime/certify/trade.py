@@ -28,6 +28,7 @@ from ballpass.runtime.certify.whole_run import (
 from ballpass.runtime.contract.bounds import outside, violations
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.point.evaluate import neighbour
 from ballpass.runtime.run.locating import LOCATED, has_kinks
 from ballpass.runtime.run.request import Request
 
@@ -212,9 +213,10 @@ def measure_trade(
     times = np.full((len(ways), members), np.nan)
     order = np.random.default_rng(2)
     turns = 1.0
-    around = dict(model.numbers(parameters).parameters)
+    user = model.numbers(parameters)
+    around = dict(user.parameters)
     for member, numbers in enumerate(perturbed(model, around, members, spread)):
-        run = prepare(model, model.numbers(numbers), Request())
+        run = prepare(model, neighbour(model, user, numbers), Request())
         turns = run.cycles
         true[member], doubt[member] = reference(run, observables)
         for k in order.permutation(len(ways)):

@@ -40,6 +40,22 @@ class ParameterInfo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class UsualInfo:
+    """Where numbers usually lie: the sum of the parameters `names`, over the amount of `of` where that is named.
+
+    Usual is a value from `least` to `most`, None bounds nothing.  With `each`, unusual is instead that every one of
+    `names` lies above zero and below `least`.  `hint` says what to check.
+    """
+
+    names: tuple[str, ...]
+    least: float | None = None
+    most: float | None = None
+    of: str = ""
+    each: bool = False
+    hint: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class VariableInfo:
     """A derived constant, state or output: name, SI unit, description; `size` > 1 for one value per ball.
 
@@ -231,6 +247,7 @@ class Manifest:
     quantities: tuple[QuantityInfo, ...] = ()
     unfit: str = ""  # why the stepper's kernels do not take the model; empty where they do
     relations: tuple[tuple[str, float, str], ...] = ()  # (name, factor, other): value > factor * value of the other
+    usual: tuple[UsualInfo, ...] = ()
     files: tuple[tuple[str, str], ...] = field(default=())  # file name -> sha256
 
     @property

@@ -15,6 +15,7 @@ from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.bounds import violations
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, scalar, unknown_name
+from ballpass.runtime.contract.usual import warn_unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.run import inputs as clock
@@ -135,7 +136,7 @@ def make_members(model: LoadedModel, table: Table, *, bounded: bool = True) -> M
 
     Parameters
     ----------
-    bounded : hold the numbers to their bounds; a difference looks a hair beyond a value at its bound
+    bounded : hold the numbers to their bounds and warn of unusual ones; a difference looks a hair beyond a bound
     """
     manifest = model.manifest
     varied = read_table(manifest, table)
@@ -148,6 +149,8 @@ def make_members(model: LoadedModel, table: Table, *, bounded: bool = True) -> M
         name = rule.partition(":")[0]
         for member in np.flatnonzero(mask):
             refused.setdefault(int(member), f"{rule}, not {columns[name][member]:.9g}.")
+    if bounded:
+        warn_unusual(manifest, columns)
     if manifest.constants:
         c = np.ascontiguousarray(model.loop("constants", ("p",))(count, {"p": p})["c"])
         for member in np.flatnonzero(~np.all(np.isfinite(c), axis=1)):

@@ -12,6 +12,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import ctypes
+import errno
 import hashlib
 import importlib.metadata
 import importlib.util
@@ -279,10 +280,19 @@ def _cache_folder() -> Path:
     return Path(os.environ.get(CACHE_VARIABLE) or platformdirs.user_cache_dir("ballpass")).absolute()
 
 
+def _refuse_unreadable(folder: Path) -> None:
+    """Python's ctypes loads no library from a path that is not UTF-8."""
+    try:
+        os.fsencode(folder).decode()
+    except UnicodeDecodeError:
+        raise OSError(errno.EILSEQ, "its path is not UTF-8") from None
+
+
 def _writable_cache_folder() -> Path:
     """The cache, made when missing; a folder of this process, with a warning, where the cache cannot be written."""
     folder = _cache_folder()
     try:
+        _refuse_unreadable(folder)
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass

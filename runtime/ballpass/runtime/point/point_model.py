@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.usual import warn_unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.evaluate import checked_time, evaluate_point
@@ -24,6 +26,23 @@ if TYPE_CHECKING:
 
 class PointModel(LoadedModel):
     """What a model answers without a run.  `ballpass.runtime.model.Model` adds runs and what is asked of them."""
+
+    _looked_usual = b""  # parameters that were last compared with the usual ones
+
+    def numbers(self, parameters: Mapping[str, float] | None = None) -> Numbers:
+        """Parameters with overrides, checked, and the derived constants that follow.
+
+        Warns
+        -----
+        UnusualWarning
+            A number is allowed, but outside of its usual range (`Manifest.usual`).
+        """
+        numbers = super().numbers(parameters)
+        looked_at = numbers.p.tobytes()
+        if looked_at != self._looked_usual:
+            self._looked_usual = looked_at
+            warn_unusual(self.manifest, numbers.parameters)
+        return numbers
 
     def constants(self, parameters: Mapping[str, float] | None = None) -> dict[str, float]:
         """Derived constants (stiffness, cage ratio, ...) by name, for the defaults with `parameters` put in."""

@@ -21,6 +21,9 @@ TURN = 2.0 * math.pi
 #: Angles closer than this are one angle [rad]: an edge hit by rounding belongs to the window that starts there.
 ANGLE_RESOLUTION = 1e-11
 
+#: Turns whose breakpoints are listed at once; each edge of a window takes eight bytes a turn.
+MOST_TURNS = 1e7
+
 #: Times closer than this fraction of the interval under study are one time [1].
 TIME_RESOLUTION = 1e-12
 
@@ -101,6 +104,11 @@ def breakpoints(inputs: Sequence[InputInfo], values: Values, t0: float, t1: floa
     Returns
     -------
     array, shape (breakpoints,), increasing [s]
+
+    Raises
+    ------
+    RequestError
+        More than `MOST_TURNS` turns.
     """
     found: list[np.ndarray] = [np.zeros(0)]
     for item in inputs:
@@ -280,6 +288,11 @@ def _covers(angle: np.ndarray, start: float, width: float) -> np.ndarray:
 def _passages(edge: float, offset: float, rate: float, t0: float, t1: float) -> np.ndarray:
     """Times in [t0, t1] at which ``offset + rate t`` passes `edge` modulo a turn [s]."""
     turns = sorted(((offset + rate * t0 - edge) / TURN, (offset + rate * t1 - edge) / TURN))
+    if not turns[1] - turns[0] <= MOST_TURNS:
+        raise RequestError(
+            f"Between {t0:g} s and {t1:g} s lie {turns[1] - turns[0]:.3g} turns, too many to list what switches in "
+            f"them. Allowed: up to {MOST_TURNS:g}. Ask for a shorter time."
+        )
     first, last = math.ceil(turns[0] - 1e-9), math.floor(turns[1] + 1e-9)
     return np.asarray((edge - offset + TURN * np.arange(first, last + 1)) / rate)
 

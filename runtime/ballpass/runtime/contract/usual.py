@@ -1,0 +1,78 @@
+"""Numbers that are allowed and unusual: said, never refused.
+
+In: the manifest and values, single ones or a column for each parameter.  Out: sentences, and warnings.
+"""
+
+from __future__ import annotations
+
+import operator
+import warnings
+from collections.abc import Mapping
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from ballpass.runtime.contract.manifest import Manifest, UsualInfo
+
+
+class UnusualWarning(UserWarning):
+    """A number, or what a run made of it, is allowed and unlike what bearings and machines have."""
+
+
+def unusual(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) -> list[str]:
+    """A sentence for each usual range that values lie outside of.
+
+    Parameters
+    ----------
+    columns : values of all parameters by name: numbers, or arrays of one shape, a value for each member
+    """
+    said = []
+    for info in manifest.usual:
+        odd = _outside(info, columns)
+        # an array for each range would take longer than a short run
+        if odd if isinstance(odd, bool) else np.any(odd):
+            said.append(_sentence(manifest, info, columns, np.atleast_1d(odd)))
+    return said
+
+
+def warn_unusual(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) -> None:
+    """Warn of what `unusual` finds."""
+    for text in unusual(manifest, columns):
+        warnings.warn(text, UnusualWarning, stacklevel=3)
+
+
+def _outside(info: UsualInfo, columns: Mapping[str, Any]) -> Any:
+    """Whether numbers lie outside of a range, or each of their arrays."""
+    values = [columns[name] for name in info.names]
+    if info.each:
+        return reduce(operator.and_, ((value > 0.0) & (value < info.least) for value in values))
+    total, scale = sum(values), abs(columns[info.of]) if info.of else 1.0
+    odd: Any = False
+    if info.least is not None:
+        odd = odd | (total < info.least * scale)
+    if info.most is not None:
+        odd = odd | (total > info.most * scale)
+    return odd & (scale > 0.0)  # a clearance of zero is no scale
+
+
+def _sentence(manifest: Manifest, info: UsualInfo, columns: Mapping[str, Any], odd: np.ndarray) -> str:
+    """Which numbers are unusual, what is usual, and what to check; of many members the first."""
+    units = {item.name: "" if item.unit == "1" else f" {item.unit}" for item in manifest.parameters}
+    k = int(np.argmax(odd))
+    values = [float(np.atleast_1d(columns[name])[k]) for name in info.names]
+    given = " and ".join(f"{name} = {value:.4g}{units[name]}" for name, value in zip(info.names, values, strict=True))
+    unit = "" if info.of else units[info.names[0]]
+    if info.of:
+        given += f", {values[0] / abs(float(np.atleast_1d(columns[info.of])[k])):.3g} of {info.of}"
+    elif len(values) > 1 and not info.each:
+        given += f", together {sum(values):.4g}{unit}"
+    if len(odd) > 1:
+        given += f" (member {k}, the first of {np.count_nonzero(odd)} among {len(odd)})"
+    if info.each:
+        usual = f"an edge above {info.least:.3g}{unit}"
+    elif info.least is None:
+        usual = f"at most {info.most:.4g}{unit}"
+    else:
+        usual = " to ".join(dict.fromkeys((f"{info.least:.4g}", f"{info.most:.4g}"))) + unit
+    return f"{given}: unusual. Usual is {usual}. {info.hint}"

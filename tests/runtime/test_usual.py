@@ -1,0 +1,106 @@
+"""Numbers that are allowed and absurd do not pass in silence, wherever they come from; those of shipped scenes do."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+
+from ballpass.derive import Scene
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.derive.reading.usual import usual_ranges
+from ballpass.runtime import Manifest, Model, UnusualWarning
+from ballpass.runtime.app.summary import summarize
+from ballpass.runtime.contract.usual import unusual
+
+SCENES = ("crank_shaper", "four_bar", "offset_slider", "punching_press", "punching_press_tangent", "varying_compliance")
+WINDOW = "mechanism.forces.punch.window"
+
+#: A slip, the numbers it makes, and words of what is said.
+SLIPS = {
+    "a radius for a diameter": ({"bearing.ball_diameter": 3.96875e-3}, "groove_radius .* 1.04 of bearing.ball_diam"),
+    "grooves far too open": ({"bearing.contact.outer_groove_radius": 4.6e-3}, "0.58 of .* 0.505 to 0.56"),
+    "mm for um": ({"bearing.clearance": 10e-3}, r"clearance = 0.01 m, 1.26 of .* -0.01 to 0.01"),
+    "a preload in mm": ({"bearing.clearance": -0.1e-3}, "clearance"),
+    "Pa for GPa": ({"bearing.contact.young_modulus": 207.0}, r"207 Pa: .* 5e\+10 to 4e\+11 Pa"),
+    "radians for degrees": (
+        {f"{WINDOW}.start": math.radians(4.1), f"{WINDOW}.end": math.radians(4.6)},
+        "whether radians were given as degrees",
+    ),
+    "degrees for radians": ({f"{WINDOW}.start": 237.0, f"{WINDOW}.end": 241.0}, "degrees were given as radians"),
+}
+
+
+@pytest.mark.parametrize(("numbers", "words"), SLIPS.values(), ids=SLIPS.keys())
+def test_a_slip_is_said_before_a_run(make_model: Callable[..., Model], numbers: dict[str, float], words: str) -> None:
+    model = make_model("punching_press")
+    with pytest.warns(UnusualWarning, match=words):
+        model.constants(numbers)
+
+
+def said(scene: Scene) -> list[str]:
+    """What is said of a scene's own numbers, without deriving it."""
+    return unusual(cast(Manifest, SimpleNamespace(usual=usual_ranges(scene), parameters=numbers(scene))), values(scene))
+
+
+def numbers(scene: Scene) -> list[SimpleNamespace]:
+    return [SimpleNamespace(name=q.path, unit=q.unit) for q in scene.quantities]
+
+
+def values(scene: Scene) -> dict[str, float]:
+    return {q.path: q.value for q in scene.quantities}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_numbers_of_shipped_scenes_are_usual(scene_text: Callable[..., str], name: str) -> None:
+    assert said(scene_from_text(scene_text(name), name)) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", SCENES)
+def test_runs_of_shipped_scenes_are_usual(make_model: Callable[..., Model], name: str) -> None:
+    model = make_model(name)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UnusualWarning)
+        assert summarize(model, model.simulate())["warnings"] == []
+
+
+def test_numbers_of_the_file_meet_the_same_ranges(scene_text: Callable[..., str]) -> None:
+    """A smoothing wider than the clearance, waves of a tenth of a millimetre, shares of a joint that are too much."""
+    text = scene_text(
+        "punching_press",
+        ("poisson_ratio = 0.3", 'poisson_ratio = 0.3\nsmoothing = "20 um"'),
+        ("[bearing.inner_ring", '[bearing.outer_waviness]\n8 = { amplitude = "0.1 mm" }\n\n[bearing.inner_ring'),
+    )
+    start, end = text.index("[bearing]"), text.index("[run]")
+    both = "\n".join(text[start:end].replace("[bearing", f"[bearings.{name}") for name in ("left", "right"))
+    scene = scene_from_text(text[:start] + both.replace("share = 0.5", "share = 0.6", 1) + text[end:], "press")
+    shares, *rest = sorted(said(scene), key=lambda text: "together" not in text)
+    assert shares.startswith("bearings.left.share = 0.6 and bearings.right.share = 0.5, together 1.1: unusual")
+    assert [text.split(" = ")[0] for text in rest] == [
+        f"bearings.{name}.{key}"
+        for name in ("left", "right")
+        for key in ("contact.smoothing", "outer_waviness.8.amplitude")
+    ]
+
+
+def test_an_ensemble_warns_once_and_says_how_many(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press")
+    with pytest.warns(UnusualWarning) as caught:
+        model.simulate_many({"bearing.clearance": [1e-5, 1e-4, 2e-4, 3e-4]}, ["peak_ball_force"], cycles=3)
+    assert len(caught) == 1
+    assert "(member 1, the first of 3 among 4)" in str(caught[0].message)
+
+
+def test_what_a_run_shows_is_said(make_model: Callable[..., Model]) -> None:
+    """A tenfold punch presses balls by Hertz's law beyond a hundredth of them; one downwards drives the drive."""
+    model = make_model("punching_press")
+    for force, words in ((89648.0, "a ball is deflected by"), (-8964.8, "the drive takes 9.078 J a turn")):
+        run = model.simulate(cycles=3, parameters={"mechanism.forces.punch.force.y": force})
+        with pytest.warns(UnusualWarning, match=words):
+            summary = summarize(model, run)
+        assert any(words in text for text in summary["warnings"])
