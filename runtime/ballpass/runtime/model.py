@@ -10,6 +10,7 @@ import numpy as np
 
 from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.error_target import simulate_to_error
+from ballpass.runtime.certify.growth import Growth, find_growth, simulate_members
 from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.parameters import Numbers, vector
@@ -326,6 +327,7 @@ class Model(PointModel):
         kinks: Kinks | None = None,
         threads: int | None = None,
         lanes: bool = True,
+        growth: bool = False,
         progress: Callable[[float], None] | None = None,
     ) -> EnsembleResult:
         """Simulate many parameter sets, keeping only observables.
@@ -351,6 +353,8 @@ class Model(PointModel):
             runs no closer than that.  ``statistics.kinks`` says which it was
         threads : default: as many as processors
         lanes : False advances one member at a time
+        growth : run each member a second time from a start moved by the tolerance; ``uncertain`` of the result then
+            says which numbers have no digits (see `growth`)
         progress : called with the finished fraction
 
         Raises
@@ -358,20 +362,60 @@ class Model(PointModel):
         RequestError
             A wrong request: unknown names, columns of unequal length, values that are no finite numbers.
         """
-        return simulate_many(
-            self,
-            parameters,
-            observables,
+
+        def run(
+            table: Table,
+            names: str | Sequence[str],
+            rtol: float | None = rtol,
+            method: str | None = method,
+            kinks: str | None = kinks,
+        ) -> EnsembleResult:
+            return simulate_many(
+                self,
+                table,
+                names,
+                cycles=cycles,
+                duration=duration,
+                transient=transient,
+                rtol=rtol,
+                method=method,
+                kinks=kinks,
+                threads=threads,
+                lanes=lanes,
+                progress=progress,
+            )
+
+        return simulate_members(self, parameters, observables, run) if growth else run(parameters, observables)
+
+    def growth(
+        self,
+        cycles: float | None = None,
+        *,
+        duration: float | None = None,
+        transient: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        rtol: float | None = None,
+        initial: Sequence[float] | np.ndarray | None = None,
+    ) -> Growth:
+        """What a start moved by the tolerance changes in the extremes of a run (see `ballpass.runtime.certify.growth`).
+
+        Takes two runs of the stepper, without samples.  Parameters are those of `simulate`.
+
+        Raises
+        ------
+        RequestError
+            A wrong request, a linkage that cannot be assembled, or no compiler for the stepper.
+        SimulationError
+            The computation failed.
+        """
+        request = Request(
             cycles=cycles,
             duration=duration,
-            transient=transient,
             rtol=rtol,
-            method=method,
-            kinks=kinks,
-            threads=threads,
-            lanes=lanes,
-            progress=progress,
+            initial=None if initial is None else vector(initial),
+            transient_cycles=transient,
         )
+        return find_growth(self, self._runnable(parameters), request)
 
     def refine_peak(self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max") -> Peak:
         """Peak of an output of a run of this model, between its samples too (see `ballpass.runtime.ask.peaks`).

@@ -29,12 +29,14 @@ from ballpass.runtime.app.commands.shared import (
     results_folder,
     show,
     show_json,
+    warn,
 )
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import read_error, trade
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:
+    from ballpass.runtime.certify.growth import Growth
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.solution import Solution
 
@@ -137,7 +139,14 @@ def run(
         if solution.nbytes > LARGE:
             size = _size(solution.nbytes)
             note(f"{len(solution)} samples, about {size}; fewer with samples_per_cycle, none with Model.reduce.")
-        summary, files = _write_results(model, solution, folder, stages, figures=figures)
+        growth = None
+        if solution.states and model.has_stepper:
+            growth = model.growth(
+                cycles, duration=seconds, transient=transient, parameters=asked.overrides, rtol=solution.statistics.rtol
+            )
+            if growth.uncertain:
+                warn(growth.words)
+        summary, files = _write_results(model, solution, growth, folder, stages, figures=figures)
     if json_:
         show_json(summary)
         return
@@ -264,7 +273,7 @@ def _size(count: int) -> str:
 
 
 def _write_results(
-    model: Model, solution: Solution, folder: Path, stages: Stages, *, figures: bool
+    model: Model, solution: Solution, growth: Growth | None, folder: Path, stages: Stages, *, figures: bool
 ) -> tuple[dict[str, Any], list[str]]:
     """Write solution, summary and figures in the place of those of an earlier run.
 
@@ -277,7 +286,7 @@ def _write_results(
     from ballpass.runtime.app.summary import summarize
 
     stages("write")
-    summary = summarize(model, solution)
+    summary = summarize(model, solution, growth)
     if solution.accuracy is not None:
         summary["accuracy"] = solution.accuracy.plain()
 

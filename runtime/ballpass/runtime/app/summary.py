@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import platform
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from importlib.metadata import version
 from math import isfinite
@@ -30,6 +30,7 @@ from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.run.inputs import breakpoints
 
 if TYPE_CHECKING:
+    from ballpass.runtime.certify.growth import Growth
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.solution import Solution
 
@@ -47,8 +48,13 @@ MOST_DEFLECTION, LEAST_WORK = 0.01, 1e-3
 _COLUMNS = ("value", "min", "max", "mean", "rms", "std")
 
 
-def summarize(model: Model, sol: Solution) -> dict[str, Any]:
+def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict[str, Any]:
     """Key numbers of a run.
+
+    Parameters
+    ----------
+    growth : of perturbations, where it was looked for; numbers whose digits the tolerance does not bear then get the
+        mean and the standard deviation over the steady turns of their samples (``over_turns``)
 
     Returns
     -------
@@ -90,11 +96,16 @@ def summarize(model: Model, sol: Solution) -> dict[str, Any]:
     summary |= _balls(manifest, peaks)
     summary |= _motions(steady)
     summary |= _constants(steady)
+    if growth is not None:
+        summary["growth"] = _numbers("growth", "1", value=growth.worst, moved=growth.moved)
+        for name in growth.uncertain:
+            _add_spread(summary, steady, name)
     summary["versions"] = _versions(steady)
     found = _unusual(steady)
     for text in found:
         warnings.warn(text, UnusualWarning, stacklevel=2)
-    summary["warnings"] = [*unusual(manifest, sol.parameters), *found]
+    grown = [growth.words] if growth is not None and growth.uncertain else []
+    summary["warnings"] = [*unusual(manifest, sol.parameters), *found, *grown]
     return summary
 
 
@@ -121,6 +132,29 @@ def _unusual(sol: Solution) -> list[str]:
                 "work. Check the directions of forces and speed, and the windows."
             )
     return said
+
+
+def _add_spread(summary: dict[str, Any], steady: Solution, name: str) -> None:
+    """Mean and standard deviation over the turns, beside the numbers of a channel that have no digits."""
+    prefix, of_ball, force = name.rpartition("ball.")
+    kinds: dict[str, Callable[[np.ndarray], float]] = {"min": np.min, "max": np.max, "rms": _rms}
+    if of_ball:
+        key = {path: key for key, path in _BALL_FORCES.items()}.get(f"ball.{force}")
+        entry, kinds = summary.get(f"{prefix}peak_ball_force"), {key: np.max} if key is not None else {}
+    else:
+        entry = summary.get(name)
+    if entry is None or not kinds or name not in steady:
+        return
+    length = steady.cycle_length
+    parts = (turns(steady.t, length) if length is not None else ()) or (slice(None),)
+    for kind, of in kinds.items():
+        found = [of(steady[name][part]) for part in parts]
+        spread = _numbers(name, entry["unit"], mean=np.mean(found), std=np.std(found))
+        entry.setdefault("over_turns", {})[kind] = spread
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _peaks(model: Model, sol: Solution) -> dict[tuple[str, Kind], Peak]:
@@ -263,6 +297,7 @@ _RUN = {
     "transient_cycles_dropped": "{} transient cycles dropped",
     "steady_cycles": "{} steady ones",
     "samples": "{} steady samples",
+    "growth": "a start moved by the tolerance changes results by {}",
 }
 
 
@@ -280,14 +315,22 @@ def render_summary(summary: Mapping[str, Any]) -> Table:
         if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
             continue
         factor, unit = TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
-        cells = [f"{factor * item[key]:.4g}" if key in item else "" for key in columns]
+        cells = [_cell(item, key, factor) for key in columns]
         if any(cells):
             table.add_row(name, *cells, unit)
         for key, value in item.items():
             if key not in _COLUMNS and key != "unit" and not isinstance(value, Mapping):
                 # a named part of a quantity, as the peak's elastic one; what is said of it is in the file
-                table.add_row(f"{name}.{key}", f"{factor * value:.4g}", "", "", "", unit)
+                table.add_row(f"{name}.{key}", _cell(item, key, factor), "", "", "", unit)
     return table
+
+
+def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
+    """A number of the table; where it has no digits, mean and standard deviation over the turns."""
+    spread = item.get("over_turns", {}).get(key)
+    if spread is not None:
+        return f"{factor * spread['mean']:.3g} ± {factor * spread['std']:.1g}"
+    return f"{factor * item[key]:.4g}" if key in item else ""
 
 
 def _caption(summary: Mapping[str, Any]) -> str:
@@ -302,5 +345,7 @@ def _caption(summary: Mapping[str, Any]) -> str:
         if key == "damping_law" or key.endswith(".damping_law")
     )
     law = [f"damping law {laws}"] if laws else []
+    if any("over_turns" in item for item in summary.values() if isinstance(item, Mapping)):
+        law.append("± mean and standard deviation over the steady turns")
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
     return f"{', '.join(run + law)}.\n{', '.join(tools)}."

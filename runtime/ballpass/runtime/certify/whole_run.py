@@ -95,14 +95,14 @@ class WholeRun:
         self,
         observables: Sequence[Observable],
         way: Way,
-        moved: float = 0.0,
+        moved: float | np.ndarray = 0.0,
         progress: Callable[[float], None] | None = None,
     ) -> Integrated:
         """Integrate all of it.
 
         Parameters
         ----------
-        moved : added to every position at the start [m]
+        moved : added to the positions at the start, a number or shape (states / 2,) [m]
         progress : called with the finished fraction
 
         Raises

@@ -80,6 +80,8 @@ class EnsembleResult(Mapping[str, np.ndarray]):
     interrupted : whether the run was stopped by the user; members finished by then are there
     statistics : what it took
     manifest : of the model
+    uncertain : where growth was asked for: by observable, members whose digits the tolerance does not bear, each of
+        shape (members,)
     """
 
     observables: Mapping[str, np.ndarray]
@@ -88,6 +90,7 @@ class EnsembleResult(Mapping[str, np.ndarray]):
     interrupted: bool
     statistics: EnsembleStatistics
     manifest: Manifest = field(repr=False)
+    uncertain: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         count = len(next(iter(self.parameters.values())))

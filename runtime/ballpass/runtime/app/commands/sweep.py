@@ -34,6 +34,9 @@ ROWS = 24
 #: Failures that the terminal names; all are in the files.
 NAMED = 5
 
+#: Members up to which each is run twice where nothing else is said, to see whether its numbers have digits.
+TWINS = 1000
+
 
 def sweep(
     scene: options.SceneFile,
@@ -67,6 +70,15 @@ def sweep(
             metavar="HOW",
             help="What steps do where a law has a kink or jump: stepped-over, in lanes, or located, one member at a "
             "time. If not given, as in ballpass run: located at tight tolerances.",
+        ),
+    ] = None,
+    growth: Annotated[
+        bool | None,
+        typer.Option(
+            "--growth/--no-growth",
+            help="Run each member a second time from a start moved by the tolerance, and mark numbers without digits. "
+            f"If not given: up to {TWINS} members.",
+            show_default=False,
         ),
     ] = None,
     threads: Annotated[
@@ -122,6 +134,7 @@ def sweep(
             method=method,
             kinks=at_kinks,
             threads=threads,
+            growth=count <= TWINS if growth is None else growth,
             progress=stages.fraction,
         )
         refused = [failure for failure in result.failures if failure.status == "REFUSED"]
@@ -132,6 +145,8 @@ def sweep(
         files = swept.write(folder, figures=figures)
     if figures and len(ranges) > 2:
         note(f"no figure: a figure shows one or two varied parameters, and {len(ranges)} vary. Numbers are in {TABLE}.")
+    if growth is None and count > TWINS:
+        note(f"{count} members: none was run twice to see whether its numbers have digits; --growth does.")
     if json_:
         show_json(swept.report())
     else:
@@ -145,6 +160,12 @@ def sweep(
         warn(f"{swept.place(failure.member)}: {failure.status}: {failure.message}")
     if len(result.failures) > NAMED:
         warn(f"and {len(result.failures) - NAMED} more members without results; {TABLE} names all.")
+    if swept.uncertain:
+        warn(
+            f"{len(swept.uncertain)} of {count} members amplify small errors: a start moved by the tolerance changes "
+            f"numbers marked ~ by more than four digits bear. First: {swept.place(min(swept.uncertain))}. Take "
+            "statistics over more turns (--cycles), and compare no single extremes of them."
+        )
     if result.interrupted:
         complain(INTERRUPTED)
         raise typer.Exit(130)

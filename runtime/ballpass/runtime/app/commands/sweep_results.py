@@ -87,6 +87,15 @@ class Sweep:
             for one, value in zip(self.ranges, self.point(member), strict=True)
         )
 
+    @cached_property
+    def uncertain(self) -> dict[int, list[str]]:
+        """Quantities without digits, by member."""
+        found: dict[int, list[str]] = {}
+        for name, flags in self.result.uncertain.items():
+            for member in np.flatnonzero(flags).tolist():
+                found.setdefault(member, []).append(name)
+        return found
+
     def report(self) -> dict[str, Any]:
         """What ran and what it gave, in SI; members in the order of the table."""
         result = self.result
@@ -116,6 +125,9 @@ class Sweep:
                 asdict(failure) | {"at": dict(zip(paths, self.point(failure.member), strict=True))}
                 for failure in result.failures
             ],
+            "uncertain": {
+                name: np.flatnonzero(flags).tolist() for name, flags in result.uncertain.items() if np.any(flags)
+            },
             "interrupted": result.interrupted,
             "statistics": asdict(result.statistics),
         }
@@ -140,14 +152,15 @@ class Sweep:
         quantities = self.result.observables
         parameters = [f"{one.path} [{one.unit}]" for one in self.ranges]
         heads = ["member", *parameters, *(f"{name} [{self.unit(name)}]" for name in quantities), "status", "message"]
-        failures = {failure.member: (failure.status, failure.message) for failure in self.result.failures}
+        ends = {member: ("DONE", f"no digits: {', '.join(names)}") for member, names in self.uncertain.items()}
+        ends |= {failure.member: (failure.status, failure.message) for failure in self.result.failures}
         with path.open("w", encoding="utf-8", newline="") as stream:
             lines = csv.writer(stream, lineterminator="\n")
             lines.writerow(heads)
             for member in range(math.prod(self.shape)):
                 values = [float(column[member]) for column in quantities.values()]
                 cells = [repr(value) if math.isfinite(value) else "" for value in values]
-                lines.writerow([member, *map(repr, self.point(member)), *cells, *failures.get(member, ("DONE", ""))])
+                lines.writerow([member, *map(repr, self.point(member)), *cells, *ends.get(member, ("DONE", ""))])
 
     def _draw(self, folder: Path) -> None:
         from ballpass.runtime.app.figures.canvas import save
@@ -164,6 +177,12 @@ class Sweep:
                 figure = draw_sweep(self.result.manifest.title, axes, name, unit, values, text)
                 save(figure, folder / f"sweep_{re.sub(r'[^a-z0-9]+', '_', name)}.png")
 
+    def _cell(self, quantity: str, value: float, member: int) -> str:
+        """A number with the digits that it has."""
+        if not math.isfinite(value):
+            return "-"
+        return f"~{value:.2g}" if quantity in self.uncertain.get(member, ()) else f"{value:.5g}"
+
     def all_members(self) -> Table:
         """All members, each a row."""
         columns = {name: self.shown(name) for name in self.result.observables}
@@ -171,9 +190,10 @@ class Sweep:
         heads += [_head(name, unit) for name, (_, unit) in columns.items()]
         table = simple_table(self.grid.attrs["title"], heads, right=heads)
         for member in range(math.prod(self.shape)):
-            values = [value / one.factor for one, value in zip(self.ranges, self.point(member), strict=True)]
-            values += [float(column.flat[member]) for column, _ in columns.values()]
-            table.add_row(*(f"{value:.5g}" if math.isfinite(value) else "-" for value in values))
+            values = zip(self.ranges, self.point(member), strict=True)
+            cells = [f"{value / one.factor:.5g}" for one, value in values]
+            cells += [self._cell(name, float(column.flat[member]), member) for name, (column, _) in columns.items()]
+            table.add_row(*cells)
         return table
 
     def extremes(self) -> Table:
@@ -185,8 +205,8 @@ class Sweep:
                 table.add_row(name, "", "-", "", "no member has a result")
                 continue
             lowest, highest = int(np.nanargmin(values)), int(np.nanargmax(values))
-            table.add_row(name, "min", f"{values.flat[lowest]:.5g}", unit, self.place(lowest))
-            table.add_row("", "max", f"{values.flat[highest]:.5g}", unit, self.place(highest))
+            table.add_row(name, "min", self._cell(name, values.flat[lowest], lowest), unit, self.place(lowest))
+            table.add_row("", "max", self._cell(name, values.flat[highest], highest), unit, self.place(highest))
         return table
 
 

@@ -1,0 +1,175 @@
+"""Growth of perturbations: does the tolerance of a run bear the digits of its numbers?
+
+In: a model, numbers, a request, or a table of members.  Out: a `Growth`, or the members whose numbers have no digits.
+
+A run is repeated from a start whose positions are moved by the tolerance: ``rtol`` times their magnitudes.  A motion
+that forgets its start gives the same numbers within some tolerances.  Where a number changes by more than four digits
+bear, both are repeated with kinks located, for what a step loses across a kink looks like growth.  Where it still
+changes, the tolerance decides about it, and only statistics mean something.  Nothing is linearised, so laws whose force
+jumps are seen as others are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ballpass.runtime.certify.whole_run import Way, WholeRun, prepare
+from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.many.ensemble import EnsembleResult
+from ballpass.runtime.many.members import Table
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run.locating import LOCATED, choose_kinks
+from ballpass.runtime.run.reductions import channel_names, observable_aliases
+from ballpass.runtime.run.request import Request, make_plan
+
+#: Relative change of a number that four printed digits do not bear [1].
+DIGITS = 5e-4
+
+#: Changes below so many tolerances are those of steps, not of a perturbation that grows.
+TOLERATED = 100.0
+
+#: Looser runs are looked at by this tolerance: what their steps lose is their error, not a growth [1].
+LOOSEST = 1e-6
+
+#: Change of a start that derivatives are to be good for [1].
+TINY = 1e-10
+
+#: What is looked at of each channel.
+KINDS = ("min", "max", "rms")
+
+#: Observables that name a moment or a ball: they may jump from one peak to another as high.
+PLACES = ("peak_time", "peak_ball", "min_time")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Growth:
+    """What a moved start changes.
+
+    Attributes
+    ----------
+    moved : how far each position was moved at the start, in its magnitudes [1]
+    changes : largest change of minimum, maximum and rms of each channel, relative to the largest of them [1]
+    uncertain : channels whose digits the tolerance does not bear
+    """
+
+    moved: float
+    changes: Mapping[str, float]
+    uncertain: tuple[str, ...]
+
+    @property
+    def worst(self) -> float:
+        """Largest of the changes [1]."""
+        return max(self.changes.values(), default=0.0)
+
+    @property
+    def words(self) -> str:
+        """A warning for people; empty where the digits stand."""
+        if not self.uncertain:
+            return ""
+        worst = max(self.uncertain, key=lambda name: self.changes[name])
+        return (
+            f"the motion amplifies small errors: a start moved by {self.moved:g} of the motion changes "
+            f"{', '.join(self.uncertain)}, {worst} by {100.0 * self.changes[worst]:.2g} %. Single extremes of such a "
+            "motion have no digits, and another tolerance gives other ones. Take statistics over many turns or many "
+            "starts, or a shorter run."
+        )
+
+
+def find_growth(model: LoadedModel, numbers: Numbers, request: Request) -> Growth:
+    """Compare a run with one from a moved start, both by the project's own stepper.
+
+    Raises
+    ------
+    RequestError
+        A wrong request, or no compiler for the stepper.
+    SimulationError
+        The computation failed.
+    """
+    run = prepare(model, numbers, request)
+    rtol = min(make_plan(model, numbers, request).rtol, LOOSEST)
+    kinks = choose_kinks(request.kinks, "stepper", model.manifest, rtol)
+    found = _compare(run, Way(method="stepper", rtol=rtol, kinks=kinks))
+    return (
+        found
+        if not found.uncertain or kinks == LOCATED
+        else _compare(run, Way(method="stepper", rtol=rtol, kinks=LOCATED))
+    )
+
+
+def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quantities: Sequence[str]) -> None:
+    """Refuse derivatives of a motion that amplifies a tiny change beyond meaning, before they are computed.
+
+    Raises
+    ------
+    SimulationError
+        A start moved by `TINY` changes an extreme of the motion by more than four digits bear.
+    """
+    found = find_growth(model, numbers, replace(request, rtol=TINY))
+    if found.uncertain:
+        worst = max(found.uncertain, key=lambda name: found.changes[name])
+        raise SimulationError(
+            f"Derivatives of {', '.join(quantities)} mean nothing here: the motion is chaotic. A start moved by "
+            f"{TINY:g} of the motion changes {worst} by {100.0 * found.changes[worst]:.2g} % within the run, a growth "
+            f"by {found.changes[worst] / TINY:.1g}. Ask for fewer turns (--cycles), another clearance or damping, or "
+            "compare ensembles (simulate_many, ballpass sweep)."
+        )
+
+
+def _compare(run: WholeRun, way: Way) -> Growth:
+    channels = [name for name in channel_names(run.model.manifest) if not name.endswith("ball.deflection")]
+    observables = [(kind, name) for name in channels for kind in KINDS]
+    moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
+    one, other = (run.integrate(observables, way, start).values.reshape(-1, len(KINDS)) for start in (0.0, moved))
+    tolerated = dict(zip(run.model.states, TOLERATED * way.rtol * run.magnitude, strict=True))
+    changes, uncertain = {}, []
+    for name, mine, its in zip(channels, one, other, strict=True):
+        largest, change = float(np.abs(mine).max()), float(np.abs(its - mine).max())
+        changes[name] = change / largest if largest > 0.0 else 0.0
+        if change > max(DIGITS * largest, tolerated.get(name, 0.0)):
+            uncertain.append(name)
+    return Growth(moved=way.rtol, changes=changes, uncertain=tuple(uncertain))
+
+
+def simulate_members(
+    model: LoadedModel, table: Table, observables: str | Sequence[str], run: Callable[..., EnsembleResult]
+) -> EnsembleResult:
+    """Run an ensemble, and tell which observables of which members have no digits.
+
+    Parameters
+    ----------
+    run : `simulate_many` of a table and observables, with all else given; takes `rtol`, `method`, `kinks`
+    """
+    manifest = model.manifest
+    asked = [observables] if isinstance(observables, str) else list(observables)
+    aliases = observable_aliases(channel_names(manifest))
+    looked_at = {name: aliases[name] for name in asked if name in aliases and aliases[name][0] not in PLACES}
+    ranges = {channel: f"range:{channel}" for _, channel in looked_at.values()}
+    names = list(dict.fromkeys((*asked, *ranges.values())))
+    result = run(table, names)
+    count = len(next(iter(result.parameters.values())))
+    uncertain = {name: np.zeros(count, dtype=bool) for name in asked}
+    rtol = min(result.statistics.rtol, LOOSEST)
+    numbers = model.numbers(None)
+    magnitude = prepare(model, numbers, Request()).magnitude
+    tolerated = dict(zip(model.states, TOLERATED * rtol * magnitude, strict=True))
+    positions = dict(zip(manifest.initial[: len(magnitude) // 2], magnitude.tolist(), strict=False))
+    left = np.setdiff1d(np.arange(count), [failure.member for failure in result.failures])
+    for ways in ({}, {"rtol": rtol, "method": "stepper", "kinks": LOCATED}):
+        if not (looked_at and len(left)) or result.interrupted:
+            break
+        rows = {name: values[left] for name, values in result.parameters.items()}
+        starts = {name: rows.get(name, np.full(len(left), numbers.parameters[name])) for name in positions}
+        moved = {name: starts[name] + rtol * positions[name] for name in positions}
+        one = {name: result[name][left] for name in names} if not ways else run(rows, names, **ways)
+        other = run({**rows, **moved}, names, **ways)
+        for name, (_, channel) in looked_at.items():
+            scale = np.fmax(np.abs(one[name]), one[ranges[channel]])
+            # a run that fails from the moved start has no digits either
+            bears = np.abs(one[name] - other[name]) <= np.fmax(DIGITS * scale, tolerated.get(channel, 0.0))
+            uncertain[name][left] = ~bears
+        left = left[np.any([uncertain[name][left] for name in looked_at], axis=0)]
+    return replace(result, observables={name: result[name] for name in asked}, uncertain=uncertain)

@@ -1,0 +1,113 @@
+"""Motion that amplifies small errors is called so by run, sweep and sensitivity; calm motion keeps its digits."""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from ballpass.runtime import Model, SimulationError
+from ballpass.runtime.app.cli import app
+
+CLEARANCE = "bearing.clearance"
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+PRESS = SCENES / "punching_press_tangent.toml"
+WIDE = {CLEARANCE: 60e-6}
+
+
+def test_chaos_is_said_at_every_tolerance(press: Model) -> None:
+    """Tangent press, 60 um, 12 turns: the lowest inner.x is -56, -60, -61 um at rtol 1e-6, 1e-8, 1e-10."""
+    lowest = [press.reduce(12, parameters=WIDE, rtol=one)["inner.x"].minimum for one in (1e-6, 1e-8, 1e-10)]
+    assert np.ptp(lowest) > 3e-6
+    for rtol in (1e-4, 1e-6, 1e-8, 1e-10):
+        found = press.growth(12, parameters=WIDE, rtol=rtol)
+        assert "inner.x" in found.uncertain
+        assert "inner.x" in found.words
+        assert found.moved == min(rtol, 1e-6)
+
+
+@pytest.mark.parametrize("scene", ["punching_press", "punching_press_tangent", "four_bar"])
+def test_shipped_scenes_keep_their_digits(make_model: Callable[..., Model], scene: str) -> None:
+    model = make_model(scene)
+    for rtol in (1e-4, 1e-6, 1e-8):
+        found = model.growth(rtol=rtol)
+        assert found.uncertain == ()
+        assert found.words == ""
+        assert 0.0 < found.worst < 1e-3
+
+
+@pytest.mark.long
+def test_a_law_whose_force_jumps_is_no_exception(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press", ('law = "one-sided"', 'law = "one-sided-gated"'))
+    assert model.growth().uncertain == ()
+    wide = {CLEARANCE: 120e-6, "bearing.damping.ratio": 1e-7}
+    start = np.zeros(len(model.states))
+    start[0] = 1e-12
+    one, other = (model.reduce(12, parameters=wide, rtol=1e-12, initial=x)["inner.x"] for x in (0.0 * start, start))
+    assert abs(one.range / other.range - 1.0) > 1e-3
+    assert "inner.x" in model.growth(12, parameters=wide).uncertain
+
+
+def test_an_ensemble_marks_the_members_that_single_runs_differ_in(press: Model) -> None:
+    clearances = np.linspace(5e-6, 65e-6, 7)
+    of = ["range_inner_x", "peak_ball_force"]
+    plain = press.simulate_many({CLEARANCE: clearances}, of, cycles=12)
+    found = press.simulate_many({CLEARANCE: clearances}, of, cycles=12, growth=True)
+    assert not plain.uncertain
+    assert list(found) == of
+    for name in of:
+        assert np.array_equal(plain[name], found[name])
+    tight = [press.reduce(12, parameters={CLEARANCE: c}, rtol=1e-10)["inner.x"].range for c in clearances]
+    apart = np.abs(found["range_inner_x"] / tight - 1.0)
+    marked = found.uncertain["range_inner_x"]
+    assert np.all(marked[apart > 2e-2])
+    assert not np.any(marked[apart < 1e-4])
+    assert marked.sum() >= 2
+
+
+def test_the_commands_say_it_and_print_statistics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    def ballpass(*words: str | Path) -> tuple[int, str, str]:
+        done = CliRunner().invoke(app, [str(word) for word in words])
+        return done.exit_code, done.stdout, done.stderr
+
+    wide, turns = ("--set", f"{CLEARANCE}=60 um"), ("--cycles", "12", "--no-figures")
+    code, shown, said = ballpass("run", PRESS, *wide, *turns)
+    assert code == 0
+    assert "amplifies small errors" in said
+    (row,) = [line for line in shown.splitlines() if line.split()[:1] == ["inner.x"]]
+    assert row.count("±") == 3
+    (force,) = [line for line in shown.splitlines() if "drive_torque" in line]
+    assert "±" not in force
+    code, shown, said = ballpass("run", PRESS, "--no-figures")
+    assert (code, "amplifies" in said, "±" in shown) == (0, False, False)
+
+    code, shown, said = ballpass("sweep", PRESS, "--vary", f"{CLEARANCE}=10 um:60 um:2", *turns)
+    assert code == 0
+    assert "1 of 2 members amplify small errors" in said
+    assert "~" in shown
+    table = (tmp_path / "results" / PRESS.stem / "sweep.csv").read_text(encoding="utf-8")
+    calm, chaotic = csv.DictReader(table.splitlines())
+    assert calm["message"] == ""
+    assert "range_inner_x" in chaotic["message"]
+
+    began = time.perf_counter()
+    code, _, said = ballpass("sensitivity", PRESS, *wide, "--cycles", "12")
+    assert code == 1
+    assert "the motion is chaotic" in said
+    assert time.perf_counter() - began < 3.0  # within a second, on a machine that does nothing else
+
+
+def test_derivatives_of_what_does_not_move_with_the_rings_are_not_refused(press: Model) -> None:
+    report = press.sensitivity(
+        "drive_work", "mechanism.forces.punch.force.y", 3, transient=1, parameters=WIDE, check=False
+    )
+    assert report.pairs[0].derivative != 0.0
+    with pytest.raises(SimulationError, match=r"rms:inner\.x mean nothing here: the motion is chaotic"):
+        press.sensitivity("rms:inner.x", CLEARANCE, 12, parameters=WIDE)
