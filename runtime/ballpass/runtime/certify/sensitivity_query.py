@@ -23,6 +23,7 @@ from ballpass.runtime.ask.study import Course, Span, Study
 from ballpass.runtime.ask.track import Outlook, Stepping
 from ballpass.runtime.certify.certificate import AGREEMENT, FLOOR, UNCHECKED, by_differences, compare
 from ballpass.runtime.certify.grazing import TOLERANCE, Grazing, find_grazing
+from ballpass.runtime.certify.growth import refuse_growth
 from ballpass.runtime.certify.member_runs import MemberRuns
 from ballpass.runtime.certify.sensitivity_report import QuantityValue, Sensitivity, SensitivityReport, ratio_unit
 from ballpass.runtime.contract import Manifest
@@ -34,7 +35,8 @@ from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.direction_scales import ANGLE
 from ballpass.runtime.run.magnitudes import model_scales
-from ballpass.runtime.run.request import TOLERANCES, asked_length
+from ballpass.runtime.run.reductions import channel_names
+from ballpass.runtime.run.request import TOLERANCES, Request, asked_length
 from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.run.simulate import STIFF_RATIO
 
@@ -173,6 +175,15 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
         family, fine = _families(query.method, scales)
     study.per_turn = query.samples_per_cycle or _nodes_a_turn(window, scales)
     tell = query.progress or (lambda _words, _fraction: None)
+    moving = [item.name for item in quantities if item.channel in channel_names(manifest)]
+    if moving and model.has_stepper:
+        tell("looking for growth", 0.0)
+        refuse_growth(
+            model,
+            numbers,
+            Request(cycles=query.span.cycles, duration=query.span.duration, transient_cycles=0.0),
+            moving,
+        )
     stepping = Stepping(family=family, rtol=query.rtol, magnitude=magnitude, sensitivity_rtol=query.sensitivity_rtol)
 
     tell("differentiating", 0.0)
