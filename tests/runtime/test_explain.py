@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from ballpass.runtime import Model
+from ballpass.derive.features import cost
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.runtime import Explanation, Manifest, Model
 from ballpass.runtime.app.cli import app
+from ballpass.runtime.app.commands.explain import _report
+from ballpass.runtime.point.explain import _knot
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -28,6 +35,35 @@ def test_breakpoints_are_the_edges_of_the_punch_window(make_model: Callable[...,
 def test_an_edge_at_the_start_of_the_turn_counts_once(make_model: Callable[..., Model]) -> None:
     said = make_model("punching_press").explain({"mechanism.driver.start_angle": math.radians(237.0)})
     assert [b.cause for b in said.breakpoints] == ["punch on", "punch off"]
+
+
+def test_a_knot_of_a_table_is_named_in_the_scenes_words() -> None:
+    assert [_knot(name) for name in ("force.punch_slope", "torque.my_brake_slope", "load.x_rate")] == [
+        "knot of punch",
+        "knot of my_brake",
+        "knot of the load",
+    ]
+
+
+def test_of_two_bearings_the_shares_and_the_rest_are_all_of_the_right_hand_side(scene_text: Callable[..., str]) -> None:
+    text = scene_text("varying_compliance", ("[bearing", "[bearings.left"))
+    start, end = text.index("[bearings.left]"), text.index("[run]")
+    more = text[start:end].replace("[bearings.left", "[bearings.right")
+    text = re.sub(r"outputs = \[.*\]", 'outputs = ["*.inner.x"]', text[:end] + more + text[end:])
+    scene = scene_from_text(text, "two")
+    said = Explanation(
+        **dict.fromkeys(("states", "outputs", "breakpoints", "smoothness", "scales", "unsupported"), ()),
+        turn=1.0,
+        method="stepper",
+        reason="",
+    )
+    counted = cost(scene)
+    parts = _report(Path(__file__), scene, counted, said, cast(Manifest, SimpleNamespace(functions=())))["modelled"]
+    rests = [part["rest"] for part in parts if part["rest"] is not None]
+    assert len(rests) == 1
+    assert rests[0] > 0
+    shares = [part["operations"].get("rhs", 0) for part in parts if part["operations"]]
+    assert rests[0] + sum(shares) == counted.functions["rhs"]
 
 
 def test_frequency_is_that_of_the_hertz_springs_at_equilibrium(make_model: Callable[..., Model]) -> None:

@@ -16,7 +16,7 @@ from ballpass.runtime import Model
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.certify.differences import richardson
-from ballpass.runtime.certify.jacobian_check import checked_jacobian
+from ballpass.runtime.certify.jacobian_check import _quotient, checked_jacobian
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.point import slopes
 from ballpass.runtime.point.jacobian import Directions, directions_of, output_tangents, quantity_values
@@ -295,3 +295,20 @@ def test_extrapolated_differences_know_their_error(noise: float) -> None:
     exact = np.array([math.cos(1.0), math.e, -1.5 * math.sqrt(0.02)])
     assert np.all(np.abs(found.value - exact) <= 3.0 * found.error)
     assert np.all(found.error <= (1e-11 if noise == 0.0 else 1e-5))
+
+
+@pytest.mark.parametrize(
+    ("above", "below", "unit"),
+    [
+        ("m/s/s", "m", "1/s^2"),
+        ("m/s/s", "m/s", "1/s"),
+        ("m/s/s", "kg", "m/(s^2*kg)"),
+        ("N", "N/m^1.5", "m^1.5"),
+        ("N*m", "rad", "N*m/rad"),
+        ("m/s", "s", "m/s^2"),
+        ("N", "1", "N"),
+        ("1", "1", "1"),
+    ],
+)
+def test_the_unit_of_a_derivative_is_a_quotient_in_lowest_terms(above: str, below: str, unit: str) -> None:
+    assert _quotient(above, below) == unit

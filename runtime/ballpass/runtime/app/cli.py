@@ -30,6 +30,7 @@ from ballpass.runtime.app.commands.shared import (
     show,
     show_json,
     warn,
+    warn_of_folder,
 )
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import read_error, trade
@@ -180,6 +181,7 @@ def derive(
             result = deriving.check(scene, out)
         else:
             folder = deriving.generate(scene, out, progress=stages)
+            warn_of_folder(folder)
     if not check:
         typer.echo(str(folder))
     elif result.stale:
@@ -227,6 +229,7 @@ def export(
         from ballpass.runtime.export.c_program import export_c
 
         export_c(generated, folder)
+        warn_of_folder(generated)
     typer.echo(str(folder))
 
 

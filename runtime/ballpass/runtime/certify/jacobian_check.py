@@ -8,6 +8,7 @@ computed anew, the derived constants, phases and tables included.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -32,6 +33,9 @@ from ballpass.runtime.point.jacobian import (
 from ballpass.runtime.point.linearize import onset_notes
 from ballpass.runtime.point.slopes import slopes
 from ballpass.runtime.run import inputs as clock
+
+#: A factor of a unit such as "N*s/m^1.5": the mark before it, its name, its power.
+_FACTOR = re.compile(r"([*/]?)([A-Za-z]+)(?:\^([0-9.]+))?")
 
 Array = NDArray[np.float64]
 
@@ -226,6 +230,13 @@ def _number(value: float) -> float | None:
 
 
 def _quotient(above: str, below: str) -> str:
-    if below == "1":
-        return above
-    return f"{above}/({below})" if any(sign in below for sign in "*/") else f"{above}/{below}"
+    """Unit of a derivative: "m/s/s" by "m" is "1/s^2"."""
+    powers: dict[str, float] = {}
+    for unit, sign in ((above, 1.0), (below, -1.0)):
+        for mark, name, power in _FACTOR.findall(unit):
+            powers[name] = powers.get(name, 0.0) + (-sign if mark == "/" else sign) * float(power or 1.0)
+    over = [f"{name}^{n:g}".removesuffix("^1") for name, n in powers.items() if n > 0.0]
+    under = [f"{name}^{-n:g}".removesuffix("^1") for name, n in powers.items() if n < 0.0]
+    if not under:
+        return "*".join(over) or "1"
+    return f"{'*'.join(over) or '1'}/{under[0] if len(under) == 1 else '(' + '*'.join(under) + ')'}"

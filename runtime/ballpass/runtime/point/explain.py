@@ -15,6 +15,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import BallpassError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.usual import unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.equilibrium import static_equilibrium
@@ -86,6 +87,7 @@ class Explanation:
         states
     unsupported : instants without equilibrium, whose rates are not known
     method, reason : what ``auto`` takes, and why
+    unusual : sentences about numbers outside of their usual ranges
     """
 
     states: tuple[str, ...]
@@ -97,6 +99,7 @@ class Explanation:
     unsupported: tuple[str, ...]
     method: str
     reason: str
+    unusual: tuple[str, ...] = ()
 
 
 def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -> Explanation:
@@ -125,6 +128,7 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
         unsupported=unsupported,
         method=method,
         reason=reason,
+        unusual=tuple(unusual(manifest, numbers.parameters)),
     )
 
 
@@ -135,14 +139,20 @@ def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float) -
     for time in clock.breakpoints(inputs, values, -1e-9 * span, span * (1.0 - 1e-9)):
         before = clock.inputs_at(inputs, values, time, time - 1e-7 * span)
         behind = clock.inputs_at(inputs, values, time, time + 1e-7 * span)
-        causes = [
-            f"{item.name.removeprefix('gate.')} {'on' if b > a else 'off'}" if item.kind == "gate" else item.name
+        causes = dict.fromkeys(  # the components of a load share their knots
+            f"{item.name.removeprefix('gate.')} {'on' if b > a else 'off'}" if item.kind == "gate" else _knot(item.name)
             for item, a, b in zip(inputs, before, behind, strict=True)
             if a != b and item.kind in ("gate", "table_rate")
-        ]
+        )
         angle = clock.crank_angle(model.manifest, values, float(time))
         found.append(Breakpoint(time=float(time), angle=angle, cause=", ".join(causes) or "a knot of a table"))
     return tuple(found)
+
+
+def _knot(slope: str) -> str:
+    """Words for a knot of the table whose slope is this input, as ``force.punch_slope`` or ``load.x_rate``."""
+    kind, _, name = slope.rpartition("_")[0].partition(".")
+    return f"knot of {'the load' if kind == 'load' else name}"
 
 
 def _time_scales(

@@ -49,7 +49,9 @@ def has_kinks(manifest: Manifest) -> bool:
     motion: the generated folder tells.  Hertz's law always has one.
     """
     written = any(name == SWITCHES for name, _ in manifest.files)
-    return written or any(name.endswith("elastic") and word != "twice smooth" for name, word in manifest.smoothness)
+    laws = dict(manifest.smoothness)
+    elastic = (laws.get(f"{bearing.prefix}elastic", "twice smooth") for bearing in manifest.bearings)
+    return written or any(word != "twice smooth" for word in elastic)
 
 
 def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float) -> Kinks:

@@ -71,9 +71,11 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
     # operations that the parts do not add by themselves are those of the contacts
     shares = [(part.path, counted.added[part.name]["rhs"]) for part in named if part.name in counted.added]
     parts: list[dict[str, Any]] = []
+    contacts = [f"{bearing.path}.contact" for bearing in scene.bearings]
     for part in named:
         added = counted.added.get(part.name)
-        contacts = added is None and part.path == "bearing.contact" and "rhs" in counted.functions
+        # of several bearings the last one's row has what all of them share
+        rest = added is None and part.path in contacts[-1:] and "rhs" in counted.functions
         parts.append(
             {
                 "name": part.name,
@@ -81,7 +83,7 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
                 "line": lines.find(tuple(part.path.split("."))),
                 "what": part.modelled,
                 "operations": None if added is None else {k: v for k, v in added.items() if v},
-                "rest": _rest(shares, counted) if contacts else None,
+                "rest": _rest(shares, counted) if rest else None,
             }
         )
     return {
@@ -105,6 +107,7 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
         ],
         "without_equilibrium": list(said.unsupported),
         "method": {"auto": said.method, "reason": said.reason},
+        "warnings": list(said.unusual),
     }
 
 
@@ -174,6 +177,7 @@ def _render(report: dict[str, Any]) -> Group:
         blocks += ["", _scales(report)]
     blocks += [f"no equilibrium at {escape(text)}" for text in report["without_equilibrium"]]
     blocks += ["", f"[italic]Method[/] auto takes {report['method']['auto']}: {escape(report['method']['reason'])}"]
+    blocks += [f"[bold yellow]unusual[/] {escape(text)}" for text in report["warnings"]]
     return Group(*blocks)
 
 
@@ -181,9 +185,10 @@ def _modelled(report: dict[str, Any]) -> Table:
     """The parts of the model, and how much of the right-hand side each one is."""
     table = plain_table("Modelled", ("part", "line", "what", "share of rhs"), right=("share of rhs",))
     total = report["functions"].get("rhs", {}).get("operations", 0)
+    several = sum(part["path"].endswith(".contact") for part in report["modelled"]) > 1
     for part in report["modelled"]:
         counts, rest = part["operations"], part["rest"]
-        name = part["name"] if rest is None else "rest: ball contacts and rings"
+        name = part["name"] if rest is None else f"rest: ball contacts and rings{' of all' if several else ''}"
         added = rest if counts is None else counts.get("rhs", 0)
         cell = "" if added is None or not total else f"{added} ({100 * added / total:.0f} %)"
         table.add_row(escape(name), str(part["line"] or ""), escape(part["what"]), cell)

@@ -48,7 +48,7 @@ STAGES = {
 
 @contextlib.contextmanager
 def command(scene: Path) -> Iterator[Stages]:
-    """The stages of a command; its warnings as messages, and its errors as messages with an exit code.
+    """The stages of a command; its warnings as messages, each once, and its errors as messages with an exit code.
 
     Parameters
     ----------
@@ -56,7 +56,14 @@ def command(scene: Path) -> Iterator[Stages]:
     """
     try:
         with warnings.catch_warnings(), Stages() as stages:
-            warnings.showwarning = warn
+            said: set[str] = set()
+
+            def once(message: Warning | str, *_: Any, **__: Any) -> None:
+                if str(message) not in said:
+                    said.add(str(message))
+                    warn(message)
+
+            warnings.showwarning = once
             yield stages
     except BallpassError as error:
         from ballpass.derive.scene.errors import SceneError
@@ -77,13 +84,22 @@ def command(scene: Path) -> Iterator[Stages]:
         raise typer.Exit(130) from None
 
 
+def warn_of_folder(folder: Path) -> None:
+    """Warn of unusual numbers of a generated folder, for commands that compute nothing."""
+    from ballpass.runtime.contract import read_manifest
+    from ballpass.runtime.contract.usual import warn_unusual
+
+    manifest = read_manifest(folder)
+    warn_unusual(manifest, {info.name: info.default for info in manifest.parameters})
+
+
 def complain(message: str) -> None:
     """Print an error on stderr."""
     errors_console.print(f"[bold red]error[/]: {escape(message)}", soft_wrap=True, highlight=False)
 
 
-def warn(message: Warning | str, *_: Any, **__: Any) -> None:
-    """Print a warning on stderr; takes the place of `warnings.showwarning`."""
+def warn(message: Warning | str) -> None:
+    """Print a warning on stderr."""
     errors_console.print(f"[bold yellow]warning[/]: {escape(str(message))}", soft_wrap=True, highlight=False)
 
 
