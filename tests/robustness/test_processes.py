@@ -22,7 +22,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -30,8 +30,10 @@ from profiles import LONG
 
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime import CacheWarning, CompileError, RequestError, load, load_solution
-from ballpass.runtime.contract import read_artefact, read_manifest
+from ballpass.runtime import CacheWarning, CompileError, RequestError, Status, load, load_solution
+from ballpass.runtime.app.commands import shared
+from ballpass.runtime.app.commands.shared import Stages, read_own
+from ballpass.runtime.contract import Manifest, read_artefact, read_manifest
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.folders import NEW, replace_files
 from ballpass.runtime.native import compile as compiling
@@ -640,3 +642,88 @@ def test_a_relative_cache_folder_is_found_from_wherever_the_process_goes(
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     assert np.isfinite(model.simulate(cycles=0.05).x).all()
+
+
+# --------------------------------------------------------------------------------------------------- paths, equal names
+
+#: Loads a scene again and again as commands do, and prints how often the numbers were another scene's.
+LOADING = """
+    import sys
+    from pathlib import Path
+    from ballpass.runtime.app.commands.shared import load_model
+
+    print("ready", flush=True)
+    wrong = 0
+    for _ in range(int(sys.argv[3])):
+        model = load_model(Path(sys.argv[1]), lambda name: None, "none", overrides={})
+        wrong += abs(model.parameters["bearing.clearance"] - float(sys.argv[2])) > 1e-12
+    print(wrong)
+"""
+
+
+def with_clearance(folder: Path, micrometres: int) -> Path:
+    folder.mkdir()
+    path = folder / "rotor.toml"
+    path.write_text(ROTOR.replace('clearance = "0 um"', f'clearance = "{micrometres} um"'), encoding="utf-8")
+    return path
+
+
+def test_a_scene_of_the_same_name_written_between_deriving_and_loading_is_not_taken_for_ones_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(shared, "ATTEMPTS", 4)
+    mine, other = (with_clearance(tmp_path / str(k), k) for k in (1, 2))
+    others = [1, 2, 3]
+
+    def read(folder: Path) -> Manifest:
+        if others:  # the other process was faster
+            others.pop()
+            generate(other)
+        return read_artefact(folder)
+
+    found = read_own(mine, cast(Stages, lambda name: None), read, lambda manifest: manifest)
+    assert not others
+    assert {info.name: info.default for info in found.parameters}["bearing.clearance"] == 1e-6
+    with pytest.raises(RequestError, match="other processes keep writing another scene of the name rotor"):
+        read_own(mine, cast(Stages, lambda name: None), lambda folder: read_artefact(generate(other)), lambda m: m)
+
+
+@pytest.mark.long
+def test_many_processes_with_scenes_of_one_name_and_different_numbers_each_get_their_own(tmp_path: Path) -> None:
+    processes = [
+        python(LOADING, with_clearance(tmp_path / str(k), k), f"{k}e-6", 40, cwd=tmp_path) for k in range(1, 7)
+    ]
+    for process in processes:
+        out, errors = process.communicate(timeout=600)
+        assert out.split() == ["ready", "0"], errors
+
+
+@pytest.fixture
+def odd(tmp_path: Path) -> Path:
+    """A folder whose name is no UTF-8."""
+    folder = tmp_path / os.fsdecode(b"odd\xff")
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("this file system has names in UTF-8 only")
+    return folder
+
+
+def test_what_is_derived_does_not_depend_on_the_path(scene: Path, rotor: Path, odd: Path) -> None:
+    """CasADi writes nothing where a path is not UTF-8, in part in silence."""
+    plain = dict(read_artefact(generate(scene, odd.parent / "plain")).files)
+    assert dict(read_artefact(generate(scene, odd / "rotor")).files) == plain
+    assert load(odd / "rotor").simulate(duration=0.001).status is Status.DONE
+
+
+def test_a_cache_whose_path_is_not_utf_8_warns_and_another_folder_is_taken(
+    odd: Path, source: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiling, "_opened", {})
+    monkeypatch.setenv(compiling.CACHE_VARIABLE, str(odd / "cache"))
+    compiler = compiling.find_compiler()
+    assert compiler is not None
+    with pytest.warns(CacheWarning, match="its path is not UTF-8"):
+        assert compiling.compile_sources((source,), compiler).path.is_file()
+    assert list(odd.iterdir()) == []

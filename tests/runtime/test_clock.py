@@ -71,6 +71,12 @@ def test_standing_driver_holds_its_gate() -> None:
     assert clock.breakpoints((GATE,), values, 0.0, 1e6).size == 0
 
 
+@pytest.mark.parametrize(("begin", "end"), [(0.0, 1e300), (-1.7e308, 1.7e308), (0.0, 1e9)])
+def test_more_turns_than_can_be_listed_are_refused(begin: float, end: float) -> None:
+    with pytest.raises(RequestError, match="too many to list what switches"):
+        clock.breakpoints((GATE,), window(237, 267), begin, end)
+
+
 @settings(max_examples=100, deadline=None)
 @given(
     start=st.floats(-720, 720),

@@ -26,14 +26,16 @@ from ballpass.runtime.app.commands.shared import (
     complain,
     load_model,
     note,
+    read_own,
     results_folder,
     show,
     show_json,
     warn,
-    warn_of_folder,
+    warn_of_scene,
 )
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import read_error, trade
+from ballpass.runtime.contract import read_artefact, read_manifest
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:
@@ -181,7 +183,7 @@ def derive(
             result = deriving.check(scene, out)
         else:
             folder = deriving.generate(scene, out, progress=stages)
-            warn_of_folder(folder)
+            warn_of_scene(read_manifest(folder))
     if not check:
         typer.echo(str(folder))
     elif result.stale:
@@ -214,22 +216,21 @@ def export(
     ] = None,
 ) -> None:
     """Write a scene as a program that runs without Python: make, and it prints the motion as CSV."""
-    from ballpass.derive import generate, read_scene
+    from ballpass.derive.emit.signature import folder_of
 
     with command(scene) as stages:
         if not c:
             raise RequestError("export: no format was given. Allowed: --c, a program in C99.")
         stages("read")
-        read = read_scene(scene)
-        folder = out if out is not None else Path("export") / read.name
+        folder = out if out is not None else Path("export") / scene.stem
         check_folder(folder)
-        generated = generate(read, progress=stages)
+        manifest = read_own(scene, stages, read_artefact, lambda manifest: manifest)
         stages("export")
         # here, for it brings CasADi
         from ballpass.runtime.export.c_program import export_c
 
-        export_c(generated, folder)
-        warn_of_folder(generated)
+        export_c(folder_of(scene), folder, manifest=manifest)
+        warn_of_scene(manifest)
     typer.echo(str(folder))
 
 

@@ -348,4 +348,5 @@ def _caption(summary: Mapping[str, Any]) -> str:
     if any("over_turns" in item for item in summary.values() if isinstance(item, Mapping)):
         law.append("± mean and standard deviation over the steady turns")
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
-    return f"{', '.join(run + law)}.\n{', '.join(tools)}."
+    sampled = [] if summary["method"].startswith("stepper") else ["extremes of the samples alone"]
+    return f"{', '.join(run + sampled + law)}.\n{', '.join(tools)}."

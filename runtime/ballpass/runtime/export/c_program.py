@@ -17,7 +17,7 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ballpass.runtime.contract import Manifest, read_artefact
+from ballpass.runtime.contract import Manifest, check_files, read_artefact
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.export.scene_numbers import (
     STANDALONE,
@@ -42,13 +42,14 @@ _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 _LEFT_OUT = re.compile(r'^#ifdef BALLPASS_(?:SENSITIVITIES|REDUCTIONS)\n(?:#include "[^"]+"\n)+#endif\n', re.MULTILINE)
 
 
-def export_c(folder: str | Path, out: str | Path) -> Path:
+def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None = None) -> Path:
     """Write the stand-alone C program of a generated folder.
 
     Parameters
     ----------
     folder : what `ballpass derive` wrote
     out : folder to write; files of the same names are replaced, others stay
+    manifest : of the folder, where it was read before: the numbers are its own then
 
     Returns
     -------
@@ -62,7 +63,7 @@ def export_c(folder: str | Path, out: str | Path) -> Path:
         The model has no states, so that there is nothing to integrate.
     """
     place, target = Path(folder).absolute(), Path(out)
-    manifest = read_artefact(place)
+    manifest = read_artefact(place) if manifest is None else manifest
     if not manifest.states:
         raise RequestError(
             f"{manifest.scene}: the model has no states, so there is nothing to integrate in C. Its functions are in "
@@ -70,6 +71,7 @@ def export_c(folder: str | Path, out: str | Path) -> Path:
         )
     # in CasADi's virtual machine: nothing has to be compiled to write C
     texts = _texts(LoadedModel(place, manifest, None), place)
+    check_files(place, manifest)  # another process may have written there meanwhile
     target.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".writing-", dir=target) as name:
         made = Path(name)

@@ -13,9 +13,9 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 from rich.console import Console
@@ -26,10 +26,16 @@ from ballpass.runtime.app.interrupted import INTERRUPTED
 from ballpass.runtime.contract.errors import BallpassError, RequestError
 
 if TYPE_CHECKING:
+    from ballpass.runtime.contract import Manifest
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.locating import Kinks
 
 errors_console = Console(stderr=True, emoji=False)  # A:B:N is no picture
+
+#: Times that a folder is derived and read while another process writes its own scene there.
+ATTEMPTS = 100
+
+_Read = TypeVar("_Read")
 
 #: Names of the stages as they are announced.
 STAGES = {
@@ -84,12 +90,10 @@ def command(scene: Path) -> Iterator[Stages]:
         raise typer.Exit(130) from None
 
 
-def warn_of_folder(folder: Path) -> None:
-    """Warn of unusual numbers of a generated folder, for commands that compute nothing."""
-    from ballpass.runtime.contract import read_manifest
+def warn_of_scene(manifest: Manifest) -> None:
+    """Warn of a scene's unusual numbers, for commands that compute nothing."""
     from ballpass.runtime.contract.usual import warn_unusual
 
-    manifest = read_manifest(folder)
     warn_unusual(manifest, {info.name: info.default for info in manifest.parameters})
 
 
@@ -203,6 +207,32 @@ def checked_kinks(kinks: str | None, method: str, error: str | None = None) -> K
     return check_located(kinks, "stepper" if method == "auto" else method) if kinks is not None else None
 
 
+def read_own(
+    scene: Path, stages: Stages, read: Callable[[Path], _Read], manifest: Callable[[_Read], Manifest]
+) -> _Read:
+    """What `read` gives of the scene's folder, derived where it is stale.
+
+    Scenes of one file name in different folders share a generated folder: where another process has written its own
+    scene there between writing and reading, both are done again.
+
+    Parameters
+    ----------
+    manifest : of what was read
+    """
+    from ballpass.derive.emit.generate import generate
+    from ballpass.derive.emit.signature import source_key
+
+    for _ in range(ATTEMPTS):
+        folder = generate(scene, progress=stages)
+        found = read(folder)
+        if manifest(found).source == source_key(scene):
+            return found
+    raise RequestError(
+        f"{folder}: other processes keep writing another scene of the name {scene.stem} there. Allowed: one scene for "
+        "a generated folder. Rename the scene file, or run in another folder."
+    )
+
+
 def load_model(
     scene: Path,
     stages: Stages,
@@ -218,14 +248,15 @@ def load_model(
     ----------
     overrides : numbers of ``--set``; refused where the linkage locks with them
     """
-    from ballpass.derive.emit.generate import generate
     from ballpass.runtime.model import load
     from ballpass.runtime.native.stepper import METHODS as STEPPERS
     from ballpass.runtime.run.locating import choose_kinks, stepper_for
 
-    folder = generate(scene, progress=stages)
-    stages("compile")
-    model = load(folder)
+    def compiled(folder: Path) -> Model:
+        stages("compile")
+        return load(folder)
+
+    model = read_own(scene, stages, compiled, lambda model: model.manifest)
     if any(path.startswith("mechanism.") for path in overrides):
         model.check_assembly(overrides)
     if model.has_stepper and method in ("auto", *STEPPERS):
