@@ -60,7 +60,8 @@ def test_a_trade_is_one_json_object_and_follows_its_settings(place: Path) -> Non
 
 
 def test_a_named_error_tells_choice_estimate_and_cost(place: Path) -> None:
-    arguments = ["run", f"{NAME}.toml", "--error", "1%", "--of", "peak_ball_force", "--no-figures"]
+    of = ["--of", "peak_ball_force", "--of", "rms:inner.y"]
+    arguments = ["run", f"{NAME}.toml", "--error", "1%", *of, "--no-figures"]
     done = CliRunner().invoke(app, [*arguments, "--json"])
     assert done.exit_code == 0, done.output
     accuracy = json.loads(done.stdout)["accuracy"]
@@ -69,6 +70,10 @@ def test_a_named_error_tells_choice_estimate_and_cost(place: Path) -> None:
     assert accuracy["check_time"] > 0.0
     told = CliRunner().invoke(app, arguments)
     assert "error asked for 1 %" in told.stdout
+    for name, factor, unit in (("peak_ball_force", 1.0, "N"), ("rms:inner.y", 1e6, "µm")):
+        (row,) = (line.split() for line in told.stdout.splitlines() if line.split()[:1] == [name])
+        assert row[1] == f"{factor * accuracy['values'][name]:.7g}"
+        assert row[2:] == [f"{100 * accuracy['estimates'][name]:.2g}", "%", unit]
     assert f"by {accuracy['method']} at rtol" in told.stdout
     assert accuracy["check"] in told.stdout
 

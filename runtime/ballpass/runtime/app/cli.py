@@ -153,12 +153,14 @@ def run(
     if json_:
         show_json(summary)
         return
-    from ballpass.runtime.app.summary import render_summary
+    from ballpass.runtime.app.summary import render_accuracy, render_summary
     from ballpass.runtime.app.tables import wide_console
 
     table = render_summary(summary)
     wide_console(table).print(table)
     if solution.accuracy is not None:
+        told = render_accuracy(model, solution.accuracy)
+        wide_console(told).print(told)
         show(solution.accuracy.words)
     size = _size((folder / "solution.nc").stat().st_size)
     show(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")

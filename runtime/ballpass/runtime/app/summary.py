@@ -23,15 +23,18 @@ from rich.table import Table
 from ballpass.runtime.app.tables import simple_table
 from ballpass.runtime.ask.observables import drive_work, kinematic_frequencies, statistics, turns
 from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks
+from ballpass.runtime.certify.whole_run import check_observables
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.usual import UnusualWarning, unusual
+from ballpass.runtime.many.ensemble import observable_unit
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.run.inputs import breakpoints
 
 if TYPE_CHECKING:
     from ballpass.runtime.certify.growth import Growth
     from ballpass.runtime.model import Model
+    from ballpass.runtime.run.accuracy import Accuracy
     from ballpass.runtime.run.solution import Solution
 
 #: Packages whose version may change a number.
@@ -331,6 +334,17 @@ def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
     if spread is not None:
         return f"{factor * spread['mean']:.3g} ± {factor * spread['std']:.1g}"
     return f"{factor * item[key]:.4g}" if key in item else ""
+
+
+def render_accuracy(model: Model, accuracy: Accuracy) -> Table:
+    """Quantities of ``--error`` with their values and estimated errors, as a table for a terminal."""
+    right = ("value", "estimated error")
+    table = simple_table("Extremes between samples included", ("quantity", *right, "unit"), right=right)
+    for name, found in zip(accuracy.of, check_observables(model, accuracy.of), strict=True):
+        unit = observable_unit(model.manifest, *found)
+        factor, unit = TABLE_UNITS.get(unit, (1.0, unit))
+        table.add_row(name, f"{factor * accuracy.values[name]:.7g}", f"{100 * accuracy.estimates[name]:.2g} %", unit)
+    return table
 
 
 def _caption(summary: Mapping[str, Any]) -> str:

@@ -129,7 +129,7 @@ class EnsembleResult(Mapping[str, np.ndarray]):
         variables = {}
         for name, values in self.observables.items():
             kind, channel = aliases[name]
-            facts = {"units": _unit(self.manifest, kind, channel), "long_name": f"{kind} of {channel}"}
+            facts = {"units": observable_unit(self.manifest, kind, channel), "long_name": f"{kind} of {channel}"}
             variables[name] = ("member", values, facts)
         return xarray.Dataset(variables, coords=coordinates, attrs={"title": self.manifest.title})
 
@@ -311,7 +311,7 @@ def _render(result: EnsembleResult) -> Any:
     table.add_column("unit", no_wrap=True)
     units = {info.name: info.unit for info in result.manifest.parameters}
     aliases = observable_aliases(channel_names(result.manifest))
-    units |= {name: _unit(result.manifest, *aliases[name]) for name in result.observables}
+    units |= {name: observable_unit(result.manifest, *aliases[name]) for name in result.observables}
     for name, values in (*result.parameters.items(), *result.observables.items()):
         known = values[np.isfinite(values)]
         cells = [f"{f(known):.6g}" for f in (np.min, np.median, np.max)] if len(known) else ["", "", ""]
@@ -319,10 +319,11 @@ def _render(result: EnsembleResult) -> Any:
     return table
 
 
-def _unit(manifest: Manifest, kind: str, channel: str) -> str:
+def observable_unit(manifest: Manifest, kind: str, channel: str) -> str:
+    """SI unit of an observable."""
     if kind in ("peak_time", "min_time"):
         return "s"
     if kind == "peak_ball":
         return "1"
     units = {state.name: state.unit for state in manifest.states}
-    return units.get(channel, "m" if channel == "ball.deflection" else "N")
+    return units.get(channel, "m" if channel.endswith("ball.deflection") else "N")

@@ -46,14 +46,12 @@ class Accuracy:
 
     @property
     def words(self) -> str:
-        """One paragraph for people."""
+        """One paragraph for people, on choice and cost; `values` and `estimates` are a table of their own."""
         worst = max(self.estimates, key=lambda name: self.estimates[name])
-        values = ", ".join(f"{name} = {value:.7g}" for name, value in self.values.items())
         after = f", after {len(self.tried)} other ways" if self.tried else ""
         return (
-            f"{values} (SI, extremes between samples included): "
-            f"error asked for {100 * self.target:g} %, estimated {100 * self.estimate:.2g} % (worst of "
-            f"{', '.join(self.of)}: {worst}) by {self.method} at rtol {self.rtol:g}, against a second whole run: "
+            f"error asked for {100 * self.target:g} %, estimated {100 * self.estimate:.2g} % (worst: "
+            f"{worst}) by {self.method} at rtol {self.rtol:g}, against a second whole run: "
             f"{self.check}. Integrated in {1e3 * self.time:.3g} ms; {1e3 * self.check_time:.3g} ms more went into the "
             f"estimate{after}."
         )
