@@ -7,7 +7,7 @@
 
 #include "trig.h"
 
-enum { BP_NQ = 4, BP_NX = 8, BP_NU = 3, BP_NP = 41, BP_NC = 39, BP_NW = 4, BP_NA = 2, BP_NJ = 57, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_NR = 5, BP_NG = 6, BP_LANES = 8 };
+enum { BP_NQ = 4, BP_NX = 8, BP_NU = 3, BP_NP = 41, BP_NC = 39, BP_NW = 4, BP_NA = 2, BP_NJ = 57, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_RELATIVE = 7, BP_NR = 7, BP_NG = 6, BP_LANES = 8 };
 
 /* Coordinates of one group share a magnitude; where a coordinate has a partner, their difference counts. */
 static const int bp_group[4] = {0, 0, 0, 0};
@@ -28,7 +28,7 @@ static inline void bp_0_numbers(const double *restrict p, const double *restrict
     (void)w;
     double w0 = c[10];
     k[0] = w0;
-    w0 = c[14];
+    w0 = c[13];
     k[1] = w0;
     w0 = c[38];
     k[2] = w0;
@@ -612,12 +612,11 @@ static inline void bp_stage_rate(double t, const double *restrict u, const doubl
     wt[3] = w4;
 }
 
-/* Of each bearing: delta = r0 + r1 cos + r2 sin, rate = r3 cos + r4 sin. 12 operations. */
+/* Of each bearing: delta = r0 + r1 cos + r2 sin, rate = r3 cos + r4 sin, cos and sin of the cage; then what accelerations need of the same. 12 operations. */
 static inline void bp_relative(const double *restrict x, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, double *restrict r)
 {
     (void)u;
     (void)p;
-    (void)w;
     double w0 = c[37];
     r[0] = w0;
     w0 = x[0];
@@ -645,11 +644,16 @@ static inline void bp_relative(const double *restrict x, const double *restrict 
     w5 = w5 * w0;
     w4 = w4 - w5;
     r[4] = w4;
+    w4 = w[0];
+    r[5] = w4;
+    w4 = w[1];
+    r[6] = w4;
 }
 
 /* Accelerations from the sums over the balls. 14 operations. */
-static inline void bp_acceleration(const double *restrict x, const double *restrict S, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, double *restrict a)
+static inline void bp_acceleration(const double *restrict x, const double *restrict S, const double *restrict r, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, double *restrict a)
 {
+    (void)r;
     (void)u;
     double w0 = c[16];
     double w1 = w[2];
@@ -684,10 +688,11 @@ static inline void bp_acceleration(const double *restrict x, const double *restr
 }
 
 /* Derivatives of the accelerations by positions and velocities, row-major. 46 operations. */
-static inline void bp_acceleration_jacobian(const double *restrict x, const double *restrict S, const double *restrict G, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, double *restrict A, double *restrict B)
+static inline void bp_acceleration_jacobian(const double *restrict x, const double *restrict S, const double *restrict G, const double *restrict r, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, double *restrict A, double *restrict B)
 {
     (void)x;
     (void)S;
+    (void)r;
     (void)u;
     (void)w;
     double w0 = c[16];
@@ -781,7 +786,7 @@ static inline void bp_acceleration_jacobian(const double *restrict x, const doub
     B[15] = w0;
 }
 
-/* Partial time derivative of the accelerations at fixed state. 26 operations. */
+/* Partial time derivative of the accelerations at fixed state. 44 operations. */
 static inline void bp_acceleration_rate(const double *restrict x, const double *restrict S, const double *restrict G, const double *restrict r, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, const double *restrict wt, double *restrict at)
 {
     (void)x;
@@ -791,50 +796,71 @@ static inline void bp_acceleration_rate(const double *restrict x, const double *
     double w0 = c[16];
     double w1 = wt[2];
     w1 = w0 * w1;
-    double w2 = r[2];
-    double w3 = G[0];
-    w3 = w2 * w3;
-    double w4 = r[1];
-    double w5 = G[1];
-    double w6 = w4 * w5;
-    w3 = w3 - w6;
-    w6 = r[3];
-    double w7 = G[4];
-    double w8 = w6 * w7;
-    w3 = w3 - w8;
-    w8 = r[4];
-    double w9 = G[3];
-    w9 = w8 * w9;
-    w3 = w3 + w9;
-    w9 = S[1];
-    w3 = w3 - w9;
-    w9 = c[12];
-    w3 = w3 * w9;
-    double w10 = w0 * w3;
-    w1 = w1 - w10;
+    double w2 = r[6];
+    double w3 = r[2];
+    double w4 = G[0];
+    w4 = w3 * w4;
+    double w5 = r[1];
+    double w6 = G[1];
+    double w7 = w5 * w6;
+    w4 = w4 - w7;
+    w7 = r[3];
+    double w8 = G[4];
+    double w9 = w7 * w8;
+    w4 = w4 - w9;
+    w9 = r[4];
+    double w10 = G[3];
+    w10 = w9 * w10;
+    w4 = w4 + w10;
+    w10 = S[1];
+    w4 = w4 - w10;
+    w10 = w2 * w4;
+    double w11 = w0 * w10;
+    double w12 = wt[0];
+    w11 = w11 * w12;
+    double w13 = r[5];
+    w4 = w13 * w4;
+    double w14 = w0 * w4;
+    double w15 = wt[1];
+    w14 = w14 * w15;
+    w11 = w11 - w14;
+    w1 = w1 + w11;
     at[0] = w1;
     w1 = wt[3];
     w1 = w0 * w1;
-    w2 = w2 * w5;
-    w5 = G[2];
-    w4 = w4 * w5;
-    w2 = w2 - w4;
-    w4 = G[5];
-    w6 = w6 * w4;
-    w2 = w2 - w6;
-    w8 = w8 * w7;
-    w2 = w2 + w8;
-    w8 = S[0];
-    w2 = w2 + w8;
-    w2 = w2 * w9;
-    w0 = w0 * w2;
-    w1 = w1 - w0;
+    w3 = w3 * w6;
+    w6 = G[2];
+    w5 = w5 * w6;
+    w3 = w3 - w5;
+    w5 = G[5];
+    w7 = w7 * w5;
+    w3 = w3 - w7;
+    w9 = w9 * w8;
+    w3 = w3 + w9;
+    w9 = S[0];
+    w3 = w3 + w9;
+    w2 = w2 * w3;
+    w9 = w0 * w2;
+    w9 = w9 * w12;
+    w13 = w13 * w3;
+    w0 = w0 * w13;
+    w0 = w0 * w15;
+    w9 = w9 - w0;
+    w1 = w1 + w9;
     at[1] = w1;
     w1 = c[31];
-    w3 = w1 * w3;
-    at[2] = w3;
+    w4 = w1 * w4;
+    w4 = w4 * w15;
+    w10 = w1 * w10;
+    w10 = w10 * w12;
+    w4 = w4 - w10;
+    at[2] = w4;
+    w13 = w1 * w13;
+    w13 = w13 * w15;
     w1 = w1 * w2;
-    at[3] = w1;
+    w1 = w1 * w12;
+    w13 = w13 - w1;
+    at[3] = w13;
 }
 
 /* Angles of a stage and their rates. 4 operations. */

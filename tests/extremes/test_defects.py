@@ -145,10 +145,10 @@ def test_the_most_deflected_ball_is_the_one_the_ring_presses_on(make_model: Mode
     for ball, angle in ((1, 0.0), (3, math.pi / 2.0), (6, 5.0 * math.pi / 4.0)):
         x = np.zeros(8)
         x[0], x[1] = 2e-5 * math.cos(angle), 2e-5 * math.sin(angle)
-        place = whereabouts(model.manifest, numbers, 0.0, x)
+        place = whereabouts(model, numbers, 0.0, x)
         assert place.ball == ball
         assert place.deflection == pytest.approx(2e-5 - 5e-6, rel=1e-12)  # less half the clearance, Eq. (6)
-    assert whereabouts(model.manifest, numbers, 0.0, np.full(8, math.nan)).ball is None
+    assert whereabouts(model, numbers, 0.0, np.full(8, math.nan)).ball is None
 
 
 def test_phases_stay_small_within_a_segment(make_model: ModelMaker, scene_text: Callable[..., str]) -> None:

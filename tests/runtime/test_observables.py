@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -9,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ballpass.runtime import Model
 from ballpass.runtime.ask.observables import (
-    ball_angles,
     drive_work,
     kinematic_frequencies,
     orbits,
@@ -20,6 +21,7 @@ from ballpass.runtime.ask.observables import (
 )
 from ballpass.runtime.ask.spectrum import amplitude_spectrum, whole_cycles
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.run.ball_angles import ball_angles
 
 TURN = 2.0 * np.pi
 INCH = 25.4e-3
@@ -68,10 +70,14 @@ class TestKinematicFrequencies:
             kinematic_frequencies(*case)
 
 
-def test_a_ball_passes_a_point_of_the_outer_ring_at_the_ball_pass_frequency() -> None:
-    frequencies = kinematic_frequencies(8, 7.9375e-3, 33.5e-3, 50.0)
-    time = np.array([0.0, 1.0 / frequencies.ball_pass_outer])
-    first, later = ball_angles(time, balls=8, cage_speed=TURN * frequencies.cage, ball_angle=0.3)
+def test_a_ball_passes_a_point_of_the_outer_ring_at_the_ball_pass_frequency(make_model: Callable[..., Model]) -> None:
+    model = make_model("varying_compliance")
+    numbers = model.numbers({"bearing.ball_angle": 0.3, "shaft.speed": 50.0})
+    values = [numbers.values[f"bearing.{name}"] for name in ("ball_diameter", "pitch_diameter")]
+    frequencies = kinematic_frequencies(model.manifest.bearings[0].balls, *values, 50.0)
+    state = np.zeros(len(model.states))
+    (first,) = ball_angles(model, numbers, 0.0, state)
+    (later,) = ball_angles(model, numbers, 1.0 / frequencies.ball_pass_outer, state)
     assert first[0] == pytest.approx(0.3)
     assert later[:-1] == pytest.approx(first[1:])
 

@@ -122,7 +122,7 @@ def test_messages_name_the_bearing_they_speak_of(pair: Model) -> None:
     assert not any("bearings.right" in str(item.message) for item in caught)
     state = np.zeros(12)
     state[4] = 2e-5  # right.inner.x
-    place = whereabouts(pair.manifest, pair.numbers(), 0.0, state)
+    place = whereabouts(pair, pair.numbers(), 0.0, state)
     assert (place.bearing, place.ball) == ("right", 1)
     assert place.deflection == pytest.approx(2e-5 - 3e-6, rel=1e-12)  # less half its clearance, Eq. (6)
     assert "ball 1 of right" in place.words

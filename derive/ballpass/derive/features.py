@@ -180,7 +180,7 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
             modelled="kink of the one-sided law at rest smoothed over a given speed",
             without=_without_smoothing(scene, kinked, f"{bearing.path}.damping.smoothing"),
         )
-    if bearing.inner.damping is not None:
+    if bearing.inner is not None and bearing.inner.damping is not None:
         free = replace(bearing, inner=InnerRing(mass=bearing.inner.mass, damping=None))
         yield Feature(
             name=f"inner ring damping{of}",
@@ -226,13 +226,14 @@ def _is_free(scene: Scene) -> bool:
 
 
 def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
-    """The bearings alone on their shaft, unloaded; None where there is none."""
-    if not scene.bearings:
+    """The bearings alone on their shaft, unloaded; None where there is none, or they act back on the mechanism."""
+    if not scene.bearings or scene.coupled:
         return None
     quantities = list(scene.quantities)
     bearings = []
     for bearing in scene.bearings:
         inner = bearing.inner
+        assert inner is not None  # loaded one-way
         if isinstance(inner.mass, EquivalentMass):
             path = f"{bearing.path}.inner_ring.mass"
             number = Quantity(path=path, value=1.0, unit="kg", description="Mass of the inner ring", latex="m_i")

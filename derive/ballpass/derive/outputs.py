@@ -17,8 +17,8 @@ from ballpass.derive.scene.records import Mechanism
 from ballpass.derive.variables import DRIVER_ANGLE, Output
 
 
-def bearing_outputs(bearing: BearingModel) -> list[Output]:
-    """What a bearing reports, in the order it is listed: rings, balls, sums over the balls, load."""
+def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None) -> list[Output]:
+    """What a bearing reports, in the order it is listed: rings, balls, sums over the balls, load on the inner ring."""
     prefix = bearing.names.prefix
     of = f" of {prefix[:-1]}" if prefix else ""
     out: list[Output] = []
@@ -44,7 +44,7 @@ def bearing_outputs(bearing: BearingModel) -> list[Output]:
     for axis, total in zip("xy", ball.sums, strict=True):
         words = f"Force of the inner ring on the balls{of} along {axis}, Eqs. (8) and (9)"
         out.append(Output(name=f"{prefix}ring_force.{axis}", expression=total.symbol, unit="N", description=words))
-    for axis, force in zip("xy", bearing.load, strict=True):
+    for axis, force in zip("xy", load or (), strict=False):
         words = f"External load on the inner ring{of} along {axis}"
         out.append(Output(name=f"{prefix}load.{axis}", expression=force, unit="N", description=words))
     return out

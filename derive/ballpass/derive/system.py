@@ -8,25 +8,37 @@ Only what the scene names is derived: no mechanism, no linkage equations; a fixe
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.bearing.equations import BearingModel, derive_bearing
+from ballpass.derive.bearing.cage import cage_between, cage_on_shaft
+from ballpass.derive.bearing.equations import (
+    BearingModel,
+    RingMotion,
+    derive_bearing,
+    ring_coordinates,
+    ring_motion,
+)
 from ballpass.derive.bearing.equivalent_mass import inner_mass
 from ballpass.derive.bearing.ring_load import RingLoad, own_load, reaction_share
-from ballpass.derive.drive import constant_speed
+from ballpass.derive.bearing.two_way import couple, play_of
+from ballpass.derive.drive import Drive, constant_speed
 from ballpass.derive.events import Event, events_of
 from ballpass.derive.mechanism.forces import Forces, derive_forces
-from ballpass.derive.mechanism.linkage import Linkage, check_assembly, derive_linkage
+from ballpass.derive.mechanism.kinematics import Play
+from ballpass.derive.mechanism.linear_forms import LinearForms
+from ballpass.derive.mechanism.linkage import NO_PLAY, Linkage, check_assembly, derive_linkage
+from ballpass.derive.mechanism.power import inertia_of, work_of
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
+from ballpass.derive.mechanism.swing import STILL, WITH_DRIVER, swing_of
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
 from ballpass.derive.scene.errors import LinkageError, SceneError
-from ballpass.derive.scene.records import Bearing, Scene
-from ballpass.derive.terms import Definition, Names, Smoothness, symbol_of
-from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, phase
+from ballpass.derive.scene.records import FRAME, Bearing, Mechanism, Scene
+from ballpass.derive.terms import Definition, Smoothness, symbol_of
+from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,6 +66,18 @@ class System:
     outputs: tuple[Output, ...]
     smoothness: tuple[tuple[str, Smoothness], ...]
     events: tuple[Event, ...]
+
+    @property
+    def late(self) -> dict[sp.Symbol, sp.Expr]:
+        """Definitions that use the sums over the balls or the accelerations, by their symbols."""
+        known = {s.symbol for bearing in self.bearings for s in bearing.ball.sums}
+        known |= {c.acceleration for c in self.coordinates}
+        found: dict[sp.Symbol, sp.Expr] = {}
+        for definition in self.definitions:
+            if not definition.expression.free_symbols.isdisjoint(known):
+                known.add(definition.symbol)
+                found[definition.symbol] = definition.expression
+        return found
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -85,7 +109,11 @@ def derive(scene: Scene) -> System:
         that can be told together, with their lines; `LinkageError` where all are of the linkage.
     """
     errors: list[SceneError] = []
-    system = _derive(scene, errors)
+    mechanism = scene.mechanism
+    if mechanism is None:
+        system: System | None = _on_shaft(scene, errors)
+    else:
+        system = _two_way(scene, mechanism, errors) if scene.coupled else _one_way(scene, mechanism, errors)
     if errors:
         kind = LinkageError if all(isinstance(error, LinkageError) for error in errors) else SceneError
         raise kind(scene.lines.place(fault for error in errors for fault in error.faults))
@@ -102,54 +130,194 @@ def _noted(errors: list[SceneError]) -> Iterator[None]:
         errors.append(error)
 
 
-def _derive(scene: Scene, errors: list[SceneError]) -> System | None:
-    inputs: list[Input] = []
-    definitions: list[Definition] = []
-    linkage: Linkage | None = None
-    reactions: Reactions | None = None
-    forces: Forces | None = None
-    mechanism = scene.mechanism
-    if mechanism is not None:
-        drive = constant_speed(mechanism.driver)
+def _on_shaft(scene: Scene, errors: list[SceneError]) -> System:
+    """Bearings on a shaft, under the scene's own load."""
+    own = own_load(scene) if scene.bearings else RingLoad(force=(sp.S.Zero, sp.S.Zero))
+    speed = sp.S.Zero if scene.shaft is None else symbol_of(scene.shaft.speed)
+    rings = [_rings(bearing, speed, own.force, inner_mass(bearing, None)) for bearing in scene.bearings]
+    return _of_rings(scene, rings, errors, inputs=own.inputs, definitions=own.definitions, constants=own.constants)
+
+
+def _linked(
+    scene: Scene, mechanism: Mechanism, drive: Drive, play: Play, errors: list[SceneError]
+) -> tuple[Linkage, Forces] | None:
+    """The linkage and what acts on it; None, with what is wrong noted."""
+    linkage, forces = None, None
+    with _noted(errors):
+        linkage = derive_linkage(mechanism, drive, play)
         with _noted(errors):
-            linkage = derive_linkage(mechanism, drive)
-            with _noted(errors):
-                forces = derive_forces(mechanism, linkage, drive)
-            with _noted(errors):
-                check_assembly(linkage, {q.path: q.value for q in scene.quantities})
-            moments = frozenset(
-                j.name
-                for j in mechanism.joints
-                if j.kind == "prismatic" and is_asked(scene.outputs, f"reaction.{j.name}.moment")
-            )
-            reactions = derive_reactions(mechanism, linkage, forces.loads if forces is not None else (), moments)
+            forces = derive_forces(mechanism, linkage, drive)
+        with _noted(errors):
+            check_assembly(linkage, {q.path: q.value for q in scene.quantities})
+        if forces is None:
+            derive_reactions(mechanism, linkage, (), _moments(scene, mechanism))  # for its faults
+    return None if linkage is None or forces is None else (linkage, forces)
+
+
+def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> System | None:
+    """An ideal linkage, and the bearings that its reactions load."""
+    drive = constant_speed(mechanism.driver)
+    linked, reactions = _linked(scene, mechanism, drive, NO_PLAY, errors), None
+    if linked is not None:
+        linkage, forces = linked
+        with _noted(errors):
+            reactions = derive_reactions(mechanism, linkage, forces.loads, _moments(scene, mechanism))
     masses = []
     for bearing in scene.bearings:
         with _noted(errors):
             masses.append(inner_mass(bearing, mechanism))
-    if len(masses) < len(scene.bearings):
+    if linked is None or reactions is None or len(masses) < len(scene.bearings):
         return None
-    if mechanism is not None:
-        if linkage is None or forces is None or reactions is None:
-            return None
-        inputs += [drive.phase, *forces.inputs]
-        definitions += [*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions]
+    speed = symbol_of(mechanism.driver.speed)
+    rings = [
+        _rings(bearing, speed, reaction_share(scene, bearing, reactions).force, mass)
+        for bearing, mass in zip(scene.bearings, masses, strict=True)
+    ]
+    return _of_rings(
+        scene,
+        rings,
+        errors,
+        inputs=(drive.phase, *forces.inputs),
+        definitions=(*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions),
+        quantities=(*mechanism_outputs(mechanism, linkage, reactions), *forces.outputs),
+        linkage=linkage,
+        reactions=reactions,
+    )
 
-    own = own_load(scene) if scene.bearings and reactions is None else RingLoad(force=(sp.S.Zero, sp.S.Zero))
-    inputs += own.inputs
-    definitions += own.definitions
-    bearings = []
-    for bearing, mass in zip(scene.bearings, masses, strict=True):
-        load = reaction_share(scene, bearing, reactions).force if reactions is not None else own.force
-        model, cage = _bearing(scene, bearing, load, mass)
-        bearings.append(model)
-        inputs.append(cage)
-    quantities = [output for bearing in bearings for output in bearing_outputs(bearing)]
-    if mechanism is not None and linkage is not None and reactions is not None and forces is not None:
-        quantities += [*mechanism_outputs(mechanism, linkage, reactions), *forces.outputs]
+
+def _two_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> System | None:
+    """A linkage whose joints have the play of its bearings: one set of equations of motion."""
+    drive = constant_speed(mechanism.driver)
+    rings = {bearing.name: ring_coordinates(bearing) for bearing in scene.bearings}
+    coordinates = tuple(c for several in rings.values() for c in several)
+    positions = tuple(c.position for c in coordinates)
+    joints = {bearing.name: mechanism.joint(bearing.joint or "") for bearing in scene.bearings}
+    play = {joints[b.name].name: play_of(b, joints[b.name], rings[b.name]) for b in scene.bearings}
+    linked = _linked(scene, mechanism, drive, play, errors)
+    if linked is None:
+        return None
+    linkage, forces = linked
+    start, speed = symbol_of(mechanism.driver.start_angle), symbol_of(mechanism.driver.speed)
+    swings = {FRAME: STILL, linkage.driven: WITH_DRIVER}
+    cages, models, coupled = [], [], []
+    for bearing in scene.bearings:
+        bodies = (bearing.inner_body, joints[bearing.name].other(bearing.inner_body))
+        for body in bodies:
+            swings.setdefault(body, swing_of(linkage.pose(body), start, positions))
+        poses, turned = tuple(map(linkage.pose, bodies)), tuple(swings[body] for body in bodies)
+        cage = cage_between(bearing, (poses[0], poses[1]), (turned[0], turned[1]), speed)
+        cages.append(cage)
+        models.append(derive_bearing(bearing, cage))
+        coupled.append(couple(bearing, models[-1], mechanism, linkage))
+    loads = (*forces.loads, *(load for part in coupled for load in part.loads))
+    reactions = None
+    with _noted(errors):
+        reactions = derive_reactions(mechanism, linkage, loads, _moments(scene, mechanism))
+    if reactions is None:
+        return None
+    known = (
+        *drive.definitions,
+        *linkage.definitions,
+        *forces.definitions,
+        *(d for swing in swings.values() for d in swing.definitions),
+        *(d for cage in cages for d in cage.definitions),
+    )
+    inertias, weights = inertia_of(mechanism, linkage)
+    motion = LinearForms(known, coordinates).motion(
+        (*inertias, *(i for part in coupled for i in part.inertias)),
+        (*weights, *work_of(forces.loads, linkage), *(e for part in coupled for e in part.efforts)),
+    )
+    return _system(
+        scene,
+        models,
+        errors,
+        inputs=(drive.phase, *forces.inputs, *(cage.phase for cage in cages)),
+        definitions=(*known, *reactions.definitions, *motion.definitions),
+        constants=(
+            *(c for swing in swings.values() for c in swing.constants),
+            *(c for model in models for c in model.constants),
+        ),
+        quantities=(
+            *(output for model in models for output in bearing_outputs(model, None)),
+            *mechanism_outputs(mechanism, linkage, reactions),
+            *forces.outputs,
+        ),
+        mass=motion.mass,
+        forcing=motion.forcing,
+        linkage=linkage,
+        reactions=reactions,
+    )
+
+
+def _moments(scene: Scene, mechanism: Mechanism) -> frozenset[str]:
+    """Guides on the frame whose moment is asked for."""
+    guides = (joint.name for joint in mechanism.joints if joint.kind == "prismatic")
+    return frozenset(name for name in guides if is_asked(scene.outputs, f"reaction.{name}.moment"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rings:
+    """A bearing loaded one-way, with the phase of its cage."""
+
+    model: BearingModel
+    motion: RingMotion
+    phase: Input
+
+
+def _rings(bearing: Bearing, shaft_speed: sp.Expr, load: tuple[sp.Expr, sp.Expr], mass: sp.Expr) -> _Rings:
+    cage = cage_on_shaft(bearing, shaft_speed)
+    model = derive_bearing(bearing, cage)
+    motion = ring_motion(bearing, model, load, mass)
+    return _Rings(model=model, motion=motion, phase=cage.phase)
+
+
+def _of_rings(
+    scene: Scene,
+    rings: Sequence[_Rings],
+    errors: list[SceneError],
+    *,
+    inputs: tuple[Input, ...],
+    definitions: tuple[Definition, ...],
+    constants: tuple[Definition, ...] = (),
+    quantities: tuple[Output, ...] = (),
+    linkage: Linkage | None = None,
+    reactions: Reactions | None = None,
+) -> System:
+    """The system of bearings that do not act back on what loads them."""
+    return _system(
+        scene,
+        [one.model for one in rings],
+        errors,
+        inputs=(*inputs, *(one.phase for one in rings)),
+        definitions=definitions,
+        constants=(*(c for one in rings for c in (*one.model.constants, *one.motion.constants)), *constants),
+        quantities=(*(q for one in rings for q in bearing_outputs(one.model, one.motion.load)), *quantities),
+        mass=sp.ImmutableMatrix(sp.diag(*(one.motion.mass for one in rings))),
+        forcing=sp.ImmutableMatrix(
+            sum(len(one.motion.forcing) for one in rings), 1, [e for one in rings for e in one.motion.forcing]
+        ),
+        linkage=linkage,
+        reactions=reactions,
+    )
+
+
+def _system(
+    scene: Scene,
+    bearings: Sequence[BearingModel],
+    errors: list[SceneError],
+    *,
+    inputs: tuple[Input, ...],
+    definitions: tuple[Definition, ...],
+    constants: tuple[Definition, ...],
+    quantities: tuple[Output, ...],
+    mass: sp.ImmutableMatrix,
+    forcing: sp.ImmutableMatrix,
+    linkage: Linkage | None,
+    reactions: Reactions | None,
+) -> System:
     outputs: tuple[Output, ...] = ()
     with _noted(errors):
-        outputs = select_outputs(quantities, scene.outputs)
+        outputs = select_outputs(list(quantities), scene.outputs)
     return System(
         scene=scene,
         parameters=tuple(
@@ -158,46 +326,23 @@ def _derive(scene: Scene, errors: list[SceneError]) -> System | None:
             )
             for q in scene.quantities
         ),
-        inputs=tuple(inputs),
+        inputs=inputs,
         coordinates=tuple(c for bearing in bearings for c in bearing.coordinates),
         initial=_initial(scene.bearings),
-        constants=(*(c for bearing in bearings for c in bearing.constants), *own.constants),
-        definitions=tuple(definitions),
-        mass=sp.ImmutableMatrix(sp.diag(*(bearing.mass for bearing in bearings))),
-        forcing=sp.ImmutableMatrix(sum(len(b.forcing) for b in bearings), 1, [e for b in bearings for e in b.forcing]),
+        constants=constants,
+        definitions=definitions,
+        mass=mass,
+        forcing=forcing,
         linkage=linkage,
         reactions=reactions,
         bearings=tuple(bearings),
-        quantities=tuple(quantities),
+        quantities=quantities,
         outputs=outputs,
         smoothness=tuple(
             (f"{bearing.names.prefix}{name}", law.anywhere) for bearing in bearings for name, law in bearing.laws
         ),
         events=events_of(inputs, bearings),
     )
-
-
-def _bearing(
-    scene: Scene, bearing: Bearing, load: tuple[sp.Expr, sp.Expr], mass: sp.Expr
-) -> tuple[BearingModel, Input]:
-    """A bearing on the driven body or the shaft, and the phase of its cage."""
-    shaft = scene.mechanism.driver.speed if scene.mechanism is not None else scene.shaft.speed if scene.shaft else None
-    assert shaft is not None  # the reader requires it
-    cage = phase(
-        f"{bearing.prefix}cage",
-        f"Angle of ball 1{f' of {bearing.name}' if bearing.name else ''} at the reference time",
-        Names(prefix=bearing.prefix, path=bearing.path).latex(r"\psi_0"),
-        offset=bearing.ball_angle.path,
-        rate=f"{bearing.path}.cage_speed",
-    )
-    model = derive_bearing(
-        bearing,
-        shaft_speed=symbol_of(shaft),
-        cage_phase=cage.symbol,
-        load=load,
-        inner_mass=mass,
-    )
-    return model, cage
 
 
 def _initial(bearings: tuple[Bearing, ...]) -> tuple[str, ...]:

@@ -78,6 +78,11 @@ class Coordinate:
     group: str
     partner: str = ""
 
+    @property
+    def acceleration(self) -> sp.Symbol:
+        """Symbol of the second time derivative."""
+        return sp.Symbol(f"acceleration.{self.name}", real=True)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class State:

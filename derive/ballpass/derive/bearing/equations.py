@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from ballpass.derive.bearing.cage import Cage
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.bearing.laws.contact import Contact, Rest
@@ -33,7 +34,7 @@ class Ball:
 
     Attributes
     ----------
-    cage_angle, cage_speed : angle of ball 1 [rad] and its rate [rad/s]
+    cage_angle, cage_speed : angle of ball 1 [rad] and its rate [rad/s], constant where the coupling is one-way
     cos, sin : of the angle of ball j
     deflection, deflection_rate, elastic_force, damping_force, force : symbols; no damping force is None
     own : what effects take from the deflection, None without effects
@@ -60,62 +61,44 @@ class Ball:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BearingModel:
-    """Equations of motion ``mass * acceleration = forcing`` of one bearing's rings, and what they need."""
+    """Contact between the rings of one bearing, over coordinates of the rings."""
 
     names: Names
     constants: tuple[Definition, ...]
     coordinates: tuple[Coordinate, ...]
     ball: Ball
-    load: Pair
-    mass: sp.ImmutableMatrix
-    forcing: sp.ImmutableMatrix
+    gradient: tuple[sp.Expr, ...]  # of a ball's deflection along the coordinates
     laws: tuple[tuple[str, LawSmoothness], ...]  # elastic, and damping where there is some
 
 
-def derive_bearing(
-    bearing: Bearing, *, shaft_speed: sp.Expr, cage_phase: sp.Expr, load: Pair, inner_mass: sp.Expr
-) -> BearingModel:
-    """Equations of motion of the rings.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RingMotion:
+    """Equations of motion ``mass * acceleration = forcing`` of a bearing's rings."""
 
-    Parameters
-    ----------
-    shaft_speed : speed of the inner ring [rad/s]
-    cage_phase : angle of ball 1 at the reference time [rad]
-    load : force on the inner ring, x and y [N]
-    inner_mass : mass moved by the inner ring [kg], an expression of parameters
-    """
+    constants: tuple[Definition, ...]
+    load: Pair
+    mass: sp.ImmutableMatrix
+    forcing: sp.ImmutableMatrix
+
+
+def derive_bearing(bearing: Bearing, cage: Cage) -> BearingModel:
+    """Contact of the balls; `cage` says how they turn."""
     names = Names(prefix=bearing.prefix, path=bearing.path)
-    stiffness, speed, mass = (names.constant(n) for n in ("k_b", "cage_speed", "m_ei"))
-    ratio = names.constant("cage_ratio")
-    ball_diameter, pitch_diameter = symbol_of(bearing.ball_diameter), symbol_of(bearing.pitch_diameter)
-    constants = [
-        *stiffness_constants(bearing, names),
-        names.define(
-            ratio,
-            (1 - ball_diameter / pitch_diameter) / 2,
-            "1",
-            "Speed of the cage over speed of the inner ring, r_b/(R_b + r_b), Eq. (7)",
-            r"\omega_c/\omega",
-        ),
-        names.define(speed, ratio * shaft_speed, "rad/s", "Speed of the cage", r"\omega_c"),
-        names.define(mass, inner_mass, "kg", "Mass moved by the inner ring, Eq. (3) or given", "m_{ei}"),
-    ]
+    stiffness = names.constant("k_b")
+    constants = [*stiffness_constants(bearing, names), *cage.constants]
     law = LAWS[bearing.damping.law]
     numbers = {q.path.rpartition(".")[2]: symbol_of(q) for q in bearing.damping.numbers}
     coefficient = law.coefficient(numbers, stiffness)
     if coefficient != 0:
         constants.append(names.define(names.constant("c_b"), coefficient, law.unit, law.words, law.latex))
-    coordinates = _coordinates(bearing, names)
-    ball, gradient, parts = _ball(bearing, names, coordinates, cage_phase)
-    matrix, forcing = _lagrange(bearing, coordinates, mass, gradient, ball, load)
+    coordinates = ring_coordinates(bearing)
+    ball, gradient, parts = _ball(bearing, names, coordinates, cage)
     return BearingModel(
         names=names,
         constants=tuple(constants),
         coordinates=coordinates,
         ball=ball,
-        load=load,
-        mass=matrix,
-        forcing=forcing,
+        gradient=tuple(gradient),
         laws=tuple(
             (name, smoothness_of(part, ball.deflection, ball.deflection_rate))
             for name, part in zip(("elastic", "damping"), parts, strict=False)
@@ -123,7 +106,9 @@ def derive_bearing(
     )
 
 
-def _coordinates(bearing: Bearing, names: Names) -> tuple[Coordinate, ...]:
+def ring_coordinates(bearing: Bearing) -> tuple[Coordinate, ...]:
+    """Centres of the rings: of the frame's axes, from where they are unloaded."""
+    names = Names(prefix=bearing.prefix, path=bearing.path)
     rings = [("inner", "inner ring", "i")] + ([("outer", "outer ring", "o")] if bearing.outer else [])
     of = f" of {bearing.name}" if bearing.name else ""
     return tuple(
@@ -144,10 +129,10 @@ def _coordinates(bearing: Bearing, names: Names) -> tuple[Coordinate, ...]:
 
 
 def _ball(
-    bearing: Bearing, names: Names, coordinates: tuple[Coordinate, ...], cage_phase: sp.Expr
+    bearing: Bearing, names: Names, coordinates: tuple[Coordinate, ...], cage: Cage
 ) -> tuple[Ball, list[sp.Expr], list[sp.Expr]]:
     """The generic ball, d(delta_j)/d(coordinate) for each coordinate, and the parts of its force."""
-    cos, sin, speed = names.variable("ball.cos"), names.variable("ball.sin"), names.constant("cage_speed")
+    cos, sin, speed = names.variable("ball.cos"), names.variable("ball.sin"), cage.rate
     motion = {c.position: sp.Function(c.name)(TIME) for c in coordinates}
     angle = sp.Function("theta")(TIME)
     # Eq. (6); a fixed outer ring has no coordinates
@@ -207,7 +192,7 @@ def _ball(
     )
     ball = Ball(
         count=bearing.balls,
-        cage_angle=cage_phase + speed * TIME,
+        cage_angle=cage.angle,
         cage_speed=speed,
         cos=cos,
         sin=sin,
@@ -225,19 +210,20 @@ def _ball(
     return ball, gradient, parts
 
 
-def _lagrange(
-    bearing: Bearing,
-    coordinates: tuple[Coordinate, ...],
-    inner_mass: sp.Expr,
-    gradient: list[sp.Expr],
-    ball: Ball,
-    load: Pair,
-) -> tuple[sp.ImmutableMatrix, sp.ImmutableMatrix]:
-    """Lagrange's equations of the second kind, mass matrix and forcing apart, Eq. (2)."""
+def ring_motion(bearing: Bearing, model: BearingModel, load: Pair, inner_mass: sp.Expr) -> RingMotion:
+    """Lagrange's equations of the second kind for rings under a load, mass matrix and forcing apart, Eq. (2).
+
+    Parameters
+    ----------
+    load : force on the inner ring, x and y [N]
+    inner_mass : mass moved by the inner ring [kg], an expression of parameters
+    """
+    coordinates, ball, moved = model.coordinates, model.ball, model.names.constant("m_ei")
+    assert bearing.inner is not None  # one-way coupling
     q = [c.position for c in coordinates]
     v = [c.velocity for c in coordinates]
     half = sp.Rational(1, 2)
-    kinetic = half * inner_mass * (v[0] ** 2 + v[1] ** 2)
+    kinetic = half * moved * (v[0] ** 2 + v[1] ** 2)
     potential: sp.Expr = sp.S.Zero
     dissipation: sp.Expr = sp.S.Zero  # Rayleigh's function
     if bearing.inner.damping is not None:
@@ -250,9 +236,15 @@ def _lagrange(
     mass = sp.ImmutableMatrix(sp.hessian(kinetic, v))
     sum_x, sum_y = (s.symbol for s in ball.sums)
     forcing = []
-    for k, slope in enumerate(gradient):
+    for k, slope in enumerate(model.gradient):
         # virtual work of the balls: -sum_j F_j d(delta_j)/d(q_k), linear in cos and sin of theta_j
         contact = -(slope.coeff(ball.cos) * sum_x + slope.coeff(ball.sin) * sum_y)
         applied = load[k] if k < 2 else sp.S.Zero
         forcing.append(applied + contact - sp.diff(potential, q[k]) - sp.diff(dissipation, v[k]))
-    return mass, sp.ImmutableMatrix(forcing)
+    words = "Mass moved by the inner ring, Eq. (3) or given"
+    return RingMotion(
+        constants=(model.names.define(moved, inner_mass, "kg", words, "m_{ei}"),),
+        load=load,
+        mass=mass,
+        forcing=sp.ImmutableMatrix(forcing),
+    )

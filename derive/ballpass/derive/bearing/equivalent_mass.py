@@ -20,6 +20,7 @@ def inner_mass(bearing: Bearing, mechanism: Mechanism | None) -> sp.Expr:
     SceneError
         Eq. (3) for a body without exactly one far joint.
     """
+    assert bearing.inner is not None  # loaded one-way
     given = bearing.inner.mass
     if not isinstance(given, EquivalentMass):
         return symbol_of(given)

@@ -123,6 +123,7 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
 def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
     scene = system.scene
     speed = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
+    driven = system.linkage.driven if system.linkage is not None else ""
     laws = [dict(bearing.laws).get("damping") for bearing in system.bearings]
     return tuple(
         mf.BearingInfo(
@@ -131,7 +132,12 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             path=bearing.path,
             balls=bearing.balls,
             joint=bearing.joint or "",
-            shaft_speed=speed.path if speed is not None else "",
+            inner_body=bearing.inner_body or driven if bearing.joint is not None else "",
+            ring_speed=f"{bearing.path}.ring_speed"
+            if bearing.coupling == "two-way"
+            else speed.path
+            if speed is not None
+            else "",
             outer_ring=bearing.outer is not None,
             damping=mf.DampingInfo(law=bearing.damping.law)
             if law is None

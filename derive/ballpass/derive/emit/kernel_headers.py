@@ -60,7 +60,8 @@ def kernels_header(system: System, functions: Functions, kernels: Kernels) -> st
         "BP_BEARINGS": count,
         "BP_NB": sum(b.balls for b in kernels.bearings),
         "BP_NS": SUMS * count,
-        "BP_NR": RELATIVE * count,
+        "BP_RELATIVE": RELATIVE,
+        "BP_NR": kernels.relative_size,
         "BP_NG": kernels.slopes,
         "BP_LANES": LANES,
     }

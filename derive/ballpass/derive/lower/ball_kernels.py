@@ -3,7 +3,8 @@
 In: the generic ball, and visitors of a lowering.  Out: `BallKernels`, small SX functions over
 
     co, si   direction of the ball
-    r        delta = r0 + r1 co + r2 si - e,  d(delta)/dt = r3 co + r4 si - de/dt,  e: what effects take (own_terms)
+    r        delta = r0 + r1 co + r2 si - e,  d(delta)/dt = r3 co + r4 si - de/dt,  e: what effects take (own_terms);
+             r5, r6: cosine and sine of the cage's angle
     k        numbers of the ball: entries of p, c and w, gathered once by ``numbers``
 
 Each gives *rows*, summands over the balls; the C driver loops over balls (lanes), adds the rows up, and knows counts
@@ -32,8 +33,11 @@ import sympy as sp
 from ballpass.derive.bearing.equations import BearingModel
 from ballpass.derive.lower.visitor import Visitor
 
-#: Coefficients of a ball's deflection and rate: three and two.
-RELATIVE = 5
+#: Coefficients of a ball's deflection and rate, three and two, and the direction of the cage.
+RELATIVE = 7
+
+#: Those of the deflection and its rate.
+RINGS = 5
 
 #: Rows of the sums.
 SUMS = 2
@@ -87,7 +91,7 @@ class BallBuilder:
 
     def __init__(self, bearing: BearingModel, visit: Visitor, of_state: Visitor) -> None:
         self.bearing, self._visit, self._of_state = bearing, visit, of_state
-        self.co, self.si, self.r = ca.SX.sym("co"), ca.SX.sym("si"), ca.SX.sym("r", RELATIVE)
+        self.co, self.si, self.r = ca.SX.sym("co"), ca.SX.sym("si"), ca.SX.sym("r", RINGS)
         self._definitions = {d.symbol: d.expression for d in bearing.ball.definitions}
         self.relative = self._relative()
         co, si, r = self.co, self.si, self.r
@@ -118,6 +122,7 @@ class BallBuilder:
             if rest.has(ball.cos, ball.sin) or (not constant and rest != 0):
                 raise UnfitError(f"{which} is not linear in the direction of the ball")
             rows += [rest, along, across] if constant else [along, across]
+        rows += [sp.cos(ball.cage_angle), sp.sin(ball.cage_angle)]
         return ca.vertcat(*(self._of_state(row) for row in rows))
 
     def _ball(self, delta: ca.SX, rate: ca.SX, co: ca.SX, si: ca.SX) -> dict[str, ca.SX]:
@@ -235,20 +240,26 @@ class BallBuilder:
         return rows
 
 
-def sums_by_relative(slopes: ca.SX) -> ca.SX:
-    """d(S)/d(r) from the rows of G; the column of r0 is left out: nothing that moves enters it."""
-    g = slopes
-    return ca.vertcat(ca.horzcat(0, g[0], g[1], g[3], g[4]), ca.horzcat(0, g[1], g[2], g[4], g[5]))
+def sums_by_relative(sums: ca.SX, slopes: ca.SX, r: ca.SX) -> ca.SX:
+    """d(S)/d(r) from S and the rows of G; the column of r0 is left out: nothing that moves enters it.
 
-
-def sums_by_time(sums: ca.SX, slopes: ca.SX, r: ca.SX, cage_speed: ca.SX, *, own: bool) -> ca.SX:
-    """Time derivative of S at fixed state and r: the cage turns, d(cos) = -sin, d(sin) = cos for every ball at once."""
+    The cage turns all balls at once, d(cos) = -sin, d(sin) = cos.
+    """
     g = slopes
     turn = ca.vertcat(
         -r[1] * g[1] + r[2] * g[0] - r[3] * g[4] + r[4] * g[3] - sums[1],
         -r[1] * g[2] + r[2] * g[1] - r[3] * g[5] + r[4] * g[4] + sums[0],
     )
-    return turn * cage_speed + (g[6:8] if own else 0)
+    return ca.horzcat(_by_rings(g), -r[6] * turn, r[5] * turn)
+
+
+def _by_rings(g: ca.SX) -> ca.SX:
+    return ca.vertcat(ca.horzcat(0, g[0], g[1], g[3], g[4]), ca.horzcat(0, g[1], g[2], g[4], g[5]))
+
+
+def sums_by_time(slopes: ca.SX, *, own: bool) -> ca.SX:
+    """Time derivative of S at fixed state and r: what effects take."""
+    return slopes[6:8] if own else ca.SX(SUMS, 1)
 
 
 def _sums_moved(rows: int, numbers: int) -> ca.Function:
@@ -256,7 +267,8 @@ def _sums_moved(rows: int, numbers: int) -> ca.Function:
     total, r_d, a_d, k_d = (ca.SX.sym(n, m) for n, m in (("T", rows), ("r_d", RELATIVE), ("a_d", 1), ("k_d", numbers)))
     by_k = ca.reshape(total[rows - SUMS * numbers :], SUMS, numbers)
     angle = rows - SUMS * numbers - 2 * SUMS
-    by_r = sums_by_relative(total[SUMS:]) @ r_d + total[angle + SUMS : angle + 2 * SUMS] * r_d[0]
+    g, rings = total[SUMS:], r_d[:RINGS]
+    by_r = _by_rings(g) @ rings + total[angle + SUMS : angle + 2 * SUMS] * r_d[0]
     moved = by_r + total[angle : angle + SUMS] * a_d + by_k @ k_d
     return ca.Function("sums_moved", [total, r_d, a_d, k_d], [ca.densify(moved)], ["T", "r_d", "a_d", "k_d"], ["S_d"])
 

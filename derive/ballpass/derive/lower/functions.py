@@ -110,6 +110,7 @@ class _Lowering:
             | constants
         )
         self._definitions = definitions
+        self._late = system.late
         self._fixed = frozenset(parameters) | frozenset(constants)
         self.visit = Visitor(self._values, definitions, constant=self._fixed, hoist=self._hoist)
 
@@ -121,28 +122,39 @@ class _Lowering:
     # the functions
 
     def functions(self, extra: Mapping[str, Mapping[str, sp.Expr]]) -> Functions:
-        system = self.system
+        system, definitions = self.system, self._definitions
         bodies: list[tuple[str, dict[str, ca.SX], str]] = []
         balls = self._balls(self.visit)
         if system.coordinates:
             bodies.append(("rhs", {"xdot": self._rhs(balls)}, "time derivative of the states"))
+            size = len(system.coordinates)
+            mass = ca.vertcat(*(self.visit(entry) for entry in system.mass.T))
+            bodies.append(
+                ("mass_matrix", {"M": ca.reshape(mass, size, size)}, "mass matrix of the equations of motion")
+            )
         if system.outputs:
             bodies.append(("outputs", self._outputs(balls), "outputs of the scene"))
+        if system.bearings:
+            turned = [self.visit(bearing.ball.cage_angle) for bearing in system.bearings]
+            bodies.append(("cages", {"angles": ca.vertcat(*turned)}, "angle of ball 1 of each bearing [rad]"))
         if system.linkage is not None:
             coordinates = [self.visit(e) for point in system.linkage.points for e in (point.x, point.y)]
-            margins = [self.visit(m.expression) for m in system.linkage.margins]
+            # of the ideal linkage: joints without play
+            closed = {c.position: ca.SX(0.0) for c in system.coordinates}
+            ideal = self.visit.child(closed, definitions) if system.linkage.play else self.visit
+            margins = [ideal(m.expression) for m in system.linkage.margins]
             bodies += [
                 ("geometry", {"points": ca.vertcat(*coordinates)}, "coordinates of all points and centres of mass [m]"),
                 ("assembly", {"margins": ca.vertcat(*margins)}, "positive while each dyad can be assembled"),
             ]
         if system.reactions is not None:
-            reactions = system.reactions
+            reactions, visit = system.reactions, self._moving(self.visit, balls)
             rows, columns = reactions.matrix.shape
             matrix = ca.SX(rows, columns)
             for (i, j), entry in sorted(reactions.matrix.todok().items()):
-                matrix[i, j] = self.visit(entry)
-            right = ca.vertcat(*(self.visit(e) for e in reactions.right_side))
-            solution = ca.vertcat(*(self.visit(s) for s in reactions.unknowns))
+                matrix[i, j] = visit(entry)
+            right = ca.vertcat(*(visit(e) for e in reactions.right_side))
+            solution = ca.vertcat(*(visit(s) for s in reactions.unknowns))
             bodies.append(
                 ("reaction_system", {"A": matrix, "b": right, "r": solution}, "Eq. (1): A r = b and its solution r")
             )
@@ -252,7 +264,7 @@ class _Lowering:
         """Net force along each coordinate with everything at rest: no damping force, no velocities."""
         at_rest = {c.velocity: sp.S.Zero for c in self.system.coordinates}
         undamped = {b.ball.force: b.ball.elastic_force for b in self.system.bearings}
-        net = visit.child(self._sums(self._balls(visit, undamped)), {})
+        net = visit.child(self._sums(self._balls(visit, undamped)), self._late)
         return [net(force.subs(at_rest)) for force in self.system.forcing]
 
     def _balls(self, visit: Visitor, instead: Mapping[sp.Symbol, sp.Expr] | None = None) -> Balls:
@@ -284,9 +296,18 @@ class _Lowering:
                 totals[total.symbol] = reduce(add, terms)
         return totals
 
+    def _moving(self, visit: Visitor, balls: Balls) -> Visitor:
+        """A visitor that knows the sums over the balls, and the accelerations where anything uses them."""
+        sums = self._sums(balls)
+        if not self._late:
+            return visit.child(sums, {})
+        found = accelerations(self.system, visit.child(sums, self._late))
+        named = {c.acceleration: a for c, a in zip(self.system.coordinates, found, strict=True)}
+        return visit.child({**sums, **named}, self._late)
+
     def _rhs(self, balls: Balls) -> ca.SX:
         """Velocities, then mass^-1 forcing."""
-        visit = self.visit.child(self._sums(balls), {})
+        visit = self.visit.child(self._sums(balls), self._late)
         return ca.vertcat(self.x[len(self.system.coordinates) :], *accelerations(self.system, visit))
 
     def _outputs(self, balls: Balls) -> dict[str, ca.SX]:
@@ -296,7 +317,7 @@ class _Lowering:
 
     def _values_of(self, outputs: Sequence[Output], balls: Balls, visit: Visitor) -> list[ca.SX]:
         """A number or a column with a row for each ball, for each output."""
-        visit = visit.child(self._sums(balls), {})
+        visit = self._moving(visit, balls)
         return [
             ca.vertcat(*(ball(output.expression) for ball in balls[output.balls_of]))
             if output.per_ball

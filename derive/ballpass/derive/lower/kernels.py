@@ -10,8 +10,8 @@ stage_turned   (C, S, t, u, p, c) -> w      w from cosines C and sines S of the 
 stage_rate_turned  (C, S, at, t, u, p, c) -> w, wt     the same with its time derivative
 stage_slopes   (C, S, t, u, p, c) -> w, J    w and its derivatives by u, p, c, those that are not always zero
 stage_moved    (J, u_d, p_d, c_d) -> w_d       w along a direction of u, p, c
-acceleration   (x, S, u, p, c, w) -> a      from the sums S over the balls of every bearing
-acceleration_jacobian  (x, S, G, u, p, c, w) -> A, B     da/dq, da/dv (row-major); G: sums of the slopes' rows
+acceleration   (x, S, r, u, p, c, w) -> a      from the sums S over the balls of every bearing
+acceleration_jacobian  (x, S, G, r, u, p, c, w) -> A, B     da/dq, da/dv (row-major); G: sums of the slopes' rows
 acceleration_rate      (x, S, G, r, u, p, c, w, wt) -> at    partial time derivative at fixed state
 
 The balls enter by the kernels of `ball_kernels`, one set for each bearing: the driver loops over them, and the compiler
@@ -20,6 +20,7 @@ makes SIMD lanes of the loop.  Text and compile time do not depend on their numb
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -56,7 +57,7 @@ class Kernels:
 
     Attributes
     ----------
-    stage_size : entries of w, which begins with cosine and sine of each cage's angle
+    stage_size, relative_size : entries of w and r
     angles : entries of the angles of `turned`, which evaluate w for many times close to each other: an angle that
         grows by little needs no sine of its own
     slopes : entries of G
@@ -68,6 +69,7 @@ class Kernels:
     """
 
     stage_size: int
+    relative_size: int
     angles: int
     slopes: int
     stage_slopes_size: int
@@ -114,10 +116,8 @@ class KernelBuilder:
         self._arguments = arguments
         self._stage: dict[sp.Basic, ca.SX] = {}
         timed = constant | {TIME} | {i.symbol for i in system.inputs}
+        self._definitions = definitions
         self._of_state = Visitor(values, definitions, constant=timed, hoist=self._hoist)
-        for bearing in system.bearings:
-            for direction in (sp.cos(bearing.ball.cage_angle), sp.sin(bearing.ball.cage_angle)):
-                self._hoist(direction)
         self._balls = [BallBuilder(bearing, visit, self._of_state) for bearing in system.bearings]
         self._bodies = self._build()
 
@@ -133,36 +133,36 @@ class KernelBuilder:
         system = self._system
         n, x, t = len(system.coordinates), self._arguments["x"], self._arguments["t"]
         bearings = system.bearings
-        relative = ca.vertcat(*(b.relative for b in self._balls))
-        if ca.jacobian(relative[::RELATIVE], x).nnz():
+        rings = ca.vertcat(*(b.relative for b in self._balls))
+        if ca.jacobian(rings[::RELATIVE], x).nnz():
             raise UnfitError("the part of a deflection that no direction changes is expected to be constant")
         sums = ca.SX.sym("S", SUMS * len(bearings))
-        symbols = [s.symbol for b in bearings for s in b.ball.sums]
-        motion = self._of_state.child({s: sums[k] for k, s in enumerate(symbols)}, {})
-        acceleration = ca.vertcat(*accelerations(system, motion))
+        known = {s.symbol: sums[k] for k, s in enumerate(s for b in bearings for s in b.ball.sums)}
+        shared = self._shared()
+        held = ca.SX.sym("r", rings.numel() + len(shared))
+        known |= {symbol: held[rings.numel() + k] for k, symbol in enumerate(shared)}
+        definitions = {k: v for k, v in self._definitions.items() if k not in known} if shared else system.late
+        acceleration = ca.vertcat(*accelerations(system, self._of_state.child(known, definitions)))
+        relative = ca.vertcat(rings, *(self._of_state(symbol) for symbol in shared))
         sizes = [8 if b.ball.own is not None else 6 for b in bearings]
         ends = [sum(sizes[: k + 1]) for k in range(len(sizes))]
-        g, r = ca.SX.sym("G", sum(sizes)), ca.SX.sym("r", RELATIVE * len(bearings))
+        g = ca.SX.sym("G", sum(sizes))
         slopes = [g[end - size : end] for end, size in zip(ends, sizes, strict=True)]
-        by_relative = ca.diagcat(*(sums_by_relative(own) for own in slopes))
-        by_sums = ca.jacobian(acceleration, sums)
-        by_state = ca.jacobian(acceleration, x) + by_sums @ by_relative @ ca.jacobian(relative, x)
-        turning = ca.vertcat(
+        by_rings = ca.diagcat(
             *(
-                sums_by_time(
-                    sums[SUMS * k : SUMS * k + SUMS],
-                    slopes[k],
-                    r[RELATIVE * k : RELATIVE * k + RELATIVE],
-                    self._of_state(b.ball.cage_speed),
-                    own=b.ball.own is not None,
-                )
-                for k, b in enumerate(bearings)
+                sums_by_relative(sums[SUMS * k : SUMS * k + SUMS], own, held[RELATIVE * k : RELATIVE * k + RELATIVE])
+                for k, own in enumerate(slopes)
             )
         )
+        by_sums = ca.jacobian(acceleration, sums)
+        by_relative = ca.jacobian(acceleration, held) + by_sums @ ca.horzcat(
+            by_rings, ca.SX(by_rings.size1(), len(shared))
+        )
+        by_state = ca.jacobian(acceleration, x) + by_relative @ ca.jacobian(relative, x)
+        own_rate = ca.vertcat(*(sums_by_time(slopes[k], own=b.ball.own is not None) for k, b in enumerate(bearings)))
         w = ca.vertcat(*self._stage.values())
         wt = ca.SX.sym("wt", w.numel())
-        moved = turning + by_relative @ ca.jtimes(relative, w, wt)
-        by_time = ca.jtimes(acceleration, w, wt) + by_sums @ moved
+        by_time = ca.jtimes(acceleration, w, wt) + by_relative @ ca.jtimes(relative, w, wt) + by_sums @ own_rate
         stage = ca.vertcat(*(self._visit(e) for e in self._stage))
         state = {k: self._arguments[k] for k in "up"} | {"c": ca.SX(0, 1)}
         tail = {**state, "w": w}
@@ -183,27 +183,49 @@ class KernelBuilder:
                 "relative",
                 {"x": x, **tail},
                 {"r": relative},
-                "Of each bearing: delta = r0 + r1 cos + r2 sin, rate = r3 cos + r4 sin",
+                "Of each bearing: delta = r0 + r1 cos + r2 sin, rate = r3 cos + r4 sin, cos and sin of the cage; then "
+                "what accelerations need of the same",
             ),
             (
                 "acceleration",
-                {"x": x, "S": sums, **tail},
+                {"x": x, "S": sums, "r": held, **tail},
                 {"a": acceleration},
                 "Accelerations from the sums over the balls",
             ),
             (
                 "acceleration_jacobian",
-                {"x": x, "S": sums, "G": g, **tail},
+                {"x": x, "S": sums, "G": g, "r": held, **tail},
                 {"A": by_state[:, :n].T, "B": by_state[:, n:].T},
                 "Derivatives of the accelerations by positions and velocities, row-major",
             ),
             (
                 "acceleration_rate",
-                {"x": x, "S": sums, "G": g, "r": r, **tail, "wt": wt},
+                {"x": x, "S": sums, "G": g, "r": held, **tail, "wt": wt},
                 {"at": by_time},
                 "Partial time derivative of the accelerations at fixed state",
             ),
         ]
+
+    def _shared(self) -> list[sp.Symbol]:
+        """Definitions of the state that both the relative motion of the rings and the accelerations use."""
+        if not self._system.late:
+            return []
+        states = {s.symbol for s in self._system.states}
+
+        def used(expressions: Iterable[sp.Expr]) -> set[sp.Symbol]:
+            found: set[sp.Symbol] = set()
+            waiting = [sp.sympify(e) for e in expressions]
+            while waiting:
+                for symbol in waiting.pop().free_symbols - found:
+                    found.add(symbol)
+                    if symbol in self._definitions:
+                        waiting.append(sp.sympify(self._definitions[symbol]))
+            return found
+
+        balls = [b.ball for b in self._system.bearings]
+        moving = used(e for ball in balls for e in (ball.cage_angle, ball.cage_speed))
+        both = moving & used([*self._system.mass, *self._system.forcing])
+        return [s for s in self._definitions if s in both and used([s]) & states]
 
     def kernels(self, c: ca.SX) -> Kernels:
         """The functions, once the vector of derived constants is complete."""
@@ -220,6 +242,7 @@ class KernelBuilder:
         angles, turned, stage_slopes, stage_moved = _turned(named["stage"].function)
         return Kernels(
             stage_size=len(self._stage),
+            relative_size=named["relative"].function.size1_out(0),
             angles=angles.function.size1_out(0),
             slopes=sum(b.slopes for b in bearings),
             stage_slopes_size=stage_slopes.function.size1_out(1),
@@ -242,7 +265,8 @@ def only_deflections(
     """A function `stage` without what deflections have no use for."""
     arguments = [ca.SX.sym(stage.name_in(k), stage.sparsity_in(k)) for k in range(stage.n_in())]
     w = stage(*arguments)
-    needed = {*range(2 * len(bearings)), *relative.jac_sparsity(0, relative.name_in().index("w")).get_col()}
+    rows, columns = relative.jac_sparsity(0, relative.name_in().index("w")).get_triplet()
+    needed = {column for row, column in zip(rows, columns, strict=True) if row < RELATIVE * len(bearings)}
     for bearing in bearings:
         numbers = bearing.over_numbers["numbers"]
         needed |= {*numbers.jac_sparsity(0, numbers.name_in().index("w")).get_col()}
@@ -329,8 +353,8 @@ def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Ker
 _TANGENTS: tuple[tuple[str, str, tuple[str, ...], tuple[str, ...]], ...] = (
     ("stage_rate_tangent", "stage_rate", ("u", "p", "c"), ("w", "wt")),
     ("relative_tangent", "relative", ("x", "u", "p", "c", "w"), ("r",)),
-    ("acceleration_tangent", "acceleration", ("x", "S", "u", "p", "c", "w"), ("a",)),
-    ("acceleration_jacobian_tangent", "acceleration_jacobian", ("x", "S", "G", "u", "p", "c", "w"), ("A", "B")),
+    ("acceleration_tangent", "acceleration", ("x", "S", "r", "u", "p", "c", "w"), ("a",)),
+    ("acceleration_jacobian_tangent", "acceleration_jacobian", ("x", "S", "G", "r", "u", "p", "c", "w"), ("A", "B")),
     (
         "acceleration_rate_tangent",
         "acceleration_rate",

@@ -11,12 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import reduce
-from operator import mul
+from operator import add, mul
 
 import casadi as ca
 import sympy as sp
 
 from ballpass.derive.bearing.hertz import ellipticity
+from ballpass.derive.mechanism.swing import OF_IDEAL_LINKAGE, POINTS, Ideal, Turns, positions_of
+from ballpass.derive.variables import DRIVER_ANGLE
 
 #: Arithmetic-geometric means from k' = 0.01 (kappa = 100) settle to rounding in six steps; one more for closer
 #: conformity.
@@ -104,7 +106,7 @@ class Visitor:
                 else:
                     found = self._parent._fixed(expression) if self._parent is not None else False
             else:
-                found = all(self._fixed(a) for a in expression.args)
+                found = isinstance(expression, OF_IDEAL_LINKAGE) or all(self._fixed(a) for a in expression.args)
             self._is_constant[expression] = found
         return found
 
@@ -156,6 +158,8 @@ class Visitor:
             return ca.SX(1.0 if expression else 0.0)
         if isinstance(expression, sp.elliptic_k | sp.elliptic_e):
             return self._elliptic(expression)
+        if isinstance(expression, OF_IDEAL_LINKAGE):
+            return self._ideal(expression)
         if isinstance(expression, ellipticity):
             return _ellipticity(self(expression.args[0]))
         function = _FUNCTIONS.get(expression.func)
@@ -223,6 +227,29 @@ class Visitor:
             # `if_else` gates the value, so that a square root of a negative deflection never enters a sum or derivative
             result = ca.if_else(self(condition), self(value), result)
         return result
+
+    def _ideal(self, expression: sp.Basic) -> ca.SX:
+        """A function of the linkage without play, at angles of the driver that it chooses."""
+        held = {position: ca.SX(0.0) for position in positions_of(expression)}
+
+        def at(angle: ca.SX | float) -> Visitor:
+            return self.child({DRIVER_ANGLE: ca.SX(angle), **held}, self._definitions)
+
+        if isinstance(expression, Ideal):
+            return at(self(expression.args[1]))(expression.args[0])
+        angles = [2.0 * ca.pi * k / POINTS for k in range(POINTS)]
+        cos, sin = zip(
+            *((visit(expression.args[0]), visit(expression.args[1])) for visit in map(at, angles)), strict=True
+        )
+        if isinstance(expression, Turns):
+            pairs = [(k, (k + 1) % POINTS) for k in range(POINTS)]
+            turned = [ca.atan2(cos[i] * sin[j] - sin[i] * cos[j], cos[i] * cos[j] + sin[i] * sin[j]) for i, j in pairs]
+            return ca.SX(ca.floor(reduce(add, turned) / (2.0 * ca.pi) + 0.5))
+        turns = self(expression.args[2])
+        rest = [(ca.cos(turns * a), ca.sin(turns * a)) for a in angles]
+        across = reduce(add, (s * c0 - c * s0 for c, s, (c0, s0) in zip(cos, sin, rest, strict=True)))
+        along = reduce(add, (c * c0 + s * s0 for c, s, (c0, s0) in zip(cos, sin, rest, strict=True)))
+        return ca.SX(ca.atan2(across, along))
 
     def _elliptic(self, expression: sp.Basic) -> ca.SX:
         (m,) = expression.args

@@ -6,6 +6,7 @@ it moves, and gives the motion of any of its points.  Vectors are pairs (x, y) o
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -64,6 +65,18 @@ class Motion:
 
 
 AT_REST = Motion(position=ZERO, velocity=ZERO, acceleration=ZERO)
+
+#: Joints whose two points do not coincide: by name, motion of the second body's point relative to the first body's.
+Play = Mapping[str, Motion]
+
+
+def displaced(motion: Motion, by: Motion | None, sign: int) -> Motion:
+    """The motion of a point that is `by` away, in the direction that `sign` says; the motion itself for None."""
+    if by is None:
+        return motion
+    one, two = (motion.position, motion.velocity, motion.acceleration), (by.position, by.velocity, by.acceleration)
+    position, velocity, acceleration = (add(a, scale(sp.Integer(sign), b)) for a, b in zip(one, two, strict=True))
+    return Motion(position=position, velocity=velocity, acceleration=acceleration)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

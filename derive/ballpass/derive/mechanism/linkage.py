@@ -19,8 +19,10 @@ from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Motion,
     Pair,
+    Play,
     Pose,
     body_point,
+    displaced,
     frame_pose,
     joint_point,
     place,
@@ -30,6 +32,9 @@ from ballpass.derive.mechanism.sweep import locked_positions
 from ballpass.derive.scene.errors import LinkageError
 from ballpass.derive.scene.records import FRAME, Joint, Mechanism
 from ballpass.derive.terms import Definition
+
+#: Joints that keep their two points together.
+NO_PLAY: Play = MappingProxyType({})
 
 #: Name of the centre of mass among the points for drawing.
 CENTER_OF_MASS = "center_of_mass"
@@ -58,6 +63,7 @@ class Linkage:
     poses : by body, in the order of assembly; the frame is none of them
     placements : the dyads, placed, in the order of assembly
     points : all points of the frame and of the bodies, and the centres of mass, for drawing
+    play : joints whose two points do not coincide
     """
 
     drive: Drive
@@ -67,6 +73,7 @@ class Linkage:
     poses: Mapping[str, Pose]
     placements: tuple[Placement, ...]
     points: tuple[PlacedPoint, ...]
+    play: Play
 
     @property
     def dyads(self) -> tuple[Dyad, ...]:
@@ -87,13 +94,14 @@ class Linkage:
         return self.pose(body).motion(body_point(mechanism, body, point))
 
 
-def derive_linkage(mechanism: Mechanism, drive: Drive) -> Linkage:
+def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY) -> Linkage:
     """Derive the kinematics of a linkage.
 
     Parameters
     ----------
     mechanism : bodies, joints and driver
     drive : angle, speed and acceleration of the driven body
+    play : joints whose two points do not coincide
 
     Raises
     ------
@@ -104,11 +112,11 @@ def derive_linkage(mechanism: Mechanism, drive: Drive) -> Linkage:
     assembly = assemble(mechanism)
     ledger = Ledger()
     poses = {FRAME: frame_pose()}
-    driven = _place_driven(ledger, mechanism, assembly.driver, assembly.driven, drive)
+    driven = _place_driven(ledger, mechanism, assembly.driver, assembly.driven, drive, play)
     poses[driven.body] = driven
     placements = []
     for dyad in assembly.dyads:
-        placement = dyad.place(ledger, mechanism, poses)
+        placement = dyad.place(ledger, mechanism, poses, play)
         poses |= {pose.body: pose for pose in placement.poses}
         placements.append(placement)
     moving = {name: pose for name, pose in poses.items() if name != FRAME}
@@ -120,6 +128,7 @@ def derive_linkage(mechanism: Mechanism, drive: Drive) -> Linkage:
         poses=MappingProxyType(moving),
         placements=tuple(placements),
         points=_points(mechanism, poses),
+        play=play,
     )
 
 
@@ -139,12 +148,14 @@ def check_assembly(linkage: Linkage, values: Mapping[str, float]) -> None:
         a parameter without a value.
     """
     driven = linkage.poses[linkage.driven]
-    faults = locked_positions(linkage.definitions, linkage.placements, driven, values)
+    apart = (entry for motion in linkage.play.values() for entry in motion.position)
+    closed = {symbol.name: 0.0 for entry in apart for symbol in entry.free_symbols}
+    faults = locked_positions(linkage.definitions, linkage.placements, driven, {**values, **closed})
     if faults:
         raise LinkageError(faults)
 
 
-def _place_driven(ledger: Ledger, mechanism: Mechanism, driver: Joint, body: str, drive: Drive) -> Pose:
+def _place_driven(ledger: Ledger, mechanism: Mechanism, driver: Joint, body: str, drive: Drive, play: Play) -> Pose:
     mark = subscript(body)
     cos = ledger.define(f"body.{body}.cos", sp.cos(drive.angle), "1", f"cosine of the angle of {body}", f"c_{{{mark}}}")
     sin = ledger.define(f"body.{body}.sin", sp.sin(drive.angle), "1", f"sine of the angle of {body}", f"s_{{{mark}}}")
@@ -157,6 +168,7 @@ def _place_driven(ledger: Ledger, mechanism: Mechanism, driver: Joint, body: str
         rf"\ddot{{\varphi}}_{{{mark}}}",
     )
     pivot = frame_pose().motion(joint_point(mechanism, driver, FRAME))
+    pivot = displaced(pivot, play.get(driver.name), 1 if driver.bodies[1] == body else -1)
     return place(
         ledger,
         mechanism,

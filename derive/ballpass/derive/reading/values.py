@@ -289,13 +289,16 @@ def _check_bearing(checker: Checker, bearing: Bearing) -> None:
         checker.within(number, law.bounds(number.path.rpartition(".")[2]))
     for effect in bearing.effects:
         EFFECTS[effect.kind].check(effect, checker)
-    if isinstance(bearing.inner.mass, EquivalentMass):
-        checker.positive(bearing.inner.mass.ring)
-        # Zero is a crankpin whose mass is part of the crank's.
-        checker.not_negative(bearing.inner.mass.crankpin)
-    else:
-        checker.positive(bearing.inner.mass)
-    checker.not_negative(bearing.inner.damping)
+    if bearing.inner is not None:
+        if isinstance(bearing.inner.mass, EquivalentMass):
+            checker.positive(bearing.inner.mass.ring)
+            # Zero is a crankpin whose mass is part of the crank's.
+            checker.not_negative(bearing.inner.mass.crankpin)
+        else:
+            checker.positive(bearing.inner.mass)
+        checker.not_negative(bearing.inner.damping)
+    if bearing.count is not None:
+        checker.positive(bearing.count)
     if bearing.outer is not None:
         checker.positive(bearing.outer.mass, 'give the moved mass, or write support = "fixed"')
         checker.not_negative(bearing.outer.stiffness)

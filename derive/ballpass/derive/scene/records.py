@@ -310,7 +310,10 @@ class Bearing:
     """A deep groove ball bearing.
 
     `name` is empty for the scene's only ``[bearing]``; ``[bearings.<name>]`` have one.  `joint` names the revolute
-    joint whose reaction loads it (None without mechanism), `share` the part of the reaction it takes.
+    joint whose reaction loads it (None without mechanism).
+    `coupling` one-way: `share` is the part of the ideal reaction it takes, `inner` what moves with the inner ring.
+    `coupling` two-way: its play moves the bodies of the joint; `inner_body` carries the inner ring, `count` bearings
+    stand side by side (None: one).
     `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
     `outer` is None for a fixed outer ring.
     """
@@ -318,6 +321,9 @@ class Bearing:
     name: str
     joint: str | None
     share: Quantity | None
+    coupling: Literal["one-way", "two-way"] = "one-way"
+    inner_body: str = ""
+    count: Quantity | None = None
     balls: int
     ball_diameter: Quantity
     pitch_diameter: Quantity
@@ -326,7 +332,7 @@ class Bearing:
     contact: HertzContact | GivenContact
     damping: Damping
     effects: tuple[BallEffect, ...]
-    inner: InnerRing
+    inner: InnerRing | None
     outer: OuterRing | None
     initial: InitialState
 
@@ -371,6 +377,11 @@ class Scene:
     run: Run
     quantities: tuple[Quantity, ...]
     lines: LineIndex = field(default=LineIndex(lines={}), repr=False, compare=False)
+
+    @property
+    def coupled(self) -> bool:
+        """Whether bearings act back on the linkage."""
+        return any(bearing.coupling == "two-way" for bearing in self.bearings)
 
     @property
     def bearing(self) -> Bearing | None:

@@ -263,11 +263,16 @@ def _constants(sol: Solution) -> dict[str, Any]:
             bearing.balls,
             sol.parameters[f"{bearing.path}.ball_diameter"],
             sol.parameters[f"{bearing.path}.pitch_diameter"],
-            sol.parameters[bearing.shaft_speed],
+            _number(sol, bearing.ring_speed),
         )
         found[f"{bearing.prefix}frequencies"] = asdict(frequencies) | {"unit": "Hz"}
         found[f"{bearing.prefix}damping_law"] = bearing.damping.law
     return found
+
+
+def _number(sol: Solution, name: str) -> float:
+    """A parameter or derived constant."""
+    return float(sol.parameters[name] if name in sol.parameters else sol.constants[name])
 
 
 def _versions(sol: Solution) -> dict[str, Any]:

@@ -77,25 +77,6 @@ def kinematic_frequencies(
     )
 
 
-def ball_angles(t: ArrayLike, *, balls: int, cage_speed: float, ball_angle: float) -> Array:
-    """Angles theta_j of the balls from +x, Eq. (7), not wrapped [rad].
-
-    Parameters
-    ----------
-    t : (n,) times [s]
-    balls : number of balls [1]
-    cage_speed : [rad/s]
-    ball_angle : theta_0, angle of ball 1 at t = 0 [rad]
-
-    Returns
-    -------
-    (n, balls) [rad]
-    """
-    time = np.asarray(t, dtype=float)
-    spacing = 2.0 * np.pi * np.arange(balls) / balls
-    return np.asarray(ball_angle + cage_speed * time[..., None] + spacing)
-
-
 def turns(t: ArrayLike, cycle_length: float) -> tuple[slice, ...]:
     """Whole turns of a record, the last one ending at the record's end.
 

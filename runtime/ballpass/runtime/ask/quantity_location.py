@@ -123,6 +123,7 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     # the bearing that the channel is one of, else the first
     bearings = sorted(manifest.bearings, key=lambda one: not (one.prefix and quantity.channel.startswith(one.prefix)))
     bearing = bearings[0]
+    speed, faster = values[bearing.ring_speed], view.slopes(bearing.ring_speed)
     ball_name, pitch_name = f"{bearing.path}.ball_diameter", f"{bearing.path}.pitch_diameter"
     ball, pitch = values[ball_name], values[pitch_name]
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.json_text import from_plain
 
-SCHEMA = 4
+SCHEMA = 5
 FILE_NAME = "manifest.json"
 
 #: Last key of the file: sha256 of its text without this key.
@@ -192,7 +192,8 @@ class BearingInfo:
     """What observables need of a bearing: balls, and the names of its kinematic parameters and constants.
 
     `name` is empty for the scene's only ``[bearing]``.  Its states and outputs begin with `prefix`, ``""`` or
-    ``"<name>."``; its parameters and constants with `path`, ``bearing`` or ``bearings.<name>``.
+    ``"<name>."``; its parameters and constants with `path`, ``bearing`` or ``bearings.<name>``.  `inner_body` of its
+    `joint` carries the inner ring; `ring_speed` names the mean speed of the inner ring relative to the outer one.
     """
 
     name: str
@@ -200,7 +201,8 @@ class BearingInfo:
     path: str
     balls: int
     joint: str
-    shaft_speed: str
+    inner_body: str
+    ring_speed: str
     outer_ring: bool
     damping: DampingInfo
 

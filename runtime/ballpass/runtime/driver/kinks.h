@@ -53,7 +53,7 @@ static inline void bp_switch_values(const bp_numbers *n, double t, const double 
     {                                                                                                                 \
         enum { here = BP_##b##_SWITCHES * BP_##b##_BALLS };                                                           \
         BP_BALLS(b, 2 * BP_##b##_SWITCHES + 1) /* one more: a bearing may have none */                                 \
-        bp_##b##_switches_lanes(co, si, r + 5 * (b), k, rows);                                                        \
+        bp_##b##_switches_lanes(co, si, r + BP_RELATIVE * (b), k, rows);                                                        \
         memcpy(g + BP_##b##_FIRST_EVENT, rows, here * sizeof *rows);                                                  \
         memcpy(slope + BP_##b##_FIRST_EVENT, rows + here, here * sizeof *rows);                                       \
     }

@@ -76,12 +76,12 @@ BP_INLINE void bp_lane_stage(const bp_lane_numbers *n, const bp_lane_angles *res
     bp_member_stage_turned_lanes(C, S, time, n->u, n->p, n->c, w);
 }
 
-/* Direction of ball j of a bearing, whose cage has the angle with the cosine and sine at w. */
-BP_INLINE void bp_lane_direction(double cage_cos, double cage_sin, const double *restrict w, double *restrict co, double *restrict si)
+/* Direction of ball j of a bearing, whose cage has the angle with the cosine and sine at `cage`. */
+BP_INLINE void bp_lane_direction(double cage_cos, double cage_sin, const double *restrict cage, double *restrict co, double *restrict si)
 {
     BP_EACH_LANE {
-        co[lane] = cage_cos * w[lane] - cage_sin * w[BP_L + lane];
-        si[lane] = cage_sin * w[lane] + cage_cos * w[BP_L + lane];
+        co[lane] = cage_cos * cage[lane] - cage_sin * cage[BP_L + lane];
+        si[lane] = cage_sin * cage[lane] + cage_cos * cage[BP_L + lane];
     }
 }
 
@@ -89,8 +89,8 @@ BP_INLINE void bp_lane_direction(double cage_cos, double cage_sin, const double 
 #define BP_LANE_SUM(b, kernel, slopes)                                                                                           \
     for (int j = 0; j < BP_##b##_DIRECTIONS; j++) {                                                                              \
         double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[(2 + (slopes)) * BP_L] BP_ALIGNED;                                 \
-        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], w + 2 * (b) * BP_L, co, si);                                         \
-        bp_member_##b##_##kernel##_lanes(co, si, r + 5 * (b) * BP_L, n->p, n->c, w, rows);                                       \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + (BP_RELATIVE * (b) + 5) * BP_L, co, si);                                         \
+        bp_member_##b##_##kernel##_lanes(co, si, r + BP_RELATIVE * (b) * BP_L, n->p, n->c, w, rows);                                       \
         for (int m = 0; m < 2; m++) BP_EACH_LANE S[(2 * (b) + m) * BP_L + lane] += rows[m * BP_L + lane];                        \
         for (int m = 0; m < (slopes); m++)                                                                                       \
             BP_EACH_LANE G[(BP_##b##_FIRST_SLOPE + m) * BP_L + lane] += rows[(2 + m) * BP_L + lane];                             \
@@ -125,7 +125,7 @@ static inline void bp_lane_rate(const bp_lane_numbers *n, const double *restrict
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
     bp_lane_sums(n, w, r, S);
     for (int k = 0; k < BP_NQ; k++) BP_EACH_LANE dx[k * BP_L + lane] = x[(BP_NQ + k) * BP_L + lane];
-    bp_member_acceleration_lanes(x, S, n->u, n->p, n->c, w, dx + BP_NQ * BP_L);
+    bp_member_acceleration_lanes(x, S, r, n->u, n->p, n->c, w, dx + BP_NQ * BP_L);
 }
 
 /* dx/dt, the blocks A = da/dq and B = da/dv of its Jacobian, and the partial time derivative of a. */
@@ -136,8 +136,8 @@ static inline void bp_lane_linearize(const bp_lane_numbers *n, const double *res
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
     bp_lane_sums_and_slopes(n, w, r, S, G);
     for (int k = 0; k < BP_NQ; k++) BP_EACH_LANE dx[k * BP_L + lane] = x[(BP_NQ + k) * BP_L + lane];
-    bp_member_acceleration_lanes(x, S, n->u, n->p, n->c, w, dx + BP_NQ * BP_L);
-    bp_member_acceleration_jacobian_lanes(x, S, G, n->u, n->p, n->c, w, A, B);
+    bp_member_acceleration_lanes(x, S, r, n->u, n->p, n->c, w, dx + BP_NQ * BP_L);
+    bp_member_acceleration_jacobian_lanes(x, S, G, r, n->u, n->p, n->c, w, A, B);
     bp_member_acceleration_rate_lanes(x, S, G, r, n->u, n->p, n->c, w, wt, at);
 }
 
@@ -154,8 +154,8 @@ static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane
 #define BP_CHANNEL(b)                                                                                                            \
     for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                                   \
         double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[4 * BP_L] BP_ALIGNED, *to = value + 4 * (b) * BP_L;                \
-        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], w + 2 * (b) * BP_L, co, si);                                         \
-        bp_member_##b##_contact_lanes(co, si, r + 5 * (b) * BP_L, n->p, n->c, w, rows);                                          \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + (BP_RELATIVE * (b) + 5) * BP_L, co, si);                                         \
+        bp_member_##b##_contact_lanes(co, si, r + BP_RELATIVE * (b) * BP_L, n->p, n->c, w, rows);                                          \
         _Pragma("omp simd")                                                                                                      \
         for (int i = 0; i < 4 * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];                                  \
     }

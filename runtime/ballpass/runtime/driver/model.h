@@ -107,12 +107,12 @@ static inline __attribute__((always_inline)) double bp_total(const double *restr
     return ((sum[0] + sum[4]) + (sum[2] + sum[6])) + ((sum[1] + sum[5]) + (sum[3] + sum[7]));
 }
 
-/* Directions of a bearing's balls: those in its cage turned by the cage's angle, whose cosine and sine begin at w.  One ball a lane. */
-static inline __attribute__((always_inline)) void bp_ball_directions(const double *restrict w, const double *restrict cage_cos,
+/* Directions of a bearing's balls: those in its cage turned by the cage's angle, whose cosine and sine are given.  One ball a lane. */
+static inline __attribute__((always_inline)) void bp_ball_directions(const double *restrict cage, const double *restrict cage_cos,
                                                                      const double *restrict cage_sin, const int balls, double *restrict co,
                                                                      double *restrict si)
 {
-    const double c = w[0], s = w[1];
+    const double c = cage[0], s = cage[1];
 #pragma omp simd
     for (int j = 0; j < balls; j++) {
         co[j] = cage_cos[j] * c - cage_sin[j] * s;
@@ -120,10 +120,10 @@ static inline __attribute__((always_inline)) void bp_ball_directions(const doubl
     }
 }
 
-/* Directions co, si and numbers k of the balls of bearing b, at the stage variables w; room for `count` rows of summands. */
+/* Directions co, si and numbers k of the balls of bearing b, from the relative motion r and the stage variables w; room for `count` rows of summands. */
 #define BP_BALLS(b, count)                                                                                                    \
     double co[BP_##b##_BALLS], si[BP_##b##_BALLS], k[BP_##b##_NK], rows[(count) * BP_##b##_BALLS];                            \
-    bp_ball_directions(w + 2 * (b), bp_##b##_cos, bp_##b##_sin, BP_##b##_BALLS, co, si);                                      \
+    bp_ball_directions(r + BP_RELATIVE * (b) + 5, bp_##b##_cos, bp_##b##_sin, BP_##b##_BALLS, co, si);                                      \
     bp_##b##_numbers(n->p, n->c, w, k);
 
 /* Rows from the `first` on, added up. */
@@ -132,11 +132,11 @@ static inline __attribute__((always_inline)) void bp_ball_directions(const doubl
 
 /* The law of the balls, and with its slopes; where kinks are located its sides are held. */
 #ifdef BALLPASS_LOCATED
-#define BP_FORCES(b) bp_##b##_held_forces_lanes(co, si, r + 5 * (b), k, n->border + BP_##b##_FIRST_EVENT, rows);
-#define BP_SLOPES(b) bp_##b##_held_slopes_lanes(co, si, r + 5 * (b), k, n->border + BP_##b##_FIRST_EVENT, rows);
+#define BP_FORCES(b) bp_##b##_held_forces_lanes(co, si, r + BP_RELATIVE * (b), k, n->border + BP_##b##_FIRST_EVENT, rows);
+#define BP_SLOPES(b) bp_##b##_held_slopes_lanes(co, si, r + BP_RELATIVE * (b), k, n->border + BP_##b##_FIRST_EVENT, rows);
 #else
-#define BP_FORCES(b) bp_##b##_forces_lanes(co, si, r + 5 * (b), k, rows);
-#define BP_SLOPES(b) bp_##b##_slopes_lanes(co, si, r + 5 * (b), k, rows);
+#define BP_FORCES(b) bp_##b##_forces_lanes(co, si, r + BP_RELATIVE * (b), k, rows);
+#define BP_SLOPES(b) bp_##b##_slopes_lanes(co, si, r + BP_RELATIVE * (b), k, rows);
 #endif
 
 /* Sums S over the balls of each bearing: F cos, F sin. */
@@ -169,7 +169,7 @@ static inline __attribute__((always_inline)) void bp_rate(const bp_numbers *n, c
     bp_relative(x, n->u, n->p, n->c, w, r);
     bp_sums(n, w, r, S);
     for (int k = 0; k < BP_NQ; k++) dx[k] = x[BP_NQ + k];
-    bp_acceleration(x, S, n->u, n->p, n->c, w, dx + BP_NQ);
+    bp_acceleration(x, S, r, n->u, n->p, n->c, w, dx + BP_NQ);
 }
 
 /* dx/dt, the blocks A = da/dq and B = da/dv of its Jacobian, and the partial time derivative of a. */
@@ -180,8 +180,8 @@ static inline void bp_linearize(const bp_numbers *n, const double *restrict w, c
     bp_relative(x, n->u, n->p, n->c, w, r);
     bp_sums_and_slopes(n, w, r, S, G);
     for (int k = 0; k < BP_NQ; k++) dx[k] = x[BP_NQ + k];
-    bp_acceleration(x, S, n->u, n->p, n->c, w, dx + BP_NQ);
-    bp_acceleration_jacobian(x, S, G, n->u, n->p, n->c, w, A, B);
+    bp_acceleration(x, S, r, n->u, n->p, n->c, w, dx + BP_NQ);
+    bp_acceleration_jacobian(x, S, G, r, n->u, n->p, n->c, w, A, B);
     bp_acceleration_rate(x, S, G, r, n->u, n->p, n->c, w, wt, at);
 }
 

@@ -66,7 +66,7 @@ static inline void bp_ball_quantities(const bp_numbers *n, double t, const doubl
 #define BP_CONTACT(b)                                                                                  \
     {                                                                                                  \
         BP_BALLS(b, BP_BALL_CHANNELS)                                                                  \
-        bp_##b##_contact_lanes(co, si, r + 5 * (b), k, rows);                                          \
+        bp_##b##_contact_lanes(co, si, r + BP_RELATIVE * (b), k, rows);                                          \
         memcpy(q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, rows, sizeof rows);                         \
     }
     BP_EACH_BEARING(BP_CONTACT)

@@ -74,11 +74,12 @@ static inline void bp_masses(const bp_numbers *n, double *mass)
 {
     const double force = 1e12, x[BP_NX] = {0.0}, none[BP_NS] = {0.0};
     double both[BP_NS];
-    double w[BP_NW], a[BP_NQ], b[BP_NQ];
+    double w[BP_NW], r[BP_NR], a[BP_NQ], b[BP_NQ];
     for (int k = 0; k < BP_NS; k++) both[k] = force;
     bp_stage(0.0, n->u, n->p, n->c, w);
-    bp_acceleration(x, none, n->u, n->p, n->c, w, a);
-    bp_acceleration(x, both, n->u, n->p, n->c, w, b);
+    bp_relative(x, n->u, n->p, n->c, w, r);
+    bp_acceleration(x, none, r, n->u, n->p, n->c, w, a);
+    bp_acceleration(x, both, r, n->u, n->p, n->c, w, b);
     for (int k = 0; k < BP_NQ; k++) mass[k] = force / fabs(b[k] - a[k]);
 }
 

@@ -32,8 +32,9 @@ static inline void bp_point_at(bp_point *restrict at, const bp_numbers *n, const
     bp_relative(x, n->u, n->p, n->c, w, at->r);
 #define BP_POINT(b)                                                                                                              \
     {                                                                                                                            \
+        const double *const r = at->r;                                                                                           \
         BP_BALLS(b, 2 + BP_##b##_PARTIALS)                                                                                       \
-        bp_##b##_partials_lanes(co, si, at->r + 5 * (b), k, rows);                                                               \
+        bp_##b##_partials_lanes(co, si, at->r + BP_RELATIVE * (b), k, rows);                                                               \
         BP_TOTALS(b, 0, 2 + BP_##b##_PARTIALS, at->total_##b)                                                                    \
         memcpy(at->S + 2 * (b), at->total_##b, 2 * sizeof *at->S);                                                               \
         memcpy(at->G + BP_##b##_FIRST_SLOPE, at->total_##b + 2, BP_##b##_SLOPES * sizeof *at->G);                                \
@@ -51,12 +52,13 @@ static inline void bp_sums_tangent(const bp_point *restrict at, const bp_directi
 {
 #define BP_MOVED(b)                                                                                                              \
     {                                                                                                                            \
-        const double c = at->w[2 * (b)], s = at->w[2 * (b) + 1], *const cd = wd + 2 * (b) * BP_LANES, *const sd = cd + BP_LANES; \
+        const double c = at->r[BP_RELATIVE * (b) + 5], s = at->r[BP_RELATIVE * (b) + 6];                                         \
+        const double *const cd = rd + (BP_RELATIVE * (b) + 5) * BP_LANES, *const sd = cd + BP_LANES;                             \
         double kd[BP_##b##_NK * BP_LANES], angle[BP_LANES];                                                                      \
         bp_##b##_numbers_lanes(d->p, d->c, wd, kd);                                                                              \
         _Pragma("omp simd")                                                                                                      \
         for (int l = 0; l < BP_LANES; l++) angle[l] = c * sd[l] - s * cd[l];                                                     \
-        bp_##b##_sums_moved_lanes(at->total_##b, rd + 5 * (b) * BP_LANES, angle, kd, Sd + 2 * (b) * BP_LANES);                   \
+        bp_##b##_sums_moved_lanes(at->total_##b, rd + BP_RELATIVE * (b) * BP_LANES, angle, kd, Sd + 2 * (b) * BP_LANES);                   \
     }
     BP_EACH_BEARING(BP_MOVED)
 #undef BP_MOVED
@@ -70,7 +72,7 @@ static inline void bp_rate_tangent(const bp_point *restrict at, const bp_numbers
     bp_relative_tangent_lanes(at->x, n->u, n->p, n->c, at->w, xd, d->u, d->p, d->c, wd, rd);
     bp_sums_tangent(at, d, wd, rd, Sd);
     for (int k = 0; k < BP_NQ * BP_LANES; k++) out[k] = xd[BP_NQ * BP_LANES + k];
-    bp_acceleration_tangent_lanes(at->x, at->S, n->u, n->p, n->c, at->w, xd, Sd, d->u, d->p, d->c, wd, out + BP_NQ * BP_LANES);
+    bp_acceleration_tangent_lanes(at->x, at->S, at->r, n->u, n->p, n->c, at->w, xd, Sd, rd, d->u, d->p, d->c, wd, out + BP_NQ * BP_LANES);
 }
 
 /* Derivatives of the Jacobian's blocks and of the partial time derivative. */
@@ -84,7 +86,7 @@ static inline void bp_linearize_tangent(const bp_point *restrict at, const bp_nu
     for (int i = 0; i < BP_NG * BP_LANES; i++) Gd[i] = 0.0;
 #define BP_MOVED(b)                                                                                                              \
     {                                                                                                                            \
-        const double *const cd = wd + 2 * (b) * BP_LANES, *const sd = cd + BP_LANES;                                             \
+        const double *const cd = rd + (BP_RELATIVE * (b) + 5) * BP_LANES, *const sd = cd + BP_LANES;                             \
         double kd[BP_##b##_NK * BP_LANES], *const to = Gd + BP_##b##_FIRST_SLOPE * BP_LANES;                                     \
         bp_##b##_numbers_lanes(d->p, d->c, wd, kd);                                                                              \
         for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                               \
@@ -95,7 +97,7 @@ static inline void bp_linearize_tangent(const bp_point *restrict at, const bp_nu
                 cod[l] = bp_##b##_cos[j] * cd[l] - bp_##b##_sin[j] * sd[l];                                                      \
                 sid[l] = bp_##b##_sin[j] * cd[l] + bp_##b##_cos[j] * sd[l];                                                      \
             }                                                                                                                    \
-            bp_##b##_moved_lanes(at->co + i, at->si + i, at->r + 5 * (b), at->k_##b, cod, sid, rd + 5 * (b) * BP_LANES, kd,      \
+            bp_##b##_moved_lanes(at->co + i, at->si + i, at->r + BP_RELATIVE * (b), at->k_##b, cod, sid, rd + BP_RELATIVE * (b) * BP_LANES, kd,      \
                                  moved);                                                                                         \
             _Pragma("omp simd")                                                                                                  \
             for (int m = 0; m < BP_##b##_SLOPES * BP_LANES; m++) to[m] += moved[m];                                              \
@@ -103,7 +105,7 @@ static inline void bp_linearize_tangent(const bp_point *restrict at, const bp_nu
     }
     BP_EACH_BEARING(BP_MOVED)
 #undef BP_MOVED
-    bp_acceleration_jacobian_tangent_lanes(at->x, at->S, at->G, n->u, n->p, n->c, at->w, xd, Sd, Gd, d->u, d->p, d->c, wd, A, B);
+    bp_acceleration_jacobian_tangent_lanes(at->x, at->S, at->G, at->r, n->u, n->p, n->c, at->w, xd, Sd, Gd, rd, d->u, d->p, d->c, wd, A, B);
     bp_acceleration_rate_tangent_lanes(at->x, at->S, at->G, at->r, n->u, n->p, n->c, at->w, wt, xd, Sd, Gd, rd, d->u, d->p, d->c, wd, wtd,
                                        rate_d);
 }

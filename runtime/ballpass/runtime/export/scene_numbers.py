@@ -70,7 +70,7 @@ def scene_source(manifest: Manifest) -> str:
     if manifest.mechanism is not None:
         speed = place[manifest.mechanism.speed]
     elif manifest.bearing is not None:
-        speed = place[manifest.bearing.shaft_speed]
+        speed = place[manifest.bearing.ring_speed]
     run = manifest.run
     method = run.method.removeprefix("stepper-") if run.method in STEPPERS and run.method != "stepper" else "auto"
     parameters = [

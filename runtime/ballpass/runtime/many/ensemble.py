@@ -263,7 +263,7 @@ def _span(model: LoadedModel, members: Members, cycles: float | None, duration: 
     count = len(members)
     durations, turns, starts = np.zeros(count), np.full(count, np.inf), np.zeros(count)
     mechanism, bearing = model.manifest.mechanism, model.manifest.bearing
-    speed = mechanism.speed if mechanism is not None else bearing.shaft_speed if bearing is not None else None
+    speed = mechanism.speed if mechanism is not None else bearing.ring_speed if bearing is not None else None
     speeds = np.abs(members.columns[speed]) if speed is not None else np.zeros(count)
     np.divide(clock.TURN, speeds, out=turns, where=speeds > 0.0)
     # where there is a run for everybody, in one go; the rules of `check_span`

@@ -14,6 +14,7 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,9 +206,13 @@ def static_equilibrium(
     half = len(model.states) // 2
     there = point(model, numbers, t, np.zeros(2 * half))
     kernel, slopes = model.kernel("static_forces"), model.kernel("static_forces_jac_x")
-    (rows,) = rows_of(model, _loads(model))
-    own = model.kernel(rows.function)(there)[rows.indices]
+    own = _own_loads(model, there)
     applied = own if load is None else vector(load)
+    if load is not None and not len(own):
+        raise RequestError(
+            "load: the bearings of this scene act back on the linkage, so that they take the load that its forces give "
+            "them. Leave load away, or change the scene's forces."
+        )
     if applied.shape != own.shape or not np.all(np.isfinite(applied)):
         words = (
             "two finite numbers, x and y" if len(own) == 2 else f"{len(own)} finite numbers, x and y of each bearing"
@@ -225,7 +230,8 @@ def static_equilibrium(
         matrix = -slopes(there).reshape(half, 2 * half)[:, :half]
         return np.asarray(0.5 * (matrix + matrix.T))
 
-    size = float(np.linalg.norm(applied))
+    # where bearings act back on the linkage, what acts is all that concentric rings do not hold
+    size = float(np.linalg.norm(applied if len(own) else force(np.zeros(half))))
     clearance = max(abs(numbers.values[f"{bearing.path}.clearance"]) for bearing in model.manifest.bearings)
 
     def done(q: Array, net: Array, matrix: Array) -> bool:
@@ -313,13 +319,24 @@ def _force_rows(model: LoadedModel) -> Rows:
 
 
 def _loads(model: LoadedModel) -> list[str]:
-    """Names of the loads on the inner rings."""
-    return [f"{bearing.prefix}load.{axis}" for bearing in model.manifest.bearings for axis in "xy"]
+    """Names of the loads on inner rings that do not act back on what loads them."""
+    known = {info.name for info in model.manifest.quantities}
+    names = (f"{bearing.prefix}load.{axis}" for bearing in model.manifest.bearings for axis in "xy")
+    return [name for name in names if name in known]
+
+
+def _own_loads(model: LoadedModel, there: dict[str, Any]) -> Array:
+    """Values of these loads [N]."""
+    names = _loads(model)
+    if not names:
+        return np.zeros(0)
+    (rows,) = rows_of(model, names)
+    return np.asarray(model.kernel(rows.function)(there)[rows.indices])
 
 
 def _loaded(model: LoadedModel) -> list[int]:
     """Coordinates that these loads act on."""
-    return [model.states.index(f"{bearing.prefix}inner.{axis}") for bearing in model.manifest.bearings for axis in "xy"]
+    return [model.states.index(name.replace("load.", "inner.")) for name in _loads(model)]
 
 
 def _balls(model: LoadedModel, numbers: Numbers, t: float, x: Array) -> tuple[Array, Array]:

@@ -29,7 +29,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import RHS, STATES, directions_of, rows_of
 from ballpass.runtime.point.slopes import Deflections, KinkWarning, Point, Slopes, named, slopes
-from ballpass.runtime.run.magnitudes import moved_masses
+from ballpass.runtime.run.magnitudes import mass_matrix
 from ballpass.runtime.run.printed import printed
 
 Array = NDArray[np.float64]
@@ -162,7 +162,7 @@ def linearize(
     jacobian = found.value
     if not np.all(np.isfinite(jacobian)):
         raise SimulationError("linearize: the derivatives at this state are not finite. Check state and parameters.")
-    mass = np.diag(moved_masses(model.manifest, numbers))
+    mass = mass_matrix(model, there)
     stiffness, damping = -mass @ jacobian[half:, :half], -mass @ jacobian[half:, half:]
     state = np.asarray(there["x"], dtype=float)
     notes = (*_sides(found, mass, model.states[:half]), *onset_notes(model, there))

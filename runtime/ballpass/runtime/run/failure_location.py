@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.ball_angles import ball_angles
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ballpass.runtime.contract import CoordinateInfo, Manifest
+    from ballpass.runtime.contract import CoordinateInfo
     from ballpass.runtime.contract.parameters import Numbers
+    from ballpass.runtime.native.loaded_model import LoadedModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +48,7 @@ class Whereabouts:
         return f"Most deflected there: {ball} at {angle:.2f} deg, by {1e6 * self.deflection:.4g} um."
 
 
-def whereabouts(manifest: Manifest, numbers: Numbers, time: float, state: np.ndarray) -> Whereabouts:
+def whereabouts(model: LoadedModel, numbers: Numbers, time: float, state: np.ndarray) -> Whereabouts:
     """Look at a state.
 
     Parameters
@@ -54,15 +56,14 @@ def whereabouts(manifest: Manifest, numbers: Numbers, time: float, state: np.nda
     time : time of the state [s]
     state : positions and velocities, shape (states,)
     """
-    values = numbers.values
+    manifest, values = model.manifest, numbers.values
     crank = clock.crank_angle(manifest, values, time)
     found = Whereabouts(crank_angle=crank, bearing="", ball=None, ball_angle=math.nan, deflection=-math.inf)
     if not np.all(np.isfinite(state)):
         return found
     at = {coordinate.name: k for k, coordinate in enumerate(manifest.coordinates)}
-    for bearing in manifest.bearings:
-        first = values[f"{bearing.path}.ball_angle"] + (values[f"{bearing.path}.cage_speed"] * time) % clock.TURN
-        angles = (first + clock.TURN * np.arange(bearing.balls) / bearing.balls) % clock.TURN
+    for bearing, turned in zip(manifest.bearings, ball_angles(model, numbers, time, state), strict=True):
+        angles = turned % clock.TURN
         x, y = (_relative(manifest.coordinates[at[f"{bearing.prefix}inner.{axis}"]], at, state) for axis in "xy")
         deflections = x * np.cos(angles) + y * np.sin(angles) - 0.5 * values[f"{bearing.path}.clearance"]  # Eq. (6)
         ball = int(np.argmax(deflections))

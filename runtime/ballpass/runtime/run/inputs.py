@@ -46,7 +46,7 @@ def speed_name(manifest: Manifest) -> str | None:
     """Parameter or constant that holds this speed; None when the model has neither."""
     if manifest.mechanism is not None:
         return manifest.mechanism.speed
-    return None if manifest.bearing is None else manifest.bearing.shaft_speed
+    return None if manifest.bearing is None else manifest.bearing.ring_speed
 
 
 def crank_angle(manifest: Manifest, values: Values, t: float) -> float:

@@ -6,6 +6,8 @@ the stepper runs, its own C finds them; elsewhere Python does, and the rates wit
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ballpass.runtime.contract import Manifest
@@ -58,7 +60,9 @@ def model_scales(model: LoadedModel, numbers: Numbers, initial: np.ndarray, dura
         initial,
         horizon,
         _groups(model.manifest),
-        moved_masses(model.manifest, numbers).tolist() if model.manifest.bearings else None,
+        np.diag(mass_matrix(model, {**fixed, "u": inputs[0], "x": initial})).tolist()
+        if model.manifest.bearings
+        else None,
     )
 
 
@@ -71,14 +75,10 @@ def _groups(manifest: Manifest) -> Groups:
     )
 
 
-def moved_masses(manifest: Manifest, numbers: Numbers) -> np.ndarray:
-    """Mass of each coordinate, shape (coordinates,) [kg]."""
-    names = {}
-    for bearing in manifest.bearings:
-        names[f"{bearing.prefix}inner"] = f"{bearing.path}.m_ei"
-        names[f"{bearing.prefix}outer"] = f"{bearing.path}.outer_ring.mass"
-    rings = [state.name.rpartition(".")[0] for state in manifest.states[: len(manifest.states) // 2]]
-    return np.array([numbers.values[names[ring]] for ring in rings])
+def mass_matrix(model: LoadedModel, there: Mapping[str, object]) -> np.ndarray:
+    """Mass matrix where t, x, u, p and c are those given, shape (coordinates, coordinates)."""
+    size = len(model.states) // 2
+    return np.asarray(model.kernel("mass_matrix")(there)).reshape(size, size)
 
 
 def _moments(

@@ -175,7 +175,7 @@ def integrate_reduced(
             taken += more
             gives_up = allowed.spend(more, outcome.time)
             if outcome.end is not End.DONE and (gives_up or outcome.end is not End.TOO_MANY_STEPS):
-                place = whereabouts(model.manifest, numbers, outcome.time, state)
+                place = whereabouts(model, numbers, outcome.time, state)
                 raise RunFailed(outcome.end, outcome.time, outcome.step, place)
             if progress is not None:
                 progress(outcome.time / duration)

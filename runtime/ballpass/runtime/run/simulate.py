@@ -140,7 +140,7 @@ def simulate(
     )
     if failure is not None:
         state = trajectory.x[max(done - 1, 0)] if failure.state is None else failure.state
-        place = whereabouts(model.manifest, numbers, failure.time, state)
+        place = whereabouts(model, numbers, failure.time, state)
         raise IntegrationError(
             failure.status, time=failure.time, place=place, method=method, detail=failure.detail, partial=solution
         )

@@ -22,8 +22,10 @@ from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Motion,
     Pair,
+    Play,
     Pose,
     cross,
+    displaced,
     dot,
     joint_point,
     name_joint,
@@ -97,13 +99,19 @@ class Dyad(ABC):
         """+1 on the first of the branches, −1 on the second."""
         return 1 if self.inner.branch == self.branches[0] else -1
 
+    def closing(self, second: Motion, play: Play) -> Motion:
+        """A point of the second body, shifted so that the loop closes as if the inner joint had no play."""
+        return displaced(second, play.get(self.inner.name), -1 if self.inner.bodies[0] == self.bodies[0] else 1)
+
     @abstractmethod
     def branch_meaning(self) -> str:
         """What the branch decides, as "on which side of ... the joint lies"."""
 
     @abstractmethod
-    def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose]) -> Placement:
+    def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose], play: Play) -> Placement:
         """Place the two bodies on the bodies in `poses`, writing the definitions into `ledger`.
+
+        Where a joint has `play`, each body has a point of its own there.
 
         Raises
         ------
@@ -138,10 +146,19 @@ class Placement:
     guide: Guide | None = None
 
 
-def name_hinge(ledger: Ledger, mechanism: Mechanism, joint: Joint, host: Pose) -> Motion:
-    """Motion of a revolute joint on a body already placed, under the names ``joint.<name>.x`` and so on."""
-    motion = host.motion(joint_point(mechanism, joint, host.body))
-    return name_joint(ledger, joint, motion)
+def name_hinge(ledger: Ledger, mechanism: Mechanism, joint: Joint, host: Pose, play: Play) -> Motion:
+    """Motion of the point that a new body has at a revolute joint on a body already placed.
+
+    That of the host is named ``joint.<name>.x`` and so on; where the joint has play, that of the new body ``joint.
+    <name>.<body>.x``.
+    """
+    motion = name_joint(ledger, joint, host.motion(joint_point(mechanism, joint, host.body)))
+    if joint.name not in play:
+        return motion
+    body = joint.other(host.body)
+    moved = displaced(motion, play[joint.name], 1 if joint.bodies[1] == body else -1)
+    words, mark = f"joint {joint.name} on {body}", f"{subscript(joint.name)},{subscript(body)}"
+    return ledger.name_motion(f"joint.{joint.name}.{body}", moved, words, mark)
 
 
 def body_span(mechanism: Mechanism, body: str, outer: Joint, inner: Joint) -> tuple[Pair, Pair]:

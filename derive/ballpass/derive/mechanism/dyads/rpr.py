@@ -27,6 +27,7 @@ from ballpass.derive.mechanism.dyads.dyad import (
 )
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
+    Play,
     Pose,
     add,
     cross,
@@ -58,12 +59,14 @@ class RPR(Dyad):
         one, guide, two = self.joints
         return f"whether joint {two} lies ahead of or behind joint {one}, seen along the direction of guide {guide}"
 
-    def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose]) -> Placement:
+    def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose], play: Play) -> Placement:
         """Position by the right triangle of the hinges and the guide, rates by the differentiated loop closure."""
         guide, (first, second), (one, two) = self.inner, self.bodies, self.outer
         prefix, mark, names = f"joint.{guide.name}", subscript(guide.name), f"from {one.name} to {two.name}"
         hosts = [poses[host] for host in self.hosts]
-        hinges = [name_hinge(ledger, mechanism, joint, host) for joint, host in zip(self.outer, hosts, strict=True)]
+        hinges = [
+            name_hinge(ledger, mechanism, joint, host, play) for joint, host in zip(self.outer, hosts, strict=True)
+        ]
         starts = [joint_point(mechanism, joint, body) for joint, body in zip(self.outer, self.bodies, strict=True)]
         span = ledger.name_pair(
             f"{prefix}.base",

@@ -32,6 +32,7 @@ from ballpass.derive.mechanism.dyads.dyad import (
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
     Motion,
+    Play,
     Pose,
     add,
     carried,
@@ -69,12 +70,12 @@ class RRP(Dyad):
             f"seen along the direction of guide {guide}"
         )
 
-    def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose]) -> Placement:
+    def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose], play: Play) -> Placement:
         """Position by the right triangle of rod and path, rates by the differentiated loop closure."""
         inner, (rod, slider), (hinge_joint, guide_joint) = self.inner, self.bodies, self.outer
         host = poses[self.hosts[1]]
         mark, prefix = subscript(inner.name), f"joint.{inner.name}"
-        hinge = name_hinge(ledger, mechanism, hinge_joint, poses[self.hosts[0]])
+        hinge = name_hinge(ledger, mechanism, hinge_joint, poses[self.hosts[0]], play)
         start, span = body_span(mechanism, rod, hinge_joint, inner)
         length = span_length(ledger, rod, span)
 
@@ -88,7 +89,7 @@ class RRP(Dyad):
         direction = name_direction(ledger, guide_joint, host.rotate(guide_axis(guide_joint)))
         normal = quarter_turn(direction)
 
-        to_path = subtract(path.position, hinge.position)
+        to_path = subtract(self.closing(path, play).position, hinge.position)
         offset = ledger.name(
             f"{prefix}.offset",
             dot(normal, to_path),
@@ -109,12 +110,13 @@ class RRP(Dyad):
 
         # P + v = base + s t, differentiated: w J v − s' t = r; cross product with t and scalar product with v.
         fellow = carried(path, scale(travel, direction), host.rate, host.acceleration)
-        gap = name_gap(ledger, inner, "v", subtract(fellow.velocity, hinge.velocity), "m/s")
+        closing = self.closing(fellow, play)
+        gap = name_gap(ledger, inner, "v", subtract(closing.velocity, hinge.velocity), "m/s")
         rate = name_rate(ledger, rod, cross(direction, gap) / reach)
         speed = name_travel(ledger, guide_joint, slider, "speed", -dot(v, gap) / reach)
         # Seen from the frame, the slider has the host's acceleration, Coriolis' and its own along the guide.
-        carried_along = add(fellow.acceleration, scale(2 * host.rate * speed, normal))
-        closure = add(subtract(carried_along, hinge.acceleration), scale(rate**2, v))
+        coriolis = scale(2 * host.rate * speed, normal)
+        closure = add(subtract(add(closing.acceleration, coriolis), hinge.acceleration), scale(rate**2, v))
         gap = name_gap(ledger, inner, "a", closure, "m/s^2")
         acceleration = name_acceleration(ledger, rod, cross(direction, gap) / reach)
         quickening = name_travel(ledger, guide_joint, slider, "acceleration", -dot(v, gap) / reach)
@@ -124,7 +126,7 @@ class RRP(Dyad):
             Motion(
                 position=fellow.position,
                 velocity=add(fellow.velocity, scale(speed, direction)),
-                acceleration=add(carried_along, scale(quickening, direction)),
+                acceleration=add(fellow.acceleration, coriolis, scale(quickening, direction)),
             ),
         )
 

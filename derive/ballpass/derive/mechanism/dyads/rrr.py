@@ -28,6 +28,7 @@ from ballpass.derive.mechanism.dyads.dyad import (
 )
 from ballpass.derive.mechanism.kinematics import (
     Ledger,
+    Play,
     Pose,
     add,
     carried,
@@ -59,12 +60,13 @@ class RRR(Dyad):
         one, inner, two = self.joints
         return f"on which side of the line from {one} to {two} joint {inner} lies"
 
-    def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose]) -> Placement:
+    def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose], play: Play) -> Placement:
         """Position by Heron's product, rates by the differentiated loop closure."""
         inner, bodies = self.inner, self.bodies
         mark, prefix = subscript(inner.name), f"joint.{inner.name}"
         outer = zip(self.outer, self.hosts, strict=True)
-        hinges = [name_hinge(ledger, mechanism, joint, poses[host]) for joint, host in outer]
+        hinges = [name_hinge(ledger, mechanism, joint, poses[host], play) for joint, host in outer]
+        ends = (hinges[0], self.closing(hinges[1], play))
         spans = [body_span(mechanism, body, joint, inner) for body, joint in zip(bodies, self.outer, strict=True)]
         one, two = (span_length(ledger, body, span) for body, (_, span) in zip(bodies, spans, strict=True))
 
@@ -72,7 +74,7 @@ class RRR(Dyad):
         base = ledger.name_pair(
             f"{prefix}.base",
             "",
-            subtract(hinges[1].position, hinges[0].position),
+            subtract(ends[1].position, ends[0].position),
             "m",
             f"component of the line {names}",
             f"d_{{{mark},AXIS}}",
@@ -110,12 +112,12 @@ class RRR(Dyad):
         ]
 
         # P1 + v1 = P2 + v2, differentiated: w1 J v1 − w2 J v2 = r; scalar products with v2 and v1 give one rate each.
-        gap = name_gap(ledger, inner, "v", subtract(hinges[1].velocity, hinges[0].velocity), "m/s")
+        gap = name_gap(ledger, inner, "v", subtract(ends[1].velocity, ends[0].velocity), "m/s")
         rates = [
             name_rate(ledger, body, dot(gap, other) / determinant) for body, other in zip(bodies, (v2, v1), strict=True)
         ]
         difference_of_accelerations = add(
-            subtract(hinges[1].acceleration, hinges[0].acceleration),
+            subtract(ends[1].acceleration, ends[0].acceleration),
             scale(rates[0] ** 2, v1),
             scale(-(rates[1] ** 2), v2),
         )

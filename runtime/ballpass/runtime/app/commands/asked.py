@@ -60,7 +60,7 @@ def read_asked(
     overrides = _plain_overrides(manifest, settings or []) if manifest is not None else None
     if manifest is not None and overrides is not None:
         run: Run | RunInfo = manifest.run
-        names = [m.speed for m in (manifest.mechanism,) if m] + [b.shaft_speed for b in manifest.bearings]
+        names = [m.speed for m in (manifest.mechanism,) if m] + [b.ring_speed for b in manifest.bearings]
         values = {info.name: info.default for info in manifest.parameters} | overrides
         speed = values.get(names[0], 0.0) if names else 0.0
     else:

@@ -149,7 +149,7 @@ def _absent(scene: Scene) -> list[str]:
         path = bearing.path
         if not bearing.damping.numbers:
             out.append(f"damping at the balls ({path}.damping)")
-        if bearing.inner.damping is None:
+        if bearing.inner is not None and bearing.inner.damping is None:
             out.append(f"viscous damping of the inner ring to the frame ({path}.inner_ring.damping)")
         if bearing.outer is None:
             out.append(f'motion of the outer ring ({path}.outer_ring, support = "elastic")')

@@ -20,7 +20,7 @@ _Points = dict[tuple[str, str], Array]
 def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
     """Draw the mechanism at a sample of the record, with the paths of its joints and the forces."""
     mechanism = record.mechanism
-    now = record.points(float(record.t[sample]))
+    now = record.points(float(record.t[sample]), record.state(sample))
     length = record.cycle_length
     times = record.t[sample] + (np.zeros(1) if length is None else np.linspace(0.0, length, _TRACE + 1))
     poses = [record.points(float(t)) for t in times]

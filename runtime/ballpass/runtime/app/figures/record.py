@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.ask.observables import KinematicFrequencies, ball_angles, kinematic_frequencies, turns
+from ballpass.runtime.ask.observables import KinematicFrequencies, kinematic_frequencies, turns
 from ballpass.runtime.contract import force_components, table_direction
+from ballpass.runtime.run.ball_angles import ball_angles
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract import BearingInfo, InputInfo, Manifest, MechanismInfo
@@ -94,7 +95,7 @@ class Record:
         if mechanism is not None:
             return self.parameter(mechanism.start_angle) + self.parameter(mechanism.speed) * time
         if bearing is not None:
-            return self.parameter(bearing.shaft_speed) * time
+            return self.parameter(bearing.ring_speed) * time
         return np.zeros_like(time)
 
     def load_windows(self) -> tuple[tuple[float, float], ...]:
@@ -120,19 +121,19 @@ class Record:
             bearing.balls,
             self.parameter("bearing.ball_diameter"),
             self.parameter("bearing.pitch_diameter"),
-            self.parameter(bearing.shaft_speed),
+            self.parameter(bearing.ring_speed),
         )
 
-    def ball_angles(self, t: float) -> Array:
-        """Angles of the balls at a time, (balls,) [rad]."""
-        bearing = self.bearing
-        assert bearing is not None  # figures of balls are drawn of scenes with a bearing only
-        return ball_angles(
-            t,
-            balls=bearing.balls,
-            cage_speed=self.parameter("bearing.cage_speed"),
-            ball_angle=self.parameter("bearing.ball_angle"),
-        )
+    def ball_angles(self, sample: int) -> Array:
+        """Angles of the balls at a sample, (balls,) [rad]."""
+        assert self.bearing is not None  # figures of balls are drawn of scenes with a bearing only
+        numbers = self.model.numbers(self.solution.parameters)
+        angles = ball_angles(self.model, numbers, float(self.t[sample]), self.state(sample))
+        return angles[self.manifest.bearings.index(self.bearing)]
+
+    def state(self, sample: int) -> Array:
+        """State at a sample, (states,)."""
+        return np.array([self.solution[name][sample] for name in self.solution.states])
 
     def ball_force(self) -> tuple[str, Array]:
         """Name and values of the ball force to show: total where asked for, else elastic, (n, balls) [N]."""
@@ -141,6 +142,11 @@ class Record:
             damped = bearing is not None and bearing.damping.acts
             return "elastic and damping force" if damped else "elastic force", self.values("ball.force")
         return "elastic force", self.values("ball.elastic_force")
+
+    def bearing_share(self) -> float:
+        """Part of its joint's force that the bearing carries."""
+        values, path = self.solution.parameters, "" if self.bearing is None else self.bearing.path
+        return float(values.get(f"{path}.share", 1.0) / values.get(f"{path}.count", 1.0))
 
     def ring_load(self) -> Array | None:
         """Load on the inner ring, (n, 2) [N]: the output, else its share of the reaction; None without both."""
@@ -153,8 +159,9 @@ class Record:
         if not self.has(*names):
             return None
         first = next(item[2] for item in mechanism.joints if item[0] == bearing.joint)
-        # Eq. (2): the force on the frame presses the ring; the reaction is that of the second body on the first
-        share = self.parameter("bearing.share") * (1.0 if first == FRAME else -1.0)
+        # Eq. (2): the force on the outer ring's body presses the ring; the reaction is that of the second body on the
+        # first
+        share = self.bearing_share() * (-1.0 if first == bearing.inner_body else 1.0)
         return share * np.column_stack([self.values(name) for name in names])
 
     def applied_forces(self, t: float) -> tuple[tuple[str, tuple[str, str], Array], ...]:
@@ -176,9 +183,10 @@ class Record:
             acting.append((name, (body, point), force))
         return tuple(acting)
 
-    def points(self, t: float) -> dict[tuple[str, str], Array]:
-        """Coordinates of the mechanism's points at a time: (body, point) -> (2,) [m]."""
+    def points(self, t: float, state: Array | None = None) -> dict[tuple[str, str], Array]:
+        """Coordinates of the mechanism's points at a time, the state there or joints without play: -> (2,) [m]."""
         given = {
+            "x": np.zeros(len(self.model.states)) if state is None else state,
             "t": 0.0,  # time since the reference time of the inputs' phases, which is t itself
             "u": self.model.inputs_at(t, self.solution.parameters),
             "p": np.array([self.solution.parameters[info.name] for info in self.manifest.parameters]),

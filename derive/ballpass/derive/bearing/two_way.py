@@ -1,0 +1,109 @@
+"""A bearing in a joint of a linkage, coupled both ways: its play moves the bodies, its forces act on both.
+
+In: a bearing's contact and the linkage that its play moves.  Out: what it adds to the equations of motion, and the
+loads it puts on the bodies.
+
+The inner ring moves with the body that carries it, the outer ring with the other one or, on an elastic housing, as a
+point mass of its own.  Bodies' masses contain their rings.  The balls are massless: besides the force through the
+ring's centre they turn both carriers by the cage moments, each with its share of the ball's angle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from ballpass.derive.bearing.equations import BearingModel
+from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.kinematics import ZERO, Motion, add, body_point, cross, quarter_turn, scale, subtract
+from ballpass.derive.mechanism.linear_forms import Effort, Inertia
+from ballpass.derive.mechanism.linkage import Linkage
+from ballpass.derive.scene.records import FRAME, Bearing, Joint, Mechanism
+from ballpass.derive.terms import components, symbol_of
+from ballpass.derive.variables import Coordinate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coupled:
+    """What a bearing adds.
+
+    Attributes
+    ----------
+    inertias, efforts : to the equations of motion
+    loads : on the bodies, besides the joint's reaction, which is the force of the housing
+    """
+
+    inertias: tuple[Inertia, ...]
+    efforts: tuple[Effort, ...]
+    loads: tuple[Load, ...]
+
+
+def ring(coordinates: tuple[Coordinate, ...], first: int) -> Motion:
+    """Motion of a ring against where it is unloaded, from the place of its x coordinate."""
+    x, y = coordinates[first : first + 2]
+    return Motion(
+        position=(x.position, y.position),
+        velocity=(x.velocity, y.velocity),
+        acceleration=(x.acceleration, y.acceleration),
+    )
+
+
+def play_of(bearing: Bearing, joint: Joint, coordinates: tuple[Coordinate, ...]) -> Motion:
+    """Motion of the second body's point of a joint relative to the first body's."""
+    inner = ring(coordinates, 0)
+    sign = sp.Integer(1 if joint.bodies[1] == bearing.inner_body else -1)
+    return Motion(
+        position=scale(sign, inner.position),
+        velocity=scale(sign, inner.velocity),
+        acceleration=scale(sign, inner.acceleration),
+    )
+
+
+def couple(bearing: Bearing, model: BearingModel, mechanism: Mechanism, linkage: Linkage) -> Coupled:
+    """Forces of the balls on both bodies, and the outer ring where it moves on its own."""
+    assert bearing.joint is not None
+    joint, ball, names = mechanism.joint(bearing.joint), model.ball, model.names
+    count = sp.S.One if bearing.count is None else symbol_of(bearing.count)
+    bodies = (bearing.inner_body, joint.other(bearing.inner_body))
+    inner = ring(model.coordinates, 0)
+    outer = (
+        ring(model.coordinates, 2)
+        if bearing.outer is not None
+        else Motion(position=ZERO, velocity=ZERO, acceleration=ZERO)
+    )
+    force = scale(count, (ball.sums[0].symbol, ball.sums[1].symbol))  # of the inner ring on the balls
+    moment = cross(subtract(inner.position, outer.position), force)
+    apart = subtract(inner.velocity, outer.velocity)
+    efforts = [Effort(amount=-f, rate=v) for f, v in zip(force, apart, strict=True)]
+    efforts.append(Effort(amount=moment, rate=ball.cage_speed))
+    ratio = names.constant("cage_ratio")
+    points = [body_point(mechanism, body, joint.point(body)) for body in bodies]
+    torques = [ratio * moment, (1 - ratio) * moment]
+    carried, inertias = ZERO, list[Inertia]()
+    if bearing.outer is not None:
+        housing, turning = linkage.motion(mechanism, bodies[1], joint.point(bodies[1])), linkage.pose(bodies[1]).rate
+        mass, stiffness, damping = (
+            count * symbol_of(q) for q in (bearing.outer.mass, bearing.outer.stiffness, bearing.outer.damping)
+        )
+        # the damper turns with the housing
+        seen = subtract(outer.velocity, scale(turning, quarter_turn(outer.position)))
+        efforts += [Effort(amount=-stiffness * u, rate=v) for u, v in zip(outer.position, outer.velocity, strict=True)]
+        efforts += [Effort(amount=-damping * v, rate=v) for v in seen]
+        torques[1] += damping * cross(outer.position, seen)
+        velocity, acceleration = add(housing.velocity, outer.velocity), add(housing.acceleration, outer.acceleration)
+        inertias = [Inertia(amount=mass, rate=v, acceleration=a) for v, a in zip(velocity, acceleration, strict=True)]
+        weight = ZERO if mechanism.gravity is None else scale(mass, components(mechanism.gravity, axis=(0, -1)))
+        efforts += [Effort(amount=f, rate=v) for f, v in zip(weight, velocity, strict=True) if f != 0]
+        # the reaction is that of the housing: the inner ring's body feels it less what moves the outer ring
+        carried = subtract(weight, scale(mass, acceleration))
+    forces = (carried, ZERO)
+    return Coupled(
+        inertias=tuple(inertias),
+        efforts=tuple(efforts),
+        loads=tuple(
+            Load(body=body, point=point, force=push, torque=torque)
+            for body, point, push, torque in zip(bodies, points, forces, torques, strict=True)
+            if body != FRAME
+        ),
+    )

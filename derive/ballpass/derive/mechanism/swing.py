@@ -1,0 +1,108 @@
+"""Angles of bodies that are continuous over any number of turns, as balls need them.
+
+In: the pose of a body.  Out: the angle as whole turns with the driver, a mean direction, and a swing about both.
+
+The pose gives cosine and sine of an angle.  In a turn of the driver the body makes N whole turns, and swings by less
+than half a turn about N theta + m; so the angle is N theta + m + atan2(sine, cosine of the rest), without a jump.  N
+and m follow from the ideal linkage, at `POINTS` angles of a turn; the result does not depend on m.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from ballpass.derive.mechanism.kinematics import Pose, subscript
+from ballpass.derive.terms import Definition
+from ballpass.derive.variables import DRIVER_ANGLE
+
+#: Angles of the driver at which the ideal linkage is looked at: neighbours less than half a turn of any body apart.
+POINTS = 24
+
+
+class Ideal(sp.Function):  # type: ignore[misc]
+    """``Ideal(symbol, angle, *positions)``: a defined symbol at an angle of the driver, joints without play.
+
+    `positions` are the coordinates that are zero then.
+    """
+
+
+class Turns(sp.Function):  # type: ignore[misc]
+    """``Turns(cos, sin, *positions)``: whole turns of a direction in a turn of the driver."""
+
+
+class Mean(sp.Function):  # type: ignore[misc]
+    """``Mean(cos, sin, turns, *positions)``: mean direction over a turn, less the whole turns [rad]."""
+
+
+#: Functions of the linkage without play: constants of a run, whatever stands in them.
+OF_IDEAL_LINKAGE = (Ideal, Turns, Mean)
+
+
+def positions_of(function: sp.Function) -> tuple[sp.Basic, ...]:
+    """The coordinates that are zero in a function of the ideal linkage."""
+    return tuple(function.args[3 if isinstance(function, Mean) else 2 :])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Swing:
+    """Angle of a body: ``turns * driver's angle + swing``.
+
+    Attributes
+    ----------
+    turns : whole turns in a turn of the driver, a constant
+    swing : rest of the angle, mean direction included [rad]
+    at_start : the same in the ideal linkage at the driver's start angle [rad]
+    constants, definitions : of the symbols in these
+    """
+
+    turns: sp.Expr
+    swing: sp.Expr
+    at_start: sp.Expr
+    constants: tuple[Definition, ...] = ()
+    definitions: tuple[Definition, ...] = ()
+
+
+#: A body that does not turn.
+STILL = Swing(turns=sp.S.Zero, swing=sp.S.Zero, at_start=sp.S.Zero)
+
+#: The driven body.
+WITH_DRIVER = Swing(turns=sp.S.One, swing=sp.S.Zero, at_start=sp.S.Zero)
+
+
+def swing_of(pose: Pose, start: sp.Expr, positions: tuple[sp.Symbol, ...]) -> Swing:
+    """Angle of a body that a dyad has placed.
+
+    Parameters
+    ----------
+    start : the driver's angle at the start of a run [rad]
+    positions : the coordinates, zero in the ideal linkage
+    """
+    if sp.sympify(pose.cos).is_number:
+        return STILL
+    body, mark = pose.body, subscript(pose.body)
+    turns, mean, swing, at_start = (
+        sp.Symbol(f"body.{body}.{name}", real=True) for name in ("turns", "mean_angle", "swing", "swing_at_start")
+    )
+    known = turns * DRIVER_ANGLE + mean
+    cos, sin = sp.cos(known), sp.sin(known)
+    constants = (
+        (turns, Turns(pose.cos, pose.sin, *positions), "1", f"Turns of the {body} in a turn of the driver", "N"),
+        (mean, Mean(pose.cos, pose.sin, turns, *positions), "rad", f"Mean of the rest of the {body}'s angle", "m"),
+        (at_start, Ideal(swing, start, *positions), "rad", f"Swing of the {body} at the start, ideal", "s^0"),
+    )
+    rest = mean + sp.atan2(pose.sin * cos - pose.cos * sin, pose.cos * cos + pose.sin * sin)
+    words = f"Angle of the {body} less its whole turns with the driver"
+    return Swing(
+        turns=turns,
+        swing=swing,
+        at_start=at_start,
+        constants=tuple(
+            Definition(symbol=s, expression=e, unit=u, description=d, latex=rf"{letter}_{{{mark}}}")
+            for s, e, u, d, letter in constants
+        ),
+        definitions=(
+            Definition(symbol=swing, expression=rest, unit="rad", description=words, latex=rf"\sigma_{{{mark}}}"),
+        ),
+    )
