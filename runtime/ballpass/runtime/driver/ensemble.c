@@ -74,8 +74,8 @@ static void enter_segment(const bp_job *job, bp_lane_block *b, int lane)
     job->results[m].evaluations++;
     b->reducing[lane] = 0.0;
     if (job->reductions != NULL && b->start[lane] >= job->reductions[m * BP_REDUCTION + BP_FROM]) {
-        double value[BP_CHANNELS];
-        bp_channels(&n, at->t, x, b->balls, value);
+        double value[BP_CHANNELS], balls[BP_BALL_QUANTITIES];
+        bp_channels(&n, at->t, x, b->balls, value, balls);
         put(b->sampled[0], lane, value, BP_CHANNELS);
         b->reducing[lane] = 1.0;
     }

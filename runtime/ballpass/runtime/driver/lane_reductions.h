@@ -4,35 +4,39 @@
 
 #include "lane_block.h"
 
-/* A member within the step just taken, for bp_extreme. */
+/* A member within the step just taken, for bp_within. */
 typedef struct {
     bp_numbers n;
     double t, h, x[BP_NX], next[BP_NX], dense[BP_DENSE_ROWS][BP_NX];
     int linearly;
+    double balls[BP_POINTS][BP_BALL_QUANTITIES]; /* at the quarters */
 } bp_lane_source;
 
-static bp_lane_source lane_source(const bp_job *job, const bp_lane_block *b, int lane)
-{
-    bp_lane_source source;
-    source.n = member_numbers(job, b->who[lane]);
-    source.t = b->t[lane];
-    source.h = b->h[lane];
-    source.linearly = b->linearly;
-    get(b->x, lane, source.x, BP_NX);
-    get(b->next, lane, source.next, BP_NX);
-    const int rows = b->linearly ? bp_rodas5p.dense_rows : 2 + bp_dp54.dense_rows;
-    for (int row = 0; row < rows; row++) get(b->dense[row], lane, source.dense[row], BP_NX);
-    return source;
-}
-
-static double lane_channel(const void *from, int channel, double theta, int *ball)
+static double lane_state(const void *from, double theta, double *x)
 {
     const bp_lane_source *source = from;
     const double(*dense)[BP_NX] = (const double(*)[BP_NX])source->dense;
-    double y[BP_NX];
-    if (source->linearly) bp_rosenbrock_at(&bp_rodas5p, dense, source->x, source->next, theta, y);
-    else bp_explicit_at(&bp_dp54, dense, source->x, source->next, theta, y);
-    return bp_channel(&source->n, source->t + theta * source->h, y, channel, ball);
+    if (theta >= 1.0) memcpy(x, source->next, sizeof source->next);
+    else if (source->linearly) bp_rosenbrock_at(&bp_rodas5p, dense, source->x, source->next, theta, x);
+    else bp_explicit_at(&bp_dp54, dense, source->x, source->next, theta, x);
+    return source->t + theta * source->h;
+}
+
+static void lane_source(const bp_job *job, const bp_lane_block *b, int lane, int balls, bp_lane_source *source)
+{
+    source->n = member_numbers(job, b->who[lane]);
+    source->t = b->t[lane];
+    source->h = b->h[lane];
+    source->linearly = b->linearly;
+    get(b->x, lane, source->x, BP_NX);
+    get(b->next, lane, source->next, BP_NX);
+    const int rows = b->linearly ? bp_rodas5p.dense_rows : 2 + bp_dp54.dense_rows;
+    for (int row = 0; row < rows; row++) get(b->dense[row], lane, source->dense[row], BP_NX);
+    for (int i = 0; i < BP_POINTS && balls; i++) {
+        double x[BP_NX];
+        const double t = lane_state(source, (double)i / (BP_POINTS - 1), x);
+        bp_ball_quantities(&source->n, t, x, source->balls[i]);
+    }
 }
 
 /* Reductions of the lanes whose step was accepted; the same rules as bp_reduce. */
@@ -52,9 +56,10 @@ static void reduce(const bp_job *job, bp_lane_block *b)
         if (!b->balls) continue;
         bp_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, y + BP_NX * BP_L);
     }
+    double news[BP_CHANNELS][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
     for (int k = 0; k < BP_CHANNELS; k++) {
         if (!(b->wanted >> k & 1)) continue;
-        double news[BP_L] BP_ALIGNED, any = 0.0;
+        double *restrict of = news[k];
         const int row = k * BP_L;
         BP_EACH_LANE {
             const double v0 = b->sampled[0][row + lane], v1 = b->sampled[1][row + lane], v2 = b->sampled[2][row + lane];
@@ -68,20 +73,25 @@ static void reduce(const bp_job *job, bp_lane_block *b)
             b->integral[row + lane] += add[lane] != 0.0 ? b->h[lane] * sum : 0.0;
             b->square[row + lane] += add[lane] != 0.0 ? b->h[lane] * squares : 0.0;
             const double above = high > b->maximum[row + lane] ? 1.0 : 0.0, below = low < b->minimum[row + lane] ? 1.0 : 0.0;
-            news[lane] = add[lane] * (above + 2.0 * below);
+            of[lane] = add[lane] * (above + 2.0 * below);
+            any[lane] += of[lane];
+            of_balls[lane] += k < BP_NX ? 0.0 : of[lane];
         }
-        for (int lane = 0; lane < BP_L; lane++) any += news[lane];
-        if (any == 0.0) continue;
-        for (int lane = 0; lane < BP_L; lane++) {
-            if (news[lane] == 0.0) continue;
-            const long m = b->who[lane];
-            double *reduction = job->reductions + m * BP_REDUCTION;
-            const bp_lane_source source = lane_source(job, b, lane);
-            const double time = b->start[lane] + b->t[lane], *v = b->sampled[0] + row + lane;
-            if (news[lane] != 2.0) bp_extreme(reduction, BP_MAX, k, 1.0, v, BP_CHANNELS * BP_L, time, b->h[lane], lane_channel, &source);
-            if (news[lane] != 1.0) bp_extreme(reduction, BP_MIN, k, -1.0, v, BP_CHANNELS * BP_L, time, b->h[lane], lane_channel, &source);
-            b->maximum[row + lane] = reduction[BP_MAX + k];
-            b->minimum[row + lane] = reduction[BP_MIN + k];
+    }
+    for (int lane = 0; lane < BP_L; lane++) {
+        if (any[lane] == 0.0) continue;
+        double *reduction = job->reductions + b->who[lane] * BP_REDUCTION;
+        bp_lane_source source;
+        lane_source(job, b, lane, of_balls[lane] != 0.0, &source);
+        const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])source.balls;
+        const bp_within step = {b->start[lane] + b->t[lane], b->h[lane], &source.n, lane_state, &source, balls};
+        for (int k = 0; k < BP_CHANNELS; k++) {
+            if (!(b->wanted >> k & 1)) continue;
+            const double *v = b->sampled[0] + k * BP_L + lane;
+            if (news[k][lane] == 1.0 || news[k][lane] == 3.0) bp_extreme(reduction, BP_MAX, k, 1.0, v, BP_CHANNELS * BP_L, &step);
+            if (news[k][lane] >= 2.0) bp_extreme(reduction, BP_MIN, k, -1.0, v, BP_CHANNELS * BP_L, &step);
+            b->maximum[k * BP_L + lane] = reduction[BP_MAX + k];
+            b->minimum[k * BP_L + lane] = reduction[BP_MIN + k];
         }
     }
     for (int lane = 0; lane < BP_L; lane++)

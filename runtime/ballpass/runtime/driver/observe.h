@@ -37,20 +37,20 @@ typedef struct {
     double t, h, from, span;
 } bp_step_taken;
 
-static double channel_at(const void *source, int channel, double theta, int *ball)
+static double state_of_step(const void *source, double theta, double *x)
 {
     const bp_step_taken *step = source;
-    double y[BP_NX];
     const double place = step->from + step->span * theta;
-    state_at(step->run, place, y);
-    return bp_channel(&step->run->numbers, step->t + place * step->h, y, channel, ball);
+    if (place < 1.0) state_at(step->run, place, x);
+    else memcpy(x, step->run->next, sizeof step->run->next);
+    return step->t + place * step->h;
 }
 
 static void reduce_start(bp_run *run, double start)
 {
     run->reduction = run->options->reduction;
     if (run->reduction != NULL && start < run->reduction[BP_FROM]) run->reduction = run->options->before;
-    if (run->reduction != NULL) bp_channels(&run->numbers, 0.0, run->x, bp_balls_wanted(run->reduction), run->sampled[0]);
+    if (run->reduction != NULL) bp_channels(&run->numbers, 0.0, run->x, bp_balls_wanted(run->reduction), run->sampled[0], run->balls[0]);
 }
 
 static void reduce_step(bp_run *run, double start, double t, double h)
@@ -62,13 +62,14 @@ static void reduce_step(bp_run *run, double start, double t, double h)
     for (int part = 0; part < parts; part++) {
         const bp_step_taken step = {run, t, h, (double)part / parts, 1.0 / parts};
         for (int i = 1; i < BP_POINTS; i++) {
-            const double theta = step.from + step.span * i / (BP_POINTS - 1);
             double y[BP_NX];
-            if (theta < 1.0) state_at(run, theta, y);
-            else memcpy(y, run->next, sizeof y);
-            bp_channels(&run->numbers, t + theta * h, y, bp_balls_wanted(run->reduction), run->sampled[i]);
+            const double time = state_of_step(&step, (double)i / (BP_POINTS - 1), y);
+            bp_channels(&run->numbers, time, y, bp_balls_wanted(run->reduction), run->sampled[i], run->balls[i]);
         }
-        bp_reduce(run->reduction, (const double(*)[BP_CHANNELS])run->sampled, start + t + step.from * h, step.span * h, channel_at, &step);
+        const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])run->balls;
+        const bp_within within = {start + t + step.from * h, step.span * h, &run->numbers, state_of_step, &step, balls};
+        bp_reduce(run->reduction, (const double(*)[BP_CHANNELS])run->sampled, &within);
+        memcpy(run->balls[0], run->balls[BP_POINTS - 1], sizeof run->balls[0]);
         memcpy(run->sampled[0], run->sampled[BP_POINTS - 1], sizeof run->sampled[0]);
     }
 }

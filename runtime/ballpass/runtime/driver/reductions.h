@@ -10,8 +10,11 @@
    Extremes: that polynomial is looked at for tops, all of them, wherever it may reach beyond the extreme known so far; the channel is
    evaluated there from the dense output, and refined where it is not what the polynomial promised.  For states and all methods but
    DOP853 the polynomial is the dense output itself, and no extreme is missed.  An extreme is always a value that the solution takes, never
-   an extrapolation across a kink.  At a kink it is met to a part of a quarter step: the smallest value of the most loaded ball is such a
-   place, for there two balls change rank.
+   an extrapolation across a kink.
+
+   The most loaded ball has kinks where two balls change rank.  Its largest value is the largest of any ball, whose tops are looked for
+   one ball after the other; its smallest is looked for where the ranks change as well.  Where a law jumps at contact, the force has its
+   extreme beside the jump: a contact that begins or ends between two quarters is bisected, and both of its sides are looked at.
 
    A reduction is a row of BP_REDUCTION numbers, which a run adds to: it can go on in another call. */
 #ifndef BALLPASS_REDUCTIONS_H
@@ -41,19 +44,21 @@ enum {
 };
 
 enum {
-    BP_REFINEMENTS = 12, /* evaluations spent on a top at most, besides the first; that of a state takes no more */
-    BP_CELLS = 16        /* parts of a step in which the slope of a channel may change its sign */
+    BP_REFINEMENTS = 40, /* evaluations spent on a top at most, besides the first; that of a state takes no more */
+    BP_CELLS = 16,       /* parts of a step in which the slope of a channel may change its sign */
+    BP_BISECTIONS = 48,  /* of a quarter of a step, down to rounding */
+    BP_RANKS = 3         /* times that a change of ranks is cut into two */
 };
 
 /* Channels wanted, a bit each; whether those of the balls are among them. */
 static inline unsigned long bp_wanted(const double *reduction) { return (unsigned long)reduction[BP_WANTED]; }
 static inline int bp_balls_wanted(const double *reduction) { return bp_wanted(reduction) >> BP_NX != 0; }
 
+/* How far a channel may reach beyond its values at the quarters of a step, as a part of their range. */
+static const double BP_BEYOND = 0.5;
+
 /* Weights of Boole's rule. */
 static const double bp_boole[BP_POINTS] = {7.0 / 90.0, 32.0 / 90.0, 12.0 / 90.0, 32.0 / 90.0, 7.0 / 90.0};
-
-/* Value of a channel within a step, and the ball that has it. */
-typedef double (*bp_channel_at)(const void *source, int channel, double theta, int *ball);
 
 /* Quantities of all balls at a state and time: for each bearing BP_BALL_CHANNELS rows, one entry a ball. */
 enum { BP_BALL_QUANTITIES = BP_BALL_CHANNELS * BP_NB };
@@ -86,13 +91,12 @@ static inline const double *bp_ball_row(const double *q, int channel, int *balls
     return q + BP_BALL_CHANNELS * first[bearing] + channel % BP_BALL_CHANNELS * *balls;
 }
 
-/* All channels at a state and time; those of the balls are zero where not wanted. */
-static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, int balls, double *restrict value)
+/* All channels at a state and time, and all quantities of the balls; those of the balls are zero where not wanted. */
+static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, int balls, double *restrict value, double *restrict q)
 {
     for (int k = 0; k < BP_NX; k++) value[k] = x[k];
     for (int k = BP_NX; k < BP_CHANNELS; k++) value[k] = 0.0;
     if (!balls) return;
-    double q[BP_BALL_QUANTITIES];
     bp_ball_quantities(n, t, x, q);
 #define BP_MOST(b)                                                                                     \
     for (int k = 0; k < BP_BALL_CHANNELS; k++) {                                                       \
@@ -106,19 +110,36 @@ static inline void bp_channels(const bp_numbers *n, double t, const double *rest
 #undef BP_MOST
 }
 
-/* One channel at a state and time, and its ball counted from 1. */
-static inline double bp_channel(const bp_numbers *n, double t, const double *restrict x, int channel, int *ball)
+/* The most loaded ball, counted from 1, of these entries. */
+static inline int bp_most_loaded(const double *of, int balls)
 {
-    *ball = 0;
-    if (channel < BP_NX) return x[channel];
-    double q[BP_BALL_QUANTITIES];
-    bp_ball_quantities(n, t, x, q);
-    int balls, best = 0;
-    const double *of = bp_ball_row(q, channel - BP_NX, &balls);
+    int best = 0;
     for (int j = 1; j < balls; j++)
         if (of[j] > of[best]) best = j;
-    *ball = best + 1;
-    return of[best];
+    return best + 1;
+}
+
+/* A step, as searches see it. */
+typedef struct {
+    double time, h;
+    const bp_numbers *n;
+    /* state at a part of the step, and its time in the segment */
+    double (*state)(const void *source, double theta, double *x);
+    const void *source;
+    const double (*balls)[BP_BALL_QUANTITIES]; /* of the balls, at the quarters */
+} bp_within;
+
+/* One channel within a step; `ball`, counted from 1, is the one looked at, 0: the most loaded ball, which is told then. */
+static inline double bp_channel(const bp_within *step, double theta, int channel, int *ball)
+{
+    double x[BP_NX], q[BP_BALL_QUANTITIES];
+    const double t = step->state(step->source, theta, x);
+    if (channel < BP_NX) return x[channel];
+    int balls;
+    bp_ball_quantities(step->n, t, x, q);
+    const double *of = bp_ball_row(q, channel - BP_NX, &balls);
+    if (*ball == 0) *ball = bp_most_loaded(of, balls);
+    return of[*ball - 1];
 }
 
 /* Top of the parabola through three points with the middle one the highest; the middle where they lie on a line. */
@@ -157,7 +178,8 @@ static inline void bp_hull(const double *restrict q, double *restrict hull)
 }
 
 /* Bounds of what a step may bring, from the values at its quarters and that polynomial: no extreme is looked for that lies within those
-   known.  A parabola through three of the points rises above them by no more than an eighth of their range. */
+   known.  A parabola through three of the points rises above them by no more than an eighth of their range; beside a jump, where two of the
+   points tell nothing of the third, a force decays by no more than half between two quarters. */
 static inline void bp_survey(double v0, double v1, double v2, double v3, double v4, const double *restrict q, double *restrict bottom,
                              double *restrict top)
 {
@@ -167,7 +189,7 @@ static inline void bp_survey(double v0, double v1, double v2, double v3, double 
     double high = a > d ? a : d, low = c < e ? c : e;
     high = v4 > high ? v4 : high;
     low = v4 < low ? v4 : low;
-    const double reach = 0.1250001 * (high - low), up = hull[0] > hull[1] ? hull[0] : hull[1], down = hull[0] > hull[1] ? hull[1] : hull[0];
+    const double reach = BP_BEYOND * (high - low), up = hull[0] > hull[1] ? hull[0] : hull[1], down = hull[0] > hull[1] ? hull[1] : hull[0];
     high = up > high + reach ? up : high + reach;
     low = down < low - reach ? down : low - reach;
     *top = hull[2] > high ? hull[2] : high;
@@ -178,20 +200,19 @@ static inline void bp_survey(double v0, double v1, double v2, double v3, double 
 typedef struct {
     double *best; /* in the reduction; its time and ball follow */
     double sign;  /* 1 for a maximum, -1 for a minimum */
-    double time, h;
-    bp_channel_at at;
-    const void *source;
+    const bp_within *step;
     int channel;
+    int ball; /* counted from 1; 0: the most loaded one, or a state */
 } bp_search;
 
 /* The channel within the step, with the sign of a maximum; the extreme is brought up to date. */
 static inline double bp_probe(const bp_search *search, double theta)
 {
-    int ball;
-    const double value = search->at(search->source, search->channel, theta, &ball), found = search->sign * value;
+    int ball = search->ball;
+    const double value = bp_channel(search->step, theta, search->channel, &ball), found = search->sign * value;
     if (found > search->sign * *search->best) {
         search->best[0] = value;
-        search->best[BP_CHANNELS] = search->time + theta * search->h;
+        search->best[BP_CHANNELS] = search->step->time + theta * search->step->h;
         search->best[2 * BP_CHANNELS] = ball;
     }
     return found;
@@ -200,69 +221,51 @@ static inline double bp_probe(const bp_search *search, double theta)
 /* The top that is near theta, where `promised` was expected; u holds the channel at the quarters, with the sign of a maximum. */
 static inline void bp_climb(const bp_search *search, const double *u, double theta, double promised)
 {
-    const int part = theta < 1.0 ? (int)((BP_POINTS - 1) * theta) : BP_POINTS - 2;
-    double b = theta, vb = bp_probe(search, b);
+    const double found_there = bp_probe(search, theta);
     /* the polynomial is the channel: there is its top */
-    if (fabs(vb - promised) <= 1e-12 * (fabs(vb) + fabs(promised))) return;
-    double a = (double)part / (BP_POINTS - 1), c = (double)(part + 1) / (BP_POINTS - 1), va = u[part], vc = u[part + 1];
-    if (vc > vb && vc >= va) {
-        /* not between the quarters around it: uphill is the next one */
-        if (part + 2 >= BP_POINTS) return;
-        a = b, va = vb, b = c, vb = vc;
-        c = (double)(part + 2) / (BP_POINTS - 1), vc = u[part + 2];
-    } else if (va > vb) {
-        if (part == 0) return;
-        c = b, vc = vb, b = a, vb = va;
-        a = (double)(part - 1) / (BP_POINTS - 1), va = u[part - 1];
+    if (fabs(found_there - promised) <= 1e-12 * (fabs(found_there) + fabs(promised))) return;
+    double place[BP_POINTS + 1], value[BP_POINTS + 1];
+    int highest = 0;
+    for (int i = 0, k = 0; k <= BP_POINTS; k++) {
+        const int here = i == k && (i == BP_POINTS || theta < 0.25 * i);
+        place[k] = here ? theta : 0.25 * i;
+        value[k] = here ? found_there : u[i];
+        if (!here) i++;
+        if (value[k] > value[highest]) highest = k;
     }
-    for (int i = 0; i < BP_REFINEMENTS && vb >= va && vb >= vc; i++) {
-        /* what the next parabola promises on top; beside a jump of the force parabolas creep, and every other place is the middle of the
-           larger part instead */
+    if (highest == 0 || highest == BP_POINTS) return;
+    double a = place[highest - 1], b = place[highest], c = place[highest + 1];
+    double va = value[highest - 1], vb = value[highest], vc = value[highest + 1];
+    for (int i = 0, settled = 0; i < BP_REFINEMENTS && settled < 2; i++) {
+        /* what the next parabola promises on top; beside a kink parabolas creep, or promise nothing by chance, and every other place is the
+           middle of the larger part instead */
         const double range = va < vc ? vb - va : vb - vc, next = bp_top(a, va, b, vb, c, vc), move = (next - b) / (next < b ? b - a : c - b);
-        if (!(range * move * move > 1e-9 * fabs(vb))) return;
-        const double place = i % 2 == 0 ? next : b - a > c - b ? 0.5 * (a + b) : 0.5 * (b + c), found = bp_probe(search, place);
-        if (place < b) {
-            if (found > vb) c = b, vc = vb, b = place, vb = found;
-            else a = place, va = found;
+        settled = range * move * move > 1e-9 * fabs(vb) ? 0 : settled + 1;
+        const double at = i % 2 == 0 && next != b ? next : b - a > c - b ? 0.5 * (a + b) : 0.5 * (b + c), found = bp_probe(search, at);
+        if (at < b) {
+            if (found > vb) c = b, vc = vb, b = at, vb = found;
+            else a = at, va = found;
         } else {
-            if (found > vb) a = b, va = vb, b = place, vb = found;
-            else c = place, vc = found;
+            if (found > vb) a = b, va = vb, b = at, vb = found;
+            else c = at, vc = found;
         }
     }
 }
 
-/* Bring one extreme of a channel up to date with a step.
-
-   reduction   the row
-   value       place of the extreme in the row; its time and ball follow
-   sign        1 for a maximum, -1 for a minimum
-   v           the channel at the quarters, `stride` apart
-   time        start of the step [s] */
-static inline void bp_extreme(double *reduction, int value, int channel, double sign, const double *v, int stride, double time, double h,
-                              bp_channel_at at, const void *source)
+/* Every top of what is searched for, whose values at the quarters are u, with the sign of a maximum.  The parabola is for where no polynomial
+   is the channel. */
+static inline void bp_tops(const bp_search *search, const double *u)
 {
-    const bp_search search = {reduction + value + channel, sign, time, h, at, source, channel};
-    double *best = search.best, u[BP_POINTS], q[5], hull[3], slope[BP_CELLS + 1];
-    const int first = !(reduction[BP_DURATION] > 0.0);
-    int top = 0, ball;
-    for (int i = 0; i < BP_POINTS; i++) {
-        u[i] = sign * v[i * stride];
+    double q[5], hull[3], slope[BP_CELLS + 1];
+    int top = 0;
+    for (int i = 1; i < BP_POINTS; i++)
         if (u[i] > u[top]) top = i;
-    }
-    if (first || u[top] > sign * *best) {
-        const double theta = (double)top / (BP_POINTS - 1);
-        at(source, channel, theta, &ball);
-        best[0] = v[top * stride];
-        best[BP_CHANNELS] = time + theta * h;
-        best[2 * BP_CHANNELS] = ball;
-    }
-    /* is there anything above it?  The parabola is for balls that change rank within the step, where no polynomial is the channel. */
     bp_quartic(u[0], u[1], u[2], u[3], u[4], q);
     bp_hull(q, hull);
     const int middle = top == 0 ? 1 : top == BP_POINTS - 1 ? BP_POINTS - 2 : top;
     const double bend = u[middle - 1] - 2.0 * u[middle] + u[middle + 1], rise = 0.5 * (u[middle + 1] - u[middle - 1]);
     const double shift = bend < 0.0 ? -rise / bend : 0.0, place = (middle + shift) / (BP_POINTS - 1);
-    const double above = u[middle] + 0.5 * rise * shift, known = sign * *best;
+    const double above = u[middle] + 0.5 * rise * shift, known = search->sign * *search->best;
     if (!(hull[0] > known || hull[1] > known || hull[2] > known || above > known)) return;
     /* every top of the polynomial: where its slope changes sign */
     for (int i = 0; i <= BP_CELLS; i++) {
@@ -279,15 +282,139 @@ static inline void bp_extreme(double *reduction, int value, int channel, double 
             s = moved < low ? low : moved > high ? high : moved;
         }
         const double promised = q[0] + s * (q[1] + s * (q[2] + s * (q[3] + s * q[4])));
-        if (promised > sign * *best) bp_climb(&search, u, 0.25 * (s + 2.0), promised);
+        if (promised > search->sign * *search->best) bp_climb(search, u, 0.25 * (s + 2.0), promised);
     }
-    if (channel >= BP_NX && above > sign * *best && place > 0.0 && place < 1.0) bp_climb(&search, u, place, above);
+    if (search->channel >= BP_NX && above > search->sign * *search->best && place > 0.0 && place < 1.0) bp_climb(search, u, place, above);
+}
+
+/* Values of a channel for all balls at a place of a step. */
+static inline const double *bp_balls_at(const bp_within *step, double theta, int channel, double *restrict q, int *balls)
+{
+    double x[BP_NX];
+    const double t = step->state(step->source, theta, x);
+    bp_ball_quantities(step->n, t, x, q);
+    return bp_ball_row(q, channel - BP_NX, balls);
+}
+
+/* Both sides of the place where a ball's contact begins or ends; `channel` is its deflection. */
+static inline void bp_jump(const bp_search *search, double from, double to, int channel, int ball, int touches)
+{
+    for (int k = 0; k < BP_BISECTIONS; k++) {
+        const double place = 0.5 * (from + to);
+        if ((bp_channel(search->step, place, channel, &ball) > 0.0) == touches) from = place;
+        else to = place;
+    }
+    bp_probe(search, from);
+    bp_probe(search, to);
+}
+
+/* Where the most loaded ball changes from one to another, and from and to those that are most loaded in between; `start` and `end` are the
+   values of all balls at both ends.  By regula falsi (Illinois), given up where one ball stays above the extreme known while the other one
+   rises. */
+static inline void bp_rank_changes(const bp_search *search, double from, double to, const double *start, const double *end, int depth)
+{
+    int balls;
+    bp_ball_row(search->step->balls[0], search->channel - BP_NX, &balls);
+    const int first = bp_most_loaded(start, balls) - 1, last = bp_most_loaded(end, balls) - 1;
+    if (first == last) return;
+    double a = from, b = to, fa = start[first] - start[last], fb = end[first] - end[last], q[BP_BALL_QUANTITIES];
+    double before = start[last], behind = end[first];
+    const double *of = start;
+    int kept = 0;
+    for (int k = 0; k < BP_BISECTIONS; k++) {
+        if (before >= *search->best || behind >= *search->best) return;
+        const double root = b - fb * (b - a) / (fb - fa), place = root > a && root < b && k % 4 != 3 ? root : 0.5 * (a + b);
+        of = bp_balls_at(search->step, place, search->channel, q, &balls);
+        const double f = of[first] - of[last], most = of[bp_most_loaded(of, balls) - 1];
+        if (most < *search->best) bp_probe(search, place);
+        if (f > 0.0) {
+            fb *= kept > 0 ? 0.5 : 1.0;
+            a = place, fa = f, kept = 1, before = of[last];
+        } else {
+            fa *= kept < 0 ? 0.5 : 1.0;
+            b = place, fb = f, kept = -1, behind = of[first];
+        }
+        if (fabs(f) <= 1e-12 * fabs(most) || !(b - a > 1e-14)) break;
+    }
+    const int most = bp_most_loaded(of, balls) - 1;
+    if (most == first || most == last || depth == 0) return;
+    bp_rank_changes(search, from, a, start, of, depth - 1);
+    bp_rank_changes(search, b, to, of, end, depth - 1);
+}
+
+/* The same for a channel of the balls, whose value of the most loaded ball at the quarters is u, with the sign of a maximum. */
+static inline void bp_ball_extreme(bp_search search, const double *u)
+{
+    const double(*q)[BP_BALL_QUANTITIES] = search.step->balls;
+    const int row = search.channel - BP_NX, kind = row % BP_BALL_CHANNELS, deflection = BP_BALL_CHANNELS - 1;
+    const double *of[BP_POINTS], *gap[BP_POINTS];
+    int balls;
+    for (int i = 0; i < BP_POINTS; i++) {
+        of[i] = bp_ball_row(q[i], row, &balls);
+        gap[i] = bp_ball_row(q[i], row - kind + deflection, &balls);
+    }
+    /* forces jump where a contact begins or ends, and no ball carries more than the most loaded one */
+    const int jumps = kind == 0 || kind == 2;
+    double least = -INFINITY;
+    for (int j = 0; j < balls; j++) {
+        double own[BP_POINTS], high = -INFINITY, low = INFINITY;
+        for (int i = 0; i < BP_POINTS; i++) {
+            own[i] = search.sign * of[i][j];
+            high = own[i] > high ? own[i] : high;
+            low = own[i] < low ? own[i] : low;
+        }
+        const double reach = BP_BEYOND * (high - low);
+        least = -high - reach > least ? -high - reach : least;
+        if (search.sign < 0.0) continue;
+        search.ball = j + 1;
+        bp_tops(&search, own);
+        for (int i = 0; i + 1 < BP_POINTS && jumps && high + reach > *search.best; i++)
+            if ((gap[i][j] > 0.0) != (gap[i + 1][j] > 0.0))
+                bp_jump(&search, 0.25 * i, 0.25 * (i + 1), BP_NX + row - kind + deflection, j + 1, gap[i][j] > 0.0);
+    }
+    if (search.sign > 0.0 || !(least < *search.best)) return;
+    bp_tops(&search, u);
+    for (int i = 0; i + 1 < BP_POINTS; i++) {
+        const double from = 0.25 * i, to = 0.25 * (i + 1);
+        bp_rank_changes(&search, from, to, of[i], of[i + 1], BP_RANKS);
+        for (int j = 0; j < balls && jumps; j++)
+            if ((gap[i][j] > 0.0) != (gap[i + 1][j] > 0.0))
+                bp_jump(&search, from, to, BP_NX + row - kind + deflection, j + 1, gap[i][j] > 0.0);
+    }
+}
+
+/* Bring one extreme of a channel up to date with a step.
+
+   reduction   the row
+   value       place of the extreme in the row; its time and ball follow
+   sign        1 for a maximum, -1 for a minimum
+   v           the channel at the quarters, `stride` apart */
+static inline void bp_extreme(double *reduction, int value, int channel, double sign, const double *v, int stride, const bp_within *step)
+{
+    const bp_search search = {reduction + value + channel, sign, step, channel, 0};
+    double *best = search.best, u[BP_POINTS];
+    int top = 0, balls;
+    for (int i = 0; i < BP_POINTS; i++) {
+        u[i] = sign * v[i * stride];
+        if (u[i] > u[top]) top = i;
+    }
+    if (!(reduction[BP_DURATION] > 0.0) || u[top] > sign * *best) {
+        best[0] = v[top * stride];
+        best[BP_CHANNELS] = step->time + 0.25 * top * step->h;
+        best[2 * BP_CHANNELS] = 0.0;
+        if (channel >= BP_NX) {
+            const double *of = bp_ball_row(step->balls[top], channel - BP_NX, &balls);
+            best[2 * BP_CHANNELS] = bp_most_loaded(of, balls);
+        }
+    }
+    if (channel < BP_NX) bp_tops(&search, u);
+    else bp_ball_extreme(search, u);
 }
 
 /* Add an accepted step whose channels at the quarters are v. */
-static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHANNELS], double time, double h, bp_channel_at at,
-                             const void *source)
+static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHANNELS], const bp_within *step)
 {
+    const double h = step->h;
     const unsigned long wanted = bp_wanted(reduction);
     const int first = !(reduction[BP_DURATION] > 0.0);
     double sum[BP_CHANNELS], square[BP_CHANNELS], top[BP_CHANNELS], bottom[BP_CHANNELS];
@@ -309,9 +436,9 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
         reduction[BP_INTEGRAL + k] += h * sum[k];
         reduction[BP_SQUARE + k] += h * square[k];
         if (first || top[k] > reduction[BP_MAX + k])
-            bp_extreme(reduction, BP_MAX, k, 1.0, v[0] + k, BP_CHANNELS, time, h, at, source);
+            bp_extreme(reduction, BP_MAX, k, 1.0, v[0] + k, BP_CHANNELS, step);
         if (first || bottom[k] < reduction[BP_MIN + k])
-            bp_extreme(reduction, BP_MIN, k, -1.0, v[0] + k, BP_CHANNELS, time, h, at, source);
+            bp_extreme(reduction, BP_MIN, k, -1.0, v[0] + k, BP_CHANNELS, step);
     }
     reduction[BP_DURATION] += h;
 }

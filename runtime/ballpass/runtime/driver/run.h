@@ -59,7 +59,7 @@ typedef struct {
 #endif
 #ifdef BALLPASS_REDUCTIONS
     double *reduction; /* or NULL where nothing is reduced in the present segment */
-    double sampled[BP_POINTS][BP_CHANNELS];
+    double sampled[BP_POINTS][BP_CHANNELS], balls[BP_POINTS][BP_BALL_QUANTITIES]; /* at the quarters of a step */
 #endif
 #ifdef BALLPASS_LOCATED
     bp_sides sides;
