@@ -74,7 +74,7 @@ def count_operations(scene: Scene) -> dict[str, int]:
     SceneError
         The scene cannot be derived.
     """
-    lowered = lower(derive(scene))
+    lowered = lower(derive(scene), derivatives=False)
     counts = {f.name(): operations(f) for f, _ in lowered.functions}
     if lowered.kernels is not None:
         counts |= {f"kernel.{k.function.name()}": operations(k.function) for k in lowered.kernels.functions}

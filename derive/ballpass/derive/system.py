@@ -46,7 +46,8 @@ class System:
     """The model as mathematics; every stage after this one needs nothing else.
 
     `constants` are the derived constants (functions of the parameters only).  `definitions` is the ordered rest.
-    `mass * d(velocities)/dt = forcing`; both empty without a bearing.  `quantities` is all that the model can report,
+    `mass * d(velocities)/dt = forcing`; both empty without a bearing.  `linear_forms` are the definitions of their
+    entries, where bearings and linkage move each other.  `quantities` is all that the model can report,
     `outputs` what the scene asks for.
     """
 
@@ -61,6 +62,7 @@ class System:
     forcing: sp.ImmutableMatrix
     linkage: Linkage | None
     reactions: Reactions | None
+    linear_forms: tuple[Definition, ...]
     bearings: tuple[BearingModel, ...]
     quantities: tuple[Output, ...]
     outputs: tuple[Output, ...]
@@ -233,6 +235,7 @@ def _two_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sy
         errors,
         inputs=(drive.phase, *forces.inputs, *(cage.phase for cage in cages)),
         definitions=(*known, *reactions.definitions, *motion.definitions),
+        linear_forms=motion.definitions,
         constants=(
             *(c for swing in swings.values() for c in swing.constants),
             *(c for model in models for c in model.constants),
@@ -314,6 +317,7 @@ def _system(
     forcing: sp.ImmutableMatrix,
     linkage: Linkage | None,
     reactions: Reactions | None,
+    linear_forms: tuple[Definition, ...] = (),
 ) -> System:
     outputs: tuple[Output, ...] = ()
     with _noted(errors):
@@ -335,6 +339,7 @@ def _system(
         forcing=forcing,
         linkage=linkage,
         reactions=reactions,
+        linear_forms=linear_forms,
         bearings=tuple(bearings),
         quantities=quantities,
         outputs=outputs,

@@ -67,10 +67,11 @@ def equations(system: System) -> str:
     if system.constants:
         parts += ["## Derived constants", "Evaluated once a run.", *_definitions(tex, system.constants)]
     if system.linkage is not None and system.reactions is not None:
+        told = {*system.reactions.definitions, *system.linear_forms}
         parts += [
             "## Linkage",
             "Positions by driver and dyads, velocities and accelerations from the differentiated loop closure.",
-            *_definitions(tex, (d for d in system.definitions if d not in system.reactions.definitions)),
+            *_definitions(tex, (d for d in system.definitions if d not in told)),
             "## Joint reactions and drive torque, Eq. (1)",
             "Newton and Euler for every moving body about its centre of mass.",
             _equation(
@@ -112,7 +113,14 @@ def _contact(tex: _Printer, model: BearingModel) -> list[str]:
 
 
 def _motion(tex: _Printer, system: System) -> list[str]:
-    parts = ["## Equations of motion, Eq. (2)"]
+    parts = ["## Equations of motion" + ("" if system.linear_forms else ", Eq. (2)")]
+    if system.linear_forms:
+        parts += [
+            "The linkage moves with the play of its joints. Its velocities are linear in the generalized velocities; "
+            "an index behind a comma is the slope by one of them, the index (0) an acceleration with all generalized "
+            "accelerations zero. Entries of the mass matrix M, and generalized forces less what is left of inertia:",
+            *_definitions(tex, system.linear_forms),
+        ]
     if system.mass.is_diagonal():
         parts += [
             _equation(rf"{tex(system.mass[k, k])}\,\ddot {c.latex} = {tex(system.forcing[k])}")

@@ -65,14 +65,17 @@ class Functions:
         raise KeyError(name)
 
 
-def lower(system: System, *, extra: Mapping[str, Mapping[str, sp.Expr]] | None = None) -> Functions:
+def lower(
+    system: System, *, extra: Mapping[str, Mapping[str, sp.Expr]] | None = None, derivatives: bool = True
+) -> Functions:
     """Lower a system.
 
     Parameters
     ----------
+    derivatives : whether `Functions.jacobians` are wanted
     extra : further functions, name -> output name -> expression over the system's symbols (used to check derivations)
     """
-    return _Lowering(system).functions(extra or {})
+    return _Lowering(system).functions(extra or {}, derivatives=derivatives)
 
 
 def operations(function: ca.Function) -> int:
@@ -121,7 +124,7 @@ class _Lowering:
 
     # the functions
 
-    def functions(self, extra: Mapping[str, Mapping[str, sp.Expr]]) -> Functions:
+    def functions(self, extra: Mapping[str, Mapping[str, sp.Expr]], *, derivatives: bool) -> Functions:
         system, definitions = self.system, self._definitions
         bodies: list[tuple[str, dict[str, ca.SX], str]] = []
         balls = self._balls(self.visit)
@@ -188,7 +191,7 @@ class _Lowering:
             if name == "rhs":  # the choice of a method needs these two
                 made += partials(name, "xdot", results["xdot"], arguments, "xt")
         rhs = bodies[0][1]["xdot"] if system.coordinates else None
-        groups, jacobians = self._jacobians(rhs, arguments)
+        groups, jacobians = self._jacobians(rhs, arguments) if derivatives else ([], [])
         named = [
             Constant(name=d.symbol.name, unit=d.unit, description=d.description, latex=d.latex)
             for d in system.constants

@@ -92,8 +92,8 @@ class LinearForms:
                     f"{symbol.name}.by.{c.name}",
                     entry,
                     "1" if definition.unit == f"{c.unit}/s" else f"({definition.unit})/({c.unit}/s)",
-                    f"{definition.description}: derivative by that of {c.name}",
-                    rf"\partial {definition.latex} / \partial \dot {c.latex}",
+                    f"{definition.description}: slope by {c.velocity.name}",
+                    rf"{{{definition.latex}}}_{{,{c.latex}}}",
                 )
                 for c, entry in zip(self._coordinates, self.columns(definition.expression), strict=True)
             )
@@ -120,7 +120,7 @@ class LinearForms:
                     bare,
                     definition.unit,
                     f"{definition.description}, with all generalized accelerations zero",
-                    rf"{{{definition.latex}}}^{{(0)}}",
+                    rf"{{{definition.latex}}}_{{(0)}}",
                 )
             )
         return self._biases[symbol]
@@ -148,14 +148,14 @@ class LinearForms:
                 mass[i][j] = self._ledger.name(
                     f"mass.{names[i]}.{names[j]}",
                     mass[i][j],
-                    "",
+                    "kg" if self._coordinates[i].unit == self._coordinates[j].unit == "m" else "kg*m^2/rad^2",
                     f"entry of the mass matrix, {names[i]} and {names[j]}",
                     f"M_{{{symbols[i]},{symbols[j]}}}",
                 )
             forcing[i] = self._ledger.name(
                 f"forcing.{names[i]}",
                 forcing[i],
-                "",
+                "N" if self._coordinates[i].unit == "m" else "N*m",
                 f"generalized force along {names[i]} without inertia, Q - h",
                 f"f_{{{symbols[i]}}}",
             )
