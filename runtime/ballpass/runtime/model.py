@@ -25,6 +25,7 @@ from ballpass.runtime.run.reduced_run import reduce_run
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.sensitivity import Sensitivities, refuse_located, sensitivities
+from ballpass.runtime.run.settle import MOST, Settled, settle
 from ballpass.runtime.run.simulate import method_names, simulate
 
 if TYPE_CHECKING:
@@ -313,6 +314,43 @@ class Model(PointModel):
             progress=progress,
         )
         return reduce_run(self, self._runnable(parameters), request)
+
+    def settle(
+        self,
+        *,
+        transient: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        method: str | None = None,
+        rtol: float | None = None,
+        initial: Sequence[float] | np.ndarray | None = None,
+        kinks: Kinks | None = None,
+        most: int = MOST,
+        progress: Callable[[float], None] | None = None,
+    ) -> Settled:
+        """Reduce a run of as many turns as its extremes and rms take to settle (see `ballpass.runtime.run.settle`).
+
+        Parameters are those of `reduce`.
+
+        Parameters
+        ----------
+        most : steady turns; ``settled`` of the result is False where they are not enough
+
+        Raises
+        ------
+        RequestError
+            A wrong request, a linkage that cannot be assembled, or a model in which nothing turns.
+        SimulationError
+            The computation failed.
+        """
+        request = Request(
+            method=method,
+            rtol=rtol,
+            initial=None if initial is None else vector(initial),
+            transient_cycles=transient,
+            kinks=kinks,
+            progress=progress,
+        )
+        return settle(self, self._runnable(parameters), request, most)
 
     def simulate_many(
         self,

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import Asked, faults_of_numbers, read_asked, read_duration
+from ballpass.runtime.app.commands.asked import Asked, faults_of_numbers, read_asked, read_duration, read_turns
 from ballpass.runtime.app.commands.explain import explain
 from ballpass.runtime.app.commands.jacobian import jacobian, linearize
 from ballpass.runtime.app.commands.sensitivity import sensitivity
@@ -39,8 +39,8 @@ from ballpass.runtime.contract import read_artefact, read_manifest
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:
-    from ballpass.runtime.certify.growth import Growth
     from ballpass.runtime.model import Model
+    from ballpass.runtime.run.locating import Kinks
     from ballpass.runtime.run.solution import Solution
 
 #: Bytes of samples that are written without a word.
@@ -76,6 +76,13 @@ def _common(
 def run(
     scene: options.SceneFile,
     cycles: options.Cycles = None,
+    turns: Annotated[
+        str | None,
+        typer.Option(
+            metavar="settle",
+            help="Peaks and rms of the summary are those of as many turns as they take to settle.",
+        ),
+    ] = None,
     duration: options.Duration = None,
     transient: Annotated[
         float | None, typer.Option(metavar="N", help="Turns at the start that summary and figures leave out.")
@@ -117,8 +124,13 @@ def run(
 
     Derives and compiles what is stale in generated/<scene>. What is not given here is as the scene's run table says.
     """
+    from ballpass.runtime.app.summary import add_turns, render_accuracy, render_summary, summarize
+    from ballpass.runtime.app.tables import wide_console
+    from ballpass.runtime.run.settle import look_further
+
     with command(scene) as stages:
         stages("read")
+        settles = read_turns(turns, duration if cycles is None else cycles)
         seconds = read_duration(duration, cycles)
         asked = read_asked(scene, set_, seconds, transient)
         _check_request(asked, cycles, transient, rtol, method)
@@ -149,15 +161,34 @@ def run(
             )
             if growth.uncertain:
                 warn(growth.words)
-        summary, files = _write_results(model, solution, growth, folder, stages, figures=figures)
+        longer = None
+        if settles:
+            taken = solution.statistics
+            longer = model.settle(
+                transient=transient,
+                parameters=asked.overrides,
+                method=taken.method,
+                rtol=taken.rtol,
+                kinks=cast("Kinks | None", taken.kinks),
+                progress=stages.fraction,
+            )
+            if not longer.settled:
+                warn(longer.words)
+        else:
+            longer = look_further(model, model.numbers(asked.overrides), solution)
+        stages("write")
+        summary = summarize(model, solution, growth)
+        turned = add_turns(summary, longer, instead=settles) if longer is not None else ""
+        if solution.accuracy is not None:
+            summary["accuracy"] = solution.accuracy.plain()
+        summary, files = _write_results(model, solution, summary, folder, stages, figures=figures)
     if json_:
         show_json(summary)
         return
-    from ballpass.runtime.app.summary import render_accuracy, render_summary
-    from ballpass.runtime.app.tables import wide_console
-
     table = render_summary(summary)
     wide_console(table).print(table)
+    if turned:
+        show(turned)
     if solution.accuracy is not None:
         told = render_accuracy(model, solution.accuracy)
         wide_console(told).print(told)
@@ -279,7 +310,7 @@ def _size(count: int) -> str:
 
 
 def _write_results(
-    model: Model, solution: Solution, growth: Growth | None, folder: Path, stages: Stages, *, figures: bool
+    model: Model, solution: Solution, summary: dict[str, Any], folder: Path, stages: Stages, *, figures: bool
 ) -> tuple[dict[str, Any], list[str]]:
     """Write solution, summary and figures in the place of those of an earlier run.
 
@@ -289,12 +320,6 @@ def _write_results(
     """
     from ballpass.runtime.app.figures import NAMES as FIGURES
     from ballpass.runtime.app.results import SOLUTION, write_results
-    from ballpass.runtime.app.summary import summarize
-
-    stages("write")
-    summary = summarize(model, solution, growth)
-    if solution.accuracy is not None:
-        summary["accuracy"] = solution.accuracy.plain()
 
     def write(made: Path) -> dict[str, Any]:
         solution.save(made / SOLUTION)

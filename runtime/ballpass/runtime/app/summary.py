@@ -9,6 +9,7 @@ the deviation from the mean.
 
 from __future__ import annotations
 
+import math
 import platform
 import warnings
 from collections.abc import Callable, Mapping
@@ -30,11 +31,14 @@ from ballpass.runtime.contract.usual import UnusualWarning, unusual
 from ballpass.runtime.many.ensemble import observable_unit
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.run.inputs import breakpoints
+from ballpass.runtime.run.settle import MEANS, PEAKS
 
 if TYPE_CHECKING:
     from ballpass.runtime.certify.growth import Growth
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.accuracy import Accuracy
+    from ballpass.runtime.run.reductions import Reduction
+    from ballpass.runtime.run.settle import Settled
     from ballpass.runtime.run.solution import Solution
 
 #: Packages whose version may change a number.
@@ -135,6 +139,63 @@ def _unusual(sol: Solution) -> list[str]:
                 "work. Check the directions of forces and speed, and the windows."
             )
     return said
+
+
+def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str:
+    """Add what more turns give to a summary (``longer``).
+
+    Parameters
+    ----------
+    longer : extremes and rms over more turns than the run's
+    instead : put them in the place of those of the run
+
+    Returns
+    -------
+    Words for people: what changes, over how many turns.
+    """
+    told: dict[str, Any] = {"turns": _numbers("turns", "1", value=longer.turns), "settled": longer.settled}
+    lines: list[tuple[float, str]] = []
+    for name, found in longer.reductions.items():
+        entry, numbers = _printed(name, found)
+        if entry not in summary or not numbers:
+            continue
+        unit, (peak, mean) = summary[entry]["unit"], longer.changes.get(name, (0.0, 0.0))
+        told[entry] = told.get(entry, {}) | _numbers(entry, unit, **numbers)
+        factor, shown = TABLE_UNITS.get(unit, (1.0, unit))
+        for kind, value in numbers.items():
+            before = summary[entry][kind]
+            # the highest force comes first, changed or not
+            change = math.inf if kind == "total" else abs(value - before) / max(abs(before), abs(value), 1e-300)
+            counts = (kind in ("min", "max") and peak > PEAKS) or (kind == "rms" and mean > MEANS)
+            if change == math.inf or (counts and change > PEAKS):
+                lines.append((change, f"{entry}.{kind} {factor * value:.4g} {shown} instead of {factor * before:.4g}"))
+        if instead:
+            summary[entry] |= told[entry]
+            for key in numbers.keys() & _BALL_FORCES.keys():
+                summary[entry]["time"][key], summary[entry]["ball"][key] = found.maximum_time, found.maximum_ball
+                summary[entry]["sampled"].pop(key)
+    summary["longer"] = told
+    if instead:
+        summary["steady_cycles"] = told["turns"]
+        return f"{longer.words}. Samples and figures are those of the first turns."
+    over = f"over {longer.turns} steady turns"
+    if longer.settled:
+        rest = f"peaks change by at most {100.0 * PEAKS:g} % of their range, rms by at most {100.0 * MEANS:g} %."
+        return f"{over}: {', '.join([*(text for change, text in lines if change == math.inf), rest])}"
+    lines.sort(key=lambda line: -line[0])
+    more = f", and {len(lines) - SHOWN} more (summary.json)" if len(lines) > SHOWN else ""
+    return f"{over}: {', '.join(text for _, text in lines[:SHOWN])}{more}. --turns settle runs until they settle."
+
+
+def _printed(channel: str, found: Reduction) -> tuple[str, dict[str, float]]:
+    """Key of a channel in the summary, and the numbers that stand there."""
+    prefix, of_ball, _ = channel.rpartition("ball.")
+    if of_ball:
+        keys = {path: key for key, path in _BALL_FORCES.items()}
+        name = channel.removeprefix(prefix)
+        return f"{prefix}peak_ball_force", {keys[name]: found.maximum} if name in keys else {}
+    numbers = {"min": found.minimum, "max": found.maximum, "mean": found.mean, "rms": found.rms, "std": found.std}
+    return channel, numbers
 
 
 def _add_spread(summary: dict[str, Any], steady: Solution, name: str) -> None:
@@ -291,6 +352,9 @@ def _numbers(name: str, unit: str, **values: float | np.floating[Any]) -> dict[s
             )
     return {**{key: float(value) for key, value in values.items()}, "unit": unit}
 
+
+#: Numbers that `add_turns` names; the file has all.
+SHOWN = 5
 
 #: Unit of a number in the file -> factor and unit in the table, so that six digits of a displacement are six digits.
 TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}

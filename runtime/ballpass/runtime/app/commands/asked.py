@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 _Run = TypeVar("_Run", bound="Run | RunInfo")
 
+#: Word of ``--turns`` for as many turns as peaks and rms take to settle.
+SETTLE = "settle"
+
 #: Lines of a scene's run table that have an option of ``ballpass run``.
 RUN_OPTIONS = {
     "run.cycles": "--cycles",
@@ -152,6 +155,26 @@ def read_quantity(option: str, text: str | None, unit: str) -> float | None:
     if not math.isfinite(value):
         raise RequestError(f"{option}: {text!r} is no finite quantity.")
     return value
+
+
+def read_turns(text: str | None, length: float | str | None) -> bool:
+    """Whether ``--turns settle`` was asked for.
+
+    Raises
+    ------
+    RequestError
+        Another word, or a length of the run as well.
+    """
+    if text is None:
+        return False
+    if text.strip() != SETTLE:
+        raise RequestError(
+            f"--turns: {text!r:.80} was given. Allowed: {SETTLE}, as many turns as peaks and rms take to settle. For a "
+            "number of turns take --cycles."
+        )
+    if length is not None:
+        raise RequestError(f"--turns {SETTLE} finds the length of the run, and {length!r} was given as well.")
+    return True
 
 
 def read_duration(text: str | None, cycles: float | None) -> float | None:

@@ -1,0 +1,137 @@
+"""How many turns make a peak: a run that goes on until its extremes and means settle.
+
+In: a model, numbers, a request.  Out: `Settled`.  The balls meet the load's peak in other places each turn, so the peak
+of two turns depends on the balls' first angle.  The turns are doubled until that changes no extreme of any channel by
+more than `PEAKS` of its range, and no rms by more than `MEANS`.  Fewer than `LEAST` turns are not trusted: two and four
+of them may share a peak by luck.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers, real
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run.reduced_run import reduce_run
+from ballpass.runtime.run.reductions import Reductions
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.solution import Solution
+
+#: Change of extremes, relative to the channel's range, and of rms, relative to itself, that counts as none [1].
+PEAKS, MEANS = 5e-3, 1e-2
+
+#: Steady turns that are compared with twice as many at first, and the most that are run.
+LEAST, MOST = 64, 4096
+
+#: Steps that `look_further` may take beside a run: some tenth of a second.
+STEPS = 100_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settled:
+    """A run whose extremes and means more turns do not change.
+
+    Attributes
+    ----------
+    reductions : over all steady turns
+    turns : how many they are
+    settled : whether half of them gave the same; False where the most turns were not enough
+    changes : of each channel by the second half of the turns: of the extremes, over the range, and of the rms [1]
+    """
+
+    reductions: Reductions
+    turns: int
+    settled: bool
+    changes: Mapping[str, tuple[float, float]]
+
+    @property
+    def words(self) -> str:
+        """A sentence for people."""
+        name = max(self.changes, key=lambda channel: max(self.changes[channel]))
+        peak, mean = self.changes[name]
+        state = "settled" if self.settled else "not settled"
+        return (
+            f"peaks and rms {state} over {self.turns} steady turns: the second half changed extremes and rms most in "
+            f"{name}, by {100.0 * peak:.2g} % of its range and {100.0 * mean:.2g} %"
+        )
+
+
+def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = MOST) -> Settled:
+    """Run on until twice the turns change nothing.
+
+    Parameters
+    ----------
+    request : its length is left out
+    most : steady turns
+
+    Raises
+    ------
+    RequestError
+        A wrong request, or nothing turns.
+    SimulationError
+        The computation failed.
+    """
+    if request.cycles is not None or request.duration is not None:
+        raise RequestError("settle: the number of turns is what it finds; give neither cycles nor duration.")
+    if not (real(most) >= 2 * LEAST and int(most) == most):
+        raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * LEAST} on is expected.")
+    run = model.manifest.run
+    transient = run.transient_cycles if request.transient_cycles is None else request.transient_cycles
+    turns = LEAST
+    before = reduce_run(model, numbers, replace(request, cycles=transient + turns))
+    while True:
+        turns *= 2
+        found = reduce_run(model, numbers, replace(request, cycles=transient + turns))
+        changes = changed(before, found)
+        settled = _settled(changes)
+        if settled or 2 * turns > most:
+            return Settled(reductions=found, turns=turns, settled=settled, changes=changes)
+        before = found
+
+
+def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Settled | None:
+    """What `LEAST` turns, or as many as `STEPS` steps reach, change in the extremes and rms of a run.
+
+    None where the run is about as long, nothing turns, or another method than the project's own stepper ran.
+
+    Raises
+    ------
+    SimulationError
+        The longer run failed.
+    """
+    few, statistics = solution.steady_reductions, solution.statistics
+    if few is None or solution.cycle_length is None or not statistics.steps:
+        return None
+    whole = (few.start + few.duration) / solution.cycle_length
+    turns = min(LEAST, int(STEPS * whole / statistics.steps))
+    if turns < 2.0 * few.duration / solution.cycle_length:
+        return None
+    request = Request(
+        cycles=solution.transient_cycles + turns,
+        transient_cycles=solution.transient_cycles,
+        method=statistics.method,
+        rtol=statistics.rtol,
+        kinks=statistics.kinks,
+        initial=np.array(statistics.initial),
+    )
+    found = reduce_run(model, numbers, request)
+    changes = changed(few, found)
+    return Settled(reductions=found, turns=turns, settled=_settled(changes), changes=changes)
+
+
+def _settled(changes: Mapping[str, tuple[float, float]]) -> bool:
+    return all(peak <= PEAKS and mean <= MEANS for peak, mean in changes.values())
+
+
+def changed(few: Reductions, many: Reductions) -> dict[str, tuple[float, float]]:
+    """Change of the extremes of each channel, over its range, and of its rms [1]."""
+    found = {}
+    for name, less in few.items():
+        more, span = many[name], many[name].range
+        peak = max(abs(more.maximum - less.maximum), abs(more.minimum - less.minimum))
+        found[name] = (peak / span if span > 0.0 else 0.0, abs(less.rms / more.rms - 1.0) if more.rms > 0.0 else 0.0)
+    return found
