@@ -20,6 +20,7 @@ SECTIONS = {
     "test_invariants": "Invariants",
     "test_methods": "Methods and refusals",
     "test_many": "Ensembles, derivatives, outputs",
+    "test_certificates": "Certificates",
     "test_generated_c": "Generated C",
 }
 

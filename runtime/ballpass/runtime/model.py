@@ -242,7 +242,7 @@ class Model(PointModel):
         method : of the derivatives: ``auto``, or one of the stepper's
         check : compare with differences, the second route; False gives derivatives without certificates
         rtol, sensitivity_rtol : tolerances of states and derivatives; tight ones by default
-        samples_per_cycle : nodes of quadratures in a turn
+        samples_per_cycle : nodes of quadratures in a turn that there are at least; there are more where signals need it
         kinks : ``stepped-over`` at any tolerance, as for `sensitivities`
         agreement : relative disagreement of both routes that is allowed
         progress : called with words and a finished fraction

@@ -109,7 +109,7 @@ def find_extremes(
         seen = look(_nodes(np.concatenate([b.times for b in every]), np.repeat([b.segment for b in every], GRID)))
         for k, bracket in enumerate(every):
             bracket.values = seen[bracket.wanted.channel].value[k * GRID : (k + 1) * GRID]
-            best = int(np.argmax(_height(bracket)))
+            best = _top(_height(bracket))
             bracket.low, bracket.high = bracket.times[max(best - 1, 0)], bracket.times[min(best + 1, GRID - 1)]
     return [_best(item, [_extreme(b, edges) for b in some], edges) for item, some in zip(wanted, brackets, strict=True)]
 
@@ -122,8 +122,9 @@ def _brackets(wanted: Wanted, track: Track, values: Array) -> list[_Bracket]:
     before = np.concatenate([[-np.inf], np.where(same, height[:-1], -np.inf)])
     behind = np.concatenate([np.where(same, height[1:], -np.inf), [-np.inf]])
     tops = np.flatnonzero((height >= before) & (height >= behind))
+    ranked = tops[np.argsort(-height[tops], kind="stable")]
     found = []
-    for k in tops[np.argsort(-height[tops], kind="stable")[:CANDIDATES]].tolist():
+    for k in [_top(height), *ranked[:CANDIDATES].tolist()]:
         low, high = (k - 1 if k and same[k - 1] else k), (k + 1 if k < len(same) and same[k] else k)
         found.append((int(nodes.segment[k]), float(nodes.t[low]), float(nodes.t[high])))
     if wanted.seen is not None:
@@ -149,11 +150,17 @@ def _height(bracket: _Bracket) -> Array:
     return np.asarray(bracket.wanted.sign * (values[:, ball] if ball is not None else np.max(values, axis=1)))
 
 
+def _top(height: Array) -> int:
+    """Place of the largest; of a plateau, as where no ball carries anything, the middle: beside its ends is more."""
+    equal = np.flatnonzero(height == np.max(height))
+    return int(equal[len(equal) // 2])
+
+
 def _extreme(bracket: _Bracket, edges: Edges) -> Extreme:
     """Extreme on the last grid of a bracket, by the parabola through its best point and both neighbours."""
     found, times, ball = bracket.values, bracket.times, bracket.wanted.ball
     left, right = float(edges.times[bracket.segment]), float(edges.times[bracket.segment + 1])
-    k = int(np.argmax(_height(bracket)))
+    k = _top(_height(bracket))
     column = ball if ball is not None else int(np.argmax(found[k]))
 
     def at(time: float, value: float) -> Extreme:

@@ -5,7 +5,7 @@ plan put onto the edges.
 
 A load switches at an edge, and outputs may jump there; speed and windows move the edges.  Nodes that keep their
 fraction of a segment never cross one, so that whatever is summed over nodes is a smooth function of the parameters:
-integrals by Gauss's rule on panels within the segments, values at both sides of each edge for extremes.
+integrals by Gauss's rule on panels within the segments (`panels.py`), values at both sides of each edge for extremes.
 """
 
 from __future__ import annotations
@@ -27,10 +27,6 @@ Array = NDArray[np.float64]
 
 #: Derivative of a parameter or derived constant along the directions, shape (directions,).
 Slopes = Callable[[str], Array]
-
-#: Nodes of Gauss's rule in a panel, in fractions of it, and their weights, which add up to one.
-_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
-GAUSS, WEIGHTS = 0.5 * (1.0 + _GAUSS), 0.5 * _WEIGHTS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,38 +173,6 @@ def turn_slope(model: LoadedModel, numbers: Numbers, slopes: Slopes) -> Array:
     if name is None or speed == 0.0:
         return np.zeros(0) if name is None else 0.0 * slopes(name)
     return np.asarray(-clock.period(manifest, numbers.values) / speed * slopes(name))
-
-
-def uniform_plan(edges: Edges, per_turn: int) -> Plan:
-    """Panels of Gauss's rule over the time that counts, and both sides of each edge.
-
-    In a segment that ends at a kink the panels are equal in s, where the fraction is ``s^2 (3 - 2 s)``: what grows like
-    the square root of time behind the kink is smooth in s.
-
-    Parameters
-    ----------
-    per_turn : nodes in a turn; in the whole run where nothing turns
-    """
-    window = edges.window
-    span = window.turn if math.isfinite(window.turn) else window.duration
-    lengths = np.diff(edges.times)
-    segment: list[Array] = []
-    fraction: list[Array] = []
-    weight: list[Array] = []
-    for k in range(edges.first, len(lengths)):
-        panels = max(1, math.ceil(lengths[k] / span * per_turn / len(GAUSS)))
-        places, shares = ((np.arange(panels)[:, None] + GAUSS) / panels).ravel(), np.tile(WEIGHTS / panels, panels)
-        if k in edges.kinks or k + 1 in edges.kinks:
-            places, shares = places**2 * (3.0 - 2.0 * places), shares * 6.0 * places * (1.0 - places)
-        fraction.append(np.concatenate([[0.0], places, [1.0]]))
-        weight.append(np.concatenate([[0.0], shares, [0.0]]))
-        segment.append(np.full(len(places) + 2, k))
-    return Plan(
-        segment=np.concatenate(segment).astype(np.int_),
-        fraction=np.concatenate(fraction),
-        weight=np.concatenate(weight),
-        segments=len(lengths),
-    )
 
 
 def with_points(plan: Plan, points: Sequence[tuple[int, float]]) -> Plan:

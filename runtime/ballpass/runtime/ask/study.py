@@ -25,9 +25,18 @@ from ballpass.runtime.ask.nodes import (
     find,
     make_edges,
     place,
-    uniform_plan,
     with_kinks,
     with_points,
+)
+from ballpass.runtime.ask.panels import (
+    GAUSS,
+    ROUGH,
+    Panels,
+    between_kinks,
+    parts_needed,
+    plan_of,
+    split,
+    uniform_panels,
 )
 from ballpass.runtime.ask.quantity_location import Place, place_of, place_slope
 from ballpass.runtime.ask.quantity_records import Estimate, Mark, Quantity, View
@@ -50,6 +59,12 @@ AT_EDGE = 1e-12
 #: Numbers that a node takes for each state, and those that each direction adds: states, channels, and what they are
 #: made of, on the way from the driver to the quantities.  Lanes without a direction are counted where they are made.
 VALUES, SLOPES = 16, 8
+
+#: Kinds that look at one moment, wherever nodes lie.
+AT_A_MOMENT = ("value", "end")
+
+#: Passes that make panels finer, and the most nodes that they may come to.
+PASSES, MOST = 6, 2**17
 
 #: Outputs with kinks where contacts begin and end.
 BROKEN = ("ball.", "ring_force.")
@@ -86,16 +101,22 @@ class Study:
     model : the model
     quantities : what is asked for
     span : how long to run
-    per_turn : nodes in a turn
+    per_turn : nodes in a turn to begin with; panels get finer where the signals need it
+    rough : see `panels.parts_needed` [1]
     """
 
-    def __init__(self, model: LoadedModel, quantities: Sequence[Quantity], span: Span, per_turn: int) -> None:
+    def __init__(
+        self, model: LoadedModel, quantities: Sequence[Quantity], span: Span, per_turn: int, *, rough: float = ROUGH
+    ) -> None:
         self.model = model
         self.quantities = tuple(quantities)
         self.span = span
         self.per_turn = per_turn
+        self.rough = rough
+        self._panels: Panels | None = None
         self._moving = [quantity for quantity in quantities if not KINDS[quantity.kind].static]
         channels = [quantity.channel for quantity in self._moving]
+        self._summed = list(dict.fromkeys(item.channel for item in self._moving if item.kind not in AT_A_MOMENT))
         self._outlook = Outlook(model, channels)
         # outputs that follow from time alone need no integration
         self._still = all(name in model.outputs and not depends(model, name, "x") for name in channels)
@@ -150,18 +171,17 @@ class Study:
         self._check_memory(window, directions)
         edges = make_edges(self.model, numbers, window, None if chain is None else chain.derivative, directions)
         extremes: dict[tuple[str, str], Extreme] = {}
-        asked = [(item, kind) for item in self._moving for kind in KINDS[item.kind].extremes]
-        if asked or (chain is not None and self._kinked):
-            row = None if self._still else self._row(window)
-            nodes = place(uniform_plan(edges, self.per_turn), edges)
-            track = follow(self.model, numbers, edges, nodes, stepping, reduction=row, still=self._still)
+        panels = uniform_panels(edges, self.per_turn) if self._panels is None else self._panels
+        if self._summed:
+            track, row, panels = self._resolve(numbers, edges, panels, stepping)
+            asked = [(item, kind) for item in self._moving for kind in KINDS[item.kind].extremes]
             extremes = self._extremes(numbers, asked, track, row, stepping)
-            if chain is not None and self._kinked:
+            if self._kinked:
                 broken = with_kinks(edges, self._kinks(numbers, track))
                 extremes = {key: _moved(item, edges, broken) for key, item in extremes.items()}
-                edges = broken
+                edges, panels = broken, between_kinks(panels, edges, broken)
         points = list(dict.fromkeys((item.segment, item.fraction) for item in extremes.values()))
-        plan = with_points(uniform_plan(edges, self.per_turn), points)
+        plan = with_points(plan_of(panels, edges), points)
         nodes, marks = self._nodes(numbers, edges, plan, chain)
         for key, item in extremes.items():
             here = np.flatnonzero((plan.segment == item.segment) & (plan.fraction == item.fraction))
@@ -187,6 +207,34 @@ class Study:
             directions=directions,
         )
         return Course(track=track, estimates=tuple(self._estimate(view, item, chain) for item in self.quantities))
+
+    def _resolve(
+        self, numbers: Numbers, edges: Edges, panels: Panels, stepping: Stepping
+    ) -> tuple[Track, Array | None, Panels]:
+        """A plain run, its reductions, and panels as fine as the signals need, unless they are fixed."""
+        most = max(MOST, 2 * len(GAUSS) * len(panels))
+        for _ in range(PASSES):
+            row = None if self._still else self._row(edges.window)
+            nodes = place(plan_of(panels, edges), edges)
+            track = follow(self.model, numbers, edges, nodes, stepping, reduction=row, still=self._still)
+            if self._panels is not None:
+                break
+            within = np.flatnonzero(nodes.weight)
+            signals = self._outlook.look(track, numbers)
+            parts = parts_needed([signals[name].value[within] for name in self._summed], self.rough)
+            if np.all(parts == 1) or len(GAUSS) * np.sum(parts) > most:
+                break
+            panels = split(panels, parts)
+        return track, row, panels
+
+    def fix(self, numbers: Numbers, stepping: Stepping) -> None:
+        """Settle the panels by a run: neighbours are then cut alike, and quantities change smoothly between them.
+
+        Not where outputs have kinks: panels that are fine where the kinks were would err by how far those have moved.
+        """
+        if self._summed and not self._kinked:
+            edges = make_edges(self.model, numbers, self.window(numbers))
+            _, _, self._panels = self._resolve(numbers, edges, uniform_panels(edges, self.per_turn), stepping)
 
     def _check_memory(self, window: Window, directions: int) -> None:
         """Refuse nodes that would not fit into memory, before any is laid."""

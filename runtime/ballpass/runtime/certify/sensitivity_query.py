@@ -12,20 +12,36 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.ask.kinks import DEFLECTION
 from ballpass.runtime.ask.nodes import Window
+from ballpass.runtime.ask.panels import ROUGH
 from ballpass.runtime.ask.quantities import default_quantities, parse_quantity
 from ballpass.runtime.ask.study import Course, Span, Study
 from ballpass.runtime.ask.track import Outlook, Stepping
-from ballpass.runtime.certify.certificate import AGREEMENT, FLOOR, UNCHECKED, by_differences, compare
+from ballpass.runtime.certify.certificate import (
+    AGREEMENT,
+    CAUTION,
+    FLOOR,
+    UNCHECKED,
+    Verdict,
+    by_differences,
+    compare,
+)
 from ballpass.runtime.certify.grazing import TOLERANCE, Grazing, find_grazing
 from ballpass.runtime.certify.growth import refuse_growth
 from ballpass.runtime.certify.member_runs import MemberRuns
-from ballpass.runtime.certify.sensitivity_report import QuantityValue, Sensitivity, SensitivityReport, ratio_unit
+from ballpass.runtime.certify.sensitivity_report import (
+    STEPS,
+    QuantityValue,
+    Sensitivity,
+    SensitivityReport,
+    ratio_unit,
+)
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real, unknown_name
@@ -49,9 +65,11 @@ RTOL, SENSITIVITY_RTOL = 1e-11, 1e-10
 #: under laws whose slope is infinite at contact onset derivatives have singular rates there.
 LOOSEST = 1e-6
 
-#: Nodes of quadratures: the fewest and the most in a turn, and those for each radian of the fastest vibration.  They
-#: have nothing to do with the samples of a run.
-FEWEST, MOST, NODES_A_RADIAN = 8192, 32768, 3
+#: Nodes of quadratures in a turn to begin with.  They have nothing to do with the samples of a run.
+NODES = 4096
+
+#: How much rougher panels of quadratures may be in the looser run beside.
+COARSER = 4.0
 
 #: A change of the start by this share of the motion is a large one: it stays near, so that its effect is linear.
 START_SHARE = 1e-2
@@ -69,7 +87,7 @@ class Query:
     direction : of ``erk``: "forward" or "adjoint"
     check : True (differences), False, or one of `CHECKS`
     rtol, sensitivity_rtol : tolerances of states and derivatives
-    samples_per_cycle : nodes of quadratures in a turn
+    samples_per_cycle : nodes of quadratures in a turn that there are at least
     agreement : relative disagreement that is allowed [1]
     progress : called with words and a finished fraction
     """
@@ -173,7 +191,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
         scales = model_scales(model, numbers, start, window.duration, window.turn)
         magnitude = scales.magnitude
         family, fine = _families(query.method, scales)
-    study.per_turn = query.samples_per_cycle or _nodes_a_turn(window, scales)
+    study.per_turn = max(query.samples_per_cycle or 0, NODES)
     tell = query.progress or (lambda _words, _fraction: None)
     moving = [item.name for item in quantities if item.channel in channel_names(manifest)]
     if moving and model.has_stepper:
@@ -194,21 +212,33 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     if query.check and model.states:
         tell("differentiating", 0.5)
         looser = replace(stepping, rtol=min(10.0 * query.rtol, 1e-3), sensitivity_rtol=10.0 * tolerance)
-        own = np.abs(slopes - np.array([e.slope for e in _differentiate(study, numbers, names, looser)[0].estimates]))
-    difference_scales = _difference_scales(manifest, numbers, names, magnitude)
+        study.rough = COARSER * ROUGH
+        found, _ = _differentiate(study, numbers, names, looser)
+        own = np.abs(slopes - np.array([item.slope for item in found.estimates]))
+    difference_scales = _difference_scales(manifest, numbers, names, magnitude, window)
     with np.errstate(invalid="ignore", divide="ignore"):
         quantum = FLOOR * np.abs(values)[:, None] / difference_scales[None, :]
     second = None
     if query.check:
         tell("checking", 0.0)
+        members = partial(
+            MemberRuns,
+            model,
+            numbers,
+            quantities,
+            query.span,
+            family=fine,
+            per_turn=study.per_turn,
+            magnitude=magnitude,
+        )
         second = by_differences(
-            MemberRuns(
-                model, numbers, quantities, query.span, family=fine, per_turn=study.per_turn, magnitude=magnitude
-            ),
+            members(closer=False),
             {name: numbers.parameters[name] for name in names},
             difference_scales,
             quantum=quantum,
             agreement=query.agreement,
+            slopes=slopes,
+            closer=partial(members, closer=True),
         )
         with np.errstate(invalid="ignore", divide="ignore"):
             # what the routes differ in tells how well quadratures and extremes are known
@@ -229,7 +259,18 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
                     route=second.route,
                     quantum=float(quantum[row, column]),
                     agreement=query.agreement,
+                    sides=second.sides(row, column),
                 )
+            known = float(own[row, column])
+            # of two numbers that nobody vouches for, the one that is known better
+            better = (
+                check.verdict is Verdict.NOT_CHECKED
+                and check.value is not None
+                and check.uncertainty is not None
+                and CAUTION * check.uncertainty < known
+            )
+            if better:
+                derivative, known = float(check.value or 0.0), CAUTION * float(check.uncertainty or 0.0)
             pairs.append(
                 Sensitivity(
                     quantity=quantity.name,
@@ -240,7 +281,9 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
                     unit=ratio_unit(quantity.unit, units[name]),
                     dimensionless=at * derivative / estimate.value if at * estimate.value != 0.0 else math.nan,
                     scale=float(difference_scales[column]),
-                    uncertainty=float(own[row, column]) if query.check else None,
+                    uncertainty=known if query.check else None,
+                    route=check.route if better else STEPS,
+                    by_steps=float(slopes[row, column]),
                     check=check,
                 )
             )
@@ -277,12 +320,6 @@ def _refuse_jumps(manifest: Manifest) -> None:
             "contact), so the derivative of the steps is not that of the motion. Allowed: a continuous law, "
             '[bearing.damping] law = "tangent" or "one-sided", or a smoothed contact, [bearing.contact] smoothing.'
         )
-
-
-def _nodes_a_turn(window: Window, scales: Scales) -> int:
-    """Nodes that quadratures need: some in each period of the fastest vibration."""
-    span = window.turn if math.isfinite(window.turn) else window.duration
-    return max(FEWEST, min(math.ceil(NODES_A_RADIAN * scales.frequency * span), MOST))
 
 
 def _listed(option: str, given: Sequence[str] | None, default: Sequence[str]) -> list[str]:
@@ -330,8 +367,11 @@ def _differentiate(study: Study, numbers: Numbers, names: Sequence[str], steppin
             tolerance *= 10.0
 
 
-def _difference_scales(manifest: Manifest, numbers: Numbers, names: Sequence[str], magnitude: Array) -> Array:
-    """Change of each parameter that is a large one: its value; a radian; what its state or length is measured in."""
+def _difference_scales(
+    manifest: Manifest, numbers: Numbers, names: Sequence[str], magnitude: Array, window: Window
+) -> Array:
+    """Change of each parameter that is a large one: its value; a radian, or what the run turns through; what its state
+    or length is measured in."""
     units = {info.name: info.unit for info in manifest.parameters}
     at_start = dict(zip(manifest.initial, magnitude.tolist(), strict=True))
     position = float(np.max(magnitude[: len(magnitude) // 2])) if len(magnitude) else 1e-3
@@ -341,7 +381,7 @@ def _difference_scales(manifest: Manifest, numbers: Numbers, names: Sequence[str
         if name in at_start:
             value = max(value, START_SHARE * at_start[name])
         elif units[name] == ANGLE:
-            value = 1.0
+            value = min(1.0, clock.TURN * window.duration / window.turn) if math.isfinite(window.turn) else 1.0
         elif value == 0.0:
             alike = [abs(numbers.parameters[other]) for other, unit in units.items() if unit == units[name]]
             value = position if units[name] == "m" else max(alike, default=0.0)

@@ -28,6 +28,9 @@ LISTED = 3
 #: Characters of a line where nobody says how wide the paper is.
 WIDTH = 110
 
+#: The route of derivatives of the stepper's own steps.
+STEPS = "steps"
+
 #: Styles of the verdicts.
 _STYLES = {Verdict.VERIFIED: "green", Verdict.DISAGREES: "bold red", Verdict.NOT_CHECKED: "yellow"}
 
@@ -52,11 +55,14 @@ class Sensitivity:
     ----------
     quantity, parameter : names
     value, parameter_value : numbers
-    derivative, unit : dQ/dp
+    derivative, unit : dQ/dp; where nothing vouches for either route's number, the one that is known better
     dimensionless : (p/Q) dQ/dp; NaN where p or Q is zero: there it says nothing of the parameter's effect
     scale : change of the parameter that is a large one, in its unit: its value; for an angle a radian; where it is
         zero, what positions move by in the run, or the largest value of its unit
-    uncertainty : of the derivative, from a run at a looser tolerance, same unit; None where there was none
+    uncertainty : of the derivative, same unit: that of the steps from a run at a looser tolerance, and from what both
+        routes' values of the quantity are apart; None where the check was turned off
+    route : which route gave the derivative: ``steps``, or that of the check
+    by_steps : derivative of the steps, same unit
     check : the certificate
     """
 
@@ -69,6 +75,8 @@ class Sensitivity:
     dimensionless: float
     scale: float
     uncertainty: float | None
+    route: str
+    by_steps: float
     check: Check
 
     @property
@@ -172,6 +180,8 @@ class SensitivityReport:
                     "parameter_scale": pair.scale,
                     "change_per_scale": _plain(pair.change),
                     "uncertainty": _plain(pair.uncertainty),
+                    "route": pair.route,
+                    "by_steps": _plain(pair.by_steps),
                     "certificate": {
                         "route": pair.check.route,
                         "value": _plain(pair.check.value),
@@ -182,6 +192,7 @@ class SensitivityReport:
                         "within_bound_only": pair.check.bounded,
                         "bound": _plain(pair.check.quantum),
                         "reason": pair.check.reason,
+                        "slopes_at_kink": None if pair.check.sides is None else list(pair.check.sides),
                     },
                 }
                 for pair in self.pairs
@@ -289,6 +300,11 @@ def _row(pair: Sensitivity) -> tuple[str, ...]:
         # digits that nothing vouches for are not shown
         relative = "~0" if math.isfinite(pair.dimensionless) else relative
         number, apart, words = f"~0 (<{check.quantum:.0e})", "-", f"{words}: ~0"
+    elif check.sides is not None:
+        number, words = f"{check.sides[0]:.4g} | {check.sides[1]:.4g}", "kink: below | above"
+    elif check.verdict is Verdict.NOT_CHECKED and pair.uncertainty is not None:
+        number = _known(pair.derivative, pair.uncertainty)
+        words += "" if pair.route == STEPS else f": by {pair.route}"
     elif check.bounded:
         words += f" to ±{check.quantum:.0e}"
     return (escape(pair.parameter), relative, number, escape(pair.unit), apart, f"[{style}]{words}[/]")
@@ -305,7 +321,7 @@ def _remarks(report: SensitivityReport) -> list[str]:
     lines = [f"{len(report.pairs)} pairs: {words}" + (f"; apart: relative distance to {route}" if route else "")]
     lines.append("p/Q dQ/dp: % per %; dQ/dp in SI units, angles in radians")
     lines += [
-        f"[bold red]disagrees[/]: d({escape(pair.quantity)})/d({escape(pair.parameter)}) is {pair.derivative:.9g}, by "
+        f"[bold red]disagrees[/]: d({escape(pair.quantity)})/d({escape(pair.parameter)}) is {pair.by_steps:.9g}, by "
         f"{pair.check.route} {_number(pair.check.value)} ± {_number(pair.check.uncertainty)} {pair.unit}"
         for pair in report.disagreements
     ]
@@ -329,6 +345,14 @@ def _remarks(report: SensitivityReport) -> list[str]:
         lines.append(f"[yellow]grazing[/] at {count}: a small change moves the motion over a kink there{more}")
         lines += [f"  {escape(describe(items))}" for items in places[:LISTED]]
     return lines
+
+
+def _known(value: float, uncertainty: float) -> str:
+    """A number with its uncertainty, to the digits that this leaves, from two to seven."""
+    digits = 2
+    if value != 0.0 and 0.0 < uncertainty < abs(value):
+        digits = min(max(math.ceil(math.log10(abs(value) / uncertainty)) + 1, 2), 7)
+    return f"{value:.{digits}g} ± {uncertainty:.0e}"
 
 
 def _number(value: float | None) -> str:
