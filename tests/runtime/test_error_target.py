@@ -17,6 +17,25 @@ from ballpass.runtime.run.request import Request
 PEAK = "peak_ball_force"
 SPEED, CLEARANCE = "mechanism.driver.speed", "bearing.clearance"
 
+#: Numbers of an offset slider whose chaos is confined to a thousandth of its motion.
+CONFINED = {
+    SPEED: 42.7,
+    "mechanism.bodies.crank.mass": 0.926,
+    "mechanism.bodies.crank.inertia": 0.000835,
+    "mechanism.bodies.rod.mass": 1.02,
+    "mechanism.bodies.rod.inertia": 0.0136,
+    "mechanism.bodies.slider.mass": 25.1,
+    "mechanism.bodies.slider.inertia": 0.00826,
+    "mechanism.forces.tool.force.magnitude": 13000.0,
+    "mechanism.forces.strip.force.magnitude": 116.0,
+    CLEARANCE: 23.2e-6,
+    "bearing.ball_angle": 4.28,
+    "bearing.inner_ring.mass": 0.462,
+    "bearing.outer_ring.mass": 0.152,
+    "bearing.outer_ring.stiffness": 149e6,
+    "bearing.outer_ring.damping": 615.0,
+}
+
 
 def run_of(model: Model, numbers: dict[str, float] | None = None, **request: float) -> WholeRun:
     return prepare(model, model.numbers(numbers), Request(**request))  # type: ignore[arg-type]
@@ -77,6 +96,7 @@ def test_errors_that_come_from_the_whole_run_are_seen(
     [
         ("punching_press_tangent", {SPEED: 600.0 * math.tau / 60.0, CLEARANCE: 60e-6}, 12.0, "range_inner_x"),
         ("four_bar", {CLEARANCE: 200e-6}, 6.0, PEAK),
+        pytest.param("offset_slider", CONFINED, 14.0, "range_inner_x", marks=pytest.mark.long),
     ],
 )
 def test_chaos_is_refused_with_words_at_every_target(

@@ -5,13 +5,14 @@ cost.
 
 `LADDER` holds the ways to integrate, from loose to tight; the target says where to begin.  A way and the next one both
 integrate the whole run, and what their quantities differ in is the estimate for the looser of the two: its error is
-several times that of the tighter one.  The two share neither tolerance nor, on the lower rungs, what they do at kinks.
-Where the difference is above the target, the rungs that cannot be enough are left out.
+several times that of the tighter one.  Where the difference is above the target, the rungs that cannot be enough are
+left out.
 
-Chaos: two runs that differ much are no proof, and two that agree by luck are none either.  Where runs differ by more
-than their tolerances explain, in the quantities or in the motion of any state, the tighter one is repeated from a start
-moved by a picometre.  Where that moves the motion as well, a tight run and a moved one decide: motion in which even
-these two part has no value to within any target.
+Chaos: two runs that differ much are no proof, and two that agree by luck are none either.  So not only quantities are
+compared but the motion of every state: calm motion forgets what two runs differ in, or carries it on as it is.  Where
+it parts by more, and steps go over kinks, the run is repeated from a start moved by a picometre.  Where that parts as
+well, a tight run and a moved one decide, the same ones at every target.  Motion in which even these two part has no
+value to within any target.  Where they do not, the tight run is one more reference for the estimate.
 """
 
 from __future__ import annotations
@@ -49,6 +50,9 @@ LADDER: tuple[tuple[Way, float], ...] = (
     (Way(method="stepper-dp54", rtol=1e-12, kinks=LOCATED), 0.0),
 )
 
+#: The loosest way that locates kinks.
+FIRST_LOCATED = next(way for way, _ in LADDER if way.kinks == LOCATED)
+
 #: Errors that may be asked for [1].
 SMALLEST, LARGEST = 1e-8, 0.5
 
@@ -58,15 +62,16 @@ SAFETY = 1.5
 #: Two runs may agree by luck, or share a mistake where both step over a kink: no estimate is below so many tolerances.
 LEAST = 0.05
 
-#: Two runs of a motion that forgets its errors differ by less, in parts of a magnitude and in tolerances of the looser.
-SUSPECT, SUSPECT_TOLERANCES = 3e-3, 100.0
+#: Runs of a calm motion are less apart where steps end on kinks: in parts of a magnitude, and of a quantity [1].
+#: Where they step over kinks, so many times that: each loses something else there.
+SUSPECT, SUSPECT_QUANTITY, STEPPED_OVER_NOISE = 1e-4, 1e-3, 3.0
 
 #: How far a start is moved to see whether the motion forgets it [m].
 MOVED = 1e-12
 
-#: The way that decides on chaos.  Motion that it and its moved run differ in by more than this is chaotic: a picometre
-#: and its local errors, 1e-8 of a magnitude, have grown a hundred thousand times [1].
-JUDGE, CHAOTIC = Way(method="stepper", rtol=1e-8, kinks=LOCATED), 1e-3
+#: The way that decides on chaos.  Motion that it and its moved run differ in by more than this is chaotic: a picometre,
+#: 1e-8 of a magnitude, has grown ten thousand times [1].
+JUDGE, CHAOTIC = Way(method="stepper", rtol=1e-10, kinks=LOCATED), 1e-4
 
 
 class TargetMissed(SimulationError):
@@ -193,19 +198,22 @@ def _compare(search: _Search, way: Way, check: Way) -> tuple[list[float], bool]:
     SimulationError
         One of them could not reach the end.
     """
-    loose, tight = search(way), search(check)
-    estimates = _relative(loose, tight, LEAST * way.rtol)
-    if max(*estimates, _apart(loose, tight)) <= min(SUSPECT, SUSPECT_TOLERANCES * way.rtol):
-        return estimates, False
-    moved = search(check, MOVED)
-    shifts = _relative(moved, tight)
-    if max(*shifts, _apart(moved, tight)) > CHAOTIC:
-        judge, other = search(JUDGE), search(JUDGE, MOVED)
-        if _apart(judge, other) > CHAOTIC:
-            spread = (*estimates, *shifts, *_relative(other, judge))
-            count = len(estimates)
-            return [max(spread[k::count]) for k in range(count)], True
-    return [max(pair) for pair in zip(estimates, shifts, strict=True)], False
+    loose = search(way)
+    estimates = _relative(loose, search(check), LEAST * way.rtol)
+    pairs = [((way, 0.0), (check, 0.0))]
+    if way.kinks != LOCATED:
+        # what steps lose at kinks differs; what becomes of a picometre tells better, and best where kinks are located
+        stepped = way if check.kinks == LOCATED else check
+        pairs += [((one, 0.0), (one, MOVED)) for one in (stepped, FIRST_LOCATED)]
+    for one, other in pairs:
+        changes = _relative(search(*other), search(*one))
+        estimates = [max(pair) for pair in zip(estimates, changes, strict=True)]
+        noise = 1.0 if one[0].kinks == LOCATED else STEPPED_OVER_NOISE
+        if _apart(search(*one), search(*other)) <= noise * SUSPECT and max(changes) <= noise * SUSPECT_QUANTITY:
+            return estimates, False
+    judge, moved = search(JUDGE), search(JUDGE, MOVED)
+    spread = zip(estimates, _relative(loose, judge), _relative(moved, judge), strict=True)
+    return [max(one) for one in spread], _apart(judge, moved) > CHAOTIC
 
 
 def _apart(one: Integrated, other: Integrated) -> float:
