@@ -199,6 +199,17 @@ def test_a_slow_press_is_seen_as_closely_as_a_fast_one(make_model: Callable[...,
     assert pair.check.verdict is Verdict.VERIFIED
 
 
+def test_integrals_follow_vibrations_that_take_a_thousandth_of_a_turn(make_model: Callable[..., Model]) -> None:
+    """The stroke at 10 rpm, against the driver's own sums over its steps."""
+    model = make_model("punching_press_tangent")
+    slow = {"mechanism.driver.speed": 10.0 * math.pi / 30.0, "mechanism.driver.start_angle": math.radians(230.0)}
+    of = ["rms:ball.force", "mean:ball.force", "rms:inner.vy"]
+    report = model.sensitivity(of, "bearing.share", 0.1, transient=0, parameters=slow, check=False)
+    run = model.reduce(0.1, transient=0, parameters=slow, rtol=1e-10)
+    values = [run["ball.force"].rms, run["ball.force"].mean, run["inner.vy"].rms]
+    assert [pair.value for pair in report.pairs] == pytest.approx(values, rel=1e-5)
+
+
 def test_one_quantity_has_one_value_whoever_is_asked(make_model: Callable[..., Model]) -> None:
     """Asking for more does not move it either."""
     model = make_model("punching_press_tangent")
