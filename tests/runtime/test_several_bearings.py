@@ -115,11 +115,18 @@ def test_kinks_are_located_beside_a_bearing_that_has_none(
     assert np.max(np.abs(both["left.ball.force"] - own["ball.force"])) < 1e-5 * np.max(own["ball.force"])
 
 
-def test_messages_name_the_bearing_they_speak_of(pair: Model) -> None:
-    """The left one's law has a corner at rest, the right one's has none; the right one's balls are pressed."""
+@pytest.mark.long
+def test_a_corner_of_a_law_is_told_of_its_bearing(scene_text: Callable[..., str], tmp_path: Path) -> None:
+    """An odd number of balls has a corner at rest under the left one's law, and none under the right one's."""
+    odd = pair_text(scene_text).replace("balls = 8", "balls = 7", 1)
+    model = load(generate(scene_from_text(odd, "odd"), tmp_path / "odd"))
     with pytest.warns(KinkWarning, match=r"bearings\.left\.damping\.smoothing") as caught:
-        pair.linearize(x=np.zeros(12))
+        model.linearize(x=np.zeros(12))
     assert not any("bearings.right" in str(item.message) for item in caught)
+
+
+def test_messages_name_the_bearing_they_speak_of(pair: Model) -> None:
+    """The right one's balls are pressed."""
     state = np.zeros(12)
     state[4] = 2e-5  # right.inner.x
     place = whereabouts(pair, pair.numbers(), 0.0, state)
