@@ -36,7 +36,7 @@ _BINARY = {
     ca.OP_DIV: "{0} / {1}",
     ca.OP_POW: "pow({0}, {1})",
     ca.OP_CONSTPOW: "pow({0}, {1})",
-    ca.OP_ATAN2: "atan2({0}, {1})",
+    ca.OP_ATAN2: "bp_atan2({0}, {1})",
     ca.OP_FMIN: "fmin({0}, {1})",
     ca.OP_FMAX: "fmax({0}, {1})",
     ca.OP_LT: "(double)({0} < {1})",

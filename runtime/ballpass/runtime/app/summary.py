@@ -320,13 +320,11 @@ def _constants(sol: Solution) -> dict[str, Any]:
             name = f"{bearing.path}.{key}"
             if name in units:
                 found[bearing.prefix + key] = _numbers(name, units[name], value=sol.constants[name])
-        frequencies = kinematic_frequencies(
-            bearing.balls,
-            sol.parameters[f"{bearing.path}.ball_diameter"],
-            sol.parameters[f"{bearing.path}.pitch_diameter"],
-            _number(sol, bearing.ring_speed),
-        )
-        found[f"{bearing.prefix}frequencies"] = asdict(frequencies) | {"unit": "Hz"}
+        speed = _number(sol, bearing.ring_speed)
+        if speed != 0.0:  # rings that only swing against each other pass no ball
+            ball, pitch = (sol.parameters[f"{bearing.path}.{name}"] for name in ("ball_diameter", "pitch_diameter"))
+            frequencies = kinematic_frequencies(bearing.balls, ball, pitch, speed)
+            found[f"{bearing.prefix}frequencies"] = asdict(frequencies) | {"unit": "Hz"}
         found[f"{bearing.prefix}damping_law"] = bearing.damping.law
     return found
 
