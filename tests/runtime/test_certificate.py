@@ -189,7 +189,7 @@ def test_quantities_do_not_depend_on_the_samples(make_model: Callable[..., Model
 
 
 def test_a_slow_press_is_seen_as_closely_as_a_fast_one(make_model: Callable[..., Model]) -> None:
-    """10 rpm: the vibrations of a stroke take a thousandth of a turn; SciPy says 5635.85 N and 5.966e7 N/m."""
+    """10 rpm: the vibrations of a stroke take a thousandth of a turn; other code says 5635.85 N and 5.966e7 N/m."""
     model = make_model("punching_press_tangent")
     slow = {"mechanism.driver.speed": 10.0 * math.pi / 30.0}
     report = model.sensitivity("peak_ball_force", "bearing.clearance", 2, transient=1, parameters=slow)
