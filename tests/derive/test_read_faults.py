@@ -5,6 +5,7 @@ Each case is an edit of a shipped scene.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -587,3 +588,37 @@ def test_a_bearing_half_moved_to_bearings_is_one_fault() -> None:
     moved = PRESS[start:end].replace("[bearing", "[bearings.left")
     text = f"{PRESS[:start]}[bearing]\nballs = 8\n\n{moved}{PRESS[end:]}"
     assert [fault.key for fault in faults(text).faults] == ["bearings"]
+
+
+TWO_WAY = ("share = 0.5                             # [paper]", 'coupling = "two-way"  #')
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("", ""), "moves with the body that carries it"),
+        (('joint = "A"\ncoupling', 'joint = "D"\ncoupling'), "must sit at a revolute joint"),
+        (('joint = "A"\ncoupling', 'joint = "B"\ncoupling'), "which one carries the inner ring"),
+        (('coupling = "two-way"', 'coupling = "two-way"\nshare = 0.5'), "takes the load that the motion gives"),
+        (
+            ("[bearing.damping]", "[bearing.outer_waviness]\norders = [3]\n[bearing.damping]"),
+            "rings that turn at constant",
+        ),
+    ],
+)
+def test_what_two_way_coupling_has_no_use_for_is_refused(
+    scene_text: Callable[..., str], change: tuple[str, str], words: str
+) -> None:
+    text = scene_text("punching_press", TWO_WAY).replace(*change, 1)
+    with pytest.raises(SceneError, match=words):
+        scene_from_text(text, "press")
+
+
+def test_a_one_way_bearing_has_no_place_in_a_linkage_with_play(scene_text: Callable[..., str]) -> None:
+    text = scene_text("punching_press_hinges")
+    one_way = text.replace('coupling = "two-way"\ncount = 2 ', "share = 0.5 ", 1)
+    with pytest.raises(SceneError, match="one coupling for all bearings"):
+        scene_from_text(one_way, "press")
+    twice = text.replace('joint = "B"', 'joint = "C"', 1).replace('body = "crank"', 'body = "rod"')
+    with pytest.raises(SceneError, match="another bearing gives this joint its play"):
+        scene_from_text(twice, "press")

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -222,7 +223,31 @@ def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None)
             # several bearings have the same symbols: their name tells them apart
             marked = {q.path: replace(q, latex=names.latex(q.latex)) for q in quantities_of(bearing)}
             bearings.append(replaced(bearing, marked))
+        _check_couplings(several, bearings)
     return tuple(bearings)
+
+
+def _check_couplings(several: Table, bearings: Sequence[Bearing]) -> None:
+    """All bearings one-way or all two-way, and of these one at each joint."""
+    one_way = [b.name for b in bearings if b.coupling == "one-way"]
+    two_way = [b for b in bearings if b.coupling == "two-way"]
+    if one_way and two_way:
+        several.fault(
+            one_way[0],
+            "a bearing loaded one-way takes the reaction of an ideal linkage, and others give this linkage play",
+            given=f"one-way: {listing(one_way)}; two-way: {listing([b.name for b in two_way])}",
+            allowed="one coupling for all bearings of a scene",
+            remedy='give all of them coupling = "two-way", or none',
+        )
+    for k, bearing in enumerate(two_way):
+        if any(bearing.joint == other.joint for other in two_way[:k]):
+            several.fault(
+                bearing.name,
+                "another bearing gives this joint its play",
+                given=f"joint {show(bearing.joint)}",
+                allowed="one bearing coupled two-way at a joint, count for equal ones side by side",
+                remedy="write count = 2 at the other one and delete this one",
+            )
 
 
 def _read_title(root: Table, name: str) -> str:
