@@ -12,6 +12,7 @@ enum { BP_NQ = 4, BP_NX = 8, BP_NU = 3, BP_NP = 41, BP_NC = 39, BP_NW = 4, BP_NA
 /* Coordinates of one group share a magnitude; where a coordinate has a partner, their difference counts. */
 static const int bp_group[4] = {0, 0, 0, 0};
 static const int bp_partner[4] = {2, 3, 0, 1};
+static const int bp_is_angle[4] = {0, 0, 0, 0};
 
 #define BP_EACH_BEARING(DO) DO(0)
 

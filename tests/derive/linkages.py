@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from ballpass.derive.drive import Drive
+from ballpass.derive.drive.constant_speed import ConstantSpeed
 from ballpass.derive.mechanism.forces import BodyTorque, Constant, Forces, PointForce, Windows, derive_forces
 from ballpass.derive.mechanism.forces.windows import Window
 from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
@@ -25,7 +25,6 @@ from ballpass.derive.scene.records import (
     Quantity,
     Vector,
 )
-from ballpass.derive.terms import TIME
 from ballpass.derive.variables import phase
 
 ANGLE = sp.Symbol("theta", real=True)
@@ -33,14 +32,12 @@ SPEED = sp.Symbol("mechanism.driver.speed", real=True)
 DEGREE = math.pi / 180.0
 
 #: Of constant speed, with symbols of its own.
-DRIVE = Drive(
+DRIVE = ConstantSpeed(
     angle=ANGLE,
     speed=SPEED,
     acceleration=sp.S.Zero,
     description="the driver's speed is constant",
-    definitions=(),
     phase=phase("driver", "angle", "q", offset="mechanism.driver.start_angle", rate="mechanism.driver.speed"),
-    advance=SPEED * TIME,
 )
 
 #: None: zero.  A number: along the body's x axis.  ("xy", x, y).  ("polar", length, angle).

@@ -118,11 +118,12 @@ def _features(scene: Scene) -> Iterator[Feature]:
 
 
 def _of_mechanism(scene: Scene, mechanism: Mechanism) -> Iterator[Feature]:
-    count = len(mechanism.bodies)
+    count, torque = len(mechanism.bodies), mechanism.driver.torque
+    driven = " at constant drive speed" if torque is None else f", driven by {torque.words()}"
     yield Feature(
         name="mechanism",
         path="mechanism",
-        modelled=f"inertia of {count} moving {'body' if count == 1 else 'bodies'} at constant drive speed, hinge "
+        modelled=f"inertia of {count} moving {'body' if count == 1 else 'bodies'}{driven}, hinge "
         "reactions in closed form",
         without=_without_mechanism(scene, mechanism),
     )

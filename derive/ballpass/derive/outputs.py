@@ -73,22 +73,22 @@ def mechanism_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactio
                     description=f"Moment of the {second} on the {first} at {joint.name}",
                 )
             )
-    out.append(
-        Output(
-            name="drive_torque",
-            expression=reactions.drive_torque,
-            unit="N*m",
-            description="Torque of the drive on the driven body, counter-clockwise",
+    drive = linkage.drive
+    torque = reactions.drive_torque if drive.torque is None else drive.torque
+    words = "Torque of the drive on the driven body, counter-clockwise"
+    out.append(Output(name="drive_torque", expression=torque, unit="N*m", description=words))
+    angle = drive.coordinate
+    if angle is None:
+        words = "Angle of the driven body, within the turn"
+        out.append(Output(name="drive_angle", expression=DRIVER_ANGLE, unit="rad", description=words))
+    else:
+        rows = (
+            ("drive_power", torque * angle.velocity, "W", "Power of the drive"),
+            (angle.name, angle.position, "rad", "Angle of the driven body from +x, whole turns counted"),
+            (angle.velocity.name, angle.velocity, "rad/s", "Speed of the driven body"),
+            ("driver.acceleration", angle.acceleration, "rad/s^2", "Angular acceleration of the driven body"),
         )
-    )
-    out.append(
-        Output(
-            name="drive_angle",
-            expression=DRIVER_ANGLE,
-            unit="rad",
-            description="Angle of the driven body, within the turn",
-        )
-    )
+        out += [Output(name=n, expression=e, unit=u, description=d) for n, e, u, d in rows]
     for body in mechanism.bodies:
         pose = linkage.poses[body.name]
         out.append(

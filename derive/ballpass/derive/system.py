@@ -25,13 +25,13 @@ from ballpass.derive.bearing.equations import (
 from ballpass.derive.bearing.equivalent_mass import inner_mass
 from ballpass.derive.bearing.ring_load import RingLoad, own_load, reaction_share
 from ballpass.derive.bearing.two_way import couple, play_of
-from ballpass.derive.drive import Drive, constant_speed
+from ballpass.derive.drive import Drive, constant_speed, drive_of
 from ballpass.derive.events import Event, events_of
 from ballpass.derive.mechanism.forces import Forces, derive_forces
 from ballpass.derive.mechanism.kinematics import Play
 from ballpass.derive.mechanism.linear_forms import LinearForms
 from ballpass.derive.mechanism.linkage import NO_PLAY, Linkage, check_assembly, derive_linkage
-from ballpass.derive.mechanism.power import inertia_of, work_of
+from ballpass.derive.mechanism.power import inertia_of, loads_of_drive, work_of, work_of_drive
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
 from ballpass.derive.mechanism.swing import STILL, WITH_DRIVER, swing_of
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
@@ -115,7 +115,8 @@ def derive(scene: Scene) -> System:
     if mechanism is None:
         system: System | None = _on_shaft(scene, errors)
     else:
-        system = _two_way(scene, mechanism, errors) if scene.coupled else _one_way(scene, mechanism, errors)
+        moving = scene.coupled or mechanism.driver.torque is not None
+        system = (_moving if moving else _one_way)(scene, mechanism, errors)
     if errors:
         kind = LinkageError if all(isinstance(error, LinkageError) for error in errors) else SceneError
         raise kind(scene.lines.place(fault for error in errors for fault in error.faults))
@@ -179,7 +180,7 @@ def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sy
         scene,
         rings,
         errors,
-        inputs=(drive.phase, *forces.inputs),
+        inputs=(*drive.inputs, *forces.inputs),
         definitions=(*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions),
         quantities=(*mechanism_outputs(mechanism, linkage, reactions), *forces.outputs),
         linkage=linkage,
@@ -187,19 +188,21 @@ def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sy
     )
 
 
-def _two_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> System | None:
-    """A linkage whose joints have the play of its bearings: one set of equations of motion."""
-    drive = constant_speed(mechanism.driver)
+def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> System | None:
+    """A linkage whose joints have the play of its bearings, or that a torque drives: one set of equations of motion."""
+    drive = drive_of(mechanism.driver)
     rings = {bearing.name: ring_coordinates(bearing) for bearing in scene.bearings}
-    coordinates = tuple(c for several in rings.values() for c in several)
-    positions = tuple(c.position for c in coordinates)
+    driven = () if drive.coordinate is None else (drive.coordinate,)
+    positions = tuple(c.position for several in rings.values() for c in several)
+    # the heaviest last: M is factored in this order, without pivoting
+    coordinates = (*(c for several in rings.values() for c in several), *driven)
     joints = {bearing.name: mechanism.joint(bearing.joint or "") for bearing in scene.bearings}
     play = {joints[b.name].name: play_of(b, joints[b.name], rings[b.name]) for b in scene.bearings}
     linked = _linked(scene, mechanism, drive, play, errors)
     if linked is None:
         return None
     linkage, forces = linked
-    start, speed = symbol_of(mechanism.driver.start_angle), symbol_of(mechanism.driver.speed)
+    start = symbol_of(mechanism.driver.start_angle)
     swings = {FRAME: STILL, linkage.driven: WITH_DRIVER}
     cages, models, coupled = [], [], []
     for bearing in scene.bearings:
@@ -207,11 +210,11 @@ def _two_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sy
         for body in bodies:
             swings.setdefault(body, swing_of(linkage.pose(body), start, positions))
         poses, turned = tuple(map(linkage.pose, bodies)), tuple(swings[body] for body in bodies)
-        cage = cage_between(bearing, (poses[0], poses[1]), (turned[0], turned[1]), speed)
+        cage = cage_between(bearing, (poses[0], poses[1]), (turned[0], turned[1]), mechanism.driver, drive)
         cages.append(cage)
         models.append(derive_bearing(bearing, cage))
         coupled.append(couple(bearing, models[-1], mechanism, linkage))
-    loads = (*forces.loads, *(load for part in coupled for load in part.loads))
+    loads = (*forces.loads, *(load for part in coupled for load in part.loads), *loads_of_drive(linkage))
     reactions = None
     with _noted(errors):
         reactions = derive_reactions(mechanism, linkage, loads, _moments(scene, mechanism))
@@ -225,15 +228,17 @@ def _two_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sy
         *(d for cage in cages for d in cage.definitions),
     )
     inertias, weights = inertia_of(mechanism, linkage)
+    turned_by, turning = work_of_drive(linkage)
     motion = LinearForms(known, coordinates).motion(
-        (*inertias, *(i for part in coupled for i in part.inertias)),
-        (*weights, *work_of(forces.loads, linkage), *(e for part in coupled for e in part.efforts)),
+        (*inertias, *turning, *(i for part in coupled for i in part.inertias)),
+        (*weights, *turned_by, *work_of(forces.loads, linkage), *(e for part in coupled for e in part.efforts)),
     )
     return _system(
         scene,
         models,
         errors,
-        inputs=(drive.phase, *forces.inputs, *(cage.phase for cage in cages)),
+        inputs=(*drive.inputs, *forces.inputs, *(i for cage in cages for i in cage.inputs)),
+        driven=driven,
         definitions=(*known, *reactions.definitions, *motion.definitions),
         linear_forms=motion.definitions,
         constants=(
@@ -264,14 +269,14 @@ class _Rings:
 
     model: BearingModel
     motion: RingMotion
-    phase: Input
+    inputs: tuple[Input, ...]
 
 
 def _rings(bearing: Bearing, shaft_speed: sp.Expr, load: tuple[sp.Expr, sp.Expr], mass: sp.Expr) -> _Rings:
     cage = cage_on_shaft(bearing, shaft_speed)
     model = derive_bearing(bearing, cage)
     motion = ring_motion(bearing, model, load, mass)
-    return _Rings(model=model, motion=motion, phase=cage.phase)
+    return _Rings(model=model, motion=motion, inputs=cage.inputs)
 
 
 def _of_rings(
@@ -291,7 +296,7 @@ def _of_rings(
         scene,
         [one.model for one in rings],
         errors,
-        inputs=(*inputs, *(one.phase for one in rings)),
+        inputs=(*inputs, *(i for one in rings for i in one.inputs)),
         definitions=definitions,
         constants=(*(c for one in rings for c in (*one.model.constants, *one.motion.constants)), *constants),
         quantities=(*(q for one in rings for q in bearing_outputs(one.model, one.motion.load)), *quantities),
@@ -318,6 +323,7 @@ def _system(
     linkage: Linkage | None,
     reactions: Reactions | None,
     linear_forms: tuple[Definition, ...] = (),
+    driven: tuple[Coordinate, ...] = (),
 ) -> System:
     outputs: tuple[Output, ...] = ()
     with _noted(errors):
@@ -331,8 +337,8 @@ def _system(
             for q in scene.quantities
         ),
         inputs=inputs,
-        coordinates=tuple(c for bearing in bearings for c in bearing.coordinates),
-        initial=_initial(scene.bearings),
+        coordinates=(*(c for bearing in bearings for c in bearing.coordinates), *driven),
+        initial=_initial(scene, driven),
         constants=constants,
         definitions=definitions,
         mass=mass,
@@ -350,8 +356,11 @@ def _system(
     )
 
 
-def _initial(bearings: tuple[Bearing, ...]) -> tuple[str, ...]:
+def _initial(scene: Scene, driven: tuple[Coordinate, ...]) -> tuple[str, ...]:
     """Parameters that hold the initial states: positions of all, then velocities."""
-    return tuple(
-        q.path for which in ("position", "velocity") for bearing in bearings for q in getattr(bearing.initial, which)
-    )
+    found: list[str] = []
+    for which, of_driver in (("position", "start_angle"), ("velocity", "speed")):
+        found += [q.path for bearing in scene.bearings for q in getattr(bearing.initial, which)]
+        if driven and scene.mechanism is not None:
+            found.append(getattr(scene.mechanism.driver, of_driver).path)
+    return tuple(found)

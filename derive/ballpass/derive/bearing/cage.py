@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.kinematics import Ledger, Pose
 from ballpass.derive.mechanism.swing import Swing
-from ballpass.derive.scene.records import Bearing
+from ballpass.derive.scene.records import Bearing, Driver
 from ballpass.derive.terms import TIME, Definition, Names, symbol_of
 from ballpass.derive.variables import Input, phase
 
@@ -23,13 +24,14 @@ class Cage:
     Attributes
     ----------
     angle, rate : of ball 1 [rad], [rad/s]
-    phase : input that holds the part of the angle that grows evenly, at the reference time
+    inputs : the one that holds the part of the angle that grows evenly, at the reference time; none where the driver's
+        angle is a coordinate
     constants, definitions : of the symbols in these
     """
 
     angle: sp.Expr
     rate: sp.Symbol
-    phase: Input
+    inputs: tuple[Input, ...]
     constants: tuple[Definition, ...]
     definitions: tuple[Definition, ...] = ()
 
@@ -47,22 +49,23 @@ def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr) -> Cage:
         _ratio(bearing, names),
         names.define(speed, cage_ratio(names) * shaft_speed, "rad/s", "Speed of the cage", r"\omega_c"),
     )
-    return Cage(angle=even.symbol + speed * TIME, rate=speed, phase=even, constants=constants)
+    return Cage(angle=even.symbol + speed * TIME, rate=speed, inputs=(even,), constants=constants)
 
 
 def cage_between(
-    bearing: Bearing, bodies: tuple[Pose, Pose], swings: tuple[Swing, Swing], driver_speed: sp.Expr
+    bearing: Bearing, bodies: tuple[Pose, Pose], swings: tuple[Swing, Swing], driver: Driver, drive: Drive
 ) -> Cage:
     """Rings that turn with two bodies: ``theta_0`` plus both angles since the start, each with its weight.
 
     Parameters
     ----------
     bodies, swings : of the bodies that carry inner and outer ring
-    driver_speed : constant [rad/s]
+    driver, drive : the driver of the scene, and how it moves; where a torque drives, constant speeds are initial ones
     """
     names = Names(prefix=bearing.prefix, path=bearing.path)
     ledger = Ledger()
-    even, speed, ratio = _phase(bearing, names), names.constant("cage_speed"), cage_ratio(names)
+    driver_speed, start = symbol_of(driver.speed), symbol_of(driver.start_angle)
+    speed, ratio = names.constant("cage_speed"), cage_ratio(names)
     weights = (ratio, 1 - ratio)
     swung = sum((w * (s.swing - s.at_start) for w, s in zip(weights, swings, strict=True)), start=sp.S.Zero)
     turns = sum((w * s.turns for w, s in zip(weights, swings, strict=True)), start=sp.S.Zero)
@@ -86,10 +89,13 @@ def cage_between(
         ),
         names.define(speed, turns * driver_speed, "rad/s", words, r"\omega_c"),
     )
+    even = _phase(bearing, names)
+    free = drive.coordinate is not None
+    angle = symbol_of(bearing.ball_angle) + turns * (drive.angle - start) if free else even.symbol + speed * TIME
     return Cage(
-        angle=even.symbol + speed * TIME + swung,
+        angle=angle + swung,
         rate=rate,
-        phase=even,
+        inputs=() if free else (even,),
         constants=constants,
         definitions=ledger.definitions,
     )

@@ -1,16 +1,66 @@
-"""The drive at constant speed: the angle is that at the reference time and speed times what has passed since."""
+"""The drive at constant speed: the angle is that at the reference time and speed times what has passed since.
+
+What changes with the angle is an input, which changes at times that are known before a run.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
 import sympy as sp
 
-from ballpass.derive.drive.drive import Drive
+from ballpass.derive.drive.drive import Drive, OverAngle
 from ballpass.derive.scene.records import Driver
 from ballpass.derive.terms import TIME, Definition, symbol_of
-from ballpass.derive.variables import DRIVER_ANGLE, phase
+from ballpass.derive.variables import DRIVER_ANGLE, Input, phase
 
 
-def constant_speed(driver: Driver) -> Drive:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConstantSpeed(Drive):
+    """A drive whose angle is known; `phase` is the input that holds it at the reference time [rad]."""
+
+    phase: Input
+
+    def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> OverAngle:
+        """An input."""
+        gate = Input(
+            name=f"gate.{name}",
+            symbol=sp.Symbol(f"gate.{name}", real=True),
+            kind="gate",
+            unit="1",
+            description=f"1 while {name} acts, else 0",
+            latex=rf"g_{{\mathrm{{{name}}}}}",
+            offset=self.phase.offset,
+            rate=self.phase.rate,
+            windows=tuple(windows),
+        )
+        return OverAngle(value=gate.symbol, inputs=(gate,))
+
+    def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str]) -> OverAngle:
+        """Value at the reference time, and slope over the angle times what has passed since."""
+
+        def entry(kind: Literal["table", "table_rate"], ending: str, unit: str, words: str, latex: str) -> Input:
+            return Input(
+                name=f"{name}{ending}",
+                symbol=sp.Symbol(f"input.{name}{ending}", real=True),
+                kind=kind,
+                unit=unit,
+                description=f"{words} of the table of {name} at the reference time",
+                latex=rf"{latex}_{{0,\mathrm{{{name}}}}}",
+                offset=self.phase.offset,
+                rate=self.phase.rate,
+                times=tuple(angles),
+                values=tuple(values),
+            )
+
+        value = entry("table", "", unit, "Value", "T")
+        slope = entry("table_rate", "_slope", f"{unit}/rad", "Slope over the driver's angle", "T'")
+        return OverAngle(value=value.symbol + slope.symbol * self.speed * TIME, inputs=(value, slope))
+
+
+def constant_speed(driver: Driver) -> ConstantSpeed:
     """Drive of a driver with speed and start angle."""
     speed = symbol_of(driver.speed)
     words = "Angle of the driven body at the reference time"
@@ -22,12 +72,11 @@ def constant_speed(driver: Driver) -> Drive:
         description="Angle of the driven body",
         latex=r"\theta_1",
     )
-    return Drive(
-        angle=DRIVER_ANGLE,
+    return ConstantSpeed(
         speed=speed,
         acceleration=sp.S.Zero,
         description="the driver's speed is constant",
         definitions=(angle,),
+        inputs=(start,),
         phase=start,
-        advance=speed * TIME,
     )

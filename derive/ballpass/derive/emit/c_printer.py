@@ -26,6 +26,7 @@ _UNARY = {
     ca.OP_EXP: "exp({0})",
     ca.OP_LOG: "log({0})",
     ca.OP_TANH: "tanh({0})",
+    ca.OP_FLOOR: "floor({0})",
     ca.OP_FABS: "fabs({0})",
     ca.OP_SIGN: "(double)(({0} > 0.0) - ({0} < 0.0))",
 }

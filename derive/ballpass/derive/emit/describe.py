@@ -110,6 +110,7 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
     mechanism, linkage = system.scene.mechanism, system.linkage
     if mechanism is None or linkage is None:
         return None
+    driven = linkage.drive.coordinate
     return mf.MechanismInfo(
         speed=mechanism.driver.speed.path,
         start_angle=mechanism.driver.start_angle.path,
@@ -117,6 +118,8 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
         points=tuple(mf.PointInfo(body=p.body, point=p.point) for p in linkage.points),
         margins=tuple(mf.MarginInfo(joint=m.joint, description=m.description) for m in linkage.margins),
         forces=drawn_forces(mechanism),
+        angle=driven.name if driven is not None else "",
+        rate=driven.velocity.name if driven is not None else "",
     )
 
 

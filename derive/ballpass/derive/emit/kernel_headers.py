@@ -73,7 +73,9 @@ def kernels_header(system: System, functions: Functions, kernels: Kernels) -> st
         "/* Coordinates of one group share a magnitude; where a coordinate has a partner, their difference counts. */\n"
         + _integers("bp_group", [groups.index(c.group) for c in system.coordinates])
         + "\n"
-        + _integers("bp_partner", [names.index(c.partner) if c.partner else -1 for c in system.coordinates]),
+        + _integers("bp_partner", [names.index(c.partner) if c.partner else -1 for c in system.coordinates])
+        + "\n"
+        + _integers("bp_is_angle", [int(c.kind == "angle") for c in system.coordinates]),
         "#define BP_EACH_BEARING(DO) " + " ".join(f"DO({k})" for k in range(count)),
         *(_bearing(k, kernels.bearings) for k in range(count)),
         *(_single(k) for k in kernels.functions),

@@ -143,7 +143,7 @@ class _Lowering:
         if system.linkage is not None:
             coordinates = [self.visit(e) for point in system.linkage.points for e in (point.x, point.y)]
             # of the ideal linkage: joints without play
-            closed = {c.position: ca.SX(0.0) for c in system.coordinates}
+            closed = {c.position: ca.SX(0.0) for c in system.coordinates if c.kind == "displacement"}
             ideal = self.visit.child(closed, definitions) if system.linkage.play else self.visit
             margins = [ideal(m.expression) for m in system.linkage.margins]
             bodies += [

@@ -318,6 +318,7 @@ _FUNCTIONS: dict[object, Callable[..., ca.SX]] = {
     sp.tanh: ca.tanh,
     sp.Abs: ca.fabs,
     sp.sign: ca.sign,
+    sp.floor: ca.floor,
     sp.Max: _fold(ca.fmax),
     sp.Min: _fold(ca.fmin),
     sp.And: _fold(ca.logic_and),

@@ -27,6 +27,22 @@ def work_of(loads: Iterable[Load], linkage: Linkage) -> tuple[Effort, ...]:
     return tuple(effort for effort in efforts if effort.amount != 0 and effort.rate != 0)
 
 
+def work_of_drive(linkage: Linkage) -> tuple[tuple[Effort, ...], tuple[Inertia, ...]]:
+    """Work of a drive's torque, and its flywheel; nothing where the speed is constant."""
+    drive = linkage.drive
+    if drive.torque is None:
+        return (), ()
+    return (Effort(amount=drive.torque, rate=drive.speed),), (
+        Inertia(amount=drive.flywheel, rate=drive.speed, acceleration=drive.acceleration),
+    )
+
+
+def loads_of_drive(linkage: Linkage) -> tuple[Load, ...]:
+    """What a flywheel does to the driven body, besides the torque of the drive."""
+    drive = linkage.drive
+    return (Load(body=linkage.driven, torque=-drive.flywheel * drive.acceleration),) if drive.flywheel != 0 else ()
+
+
 def inertia_of(mechanism: Mechanism, linkage: Linkage) -> tuple[tuple[Inertia, ...], tuple[Effort, ...]]:
     """Inertia of the bodies, and the work of their weight."""
     gravity = ZERO if mechanism.gravity is None else components(mechanism.gravity, axis=(0, -1))

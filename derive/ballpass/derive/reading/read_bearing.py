@@ -115,9 +115,10 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
 
 
 def _read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-way", "two-way"]:
-    if not table.has("coupling"):
-        return "one-way"
-    coupling = table.choice("coupling", ("one-way", "two-way"))
+    coupling = table.choice("coupling", ("one-way", "two-way"), default="one-way")
+    if coupling == "one-way" and mechanism is not None and mechanism.driver.torque is not None:
+        _refuse_one_way(table)
+        return "two-way"
     if coupling == "two-way" and mechanism is None:
         table.fault(
             "coupling",
@@ -128,6 +129,16 @@ def _read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-wa
         )
         return "one-way"
     return "two-way" if coupling == "two-way" else "one-way"
+
+
+def _refuse_one_way(table: Table) -> None:
+    table.fault(
+        "coupling",
+        "a bearing loaded one-way takes the reaction of a linkage at constant speed",
+        given=show(table.data.get("coupling", "nothing, which is one-way")),
+        allowed='coupling = "two-way" where [mechanism.driver.torque] drives',
+        remedy='write coupling = "two-way", and what such a bearing needs; or delete [mechanism.driver.torque]',
+    )
 
 
 def _read_count(table: Table, coupling: str) -> Quantity | None:

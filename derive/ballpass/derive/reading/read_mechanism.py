@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from typing import Literal
 
+from ballpass.derive.drive import LAWS
+from ballpass.derive.drive.laws import TorqueLaw
 from ballpass.derive.mechanism.dyads import BRANCHES
 from ballpass.derive.mechanism.forces import FORCE_TABLES
 from ballpass.derive.scene.body_keys import Points, read_pair, refuse_unknown_body, refuse_unknown_point
-from ballpass.derive.scene.records import FRAME, Body, Driver, Force, Joint, Mechanism, NamedPoint
+from ballpass.derive.scene.records import FRAME, Body, Driver, Force, Joint, Mechanism, NamedPoint, Quantity
 from ballpass.derive.scene.schema import Table, VectorWords, listing, suggest, upright
 from ballpass.derive.scene.units import show
 
@@ -58,9 +60,11 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
 
 def _read_driver(table: Table) -> Driver:
     with table.table("driver", "joint and speed") as driver:
+        by_torque = driver.has("torque")
+        words = "Speed of the driver at the start" if by_torque else "Speed of the driver"
         return Driver(
             joint=driver.text("joint", "A") or "",
-            speed=driver.quantity("speed", "rad/s", "Speed of the driver", r"\omega", example="500 rpm"),
+            speed=driver.quantity("speed", "rad/s", words, r"\omega_0" if by_torque else r"\omega", example="500 rpm"),
             start_angle=driver.quantity(
                 "start_angle",
                 "rad",
@@ -69,7 +73,32 @@ def _read_driver(table: Table) -> Driver:
                 example="0 deg",
                 default="0 deg",
             ),
+            torque=_read_torque(driver) if by_torque else None,
+            flywheel=_read_flywheel(driver, by_torque) if driver.has("flywheel") else None,
         )
+
+
+def _read_torque(driver: Table) -> TorqueLaw | None:
+    with driver.table("torque", f"law: {listing(list(LAWS))}") as data:
+        name = data.choice("law", tuple(LAWS))
+        if name is None:
+            data.know(*data.data)
+            return None
+        return LAWS[name].read(data)
+
+
+def _read_flywheel(driver: Table, by_torque: bool) -> Quantity:
+    if not by_torque:
+        driver.fault(
+            "flywheel",
+            "at constant speed a flywheel is without effect",
+            given="[mechanism.driver.flywheel] without [mechanism.driver.torque]",
+            allowed="a flywheel where a torque drives",
+            remedy="delete the flywheel, or add [mechanism.driver.torque]",
+        )
+    with driver.table("flywheel", "inertia") as wheel:
+        words = "Moment of inertia that turns with the driven body"
+        return wheel.quantity("inertia", "kg*m^2", words, "J_f", example="0.5 kg*m^2")
 
 
 def _read_points(table: Table, body: str) -> tuple[NamedPoint, ...]:

@@ -226,6 +226,9 @@ def _check_mechanism(checker: Checker, mechanism: Mechanism) -> None:
         if point.position.kind == "axis":
             checker.positive(point.position.first, "give a positive length, or write the point as [x, y]")
         checker.polar(point.position)
+    if mechanism.driver.torque is not None:
+        mechanism.driver.torque.check(checker)
+    checker.not_negative(mechanism.driver.flywheel)
     for force in mechanism.forces:
         force.pathway.check(checker)
         force.law.check(checker)

@@ -127,14 +127,19 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Driver:
-    """The joint (revolute, frame to a body) turned at constant speed [rad/s] from `start_angle` [rad] at t = 0.
+    """The joint (revolute, frame to a body) turned from `start_angle` [rad] at t = 0.
 
     The driver's angle is that of the driven body's x axis from +x.
+
+    Without a `torque` the `speed` [rad/s] is constant.  With one, a record of `ballpass.derive.drive` that this layer
+    only carries, it is that at t = 0, and a `flywheel` [kg*m^2] (None: none) turns with the driven body.
     """
 
     joint: str
     speed: Quantity
     start_angle: Quantity
+    torque: Any = None
+    flywheel: Quantity | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

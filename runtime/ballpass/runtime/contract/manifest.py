@@ -214,6 +214,9 @@ class MechanismInfo:
     The components of an applied force are the parameters ``mechanism.forces.<name>.force.x`` and ``.y``, or
     ``.magnitude`` and ``.direction`` (see `force_components`).  Where its input is a table, that holds the amount, and
     the parameter ``mechanism.forces.<name>.direction`` the direction.
+
+    Where a torque drives, `angle` and `rate` name the states that hold the driver's angle and speed, and `speed` and
+    `start_angle` the parameters they start from; else they are empty.
     """
 
     speed: str
@@ -222,6 +225,8 @@ class MechanismInfo:
     points: tuple[PointInfo, ...]
     margins: tuple[MarginInfo, ...]
     forces: tuple[tuple[str, str, str, str], ...] = ()  # name, body, point, input: gate, table or ""
+    angle: str = ""
+    rate: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

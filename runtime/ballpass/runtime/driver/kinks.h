@@ -75,6 +75,7 @@ static inline void bp_sides_start(bp_sides *restrict s, const bp_numbers *n, dou
     for (int e = 0; e < BP_EVENTS; e++) {
         double least = INFINITY; /* weight: of the coarsest state */
         for (int k = 0; k < BP_NQ; k++) {
+            if (bp_is_angle[k]) continue;
             const double of = weight[bp_of_rate[e] > 0.0 ? BP_NQ + k : k];
             least = of < least ? of : least;
         }

@@ -9,7 +9,15 @@
 
 enum { BP_LOADED_MOMENTS = 3, BP_ITERATIONS = 80 };
 
-static const double BP_SOFT = 10.0, BP_FAR = 1e9;
+static const double BP_SOFT = 10.0, BP_FAR = 1e9, BP_RADIAN = 1.0;
+
+/* A state at rest, moment i of so many: angles are spread over a turn, and keep their velocities. */
+static inline void bp_at_moment(const double *rest, long i, long moments, double *x)
+{
+    for (int k = 0; k < BP_NX; k++) x[k] = rest[k];
+    for (int k = 0; k < BP_NQ; k++)
+        if (bp_is_angle[k]) x[k] += 6.283185307179586 * (double)i / (double)moments;
+}
 
 static inline double bp_length(const double *v)
 {
@@ -80,7 +88,7 @@ static inline void bp_masses(const bp_numbers *n, double *mass)
     bp_relative(x, n->u, n->p, n->c, w, r);
     bp_acceleration(x, none, r, n->u, n->p, n->c, w, a);
     bp_acceleration(x, both, r, n->u, n->p, n->c, w, b);
-    for (int k = 0; k < BP_NQ; k++) mass[k] = force / fabs(b[k] - a[k]);
+    for (int k = 0; k < BP_NQ; k++) mass[k] = bp_is_angle[k] ? 1.0 : force / fabs(b[k] - a[k]);
 }
 
 /* Coordinates of a group share a magnitude (bp_group); what counts of one that has a partner (bp_partner) is their difference. */
@@ -126,12 +134,23 @@ static inline double bp_weighted(const double *mass, const double *a)
     return bp_length(force);
 }
 
+/* The same with angles held where they are. */
+static inline void bp_field_held(const bp_numbers *n, const double *x, double *a, double *A)
+{
+    bp_field(n, x, a, A);
+    for (int k = 0; k < BP_NQ; k++) {
+        if (!bp_is_angle[k]) continue;
+        a[k] = 0.0;
+        for (int j = 0; j < BP_NQ; j++) A[k * BP_NQ + j] = A[j * BP_NQ + k] = 0.0;
+    }
+}
+
 /* Positions at rest with vanishing acceleration, by pseudo-transient continuation; returns 0 when nothing holds them, and -1 when it
    gets nowhere. */
 static inline int bp_equilibrium(const bp_numbers *n, const double *mass, double *x)
 {
     double a[BP_NQ], A[BP_NQ * BP_NQ], there[BP_NQ], slopes[BP_NQ * BP_NQ], d[BP_NQ];
-    bp_field(n, x, a, A);
+    bp_field_held(n, x, a, A);
     double size = bp_weighted(mass, a);
     const double first = size;
     if (size == 0.0) return 1;
@@ -143,7 +162,7 @@ static inline int bp_equilibrium(const bp_numbers *n, const double *mass, double
         if (!bp_eliminate(rows, d)) return -1;
         memcpy(trial, x, sizeof trial);
         for (int k = 0; k < BP_NQ; k++) trial[k] += d[k];
-        bp_field(n, trial, there, slopes);
+        bp_field_held(n, trial, there, slopes);
         const double reached = bp_weighted(mass, there);
         if (!(reached <= DBL_MAX) || reached > 1.5 * size) {
             tau /= 8.0;
@@ -175,11 +194,12 @@ static double bp_rounded(double value)
 static inline int bp_loaded_moments(const double *p, const double *c, const double *rest, long moments, const double *u, int group,
                                     long which[BP_LOADED_MOMENTS], double *highest)
 {
-    double loaded[BP_LOADED_MOMENTS], a[BP_NQ], A[BP_NQ * BP_NQ];
+    double loaded[BP_LOADED_MOMENTS], a[BP_NQ], A[BP_NQ * BP_NQ], x[BP_NX];
     int kept = 0;
     for (long i = 0; i < moments; i++) {
         const bp_numbers n = {.u = u + i * BP_NU, .p = p, .c = c};
-        bp_field(&n, rest, a, A);
+        bp_at_moment(rest, i, moments, x);
+        bp_field(&n, x, a, A);
         double size = bp_largest_of(a, group);
         if (!(size <= DBL_MAX)) size = 0.0;
         int place = kept;
@@ -205,6 +225,8 @@ static inline void bp_magnitudes(const double *p, const double *c, const double 
     double rest[BP_NX] = {0.0}, highest[BP_NQ], travel[BP_NQ] = {0.0}, apart[BP_NQ], equal[BP_NQ], mass[BP_NQ];
     int found = 0;
     memcpy(rest, initial, BP_NQ * sizeof *rest);
+    for (int k = 0; k < BP_NQ; k++)
+        if (bp_is_angle[k]) rest[BP_NQ + k] = initial[BP_NQ + k];
     for (int k = 0; k < BP_NQ; k++) equal[k] = 1.0;
     for (int g = 0; g < BP_NQ; g++) apart[g] = bp_apart(initial, g);
     for (int g = 0; g < BP_NQ; g++) {
@@ -215,11 +237,11 @@ static inline void bp_magnitudes(const double *p, const double *c, const double 
         for (int i = 0; i < kept; i++) {
             const bp_numbers n = {.u = u + which[i] * BP_NU, .p = p, .c = c};
             double x[BP_NX];
-            memcpy(x, rest, sizeof x);
+            bp_at_moment(rest, which[i], moments, x);
             /* a light ring has enormous accelerations on the way: then the forces have to fall */
             int held = bp_equilibrium(&n, equal, x);
             if (held < 0) {
-                memcpy(x, rest, sizeof x);
+                bp_at_moment(rest, which[i], moments, x);
                 bp_masses(&n, mass);
                 held = bp_equilibrium(&n, mass, x);
             }
@@ -239,6 +261,7 @@ static inline void bp_magnitudes(const double *p, const double *c, const double 
         if (!found) position = fmax(position, highest[g] * (horizon / turn) * (horizon / turn));
         if (!found || highest[g] == 0.0) position = fmax(position, moving * (horizon / turn));
         if (bp_has_partners(g) && apart[g] > 0.0) position = fmin(position, BP_SOFT * apart[g]);
+        if (bp_is_angle[k]) position = BP_RADIAN;
         double speed = fmax(sqrt(highest[g] * position), moving);
         /* a model at rest without load: any magnitude will do */
         if (position == 0.0) position = speed > 0.0 ? speed * horizon / turn : 1.0;

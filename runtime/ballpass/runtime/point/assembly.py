@@ -32,7 +32,7 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
     mechanism = model.manifest.mechanism
     if mechanism is None or not mechanism.margins:
         return
-    turn = clock.period(model.manifest, numbers.values)
+    turn = clock.TURN if mechanism.angle else clock.period(model.manifest, numbers.values)
     times = turn * np.arange(ANGLES) / ANGLES if math.isfinite(turn) else np.zeros(1)
     margins = _margins(model, numbers, times)
     faults = []
@@ -42,7 +42,10 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
         if worst > 0.0 and len(times) > 1:
             time, worst = _refine(model, numbers, row, time, turn / ANGLES)
         if worst <= 0.0:
-            angle = math.degrees(clock.crank_angle(model.manifest, numbers.values, time))
+            if mechanism.angle:
+                angle = math.degrees(numbers.values[mechanism.start_angle] + time) % 360.0
+            else:
+                angle = math.degrees(clock.crank_angle(model.manifest, numbers.values, time))
             faults.append(
                 f"The linkage cannot be assembled at joint {info.joint!r}, worst at crank angle {angle:.2f} deg "
                 f"({info.description}: margin {worst:.4g})."
@@ -52,9 +55,19 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
 
 
 def _margins(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> np.ndarray:
-    """Margins at times counted from t = 0, shape (times, margins); no number is no assembly."""
+    """Margins at times counted from t = 0, shape (times, margins); no number is no assembly.
+
+    Where the driver's angle is a state, in place of times angles past the start [rad].
+    """
     fixed = {"u": clock.inputs_at(model.manifest.inputs, numbers.values, 0.0), "p": numbers.p, "c": numbers.c}
-    (found,) = model.loop("assembly", ("t",))(len(times), {"t": times, **fixed}).values()
+    mechanism = model.manifest.mechanism
+    if mechanism is not None and mechanism.angle:
+        names = [state.name for state in model.manifest.states]
+        x = np.zeros((len(times), len(names)))
+        x[:, names.index(mechanism.angle)] = numbers.values[mechanism.start_angle] + times
+        (found,) = model.loop("assembly", ("x",))(len(times), {"x": x, **fixed}).values()
+    else:
+        (found,) = model.loop("assembly", ("t",))(len(times), {"t": times, **fixed}).values()
     return np.where(np.isnan(found), -np.inf, found)
 
 

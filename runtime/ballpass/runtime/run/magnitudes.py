@@ -72,6 +72,7 @@ def _groups(manifest: Manifest) -> Groups:
     return Groups(
         {str(group): np.flatnonzero(kinds == group) for group in dict.fromkeys(kinds)},
         np.array([names.index(info.partner) if info.partner else -1 for info in manifest.coordinates]),
+        np.array([info.kind == "angle" for info in manifest.coordinates]),
     )
 
 

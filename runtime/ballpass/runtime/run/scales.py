@@ -5,7 +5,8 @@ nonsense when a coordinate passes zero; so they are found once a run, from the m
 moments that load it most:
 
 Coordinates that share a magnitude make a group, as the rings of a bearing do; some have a partner, as the other ring's
-coordinate along the same axis.
+coordinate along the same axis.  An angle, which grows as the driver turns, has the magnitude of a radian; moments are
+spread over a turn of it, it keeps its initial velocity, and stays where it is while an equilibrium is sought.
 
 1. For each group the moments with its largest acceleration at the initial positions, at rest, are picked from the run.
 2. At each, the positions of static equilibrium are found (`equilibrium_newton`).  What has to fall is the residual of
@@ -43,6 +44,9 @@ SETTLED = 1e-6
 #: Largest coordinate over the difference to its partner at which that difference still has digits [1].
 FAR = 1e9
 
+#: Magnitude of an angle [rad].
+RADIAN = 1.0
+
 #: Most that a position's magnitude may be of the difference between partners [1].
 SOFT = 10.0
 
@@ -78,10 +82,12 @@ class Groups:
     ----------
     members : coordinates of each group
     partners : of each coordinate the one whose difference to it counts, -1 where there is none
+    angles : whether each coordinate is an angle
     """
 
     members: dict[str, np.ndarray]
     partners: np.ndarray
+    angles: np.ndarray
 
     def apart(self, group: str, x: np.ndarray) -> float:
         """Largest difference between coordinates of a group and their partners."""
@@ -121,8 +127,10 @@ def find_scales(
     masses : of the coordinates [kg].  Default: equal ones
     """
     half = len(initial) // 2
-    rest = np.concatenate([initial[:half], np.zeros(half)])
-    accelerations = np.abs([rhs(u, rest)[half:] for u in inputs])
+    turns = np.concatenate([groups.angles, np.zeros(half, dtype=bool)])
+    rest = np.concatenate([initial[:half], np.where(groups.angles, initial[half:], 0.0)])
+    rests = [rest + turns * (2.0 * math.pi * i / len(inputs)) for i in range(len(inputs))]
+    accelerations = np.abs([rhs(u, x)[half:] for u, x in zip(inputs, rests, strict=True)])
     weights = np.ones(half) if masses is None else np.array(masses, dtype=float)
     ranked = {}
     for name, members in groups.members.items():
@@ -132,10 +140,10 @@ def find_scales(
         ranked[name] = (order, float(size[order[0]]))
     loaded = []
     for k in dict.fromkeys(k for order, _ in ranked.values() for k in order.tolist()):
-        end = _equilibrium(rhs, jacobian, groups, inputs[k], rest, np.ones(half))
+        end = _equilibrium(rhs, jacobian, groups, inputs[k], rests[k], np.ones(half))
         if end is None:
-            end = _equilibrium(rhs, jacobian, groups, inputs[k], rest, weights)
-        loaded.append((inputs[k], *(end or (rest, False))))
+            end = _equilibrium(rhs, jacobian, groups, inputs[k], rests[k], weights)
+        loaded.append((inputs[k], *(end or (rests[k], False))))
     held = [x for _, x, is_held in loaded if is_held]
     magnitude = np.empty(2 * half)
     for name, members in groups.members.items():
@@ -149,6 +157,8 @@ def find_scales(
         apart = max(groups.apart(name, x) for x in (initial, *(x for _, x, _ in loaded)))
         if np.any(groups.partners[members] >= 0) and apart > 0.0:
             position = min(position, SOFT * apart)
+        if np.any(groups.angles[members]):
+            position = RADIAN
         speed = max(math.sqrt(acceleration * position), moving)
         # a model at rest without load: any magnitude will do
         position = position or speed * horizon / (2.0 * math.pi) or 1.0
@@ -175,14 +185,15 @@ def _equilibrium(
     None when the continuation gets nowhere.
     """
     half = len(start) // 2
+    free = ~groups.angles
 
     def state(q: np.ndarray) -> np.ndarray:
-        return np.concatenate([q, np.zeros(half)])
+        return np.concatenate([q, start[half:]])
 
-    first = float(np.linalg.norm(weights * rhs(u, start)[half:]))
+    first = float(np.linalg.norm(weights * free * rhs(u, start)[half:]))
     found = settle(
-        lambda q: rhs(u, state(q))[half:],
-        lambda q: -jacobian(u, state(q))[half:, :half],
+        lambda q: free * rhs(u, state(q))[half:],
+        lambda q: -jacobian(u, state(q))[half:, :half] * np.outer(free, free),
         start[:half],
         weights=weights,
         done=lambda _q, net, _k: float(np.linalg.norm(weights * net)) <= SETTLED * first,

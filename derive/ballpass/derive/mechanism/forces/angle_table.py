@@ -39,11 +39,9 @@ class AngleTable(Law):
         return cls(angle=angle, values=values)
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
-        """Value at the reference time, and slope times the advance of the angle."""
+        """The table's value."""
         knots, values = ([q.path for q in column] for column in (self.angle, self.values))
-        value, slope = setting.drive.table(force.label, force.pathway.unit, knots, values)
-        setting.inputs.extend((value, slope))
-        return value.symbol + slope.symbol * setting.drive.advance
+        return setting.over_angle(setting.drive.table(force.label, force.pathway.unit, knots, values))
 
     def words(self) -> str:
         """Number of rows."""

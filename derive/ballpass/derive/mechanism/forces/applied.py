@@ -33,18 +33,21 @@ def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Force
         loads += action.loads(force.law.amount(force, action, setting))
     return Forces(
         loads=tuple(loads),
-        definitions=setting.ledger.definitions,
+        definitions=(*setting.switched, *setting.ledger.definitions),
         inputs=tuple(setting.inputs),
         outputs=tuple(setting.outputs),
     )
 
 
 def drawn_forces(mechanism: Mechanism) -> tuple[tuple[str, str, str, str], ...]:
-    """Forces on points: name, body, point, and input that gates it or holds its amount, or "" (acts always)."""
+    """Forces on points: name, body, point, and input that gates it or holds its amount, or "" (acts always).
+
+    Where the driver's angle is a coordinate no input tells when a load acts: only those that always do are here.
+    """
     return tuple(
         (force.name, force.pathway.body, force.pathway.point, _input(force))
         for force in mechanism.forces
-        if isinstance(force.pathway, PointForce)
+        if isinstance(force.pathway, PointForce) and not (mechanism.driver.torque is not None and _input(force))
     )
 
 

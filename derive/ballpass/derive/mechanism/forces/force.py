@@ -17,13 +17,14 @@ from typing import ClassVar, Self
 
 import sympy as sp
 
-from ballpass.derive.drive import Drive
+from ballpass.derive.drive import Drive, OverAngle
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import Force, Mechanism
 from ballpass.derive.scene.schema import Table, listing
+from ballpass.derive.terms import Definition
 from ballpass.derive.variables import Input, Output
 
 #: Names of the points of every body and of the frame.
@@ -32,7 +33,10 @@ Points = Mapping[str, Sequence[str]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """What forces act in, and what they add: definitions, inputs, outputs."""
+    """What forces act in, and what they add: definitions, inputs, outputs.
+
+    `switched` are the definitions of what changes with the driver's angle, which others use.
+    """
 
     mechanism: Mechanism
     linkage: Linkage
@@ -40,6 +44,13 @@ class Setting:
     ledger: Ledger = field(default_factory=Ledger)
     inputs: list[Input] = field(default_factory=list)
     outputs: list[Output] = field(default_factory=list)
+    switched: list[Definition] = field(default_factory=list)
+
+    def over_angle(self, found: OverAngle) -> sp.Expr:
+        """Take what changes with the driver's angle; its value."""
+        self.inputs.extend(found.inputs)
+        self.switched.extend(found.definitions)
+        return found.value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

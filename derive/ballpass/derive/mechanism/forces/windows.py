@@ -55,9 +55,7 @@ class Windows(Law):
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The gate."""
-        gate = setting.drive.gate(force.name, [(w.start.path, w.end.path) for w in self.windows])
-        setting.inputs.append(gate)
-        return gate.symbol
+        return setting.over_angle(setting.drive.gate(force.name, [(w.start.path, w.end.path) for w in self.windows]))
 
     def words(self) -> str:
         """Number of windows."""

@@ -1,0 +1,94 @@
+"""The drive by a torque: the driver's angle is a coordinate, and what changes with it is a function of the state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from ballpass.derive.drive.drive import Drive, OverAngle
+from ballpass.derive.drive.piecewise_linear import piecewise_linear
+from ballpass.derive.scene.records import Driver
+from ballpass.derive.terms import Definition, symbol_of
+from ballpass.derive.variables import DRIVER_ANGLE, Coordinate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ByTorque(Drive):
+    """A drive whose angle follows from its torque."""
+
+    def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> OverAngle:
+        """1 where the switching function of a window is positive."""
+        inside = [sp.Piecewise((1, inside_window(*window) > 0), (0, True)) for window in windows]
+        gate = Definition(
+            symbol=sp.Symbol(f"gate.{name}", real=True),
+            expression=sp.Max(*inside, evaluate=False) if len(inside) > 1 else inside[0],
+            unit="1",
+            description=f"1 while {name} acts, else 0",
+            latex=rf"g_{{\mathrm{{{name}}}}}",
+        )
+        return OverAngle(value=gate.symbol, definitions=(gate,))
+
+    def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str]) -> OverAngle:
+        """Value over the angle behind the first knot, whole turns taken off."""
+        knots, heights = ([sp.Symbol(path, real=True) for path in column] for column in (angles, values))
+        turn, past = 2 * sp.pi, DRIVER_ANGLE - knots[0]
+        behind = Definition(
+            symbol=sp.Symbol(f"{name}.angle", real=True),
+            expression=past - turn * sp.floor(past / turn, evaluate=False),
+            unit="rad",
+            description=f"Driver's angle behind the first row of the table of {name}, within a turn",
+            latex=rf"\theta_{{\mathrm{{{name}}}}}",
+        )
+        places = [knot - knots[0] for knot in knots]
+        value = Definition(
+            symbol=sp.Symbol(f"{name}.value", real=True),
+            expression=piecewise_linear(behind.symbol, [*places, turn], [*heights, heights[0]]),
+            unit=unit,
+            description=f"Value of the table of {name}",
+            latex=rf"T_{{\mathrm{{{name}}}}}",
+        )
+        return OverAngle(value=value.symbol, definitions=(behind, value))
+
+
+def inside_window(start: str, end: str) -> sp.Expr:
+    """Switching function of a window from one driver angle to another: positive inside, modulo a turn [1].
+
+    Its zeros are the edges: cos(angle - middle) - cos(half the width).  An end before the start lies in the next turn:
+    middle and half width are then half a turn more, which changes both signs.
+    """
+    first, last = (sp.Symbol(path, real=True) for path in (start, end))
+    span = last - first
+    half = sp.Min(sp.Abs(span) / 2, sp.pi, evaluate=False)
+    return sp.sign(span, evaluate=False) * (sp.cos(DRIVER_ANGLE - (first + last) / 2) - sp.cos(half))
+
+
+def by_torque(driver: Driver) -> ByTorque:
+    """Drive of a driver with a law of its torque; speed and angle are the initial ones."""
+    angle = Coordinate(
+        name=DRIVER_ANGLE.name,
+        kind="angle",
+        unit="rad",
+        position=DRIVER_ANGLE,
+        velocity=sp.Symbol("driver.speed", real=True),
+        latex=r"\theta_1",
+        description="of the driven body, counter-clockwise",
+        group="driver",
+    )
+    torque = Definition(
+        symbol=sp.Symbol("driver.torque", real=True),
+        expression=driver.torque.torque(angle.velocity),
+        unit="N*m",
+        description="Torque of the drive on the driven body, counter-clockwise",
+        latex="M_d",
+    )
+    return ByTorque(
+        speed=angle.velocity,
+        acceleration=angle.acceleration,
+        description="from the equations of motion",
+        definitions=(torque,),
+        coordinate=angle,
+        torque=torque.symbol,
+        flywheel=sp.S.Zero if driver.flywheel is None else symbol_of(driver.flywheel),
+    )

@@ -1,0 +1,15 @@
+"""Laws of a drive's torque: each is one file here."""
+
+from ballpass.derive.drive.laws.asynchronous import Asynchronous
+from ballpass.derive.drive.laws.constant import ConstantTorque
+from ballpass.derive.drive.laws.law import TorqueLaw
+from ballpass.derive.drive.laws.linear import LinearCharacteristic
+from ballpass.derive.drive.laws.none import NoTorque
+from ballpass.derive.drive.laws.speed_table import SpeedTable
+
+#: By the name that stands in the scene file.
+LAWS: dict[str, type[TorqueLaw]] = {
+    law.name: law for law in (ConstantTorque, LinearCharacteristic, SpeedTable, Asynchronous, NoTorque)
+}
+
+__all__ = ["LAWS", "TorqueLaw"]

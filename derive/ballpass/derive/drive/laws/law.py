@@ -1,0 +1,64 @@
+"""What a law of a drive's torque is: its name, its numbers in the scene file, its torque over the speed."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar, Self
+
+import sympy as sp
+
+from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.records import Quantity
+from ballpass.derive.scene.schema import Table
+
+
+class TorqueLaw(ABC):
+    """Torque of a drive; a frozen record of the scene.
+
+    Attributes
+    ----------
+    name : what stands in the scene file
+    """
+
+    __slots__ = ()
+    name: ClassVar[str]
+
+    @classmethod
+    @abstractmethod
+    def read(cls, data: Table) -> Self:
+        """The law from the keys of ``[mechanism.driver.torque]``, faults noted there."""
+
+    @abstractmethod
+    def torque(self, speed: sp.Expr) -> sp.Expr:
+        """Torque on the driven body, counter-clockwise [N*m]; `speed` is that of the driver [rad/s]."""
+
+    @abstractmethod
+    def words(self) -> str:
+        """What drives, for people: "a constant torque"."""
+
+    def check(self, checker: Checker) -> None:  # noqa: B027  not every law has a number that could be wrong
+        """Note faults of its numbers."""
+
+
+def not_zero(checker: Checker, speed: Quantity, word: str) -> None:
+    """Note a fault where a speed is zero."""
+    if speed.value == 0.0:
+        checker.fault(
+            speed.path,
+            f"the {word} is zero",
+            checker.show(speed),
+            "a speed other than zero, negative for a motor that turns clockwise",
+            "give the speed of the motor, seen at the driver's joint",
+        )
+
+
+def same_sign(checker: Checker, torque: Quantity, speed: Quantity, words: str) -> None:
+    """Note a fault where a motor turns the other way than its torque."""
+    if torque.value * speed.value < 0.0:
+        checker.fault(
+            torque.path,
+            f"the signs of {words} differ: the motor would drive beyond that speed",
+            f"{checker.show(torque)}, {checker.show(speed)}",
+            "both positive, or both negative for a motor that turns clockwise",
+            "change the sign of one of the two",
+        )

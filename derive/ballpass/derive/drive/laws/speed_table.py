@@ -1,0 +1,63 @@
+"""Law: a torque from a table over the speed, linear between its rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import ClassVar, Self
+
+import sympy as sp
+
+from ballpass.derive.drive.laws.law import TorqueLaw
+from ballpass.derive.drive.piecewise_linear import piecewise_linear
+from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.records import Quantity
+from ballpass.derive.scene.schema import Table
+from ballpass.derive.terms import symbol_of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedTable(TorqueLaw):
+    """Rows of `speed` [rad/s], increasing, and `amount` [N*m]; constant before the first and behind the last."""
+
+    name: ClassVar[str] = "table"
+
+    speed: tuple[Quantity, ...]
+    amount: tuple[Quantity, ...]
+
+    @classmethod
+    def read(cls, data: Table) -> Self:
+        speed = data.column("speed", "rad/s", "Speed in row ROW of the drive's table", r"\omega_{d,ROW}")
+        return cls(
+            speed=speed,
+            amount=data.column("torque", "N*m", "Torque in row ROW of the drive's table", "M_{d,ROW}"),
+        )
+
+    def torque(self, speed: sp.Expr) -> sp.Expr:
+        return piecewise_linear(speed, [symbol_of(q) for q in self.speed], [symbol_of(q) for q in self.amount])
+
+    def words(self) -> str:
+        return f"a torque by a table of {len(self.speed)} speeds"
+
+    def check(self, checker: Checker) -> None:
+        """Columns of one length, of two rows or more; speeds increase."""
+        rows = len(self.speed), len(self.amount)
+        if min(rows) == 0:  # reported when it was read
+            return
+        if rows[0] != rows[1] or rows[0] < 2:
+            checker.fault(
+                self.speed[0].path.rpartition(".")[0].rpartition(".")[0],
+                "the columns of the table differ in length" if rows[0] != rows[1] else "the table has too few rows",
+                " and ".join(str(count) for count in rows),
+                "two columns of one length, two rows or more",
+                'give every row a speed and a torque, or write law = "constant"',
+            )
+        for before, behind in pairwise(self.speed):
+            if behind.value <= before.value:
+                checker.fault(
+                    behind.path,
+                    "the speed does not increase",
+                    f"{checker.show(behind)} after {checker.show(before)}",
+                    "strictly increasing speeds",
+                    "sort the rows by speed; write a jump as two rows with a small step of speed between them",
+                )

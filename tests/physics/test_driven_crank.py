@@ -1,0 +1,158 @@
+"""A crank that a torque drives, against published test problems, textbook formulas and balances of energy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy.integrate import simpson
+
+from ballpass.derive import derive, generate, read_scene
+from ballpass.derive.mechanism.numeric import Evaluator
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.derive.scene.errors import SceneError
+from ballpass.derive.system import System
+from ballpass.runtime import Model, load
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+ANDREWS = ROOT / "scenes/andrews.toml"
+CRANK = (HERE / "slider_crank.toml").read_text()
+
+BETA, THETA = 14222.4439199541, -10666.8329399656  # initial angular accelerations of the test set [rad/s^2]
+
+
+@pytest.fixture(scope="module")
+def andrews(tmp_path_factory: pytest.TempPathFactory) -> Model:
+    return load(generate(ANDREWS, tmp_path_factory.mktemp("andrews")))
+
+
+def test_andrews_squeezer_starts_with_the_published_accelerations(andrews: Model) -> None:
+    """beta'' and beta'' + Theta'' of the IVP test set; at that place no other body accelerates."""
+    assert andrews.evaluate(0.0)["driver.acceleration"] == pytest.approx(BETA, rel=1e-11)
+    system = derive(read_scene(ANDREWS))
+    numbers = {p.symbol: p.default for p in system.parameters}
+    numbers |= {s.symbol: numbers[sp.Symbol(n, real=True)] for s, n in zip(system.states, system.initial, strict=True)}
+    numbers[system.coordinates[0].acceleration] = BETA
+    assert system.linkage is not None
+    names = ("coupler", "arm", "upper_link", "lower_link")
+    definitions = [d for d in system.definitions if d in system.linkage.definitions]
+    found = Evaluator(definitions, [system.linkage.pose(name).acceleration for name in names])(numbers)
+    assert found == pytest.approx([BETA + THETA, 0.0, 0.0, 0.0], rel=1e-11, abs=1e-8)
+
+
+def test_andrews_squeezer_comes_to_the_published_end(andrews: Model) -> None:
+    """Angles of the IVP test set at 0.03 s, to the digits that are known."""
+    end = andrews.simulate(rtol=1e-11)
+    phi, delta, omega, epsilon = -0.53473012, 0.52440997, 0.53473012, 1.04808074
+    expected = {
+        "driver.angle": 15.8107712,
+        "body.coupler.angle": 15.8107712 - 15.7563711,
+        "body.arm.angle": 0.04082224,
+        "body.upper_link.angle": phi + delta,
+        "body.upper_jaw.angle": delta,
+        "body.lower_link.angle": omega + epsilon,
+        "body.lower_jaw.angle": epsilon,
+    }
+    for name, value in expected.items():
+        assert float(end[name][-1]) == pytest.approx(value, abs=1e-7), name
+
+
+def test_kinetic_energy_of_a_slider_crank_and_its_sensitivities_are_those_of_idas(tmp_path: Path) -> None:
+    """G, dG/dk and dG/dc of SUNDIALS' example idasSlCrank_FSA_dns, by the project's own forward sensitivities."""
+    path = tmp_path / "slider_crank.toml"
+    path.write_text(CRANK)
+    model = load(generate(path, tmp_path / "model"))
+    names = ["mechanism.springs.link.stiffness", "mechanism.springs.link.damping"]
+    slopes = model.sensitivities(names, rtol=1e-10, samples_per_cycle=2000)
+    angle, speed = slopes.solution["driver.angle"], slopes.solution["driver.speed"]
+
+    def energy(theta: np.ndarray, omega: np.ndarray) -> np.ndarray:
+        """Crank 1 kg m^2, rod 2 kg m^2 of length 1, 1 kg at the slider; sin p = -sin(theta)/2."""
+        sine, cosine = np.sin(theta) / 2.0, np.cos(theta) / 2.0
+        rod = -cosine * omega / np.sqrt(1.0 - sine * sine)
+        slider = -sine * omega + sine * rod
+        return 0.5 * omega**2 + rod**2 + 0.5 * slider**2
+
+    step = 1e-30j
+    by_angle = np.imag(energy(angle + step, speed + 0j)) / 1e-30
+    by_speed = np.imag(energy(angle + 0j, speed + step)) / 1e-30
+    time = slopes.solution.t
+    assert simpson(energy(angle, speed), x=time) == pytest.approx(3.3366068, abs=1e-8)
+    found = [simpson(by_angle * slopes.x[:, 0, k] + by_speed * slopes.x[:, 1, k], x=time) for k in range(2)]
+    assert found == pytest.approx([0.3334481, -0.3637540], abs=1e-6)
+
+
+def _with_torque(keys: str) -> str:
+    return CRANK.replace('law = "none"', keys)
+
+
+def _torque(keys: str) -> tuple[System, sp.Expr]:
+    """The torque of a law over the speed, its numbers put in."""
+    system = derive(scene_from_text(_with_torque(keys), "crank"))
+    assert system.linkage is not None
+    (torque,) = system.linkage.drive.definitions
+    return system, torque.expression.subs({p.symbol: p.default for p in system.parameters})
+
+
+def test_torques_of_motors_are_those_of_their_data_sheets() -> None:
+    """Constant; straight lines; a table by NumPy's interpolation; Kloss's formula and its breakdown point."""
+    speeds = np.linspace(-35.0, 225.0, 14)
+
+    def over(keys: str) -> np.ndarray:
+        system, torque = _torque(keys)
+        return np.array([float(torque.subs(system.coordinates[0].velocity, s)) for s in speeds])
+
+    assert over('law = "constant"\ntorque = "5 N*m"') == pytest.approx(np.full(14, 5.0))
+    stall = over('law = "linear"\nstall_torque = "8 N*m"\nno_load_speed = "200 rad/s"')
+    assert stall == pytest.approx(8.0 - 0.04 * speeds)
+    nominal = 'law = "linear"\nnominal_torque = "2 N*m"\nnominal_speed = "150 rad/s"\nno_load_speed = "200 rad/s"'
+    assert over(nominal) == pytest.approx(stall)
+    rows = 'law = "table"\nspeed = ["0 rad/s", "50 rad/s", "200 rad/s"]\ntorque = ["3 N*m", "4 N*m", "-1 N*m"]'
+    assert over(rows) == pytest.approx(np.interp(speeds, [0.0, 50.0, 200.0], [3.0, 4.0, -1.0]))
+    kloss = 'law = "asynchronous"\nbreakdown_torque = "9 N*m"\nbreakdown_slip = 0.2\nsynchronous_speed = "150 rad/s"'
+    slip = 1.0 - speeds / 150.0
+    assert over(kloss) == pytest.approx(2.0 * 9.0 / (slip / 0.2 + 0.2 / slip))
+    system, torque = _torque(kloss)
+    speed = system.coordinates[0].velocity
+    assert float(torque.subs(speed, 120.0)) == pytest.approx(9.0)
+    assert float(sp.diff(torque, speed).subs(speed, 120.0)) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ('law = "linear"\nno_load_speed = "150 rad/s"', "the torque is missing"),
+        ('law = "linear"\nno_load_speed = "-150 rad/s"\nstall_torque = "5 N*m"', "the signs of torque"),
+        (
+            'law = "linear"\nno_load_speed = "150 rad/s"\nnominal_torque = "5 N*m"\nnominal_speed = "160 rad/s"',
+            "does not lie between rest and the no-load speed",
+        ),
+        ('law = "table"\nspeed = ["0 rad/s", "0 rad/s"]\ntorque = ["3 N*m", "4 N*m"]', "the speed does not increase"),
+        (
+            'law = "asynchronous"\nbreakdown_torque = "5 N*m"\nbreakdown_slip = 0\nsynchronous_speed = "150 rad/s"',
+            "the value is zero",
+        ),
+        ('law = "servo"', "this is none of the choices"),
+        ('law = "none"\ntorque = "5 N*m"', "unknown key"),
+    ],
+)
+def test_torques_that_no_motor_has_are_refused(keys: str, words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        scene_from_text(_with_torque(keys), "crank")
+
+
+def test_what_a_torque_has_no_meaning_for_is_refused_with_reason() -> None:
+    """A flywheel at constant speed, and a bearing loaded by the reaction at constant speed."""
+    wheel = '[mechanism.driver.flywheel]\ninertia = "1 kg*m^2"\n'
+    constant = CRANK.replace('[mechanism.driver.torque]\nlaw = "none"\n', wheel)
+    with pytest.raises(SceneError, match="at constant speed a flywheel is without effect"):
+        scene_from_text(constant, "crank")
+    press = (ROOT / "scenes/punching_press.toml").read_text()
+    driven = press.replace(
+        "[mechanism.frame.points]", '[mechanism.driver.torque]\nlaw = "none"\n\n[mechanism.frame.points]'
+    )
+    with pytest.raises(SceneError, match="loaded one-way takes the reaction of a linkage at constant speed"):
+        scene_from_text(driven, "press")
