@@ -1,9 +1,10 @@
-"""Whether a linkage can be assembled at every angle of a turn."""
+"""Whether a linkage can be assembled: at every angle of a turn, and at one instant."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,6 +53,42 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
             )
     if faults:
         raise RequestError("\n".join(faults) + "\nChange the lengths of the bodies that meet at the joint.")
+
+
+def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mapping[str, Any]) -> None:
+    """Look at every margin of the linkage at one instant alone; others of the turn are not looked at.
+
+    Parameters
+    ----------
+    t : the instant [s]
+    there : arguments of generated functions at it, by name: t, u, p, c
+
+    Raises
+    ------
+    RequestError
+        A dyad cannot be assembled there; names its joint and the crank angle.
+    """
+    mechanism = model.manifest.mechanism
+    if mechanism is None or not mechanism.margins:
+        return
+    kernel = model.kernel("assembly")
+    kernel.run(there)
+    (margins,) = kernel.outputs.values()
+    heights = margins.tolist()
+    if all(height > 0.0 for height in heights):  # no number is no assembly
+        return
+    angle = math.degrees(clock.crank_angle(model.manifest, numbers.values, t))
+    faults = [
+        f"The linkage cannot be assembled at joint {info.joint!r} at {t:.6g} s, crank angle {angle:.2f} deg "
+        f"({info.description}: margin {height:.4g})."
+        for info, height in zip(mechanism.margins, heights, strict=True)
+        if not height > 0.0
+    ]
+    raise RequestError(
+        "\n".join(faults)
+        + "\nChange the lengths of the bodies that meet at the joint, or ask at an angle at which they "
+        "reach each other."
+    )
 
 
 def _margins(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> np.ndarray:

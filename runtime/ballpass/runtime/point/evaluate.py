@@ -10,6 +10,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, real, unchecked_numbers, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.point.assembly import check_assembled
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.request import no_output
 
@@ -26,7 +27,7 @@ def evaluate_point(
     Raises
     ------
     RequestError
-        No such output, a time that is not finite, or a state of another shape.
+        No such output, a time that is not finite, a state of another shape, or a linkage that cannot be assembled then.
     """
     wanted = list(model.outputs) if outputs is None else list(outputs)
     for name in wanted:
@@ -59,7 +60,7 @@ def point(
     Raises
     ------
     RequestError
-        `x` has another shape than (states,).
+        `x` has another shape than (states,), or the linkage cannot be assembled at `t`.  Other instants do not count.
     """
     state = np.array([numbers.values[name] for name in model.manifest.initial]) if x is None else vector(x)
     if state.shape != (len(model.states),) or not np.all(np.isfinite(state)):
@@ -68,7 +69,9 @@ def point(
             f"{'' if np.all(np.isfinite(state)) else ' with NaN or inf'}."
         )
     u = clock.inputs_at(model.manifest.inputs, numbers.values, t)
-    return {"t": 0.0, "x": state, "u": u, "p": numbers.p, "c": numbers.c}
+    there: dict[str, float | np.ndarray] = {"t": 0.0, "x": state, "u": u, "p": numbers.p, "c": numbers.c}
+    check_assembled(model, numbers, t, there)
+    return there
 
 
 def checked_time(t: float) -> float:

@@ -87,6 +87,12 @@ class PointModel(LoadedModel):
         Returns
         -------
         dict from name to number, or to array of shape (balls,)
+
+        Raises
+        ------
+        RequestError
+            Unknown names, a state of another shape, or a linkage that cannot be assembled at `t`, as in all that is
+            asked at one instant.  It may lock at others: `check_assembly` looks at a turn.
         """
         return evaluate_point(self, self.numbers(parameters), t, x, outputs)
 
@@ -129,7 +135,7 @@ class PointModel(LoadedModel):
         Raises
         ------
         RequestError
-            Unknown names, with the nearest ones.
+            Unknown names, with the nearest ones, or a linkage that cannot be assembled at `t`.
         """
         return jacobian(self, self.numbers(parameters), of, wrt, t=t, x=x)
 
@@ -190,7 +196,7 @@ class PointModel(LoadedModel):
         Raises
         ------
         RequestError
-            No bearing, or an unloaded ring in a clearance.
+            No bearing, an unloaded ring in a clearance, or a linkage that cannot be assembled at that instant.
         SimulationError
             Nothing holds the rings.
         """
@@ -220,6 +226,11 @@ class PointModel(LoadedModel):
         -----
         KinkWarning
             The damping law has no derivative at this state; the warning says what is given.
+
+        Raises
+        ------
+        RequestError
+            As for `static_equilibrium`.
         """
         from ballpass.runtime.point.equilibrium import instant, static_equilibrium
         from ballpass.runtime.point.linearize import linearize  # with SciPy
