@@ -23,6 +23,8 @@ from ballpass.derive.variables import DRIVER_ANGLE
 #: Arithmetic-geometric means from k' = 0.01 (kappa = 100) settle to rounding in six steps; one more for closer
 #: conformity.
 AGM_STEPS = 7
+#: To which fraction of a radian the mean direction of a body is rounded.
+STEPS_A_RADIAN = 64.0
 #: Newton steps on the logarithm of kappa; the start (1977 fit of Brewe and Hamrock) is 3 % off, each step squares that.
 ELLIPTICITY_STEPS = 4
 
@@ -56,6 +58,7 @@ class Visitor:
         self._memo: dict[sp.Basic, ca.SX] = {}
         self._is_constant: dict[sp.Basic, bool] = {}
         self._is_own: dict[sp.Basic, bool] = {}
+        self._ideals: dict[object, Visitor] = {}
         self._agm: dict[sp.Basic, tuple[ca.SX, ca.SX]] = {}
 
     def child(self, values: Mapping[sp.Symbol, ca.SX], definitions: Mapping[sp.Symbol, sp.Expr]) -> Visitor:
@@ -230,13 +233,17 @@ class Visitor:
 
     def _ideal(self, expression: sp.Basic) -> ca.SX:
         """A function of the linkage without play, at angles of the driver that it chooses."""
-        held = {position: ca.SX(0.0) for position in positions_of(expression)}
+        closed = positions_of(expression)
 
-        def at(angle: ca.SX | float) -> Visitor:
-            return self.child({DRIVER_ANGLE: ca.SX(angle), **held}, self._definitions)
+        def at(angle: float | sp.Basic) -> Visitor:
+            if (angle, closed) not in self._ideals:
+                driver = self(angle) if isinstance(angle, sp.Basic) else ca.SX(angle)
+                held = {DRIVER_ANGLE: driver} | {position: ca.SX(0.0) for position in closed}
+                self._ideals[angle, closed] = self.child(held, self._definitions)
+            return self._ideals[angle, closed]
 
         if isinstance(expression, Ideal):
-            return at(self(expression.args[1]))(expression.args[0])
+            return at(expression.args[1])(expression.args[0])
         angles = [2.0 * ca.pi * k / POINTS for k in range(POINTS)]
         cos, sin = zip(
             *((visit(expression.args[0]), visit(expression.args[1])) for visit in map(at, angles)), strict=True
@@ -249,7 +256,8 @@ class Visitor:
         rest = [(ca.cos(turns * a), ca.sin(turns * a)) for a in angles]
         across = reduce(add, (s * c0 - c * s0 for c, s, (c0, s0) in zip(cos, sin, rest, strict=True)))
         along = reduce(add, (c * c0 + s * s0 for c, s, (c0, s0) in zip(cos, sin, rest, strict=True)))
-        return ca.SX(ca.atan2(across, along))
+        # a step function: no derivative follows a number that cancels
+        return ca.SX(ca.floor(ca.atan2(across, along) * STEPS_A_RADIAN + 0.5) / STEPS_A_RADIAN)
 
     def _elliptic(self, expression: sp.Basic) -> ca.SX:
         (m,) = expression.args

@@ -33,7 +33,7 @@ class Turns(sp.Function):  # type: ignore[misc]
 
 
 class Mean(sp.Function):  # type: ignore[misc]
-    """``Mean(cos, sin, turns, *positions)``: mean direction over a turn, less the whole turns [rad]."""
+    """``Mean(cos, sin, turns, *positions)``: mean direction over a turn, less the whole turns, rounded [rad]."""
 
 
 #: Functions of the linkage without play: constants of a run, whatever stands in them.

@@ -34,7 +34,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.locating import has_kinks
 
 #: What of the compiler's flags makes a shared library, or is overruled.
-_LIBRARY_ONLY = ("-O2", "-fPIC", "-shared")
+_LIBRARY_ONLY = ("-O1", "-fPIC", "-shared")
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 
