@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.lower.functions import lower, operations
 from ballpass.derive.scene.records import (
+    FRAME,
     Bearing,
     ConstantLoad,
     Damping,
@@ -157,6 +158,13 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
         modelled=f"{bearing.balls} balls at the cage's angles, Hertz force of each",
         without=None,
     )
+    if bearing.coupling == "two-way":
+        yield Feature(
+            name=f"coupling{of}",
+            path=f"{bearing.path}.coupling",
+            modelled=f"play of joint {bearing.joint} moves the linkage, forces of the balls act on both bodies",
+            without=_one_way(scene, bearing),
+        )
     if bearing.contact.smoothing is not None:
         sharp = replace(bearing, contact=replace(bearing.contact, smoothing=None))
         yield Feature(
@@ -250,6 +258,29 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
         quantities=tuple(quantities),
         outputs=_patterns(scene, "reaction", "drive", "body", *(f"{f.word}." for f in mechanism.forces)),
     )
+
+
+def _one_way(scene: Scene, bearing: Bearing) -> Scene | None:
+    """The scene with its bearing loaded by the ideal linkage; None where one-way coupling has no place."""
+    mechanism = scene.mechanism
+    assert mechanism is not None  # what the bearing is coupled with
+    joint = mechanism.joint(mechanism.driver.joint)
+    if len(scene.bearings) > 1 or bearing.joint != joint.name or bearing.inner_body != joint.other(FRAME):
+        return None
+    share = Quantity(path=f"{bearing.path}.share", value=1.0, unit="1", description="Share of the reaction", latex="s")
+    mass = Quantity(
+        path=f"{bearing.path}.inner_ring.mass", value=1.0, unit="kg", description="Mass of the inner ring", latex="m_i"
+    )
+    loaded = replace(
+        bearing,
+        coupling="one-way",
+        inner_body="",
+        count=None,
+        share=share,
+        inner=InnerRing(mass=mass, damping=None),
+    )
+    kept = (q for q in scene.quantities if bearing.count is None or q.path != bearing.count.path)
+    return replace(_with(scene, loaded), quantities=(*kept, share, mass))
 
 
 def _keep(scene: Scene, *vanished: str, bearing: Bearing) -> Scene:

@@ -147,6 +147,8 @@ def _absent(scene: Scene) -> list[str]:
         out.append("a bearing: forces of the mechanism only ([bearing])")
     for bearing in scene.bearings:
         path = bearing.path
+        if mechanism is not None and bearing.coupling == "one-way":
+            out.append(f'play and forces of the bearing that act back on the linkage ({path}.coupling = "two-way")')
         if not bearing.damping.numbers:
             out.append(f"damping at the balls ({path}.damping)")
         if bearing.inner is not None and bearing.inner.damping is None:
