@@ -31,7 +31,7 @@ from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kink
 from ballpass.runtime.run.printed import printed
 from ballpass.runtime.run.reduced_run import check_span, choose_family
 from ballpass.runtime.run.reductions import channel_names, observable_aliases, observe
-from ballpass.runtime.run.request import check_memory
+from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, check_memory
 from ballpass.runtime.run.request import tolerance as relative_tolerance
 
 if TYPE_CHECKING:
@@ -270,7 +270,8 @@ def _span(model: LoadedModel, members: Members, cycles: float | None, duration: 
     if 0.0 <= transient < math.inf and (duration is not None or np.all(np.isfinite(turns))):
         durations = np.full(count, float(duration)) if duration is not None else float(cycles or 0.0) * turns
         starts = transient * turns if transient > 0.0 else starts
-        if np.all(starts < durations * (1.0 - 1e-9)):
+        longest = np.minimum(MOST_TIME, MOST_TURNS * turns)
+        if np.all((starts < durations * (1.0 - 1e-9)) & (durations <= longest)):
             return Span(durations=durations, turns=turns, starts=starts)
     durations, starts = np.zeros(count), np.zeros(count)
     for turn in np.unique(turns):

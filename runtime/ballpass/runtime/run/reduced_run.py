@@ -25,7 +25,7 @@ from ballpass.runtime.run.limits import allowance
 from ballpass.runtime.run.locating import choose_kinks, stepper_for
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
 from ballpass.runtime.run.reductions import Reductions, channel_names, reductions_of
-from ballpass.runtime.run.request import Request, run_length, start_state, tolerance
+from ballpass.runtime.run.request import Request, check_length, run_length, start_state, tolerance
 from ballpass.runtime.run.segments import edge_windows, make_segments, rest_of
 from ballpass.runtime.run.stepping import STATUS_OF_END
 
@@ -43,8 +43,9 @@ def check_span(duration: float, turn: float, transient: float) -> float:
     Raises
     ------
     RequestError
-        The transient is no number of turns from 0 on, nothing turns, or nothing is left of the run.
+        The run is too long, the transient no number of turns from 0 on, nothing turns, or nothing is left of the run.
     """
+    check_length(duration, turn)
     if not 0.0 <= transient < math.inf:
         raise RequestError(f"transient: a number of cycles from 0 on is expected, not {transient!r}.")
     if transient > 0.0 and not math.isfinite(turn):

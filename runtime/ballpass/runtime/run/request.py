@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 #: Smallest and largest relative tolerance [1].
 TOLERANCES = (1e-13, 1e-1)
 
+#: Longest run, in turns and in time [s].  A press takes days for so many turns, and an edge of a window within the last
+#: of them is known to a thousandth of a turn.
+MOST_TURNS, MOST_TIME = 1e9, 1e9
+
 #: Most numbers that the samples of a run may hold, its derivatives, or its segments: 4 GiB.
 MAX_NUMBERS = 2**29
 
@@ -123,9 +127,11 @@ def _sample_times(
     """Length of the run, and the times of its samples."""
     if request.times is None:
         duration = run_length(model, request, turn)
+        check_length(duration, turn)
         per_cycle = _whole("samples_per_cycle", request.samples_per_cycle, model.manifest.run.samples_per_cycle)
-        count = max(1, round(per_cycle * duration / turn)) if math.isfinite(turn) else per_cycle
-        _check_memory(model, count, outputs)
+        wanted = np.rint(float(per_cycle) * duration / turn) if math.isfinite(turn) else float(per_cycle)
+        _check_memory(model, wanted, outputs)
+        count = max(1, int(wanted))
         return duration, duration * (np.arange(count + 1) / count)
     if request.samples_per_cycle is not None:
         raise RequestError(
@@ -157,6 +163,7 @@ def _sample_times(
                 f"times: the run ends at {duration!r} s, and {float(times[-1])!r} s lies behind it. Run longer, or "
                 "leave cycles and duration out: the run then ends at the last time."
             )
+    check_length(duration, turn)
     if times[0] < 0.0:
         raise RequestError(
             f"times: the run starts at 0 s, and {float(times[0])!r} s lies before it. Leave earlier times out."
@@ -165,16 +172,16 @@ def _sample_times(
     return duration, times
 
 
-def _check_memory(model: LoadedModel, count: int, outputs: Sequence[str]) -> None:
+def _check_memory(model: LoadedModel, count: float, outputs: Sequence[str]) -> None:
     wanted = set(outputs)
     columns = len(model.states) + sum(info.size for info in model.manifest.outputs if info.name in wanted)
     columns += len(model.manifest.inputs)
     check_memory(
-        f"{count} samples of",
+        f"{count:.10g} samples of",
         count,
         columns,
-        "Take fewer samples a cycle or a shorter run, or keep extremes and means only: `Model.reduce` runs any number "
-        "of cycles without samples.",
+        "Take fewer samples a cycle or a shorter run, or keep extremes and means only: `Model.reduce` runs without "
+        "samples.",
     )
 
 
@@ -261,6 +268,27 @@ def run_length(model: LoadedModel, request: Request, turn: float) -> float:
     if not math.isfinite(turn):
         raise RequestError("cycles: nothing turns in this model (its speed is zero). Give duration in seconds.")
     return cycles * turn
+
+
+def check_length(duration: float, turn: float) -> None:
+    """Refuse a run that would not come to its end.
+
+    Parameters
+    ----------
+    duration, turn : of the run, and of a turn, infinite where nothing turns [s]
+
+    Raises
+    ------
+    RequestError
+        It is longer than `MOST_TURNS` or `MOST_TIME`.
+    """
+    turns = duration / turn
+    if not (turns <= MOST_TURNS * (1.0 + 1e-9) and duration <= MOST_TIME):
+        words = f"{duration:g} s, {turns:.3g} turns," if turns else f"{duration:g} s"
+        raise RequestError(
+            f"A run of {words} is too long to be computed. Allowed: up to {MOST_TURNS:g} turns and {MOST_TIME:g} s. "
+            "Give fewer cycles or a shorter duration."
+        )
 
 
 def start_state(model: LoadedModel, numbers: Numbers, given: np.ndarray | None) -> np.ndarray:
