@@ -1,0 +1,472 @@
+"""Claims about bearings coupled both ways, against a second implementation: absolute coordinates with multipliers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from coupled_scenes import (
+    GATED,
+    HUNT,
+    LAWS,
+    ONE_SIDED,
+    UNDAMPED,
+    Derived,
+    bearing,
+    linkage_text,
+    with_bearings,
+)
+from linkages import MACHINES, Machine
+from multibody import Multibody
+from scipy.integrate import cumulative_simpson, solve_ivp
+from scipy.optimize import root
+
+from ballpass.derive import generate
+from ballpass.derive.scene.records import Scene
+from ballpass.runtime import load
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+
+SPRINGS = """[mechanism.springs.return]
+bodies = ["frame", "lever"]
+points = ["hook", "tip"]
+stiffness = "2 N/mm"
+free_length = "150 mm"
+damping = "40 N*s/m"
+preload = "20 N"
+
+[mechanism.torsion_springs.twist]
+bodies = ["crank", "lever"]
+stiffness = "30 N*m/rad"
+free_angle = "80 deg"
+damping = "0.5 N*m*s/rad"
+preload = "3 N*m"
+
+[mechanism.forces.cut]
+"""
+
+
+@cache
+def text(name: str, *changes: tuple[str, str]) -> str:
+    out = (SCENES / f"{name}.toml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in out, f"{old!r} is not in {name}"
+        out = out.replace(old, new)
+    return out
+
+
+#: Ground is the shortest link: crank, coupler and rocker all go round.
+DRAG_LINK = (
+    ('D = ["120 mm", "0 mm"]', 'D = ["30 mm", "0 mm"]'),
+    ('B = "30 mm"', 'B = "80 mm"'),
+    ('C = "80 mm"', 'C = "110 mm"'),
+)
+#: The pivot lies within the crank's circle: the lever goes round.
+WHITWORTH = (('"-200 mm"', '"-70 mm"'),)
+SPRUNG = (
+    ("[mechanism.frame.points]\n", '[mechanism.frame.points]\nhook = ["250 mm", "180 mm"]\n'),
+    ("[mechanism.forces.cut]\n", SPRINGS),
+)
+OFF_CENTRE = (('{ distance = "0 mm", angle = "0 deg" }', '{ distance = "4 mm", angle = "50 deg" }'),)
+
+
+FRAME_POINTS = "[mechanism.frame.points]"
+MOTOR = """[mechanism.driver.torque]
+law = "asynchronous"
+breakdown_torque = "40 N*m"
+breakdown_slip = 0.2
+synchronous_speed = "520 rpm"
+
+[mechanism.driver.flywheel]
+inertia = "0.2 kg*m^2"
+
+"""
+DIRECT_CURRENT = """[mechanism.driver.torque]
+law = "linear"
+no_load_speed = "700 rpm"
+nominal_torque = "9 N*m"
+nominal_speed = "600 rpm"
+
+"""
+RUN_DOWN = """[mechanism.driver.torque]
+law = "none"
+
+"""
+
+
+def driven_by(drive: str) -> tuple[tuple[str, str], ...]:
+    return ((FRAME_POINTS, drive + FRAME_POINTS),)
+
+
+#: Scene, changes of it, bearings; no bearings: those of the scene.
+CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
+    "press, A": ("punching_press", OFF_CENTRE, (bearing("A", law=ONE_SIDED, count=2),)),
+    "two-way press": ("punching_press_two_way", (), ()),
+    "press, bearings in all hinges": ("punching_press_hinges", (), ()),
+    "Andrews' squeezer": ("andrews", (), ()),
+    "press, motor and flywheel": (
+        "punching_press",
+        (*OFF_CENTRE, *driven_by(MOTOR)),
+        (bearing("A", "frame", count=2, elastic=True), bearing("B", "crank"), bearing("C", "slider", law=HUNT)),
+    ),
+    "four-bar, motor": (
+        "four_bar",
+        driven_by(DIRECT_CURRENT),
+        (bearing("A"), bearing("B", "crank", elastic=True), bearing("D", "frame", elastic=True)),
+    ),
+    "press, A B C elastic": (
+        "punching_press",
+        OFF_CENTRE,
+        (
+            bearing("A", count=2, elastic=True),
+            bearing("B", "rod", elastic=True, law=GATED),
+            bearing("C", "rod", elastic=True, balls=9),
+        ),
+    ),
+    "four-bar, all joints": (
+        "four_bar",
+        (),
+        (
+            bearing("A", "frame", elastic=True),
+            bearing("B", "coupler", count=2, elastic=True),
+            bearing("C", "coupler"),
+            bearing("D", law=ONE_SIDED),
+        ),
+    ),
+    "drag link": (
+        "four_bar",
+        (*DRAG_LINK, ('speed = "600 rpm"', 'speed = "-200 rpm"')),
+        (
+            bearing("A"),
+            bearing("B", "crank", elastic=True),
+            bearing("C", "rocker", elastic=True),
+            bearing("D", "frame"),
+        ),
+    ),
+    "sprung shaper": (
+        "crank_shaper",
+        SPRUNG,
+        (bearing("A", elastic=True), bearing("B", "block", elastic=True), bearing("O", "lever", count=2)),
+    ),
+    "Whitworth": (
+        "crank_shaper",
+        WHITWORTH,
+        (bearing("B", "crank", elastic=True), bearing("O", "frame", elastic=True)),
+    ),
+}
+
+
+@cache
+def pair(name: str) -> tuple[Derived, Multibody]:
+    scene, changes, bearings = CASES[name]
+    derived = Derived(with_bearings(text(scene, *changes), *bearings))
+    return derived, Multibody(derived.scene, derived.points())
+
+
+def drawn(rng: np.random.Generator, derived: Derived, machine: Multibody) -> tuple[float, np.ndarray, dict[str, float]]:
+    """A time in the first two turns, a state with loaded and free balls, and the gates there."""
+    size = len(derived.coordinates)
+    t = float(rng.uniform(0, 2)) * 2 * math.pi / abs(machine.speed or 1.0)
+    x = np.concatenate([rng.uniform(-3e-5, 3e-5, size), rng.uniform(-0.1, 0.1, size)])
+    if machine.motor is not None:
+        x[size - 1], x[-1] = machine.start + rng.uniform(-10, 10), rng.uniform(-60, 60)
+    angle, _ = machine.drive(t, x)
+    return t, x, {name: machine.gate(name, angle) for name in derived.gates()}
+
+
+def largest_difference(derived: Derived, machine: Multibody, t: float, x: np.ndarray, gates: dict[str, float]) -> float:
+    """Of accelerations, forces, and moments, relative to the largest one of a kind; ball angles are compared, too."""
+    reference, size = machine.evaluate(t, x), len(derived.coordinates)
+    outputs = derived.outputs(t, x, gates)
+    accelerations = dict(zip(derived.coordinates, derived.rhs(t, x, gates)[size:], strict=True))
+    assert set(accelerations) == set(reference.accelerations)
+    q, _ = machine.absolute(t, x)
+    assert derived.ball_angles(t, x) == pytest.approx(
+        [machine.ball_angle(one, q) for one in machine.bearings], abs=1e-11
+    )
+    moments = [name for name in reference.outputs if name.endswith(("moment", "torque"))]
+    worst = 0.0
+    for found, expected in (
+        (accelerations, reference.accelerations),
+        (outputs, {k: v for k, v in reference.outputs.items() if k not in moments}),
+        (outputs, {k: reference.outputs[k] for k in moments}),
+    ):
+        scale = max(map(abs, expected.values()))
+        worst = max(worst, *(abs(found[name] - value) / scale for name, value in expected.items()))
+    return worst
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_accelerations_and_reactions_are_those_of_absolute_coordinates_with_multipliers(name: str) -> None:
+    derived, machine = pair(name)
+    rng = np.random.default_rng(14)
+    assert max(largest_difference(derived, machine, *drawn(rng, derived, machine)) for _ in range(3)) < 1e-10
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_the_reaction_at_a_bearing_is_the_force_between_its_rings(name: str) -> None:
+    """Reactions and the drive's torque come out of the balances of the bodies, forces of the balls and housings out of
+    deflections, a motor's torque out of its law: a free check."""
+    derived, machine = pair(name)
+    t, x, gates = drawn(np.random.default_rng(3), derived, machine)
+    outputs = derived.outputs(t, x, gates)
+    largest = max(abs(value) for key, value in outputs.items() if key.startswith("reaction") and "moment" not in key)
+    q, v = machine.absolute(t, x)
+    (balance,) = derived.at(t, x, gates)[4]
+    assert balance == pytest.approx(outputs["drive_torque"], rel=1e-9, abs=1e-12 * largest)
+    for one in machine.bearings:
+        joint = machine.mechanism.joint(one.joint or "")
+        sign = 1.0 if one.inner_body == joint.bodies[0] else -1.0
+        on_inner = -machine.count(one) * np.array([outputs[f"{one.prefix}ring_force.{axis}"] for axis in "xy"])
+        if one.outer is not None:
+            on_inner, _ = machine.housing_force(one, q, v)
+        reaction = np.array([outputs[f"reaction.{joint.name}.{axis}"] for axis in "xy"])
+        assert np.max(np.abs(reaction - sign * on_inner)) < 1e-11 * largest, one.name
+
+
+@pytest.mark.parametrize("name", ["press, bearings in all hinges", "drag link", "Whitworth"])
+def test_balls_roll_on_without_a_jump_over_several_turns(name: str) -> None:
+    """Rods swing, couplers and levers turn: angles follow the integrated rate of pure rolling."""
+    derived, machine = pair(name)
+    times = np.linspace(0, 2.2 * 2 * math.pi / abs(machine.speed), 401)
+    still = np.zeros(2 * len(derived.coordinates))
+    found = np.array([derived.ball_angles(t, still) for t in times])
+    rates = np.empty_like(found)
+    for k, t in enumerate(times):
+        _, v = machine.absolute(t, still)
+        for j, one in enumerate(machine.bearings):
+            bodies = (one.inner_body, machine.mechanism.joint(one.joint or "").other(one.inner_body))
+            rates[k, j] = sum(w * (machine.row(b) @ v) for w, b in zip(machine.weights(one), bodies, strict=True))
+    integrated = found[0] + cumulative_simpson(rates, x=times, axis=0, initial=0)
+    assert np.max(np.abs(found - integrated)) < 1e-3
+
+
+def energy_drift(scene: Scene, turns: float) -> float:
+    """Of kinetic and potential energy less the drive's work, relative to the energy that goes to and fro."""
+    derived = Derived(scene)
+    machine = Multibody(derived.scene, derived.points())
+    gates, torque, size = derived.gates(), derived.names.index("drive_torque"), len(derived.coordinates)
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        accelerations, outputs, *_ = derived.at(t, y[:-1], gates)
+        return np.append(accelerations, outputs[torque] * machine.drive(t, y[:-1])[1])
+
+    end = turns * 2 * math.pi / abs(machine.speed)
+    scale = np.concatenate([np.full(size, 1e-6), np.full(size, 1e-2), [1.0]])
+    start = np.append(derived.initial, 0.0)
+    times = np.linspace(0, end, 31)
+    run = solve_ivp(rates, (0, end), start, method="DOP853", rtol=1e-11, atol=1e-11 * scale, t_eval=times)
+    energy = np.array([machine.energy(t, y[:-1]) for t, y in zip(run.t, run.y.T, strict=True)])
+    return float(np.max(np.abs(energy - energy[0] - run.y[-1])) / np.ptp(energy))
+
+
+def undamped(joint: str, inner: str = "", *, elastic: bool = False, clearance: str = "10 um") -> str:
+    return bearing(joint, inner, law=UNDAMPED, elastic=elastic, clearance=clearance, housing_damping="0 N*s/m")
+
+
+IDLE_PRESS = (('force = ["0 N", "8964.8 N"]', 'force = ["0 N", "0 N"]'),)
+IDLE_FOUR_BAR = (('torque = "-60 N*m"', 'torque = "0 N*m"'),)
+IDLE_SHAPER = (*SPRUNG, ('force = ["1500 N", "0 N"]', 'force = ["0 N", "0 N"]'))
+UNDAMPED_SPRINGS = (('damping = "40 N*s/m"\n', ""), ('damping = "0.5 N*m*s/rad"\n', ""))
+
+
+@pytest.mark.parametrize("clearance", ["0 um", "10 um"])
+def test_energy_changes_by_the_work_of_the_drive_alone(clearance: str) -> None:
+    """Without clearance, and with balls that fly and impact."""
+    press = text("punching_press", *IDLE_PRESS)
+    assert energy_drift(with_bearings(press, undamped("A", clearance=clearance)), 0.04) < 1e-9
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["press, A", "press, A B C elastic", "four-bar", "sprung shaper", "run-down", "motor"])
+def test_energy_changes_by_the_work_of_the_drive_alone_over_a_turn(name: str) -> None:
+    press = text("punching_press", *IDLE_PRESS)
+    scene, turns = {
+        "press, A": (with_bearings(press, undamped("A")), 1.0),
+        "press, A B C elastic": (
+            with_bearings(
+                press,
+                undamped("A", elastic=True),
+                undamped("B", "rod", elastic=True),
+                undamped("C", "slider", elastic=True),
+            ),
+            0.3,
+        ),
+        "four-bar": (
+            with_bearings(
+                text("four_bar", *IDLE_FOUR_BAR),
+                undamped("A", "frame", clearance="0 um"),
+                undamped("B", "coupler", elastic=True),
+                undamped("D"),
+            ),
+            1.0,
+        ),
+        "sprung shaper": (
+            with_bearings(
+                text("crank_shaper", *IDLE_SHAPER, *UNDAMPED_SPRINGS),
+                undamped("B", "block", elastic=True),
+                undamped("O", "frame"),
+            ),
+            0.3,
+        ),
+        "run-down": (
+            with_bearings(
+                text("punching_press", *IDLE_PRESS, *driven_by(RUN_DOWN)), undamped("A"), undamped("B", "rod")
+            ),
+            0.5,
+        ),
+        "motor": (
+            with_bearings(text("punching_press", *IDLE_PRESS, *driven_by(MOTOR)), undamped("A", "frame", elastic=True)),
+            0.5,
+        ),
+    }[name]
+    assert energy_drift(scene, turns) < 1e-9
+
+
+FOUR_BAR_JOINTS = (("A", ""), ("B", "coupler"), ("C", "rocker"), ("D", ""))
+
+
+def reactions(outputs: dict[str, float]) -> np.ndarray:
+    return np.array([outputs[k] for k in sorted(outputs) if k.startswith("reaction") and not k.endswith("moment")])
+
+
+def stiffer(machine: Multibody, decades: int) -> dict[str, float]:
+    """Stiffness of all contacts up by decades, clearance down."""
+    stiffness = {one.contact.stiffness.path: 8.6e9 * 10.0**decades for one in machine.bearings}
+    return stiffness | {one.clearance.path: 1e-5 * 0.1**decades for one in machine.bearings}
+
+
+@pytest.mark.parametrize(
+    ("name", "joints", "time"),
+    [
+        ("punching_press", (("A", ""), ("B", "crank"), ("C", "slider")), 0.05),
+        ("four_bar", FOUR_BAR_JOINTS, 0.033),
+    ],
+)
+def test_carried_by_stiff_contacts_a_linkage_has_the_reactions_of_ideal_joints(
+    name: str, joints: tuple[tuple[str, str], ...], time: float
+) -> None:
+    """Rings where they have no acceleration: the deflection, and with it the error, goes like stiffness^(-2/3)."""
+    derived = Derived(with_bearings(text(name), *(bearing(*joint, count=2) for joint in joints)))
+    machine = Multibody(derived.scene, derived.points())
+    rigid = Multibody(replace(derived.scene, bearings=()), derived.points())
+    gates = {gate: rigid.gate(gate, rigid.start + rigid.speed * time) for gate in derived.gates()}
+    outputs = rigid.evaluate(time, np.zeros(0)).outputs
+    ideal, size = reactions(outputs), len(derived.coordinates)
+    errors = []
+    for decades in range(5):
+        changes = stiffer(machine, decades)
+        derived.change(changes)
+        guess = []
+        for one in machine.bearings:
+            joint = machine.mechanism.joint(one.joint or "")
+            push = np.array([outputs[f"reaction.{joint.name}.{axis}"] for axis in "xy"])
+            load = float(np.linalg.norm(push))
+            deflection = (load / 2 / (2 * changes[one.contact.stiffness.path])) ** (2 / 3)
+            shift = (deflection + changes[one.clearance.path] / 2) * push / load
+            guess.append(-shift if one.inner_body == joint.bodies[0] else shift)
+
+        def accelerations(microns: np.ndarray) -> np.ndarray:
+            return derived.rhs(time, np.concatenate([microns * 1e-6, np.zeros(size)]), gates)[size:]
+
+        found = root(accelerations, np.concatenate(guess) * 1e6, tol=1e-13)
+        assert np.max(np.abs(found.fun)) < 1e-6
+        state = np.concatenate([found.x * 1e-6, np.zeros(size)])
+        errors.append(float(np.max(np.abs(reactions(derived.outputs(time, state, gates)) - ideal))))
+    assert all(after < 0.3 * before for before, after in pairwise(errors))
+    assert errors[0] < 1e-2 * np.max(np.abs(ideal))
+    assert errors[-1] < 2e-6 * np.max(np.abs(ideal))
+
+
+@pytest.mark.long
+def test_runs_with_stiff_contacts_tend_to_the_reactions_of_ideal_joints(tmp_path: Path) -> None:
+    window = 'window = { start = "70 deg", end = "190 deg" }\n'
+    scene = with_bearings(text("four_bar", (window, "")), bearing("A"), bearing("C", "coupler"))
+    model, derived = load(generate(scene, tmp_path / "model")), Derived(scene)
+    machine, rigid = (Multibody(s, derived.points()) for s in (scene, replace(scene, bearings=())))
+    times = np.linspace(0.05, 0.1, 101)
+    names = [f"reaction.{joint}.{axis}" for joint in "ABCD" for axis in "xy"]
+    ideal = np.array([[rigid.evaluate(t, np.zeros(0)).outputs[name] for name in names] for t in times])
+    errors = []
+    for decades in range(5):
+        run = {"times": times, "transient": 0, "method": "stepper-rodas5p", "rtol": 1e-8, "outputs": names}
+        solution = model.simulate(duration=0.1, parameters=stiffer(machine, decades), **run)
+        found = np.array([solution[name] for name in names]).T
+        errors.append(float(np.max(np.abs(found - ideal)) / np.max(np.abs(ideal))))
+    assert all(after < 0.4 * before for before, after in pairwise(errors))
+    assert errors[-1] < 2e-6
+
+
+def random_scene(seed: int) -> Scene:
+    """A linkage of the tests with other numbers, bearings of any kind in some of its hinges, either way round."""
+    rng = np.random.default_rng(seed)
+    machine = list(MACHINES.values())[seed % len(MACHINES)]()
+    values = {path: value * rng.uniform(0.9, 1.1) for path, value in machine.values.items()}
+    values["mechanism.driver.speed"] *= rng.choice([-1, 1])
+    values["mechanism.driver.start_angle"] = rng.uniform(-3, 9)
+    machine = Machine(mechanism=machine.mechanism, values=values)
+    driver = machine.mechanism.joint("A")
+    if driver.bodies[0] != "frame":
+        machine = machine.with_joint("A", bodies=driver.bodies[::-1], points=driver.points[::-1])
+    hinges = [joint for joint in machine.mechanism.joints if joint.kind == "revolute"]
+    chosen = [joint for joint in hinges if rng.random() < 0.5] or hinges[-1:]
+    return with_bearings(
+        linkage_text(machine),
+        *(
+            bearing(
+                joint.name,
+                str(rng.choice(joint.bodies)),
+                law=str(rng.choice(LAWS)),
+                elastic=bool(rng.random() < 0.5),
+                count=float(rng.integers(1, 3)),
+                clearance=f"{float(rng.uniform(0, 20))} um",
+                balls=int(rng.integers(6, 10)),
+            )
+            for joint in chosen
+        ),
+    )
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("topology", range(len(MACHINES)), ids=list(MACHINES))
+def test_random_linkages_move_as_in_absolute_coordinates(topology: int) -> None:
+    """The bound is wider than above: absolute coordinates round the play of light bearings to 1e-17 m."""
+    for seed in range(topology, 4 * len(MACHINES), len(MACHINES)):
+        derived = Derived(random_scene(seed))
+        machine = Multibody(derived.scene, derived.points())
+        rng = np.random.default_rng(seed)
+        worst = max(largest_difference(derived, machine, *drawn(rng, derived, machine)) for _ in range(2))
+        assert worst < 1e-9, seed
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [13, 22, 47, 57, 79])
+def test_random_linkages_run_alike_by_an_explicit_and_an_implicit_method(seed: int, tmp_path: Path) -> None:
+    """And as SciPy integrates the equations."""
+    scene = random_scene(seed)
+    derived, model = Derived(scene), load(generate(scene, tmp_path / "model"))
+    size = len(derived.coordinates)
+    end = 0.02 * 2 * math.pi / abs(derived.values["mechanism.driver.speed"])
+    times = np.linspace(end / 8, end, 8)
+    runs = [
+        model.simulate(duration=end, times=times, method=method, rtol=1e-10, transient=0, outputs=[]).x
+        for method in ("stepper-dop853", "stepper-rodas5p")
+    ]
+    scale = np.repeat([np.max(np.abs(runs[0][:, :size])), np.max(np.abs(runs[0][:, size:]))], size)
+    gates = derived.gates()
+    other = solve_ivp(
+        lambda t, x: derived.rhs(t, x, gates),
+        (0, end),
+        np.zeros(2 * size),
+        method="DOP853",
+        rtol=1e-10,
+        atol=1e-10 * scale,
+        t_eval=times,
+    )
+    assert np.max(np.abs(runs[0] - runs[1]) / scale) < 1e-5
+    assert np.max(np.abs(runs[0] - other.y.T) / scale) < 1e-5
