@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from ballpass.derive.mechanism.numeric import Evaluator
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.system import System
-from ballpass.runtime import Model, load
+from ballpass.runtime import Model, Solution, load
+from ballpass.runtime.contract.errors import RequestError
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -156,3 +158,102 @@ def test_what_a_torque_has_no_meaning_for_is_refused_with_reason() -> None:
     )
     with pytest.raises(SceneError, match="loaded one-way takes the reaction of a linkage at constant speed"):
         scene_from_text(driven, "press")
+
+
+MOTOR = """[mechanism.driver.torque]
+law = "asynchronous"
+breakdown_torque = "60 N*m"
+breakdown_slip = 0.2
+synchronous_speed = "520 rpm"
+
+[mechanism.driver.flywheel]
+inertia = "0.2 kg*m^2"
+
+"""
+TORQUE, WHEEL, PUNCH = (
+    "mechanism.driver.torque.breakdown_torque",
+    "mechanism.driver.flywheel.inertia",
+    "mechanism.forces.punch.force.y",
+)
+CRANK_LENGTH, ROD_LENGTH, FORCE = 0.006, 0.1, 8964.8
+START, END = math.radians(237.0), math.radians(267.0)
+
+
+def _press(motor: str) -> str:
+    """The press of the paper without its bearing, at 500 rpm or from there on."""
+    text = (ROOT / "scenes/punching_press.toml").read_text()
+    head = text[: text.index("[bearing]")].replace("[mechanism.frame.points]", motor + "[mechanism.frame.points]")
+    outputs = '"driver.*", "drive_*", ' if motor else '"drive_angle", '
+    return f'{head}\n[run]\ncycles = 2\noutputs = [{outputs}"reaction.A.*"]\n'
+
+
+@pytest.fixture(scope="module")
+def press(tmp_path_factory: pytest.TempPathFactory) -> Model:
+    folder = tmp_path_factory.mktemp("motor")
+    (folder / "motor.toml").write_text(_press(MOTOR))
+    return load(generate(folder / "motor.toml", folder / "model"))
+
+
+def _energy(model: Model, solution: Solution) -> np.ndarray:
+    """Kinetic energy by the mass matrix, potential energy of rod and slider, work of the punch in whole windows [J]."""
+    numbers = model.numbers(solution.parameters)
+    mass, angle, speed = model.function("mass_matrix"), solution["driver.angle"], solution["driver.speed"]
+    inertia = [float(mass([a, 0.0], [], numbers.p, numbers.c)) for a in angle.tolist()]
+    weight = 9.81 * (2.55 * (_height(angle) + CRANK_LENGTH * np.sin(angle)) / 2.0 + 16.7965 * _height(angle))
+    inside = np.clip(angle % (2.0 * np.pi), START, END)
+    work = solution.parameters[PUNCH] * (_height(inside) - _height(START))
+    work += angle // (2.0 * np.pi) * solution.parameters[PUNCH] * (_height(END) - _height(START))
+    return np.asarray(0.5 * np.array(inertia) * speed**2 + weight - work)
+
+
+def _height(angle: np.ndarray | float) -> np.ndarray:
+    """Height of the slider over the crank's axis [m]."""
+    return np.asarray(CRANK_LENGTH * np.sin(angle) - np.sqrt(ROD_LENGTH**2 - (CRANK_LENGTH * np.cos(angle)) ** 2))
+
+
+def test_every_joule_of_a_press_without_drive_is_in_motion_weight_or_punch(press: Model) -> None:
+    """Through two windows, both edges of each; the closed form of the slider's height is written here."""
+    run = press.simulate(rtol=1e-12, samples_per_cycle=100, parameters={TORQUE: 0.0})
+    energy = _energy(press, run)
+    assert run["driver.angle"][-1] > 2.0 * np.pi + END
+    assert np.max(np.abs(energy - energy[0])) <= 1e-9 * abs(energy[0])
+
+
+def test_work_of_a_motor_is_the_integral_of_its_power(press: Model) -> None:
+    """Without the punch everything is smooth, and Simpson's rule is exact enough."""
+    run = press.simulate(rtol=1e-12, samples_per_cycle=1000, parameters={PUNCH: 0.0, "mechanism.driver.speed": 45.0})
+    energy = _energy(press, run)
+    work = simpson(run["drive_power"], x=run.t)
+    assert abs(work) > 10.0
+    assert energy[-1] - energy[0] == pytest.approx(work, rel=1e-9)
+
+
+def test_a_heavy_flywheel_keeps_the_speed_constant(press: Model, tmp_path: Path) -> None:
+    """Deviations of the speed, and of the reaction from that at constant speed, fall with one over its inertia."""
+    (tmp_path / "constant.toml").write_text(_press(""))
+    constant = load(generate(tmp_path / "constant.toml", tmp_path / "model"))
+    speeds, forces = [], []
+    for inertia in (10.0, 100.0, 1000.0):
+        run = press.simulate(rtol=1e-11, samples_per_cycle=60, parameters={TORQUE: 0.0, WHEEL: inertia})
+        omega = run.parameters["mechanism.driver.speed"]
+        speeds.append(np.max(np.abs(run["driver.speed"] / omega - 1.0)))
+        there = [constant.evaluate(a / omega, outputs=["reaction.A.x"])["reaction.A.x"] for a in run["driver.angle"]]
+        forces.append(np.max(np.abs(run["reaction.A.x"] - there)))
+    for errors in (speeds, forces):
+        assert errors[0] / errors[1] == pytest.approx(10.0, rel=0.05)
+        assert errors[1] / errors[2] == pytest.approx(10.0, rel=0.01)
+
+
+def test_derivatives_across_a_window_of_a_driven_crank_are_refused(press: Model) -> None:
+    """The gate's edge is passed when the motion gets there: differentiated steps would leave out the jump."""
+    for ask in (press.sensitivities, lambda name: press.sensitivity("max:driver.speed", name)):
+        with pytest.raises(RequestError, match=r"load punch acts within windows of its angle.*table over the angle"):
+            ask(PUNCH)
+
+
+def test_what_counts_on_a_constant_speed_is_refused_with_reason(press: Model) -> None:
+    for quantity in ("value:driver.speed@240deg", "amplitude:driver.speed@2x", "drive_work"):
+        with pytest.raises(RequestError, match="a torque drives this scene"):
+            press.simulate(error=1e-3, of=quantity)
+    with pytest.raises(RequestError, match=r"driver's angle is a state.*'driver.angle' instead"):
+        press.jacobian("reaction.A.y", "crank_angle")

@@ -239,6 +239,7 @@ def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sys
         errors,
         inputs=(*drive.inputs, *forces.inputs, *(i for cage in cages for i in cage.inputs)),
         driven=driven,
+        smoothness=(*(("driver.torque", drive.smoothness) for _ in driven), *forces.smoothness),
         definitions=(*known, *reactions.definitions, *motion.definitions),
         linear_forms=motion.definitions,
         constants=(
@@ -324,6 +325,7 @@ def _system(
     reactions: Reactions | None,
     linear_forms: tuple[Definition, ...] = (),
     driven: tuple[Coordinate, ...] = (),
+    smoothness: tuple[tuple[str, Smoothness], ...] = (),
 ) -> System:
     outputs: tuple[Output, ...] = ()
     with _noted(errors):
@@ -349,8 +351,9 @@ def _system(
         bearings=tuple(bearings),
         quantities=quantities,
         outputs=outputs,
-        smoothness=tuple(
-            (f"{bearing.names.prefix}{name}", law.anywhere) for bearing in bearings for name, law in bearing.laws
+        smoothness=(
+            *((f"{bearing.names.prefix}{name}", law.anywhere) for bearing in bearings for name, law in bearing.laws),
+            *smoothness,
         ),
         events=events_of(inputs, bearings),
     )

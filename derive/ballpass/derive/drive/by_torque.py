@@ -10,7 +10,7 @@ import sympy as sp
 from ballpass.derive.drive.drive import Drive, OverAngle
 from ballpass.derive.drive.piecewise_linear import piecewise_linear
 from ballpass.derive.scene.records import Driver
-from ballpass.derive.terms import Definition, symbol_of
+from ballpass.derive.terms import Definition, Smoothness, symbol_of
 from ballpass.derive.variables import DRIVER_ANGLE, Coordinate
 
 
@@ -28,7 +28,8 @@ class ByTorque(Drive):
             description=f"1 while {name} acts, else 0",
             latex=rf"g_{{\mathrm{{{name}}}}}",
         )
-        return OverAngle(value=gate.symbol, definitions=(gate,))
+        jumps = ((gate.symbol.name, Smoothness.DISCONTINUOUS),)
+        return OverAngle(value=gate.symbol, definitions=(gate,), smoothness=jumps)
 
     def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str]) -> OverAngle:
         """Value over the angle behind the first knot, whole turns taken off."""
@@ -49,7 +50,8 @@ class ByTorque(Drive):
             description=f"Value of the table of {name}",
             latex=rf"T_{{\mathrm{{{name}}}}}",
         )
-        return OverAngle(value=value.symbol, definitions=(behind, value))
+        kinks = ((f"{name}.table", Smoothness.KINKED),)
+        return OverAngle(value=value.symbol, definitions=(behind, value), smoothness=kinks)
 
 
 def inside_window(start: str, end: str) -> sp.Expr:
@@ -90,5 +92,6 @@ def by_torque(driver: Driver) -> ByTorque:
         definitions=(torque,),
         coordinate=angle,
         torque=torque.symbol,
+        smoothness=driver.torque.smoothness,
         flywheel=sp.S.Zero if driver.flywheel is None else symbol_of(driver.flywheel),
     )

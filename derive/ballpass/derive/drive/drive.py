@@ -11,17 +11,21 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.terms import Definition
+from ballpass.derive.terms import Definition, Smoothness
 from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OverAngle:
-    """Something that changes with the driver's angle: its value, and the inputs and definitions that this needs."""
+    """Something that changes with the driver's angle: its value, and the inputs and definitions that this needs.
+
+    `smoothness` is that of what is a function of the state, by name.
+    """
 
     value: sp.Expr
     inputs: tuple[Input, ...] = ()
     definitions: tuple[Definition, ...] = ()
+    smoothness: tuple[tuple[str, Smoothness], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +42,7 @@ class Drive(ABC):
     coordinate : the angle, where it is a coordinate of the equations of motion
     torque : on the driven body [N*m]; None where it is what the motion takes
     flywheel : moment of inertia that turns with the driven body [kg*m^2]
+    smoothness : of the torque
     """
 
     angle: sp.Expr = DRIVER_ANGLE
@@ -49,6 +54,7 @@ class Drive(ABC):
     coordinate: Coordinate | None = None
     torque: sp.Expr | None = None
     flywheel: sp.Expr = sp.S.Zero
+    smoothness: Smoothness = Smoothness.TWICE_SMOOTH
 
     @abstractmethod
     def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> OverAngle:

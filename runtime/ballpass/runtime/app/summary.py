@@ -93,9 +93,9 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
         "transient_cycles_dropped": _numbers("transient cycles", "1", value=sol.transient_cycles),
         "samples": {"value": len(steady.t), "unit": "1"},
     }
-    if steady.cycle_length is not None:
-        turns_run = (steady.t[-1] - steady.t[0]) / steady.cycle_length
-        summary["cycle_length"] = _numbers("cycle_length", "s", value=steady.cycle_length)
+    if steady.period is not None:
+        turns_run = (steady.t[-1] - steady.t[0]) / steady.period
+        summary["cycle_length"] = _numbers("cycle_length", "s", value=steady.period)
         summary["steady_cycles"] = _numbers("steady_cycles", "1", value=turns_run)
     peaks = _peaks(model, steady)
     summary |= _forces(steady, peaks)
@@ -130,7 +130,7 @@ def _unusual(sol: Solution) -> list[str]:
                 f"of its diameter: unusual. Usual is at most {100.0 * MOST_DEFLECTION:g} %: contacts are not elastic "
                 "beyond. Check loads, stiffness and their units."
             )
-    length, mechanism = sol.cycle_length, sol.manifest.mechanism
+    length, mechanism = sol.period, sol.manifest.mechanism
     if mechanism is not None and "drive_torque" in sol.outputs and length is not None and turns(sol.t, length):
         work, gross = (_work(sol, torque) for torque in (sol["drive_torque"], np.abs(sol["drive_torque"])))
         if work < -LEAST_WORK * abs(gross):
@@ -209,7 +209,7 @@ def _add_spread(summary: dict[str, Any], steady: Solution, name: str) -> None:
         entry = summary.get(name)
     if entry is None or not kinds or name not in steady:
         return
-    length = steady.cycle_length
+    length = steady.period
     parts = (turns(steady.t, length) if length is not None else ()) or (slice(None),)
     for kind, of in kinds.items():
         found = [of(steady[name][part]) for part in parts]
@@ -243,7 +243,7 @@ def _forces(sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, 
             low, high = peaks[info.name, "min"], peaks[info.name, "max"]
             found[info.name] = _numbers(info.name, info.unit, min=low.value, max=high.value)
     mechanism = sol.manifest.mechanism
-    length = sol.cycle_length
+    length = sol.period
     if mechanism is not None and "drive_torque" in found and length is not None and turns(sol.t, length):
         found["drive_work"] = _numbers("drive_torque", "J", value=_work(sol, sol["drive_torque"]))
     return found
@@ -252,7 +252,7 @@ def _forces(sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, 
 def _work(sol: Solution, torque: np.ndarray) -> float:
     """Work of a torque on the driven body, the mean over the turns of a run [J]."""
     assert sol.manifest.mechanism is not None
-    assert sol.cycle_length is not None
+    assert sol.period is not None
     values = {**sol.parameters, **sol.constants}
     return float(
         np.mean(
@@ -260,7 +260,7 @@ def _work(sol: Solution, torque: np.ndarray) -> float:
                 sol.t,
                 torque,
                 speed=sol.parameters[sol.manifest.mechanism.speed],
-                cycle_length=sol.cycle_length,
+                cycle_length=sol.period,
                 steps=breakpoints(sol.manifest.inputs, values, float(sol.t[0]), float(sol.t[-1])),
             )
         )
@@ -321,7 +321,9 @@ def _constants(sol: Solution) -> dict[str, Any]:
             if name in units:
                 found[bearing.prefix + key] = _numbers(name, units[name], value=sol.constants[name])
         speed = _number(sol, bearing.ring_speed)
-        if speed != 0.0:  # rings that only swing against each other pass no ball
+        mechanism = sol.manifest.mechanism
+        even = mechanism is None or not mechanism.angle
+        if even and speed != 0.0:  # rings that only swing against each other pass no ball
             ball, pitch = (sol.parameters[f"{bearing.path}.{name}"] for name in ("ball_diameter", "pitch_diameter"))
             frequencies = kinematic_frequencies(bearing.balls, ball, pitch, speed)
             found[f"{bearing.prefix}frequencies"] = asdict(frequencies) | {"unit": "Hz"}

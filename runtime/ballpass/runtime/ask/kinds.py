@@ -13,6 +13,7 @@ import numpy as np
 
 from ballpass.runtime.ask.quantity_location import frequency
 from ballpass.runtime.ask.quantity_records import Estimate, Quantity, View
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.run import inputs as clock
 
 
@@ -114,6 +115,11 @@ def _amplitude(view: View, quantity: Quantity) -> Estimate:
 def _drive_work(view: View, quantity: Quantity) -> Estimate:
     mechanism = view.manifest.mechanism
     assert mechanism is not None  # it has a drive torque
+    if mechanism.angle:
+        raise RequestError(
+            f"{quantity.name}: a torque drives this scene, and its turns are not alike. Ask for mean:drive_power, "
+            "times the length of the run."
+        )
     value, slope = view.channel(quantity)
     total, moved = view.integral(value, slope)
     length, longer = view.length

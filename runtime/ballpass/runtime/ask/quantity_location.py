@@ -69,6 +69,7 @@ def place_of(manifest: Manifest, numbers: Numbers, window: Window, quantity: Qua
             raise RequestError(f"{quantity.name}: the run ends at {window.duration:g} s. Run longer, or ask earlier.")
         return number, asked
     angle = asked.number
+    _refuse_driven(manifest, quantity, "passes an angle when its motion does. Name a time instead, as in @0.41s")
     speed = clock.shaft_speed(manifest, numbers.values)
     if speed == 0.0:
         raise RequestError(f"{quantity.name}: nothing turns (its speed is zero). Name a time instead, as in @0.41s.")
@@ -80,6 +81,12 @@ def place_of(manifest: Manifest, numbers: Numbers, window: Window, quantity: Qua
     if time < 0.0:
         raise RequestError(f"{quantity.name}: the run is over before that angle is passed. Run longer.")
     return min(time, window.duration), asked
+
+
+def _refuse_driven(manifest: Manifest, quantity: Quantity, words: str) -> None:
+    """Refuse what counts on a constant speed where a torque drives."""
+    if manifest.mechanism is not None and manifest.mechanism.angle:
+        raise RequestError(f"{quantity.name}: a torque drives this scene, and its driver {words}.")
 
 
 def place_slope(
@@ -113,6 +120,7 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     form = _PLACE.fullmatch(place)
     if form is not None and form["unit"] == "Hz":
         return float(form["number"]), np.zeros(view.directions)
+    _refuse_driven(manifest, quantity, "has no one speed. Name a frequency instead, as in @250Hz")
     speed = clock.shaft_speed(manifest, values)
     name = clock.speed_name(manifest)
     assert name is not None  # something turns

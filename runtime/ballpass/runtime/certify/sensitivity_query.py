@@ -50,6 +50,7 @@ from ballpass.runtime.native.stepper import METHODS, Family
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.direction_scales import ANGLE
+from ballpass.runtime.run.locating import refuse_jumps
 from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.request import TOLERANCES, Request, asked_length
@@ -178,7 +179,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
         The computation failed.
     """
     manifest = model.manifest
-    _refuse_jumps(manifest)
+    refuse_jumps(manifest, "sensitivity")
     check_assembly(model, numbers)
     quantities = [parse_quantity(manifest, name) for name in _listed("of", query.of, default_quantities(manifest))]
     names = _chosen(_listed("wrt", query.wrt, tuple(numbers.parameters)), numbers.parameters)
@@ -312,16 +313,6 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     )
 
 
-def _refuse_jumps(manifest: Manifest) -> None:
-    jumping = [law for law, smoothness in manifest.smoothness if smoothness == "discontinuous"]
-    if jumping:
-        raise RequestError(
-            f"sensitivity: the {' and '.join(jumping)} law of this scene is discontinuous (its force jumps at "
-            "contact), so the derivative of the steps is not that of the motion. Allowed: a continuous law, "
-            '[bearing.damping] law = "tangent" or "one-sided", or a smoothed contact, [bearing.contact] smoothing.'
-        )
-
-
 def _listed(option: str, given: Sequence[str] | None, default: Sequence[str]) -> list[str]:
     names = list(dict.fromkeys(default if given is None else given))
     if not names:
@@ -395,10 +386,14 @@ def _grazing(model: LoadedModel, numbers: Numbers, course: Course, tolerance: fl
     if track is None or not manifest.bearings:
         return ()
     names = [bearing.prefix + DEFLECTION for bearing in manifest.bearings]
-    signals = Outlook(model, names).look(track, numbers)
+    state = manifest.mechanism.angle if manifest.mechanism is not None else ""
+    signals = Outlook(model, [*names, *([state] if state else [])]).look(track, numbers)
     order = np.lexsort((track.nodes.t, track.nodes.segment))
     times = track.nodes.t[order]
-    angles = np.array([clock.crank_angle(manifest, numbers.values, float(time)) for time in times])
+    if state:
+        angles = signals[state].value[order, 0] % clock.TURN
+    else:
+        angles = np.array([clock.crank_angle(manifest, numbers.values, float(time)) for time in times])
     found = [
         item
         for bearing, name in zip(manifest.bearings, names, strict=True)

@@ -33,8 +33,9 @@ _KINDS = {
 
 
 def margins_of(manifest: Manifest) -> tuple[MarginInfo, ...]:
-    """Of the dyads of the linkage; none where there is no linkage."""
-    return manifest.mechanism.margins if manifest.mechanism is not None else ()
+    """Of the dyads of the linkage; none where there is no linkage, or its driver's angle is a state."""
+    mechanism = manifest.mechanism
+    return () if mechanism is None or mechanism.angle else mechanism.margins
 
 
 def filled(template: Path, **values: str) -> str:

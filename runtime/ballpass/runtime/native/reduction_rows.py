@@ -58,8 +58,7 @@ class ReductionRows:
 
 def reduction_rows(manifest: Manifest) -> ReductionRows:
     """Layout of the rows of a model."""
-    # a model without a bearing has the channels of one, which are zero
-    prefixes = [bearing.prefix for bearing in manifest.bearings] or [""]
+    prefixes = [bearing.prefix for bearing in manifest.bearings]
     return ReductionRows(
         states=tuple(state.name for state in manifest.states),
         balls=tuple(prefix + name for prefix in prefixes for name in BALL_CHANNELS),

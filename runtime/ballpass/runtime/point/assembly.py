@@ -99,9 +99,7 @@ def _margins(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> np.ndar
     fixed = {"u": clock.inputs_at(model.manifest.inputs, numbers.values, 0.0), "p": numbers.p, "c": numbers.c}
     mechanism = model.manifest.mechanism
     if mechanism is not None and mechanism.angle:
-        names = [state.name for state in model.manifest.states]
-        x = np.zeros((len(times), len(names)))
-        x[:, names.index(mechanism.angle)] = numbers.values[mechanism.start_angle] + times
+        x = clock.turned_states(model.manifest, numbers.values, times)
         (found,) = model.loop("assembly", ("x",))(len(times), {"x": x, **fixed}).values()
     else:
         (found,) = model.loop("assembly", ("t",))(len(times), {"t": times, **fixed}).values()

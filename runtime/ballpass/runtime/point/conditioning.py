@@ -73,11 +73,17 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
     ConditioningWarning
         The scaled condition number passes `BOUND`; names the crank angle.
     """
-    turn = clock.period(model.manifest, numbers.values)
+    mechanism = model.manifest.mechanism
+    by_angle = mechanism is not None and mechanism.angle != ""
+    turn = clock.TURN if by_angle else clock.period(model.manifest, numbers.values)
     kernel = model.kernel(FUNCTION)
     span = turn if math.isfinite(turn) else 0.0
 
     def matrix(t: float) -> np.ndarray:
+        """At a time, or so far past the start angle."""
+        if by_angle:
+            (x,) = clock.turned_states(model.manifest, numbers.values, np.array([t]))
+            return np.asarray(kernel({"t": 0.0, "x": x, "u": np.zeros(0), "p": numbers.p, "c": numbers.c}))
         u = clock.inputs_at(model.manifest.inputs, numbers.values, t)
         return np.asarray(kernel({"t": 0.0, "u": u, "p": numbers.p, "c": numbers.c}))
 
@@ -95,7 +101,8 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
                 values = condition(np.array([matrix(float(t)) for t in near]))
                 k = int(np.argmax(values))
                 time, largest, reach = float(near[k]), float(values[k]), reach / FINE
-        found.append((largest, clock.crank_angle(model.manifest, numbers.values, time)))
+        start = clock.crank_angle(model.manifest, numbers.values, 0.0 if by_angle else time)
+        found.append((largest, (start + time) % clock.TURN if by_angle else start))
     (whole, whole_angle), (equal, equal_angle) = found
     if not equal <= BOUND:
         warnings.warn(

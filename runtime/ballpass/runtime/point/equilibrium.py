@@ -138,6 +138,7 @@ class StaticEquilibrium:
         if self.load_is_given:
             (load,) = rows_of(self.model, _loads(self.model))
             moved[_loaded(self.model)] -= contract(self.model, load, directions, there)
+        moved[held_coordinates(self.model)] = 0.0
         slopes = np.linalg.solve(self.stiffness, moved)
         if of == "positions":
             total = slopes
@@ -169,6 +170,12 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
         raise RequestError("Both t and crank_angle were given. Allowed: one of the two.")
     if crank_angle is None:
         return checked_time(0.0 if t is None else t)
+    mechanism = model.manifest.mechanism
+    if mechanism is not None and mechanism.angle:
+        raise RequestError(
+            "crank_angle: a torque drives this scene, so that no time belongs to an angle. Give the angle as the "
+            f"parameter {mechanism.start_angle} instead."
+        )
     angle = real(crank_angle)
     if not math.isfinite(angle):
         raise RequestError(f"crank_angle: a finite angle [rad] is expected, not {crank_angle!r}.")
@@ -184,6 +191,11 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
             return 0.0
         raise RequestError("crank_angle: nothing turns in this scene. Give the start angle as a parameter instead.")
     return (past % clock.TURN) / abs(speed)
+
+
+def held_coordinates(model: LoadedModel) -> Array:
+    """Whether each coordinate keeps its initial place and speed while the rings come to rest: the driver's angle."""
+    return np.array([info.kind == "angle" for info in model.manifest.coordinates], dtype=bool)
 
 
 def static_equilibrium(
@@ -221,31 +233,42 @@ def static_equilibrium(
     extra = np.zeros(half)
     extra[_loaded(model)] = applied - own
 
+    held = held_coordinates(model)
+    start, velocity = np.zeros(half), np.zeros(half)
+    mechanism = model.manifest.mechanism
+    if mechanism is not None and mechanism.angle:
+        start[held], velocity[held] = numbers.values[mechanism.start_angle], numbers.values[mechanism.speed]
+
     def force(q: Array) -> Array:
-        there["x"] = np.concatenate([q, np.zeros(half)])
-        return np.asarray(kernel(there) + extra)
+        there["x"] = np.concatenate([q, velocity])
+        return np.where(held, 0.0, kernel(there) + extra)
 
     def stiffness(q: Array) -> Array:
-        there["x"] = np.concatenate([q, np.zeros(half)])
+        there["x"] = np.concatenate([q, velocity])
         matrix = -slopes(there).reshape(half, 2 * half)[:, :half]
-        return np.asarray(0.5 * (matrix + matrix.T))
+        matrix = 0.5 * (matrix + matrix.T)
+        if np.any(held):
+            matrix[held, :] = matrix[:, held] = 0.0
+            matrix[held, held] = np.max(np.abs(matrix))
+        return np.asarray(matrix)
 
     # where bearings act back on the linkage, what acts is all that concentric rings do not hold
-    size = float(np.linalg.norm(applied if len(own) else force(np.zeros(half))))
+    size = float(np.linalg.norm(applied if len(own) else force(start)))
     clearance = max(abs(numbers.values[f"{bearing.path}.clearance"]) for bearing in model.manifest.bearings)
 
     def done(q: Array, net: Array, matrix: Array) -> bool:
         # rounding of the forces themselves: stiffness times the last digit of what a deflection is computed from
-        rounding = 16.0 * np.finfo(float).eps * float(np.max(np.abs(matrix))) * (float(np.max(np.abs(q))) + clearance)
+        reach = float(np.max(np.abs(q - start))) + clearance
+        rounding = 16.0 * np.finfo(float).eps * float(np.max(np.abs(matrix))) * reach
         return bool(np.max(np.abs(net)) <= TOLERANCE * size + rounding)
 
     found = settle(
         force,
         stiffness,
-        np.zeros(half),
+        start,
         weights=np.ones(half),
         done=done,
-        gone=lambda q: float(np.max(np.abs(q))) > FAR,
+        gone=lambda q: float(np.max(np.abs(q - start))) > FAR,
         iterations=ITERATIONS,
     )
     if found.end is not Rest.FOUND:
@@ -258,8 +281,8 @@ def static_equilibrium(
     matrix = stiffness(q)
     eigenvalues, vectors = np.linalg.eigh(matrix)
     free = vectors[:, eigenvalues <= FREE * max(float(eigenvalues[-1]), 0.0)].T
-    held = np.concatenate([q, np.zeros(half)])
-    if len(free) and not np.any(applied) and float(np.max(_balls(model, numbers, t, held)[0])) < 0.0:
+    state = np.concatenate([q, velocity])
+    if len(free) and not np.any(applied) and float(np.max(_balls(model, numbers, t, state)[0])) < 0.0:
         raise RequestError(
             "static_equilibrium: the inner ring carries no load and no ball touches: it may stand anywhere in its "
             "clearance. Give a load, or a negative clearance (preload)."
@@ -272,11 +295,11 @@ def static_equilibrium(
             FreeRingWarning,
             stacklevel=3,
         )
-    deflection, ball_force = _balls(model, numbers, t, held)
+    deflection, ball_force = _balls(model, numbers, t, state)
     return StaticEquilibrium(
         coordinates=model.states[:half],
         positions=q,
-        x=held,
+        x=state,
         time=t,
         load=tuple(applied.tolist()),
         deflection=deflection,

@@ -18,7 +18,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.usual import unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
-from ballpass.runtime.point.equilibrium import static_equilibrium
+from ballpass.runtime.point.equilibrium import held_coordinates, static_equilibrium
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.point.slopes import jacobian
@@ -162,34 +162,39 @@ def _time_scales(
     values = numbers.values
     half = len(model.states) // 2
     rest = np.array([values[name] for name in model.manifest.initial])
-    rest[half:] = 0.0
+    rest[half:] *= held_coordinates(model)
     times = (np.arange(INSTANTS) + 0.5) / INSTANTS * span
     # at the initial position, where the contacts press as they do at t = 0: what differs between instants is the load
     point = {"t": 0.0, "x": rest, "p": numbers.p, "c": numbers.c}
     pull = np.empty(INSTANTS)
     for k, time in enumerate(times):
         u = clock.inputs_at(model.manifest.inputs, values, float(time))
-        pull[k] = np.linalg.norm(model.kernel("rhs")({**point, "u": u})[half:])
+        free = 1.0 - held_coordinates(model)
+        pull[k] = np.linalg.norm(free * model.kernel("rhs")({**point, "u": u})[half:])
     scales, unsupported = [], []
     instants: tuple[tuple[str, int], ...] = (
         ("lightest load", int(np.argmin(pull))),
         ("heaviest load", int(np.argmax(pull))),
     )
-    if _is_constant(model, numbers, times):
+    mechanism = model.manifest.mechanism
+    if mechanism is not None and mechanism.angle:
+        instants = (("at the start", 0),)
+    elif _is_constant(model, numbers, times):
         instants = (("at rest under the load", 0),)
     for name, k in instants:
         time = float(times[k])
         angle = clock.crank_angle(model.manifest, values, time)
         try:
-            x = static_equilibrium(model, numbers, t=time, load=None).x
+            x = static_equilibrium(model, numbers, t=time, load=None).x if model.manifest.bearings else rest
         except BallpassError as fault:
             unsupported.append(f"{name}, {math.degrees(angle):.4g} deg: {fault}")
             continue
         decay = frequency = 0.0
         slowest = math.inf
-        speed = math.sqrt(pull[k] * max(float(np.max(np.abs(x[:half]))), 1e-12))
+        moved = (1.0 - held_coordinates(model)) * np.abs(x[:half])
+        speed = math.sqrt(pull[k] * max(float(np.max(moved)), 1e-12))
         for kick in (np.zeros(half), *(sign * speed * unit for unit in np.eye(half) for sign in (1.0, -1.0))):
-            matrix = jacobian(model, numbers, "rhs", "states", t=time, x=np.concatenate([x[:half], kick]))
+            matrix = jacobian(model, numbers, "rhs", "states", t=time, x=np.concatenate([x[:half], x[half:] + kick]))
             eigenvalues = np.linalg.eigvals(matrix)
             decay = max(decay, float(np.max(-eigenvalues.real)))
             slowest = min(slowest, float(np.min(np.abs(eigenvalues))))

@@ -192,6 +192,11 @@ def turning_speed(model: LoadedModel, numbers: Numbers) -> float:
     RequestError
         Nothing turns.
     """
+    mechanism = model.manifest.mechanism
+    if mechanism is not None and mechanism.angle:
+        raise RequestError(
+            f"crank_angle: the driver's angle is a state of this scene. Differentiate by {mechanism.angle!r} instead."
+        )
     speed = clock.shaft_speed(model.manifest, numbers.values)
     if speed == 0.0:
         raise RequestError(

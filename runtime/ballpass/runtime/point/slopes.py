@@ -181,7 +181,10 @@ class Deflections:
         rows, x = self._rows, np.asarray(there["x"])
         half = len(x) // 2
         by_states = self._model.kernel(f"{rows.function}_jac_x")(there).reshape(-1, len(x))[rows.indices]
-        by_time = self._model.kernel(f"{rows.function}_jac_t")(there)[rows.indices]
+        name = f"{rows.function}_jac_t"  # none where nothing depends on time but through the state
+        by_time = np.zeros(len(rows.indices))
+        if self._model.has(name):
+            by_time = self._model.kernel(name)(there)[rows.indices]
         rates: Array = by_states[:, :half] @ x[half:] + by_time
         return rates, by_time
 

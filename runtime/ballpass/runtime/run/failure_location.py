@@ -57,7 +57,7 @@ def whereabouts(model: LoadedModel, numbers: Numbers, time: float, state: np.nda
     state : positions and velocities, shape (states,)
     """
     manifest, values = model.manifest, numbers.values
-    crank = clock.crank_angle(manifest, values, time)
+    crank = clock.crank_angle(manifest, values, time, state)
     found = Whereabouts(crank_angle=crank, bearing="", ball=None, ball_angle=math.nan, deflection=-math.inf)
     if not np.all(np.isfinite(state)):
         return found

@@ -31,7 +31,10 @@ Values = Mapping[str, float]
 
 
 def period(manifest: Manifest, values: Values) -> float:
-    """Time of one turn of driver or shaft [s]; infinite when it stands or none exists."""
+    """Time of one turn of driver or shaft [s]; infinite when it stands or none exists.
+
+    Where a torque drives, at the initial speed.
+    """
     speed = shaft_speed(manifest, values)
     return TURN / abs(speed) if speed != 0.0 else math.inf
 
@@ -49,10 +52,25 @@ def speed_name(manifest: Manifest) -> str | None:
     return None if manifest.bearing is None else manifest.bearing.ring_speed
 
 
-def crank_angle(manifest: Manifest, values: Values, t: float) -> float:
-    """Angle of the driver (of the shaft: from its position at t = 0) in [0, 2 pi) [rad]."""
+def crank_angle(manifest: Manifest, values: Values, t: float, state: np.ndarray | None = None) -> float:
+    """Angle of the driver (of the shaft: from its position at t = 0) in [0, 2 pi) [rad].
+
+    Where a torque drives it is in the `state`, shape (states,); None is the one at t = 0.
+    """
+    if manifest.mechanism is not None and manifest.mechanism.angle:
+        at = [info.name for info in manifest.states].index(manifest.mechanism.angle)
+        return float(values[manifest.mechanism.start_angle] if state is None else state[at]) % TURN
     start = values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
     return (start + shaft_speed(manifest, values) * t) % TURN
+
+
+def turned_states(manifest: Manifest, values: Values, angles: np.ndarray) -> np.ndarray:
+    """States in which a driver that a torque drives is so far past its start [rad], all else zero, (angles, states)."""
+    assert manifest.mechanism is not None  # it has the driver
+    found = np.zeros((len(angles), len(manifest.states)))
+    at = [info.name for info in manifest.states].index(manifest.mechanism.angle)
+    found[:, at] = values[manifest.mechanism.start_angle] + angles
+    return found
 
 
 def inputs_at(inputs: Sequence[InputInfo], values: Values, t: float, inside: float | None = None) -> np.ndarray:

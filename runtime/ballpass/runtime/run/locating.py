@@ -107,3 +107,31 @@ def refuse_with_error(kinks: str | None, error: object) -> None:
 def stepper_for(model: LoadedModel, kinks: Kinks) -> Stepper:
     """Driver of single runs; errors as for `Model.stepper`."""
     return model.locating_stepper if kinks == LOCATED and has_kinks(model.manifest) else model.stepper
+
+
+def refuse_jumps(manifest: Manifest, what: str) -> None:
+    """Refuse derivatives of a motion whose forces jump at places that the state decides.
+
+    Parameters
+    ----------
+    what : word that the message begins with
+
+    Raises
+    ------
+    RequestError
+        Names the laws, or the loads that act within windows of an angle that a torque drives.
+    """
+    jumping = [law for law, smoothness in manifest.smoothness if smoothness == "discontinuous"]
+    loads = [law.removeprefix("gate.") for law in jumping if law.startswith("gate.")]
+    if loads:
+        raise RequestError(
+            f"{what}: a torque drives this scene, and the load {' and '.join(loads)} acts within windows of its angle: "
+            "the force jumps when the motion gets there, and the derivative of the steps is not that of the motion. "
+            "Allowed: continuous loads. Give the load as a table over the angle, with flanks as steep as they are."
+        )
+    if jumping:
+        raise RequestError(
+            f"{what}: the {' and '.join(jumping)} law of this scene is discontinuous (its force jumps at "
+            "contact), so the derivative of the steps is not that of the motion. Allowed: a continuous law, "
+            '[bearing.damping] law = "tangent" or "one-sided", or a smoothed contact, [bearing.contact] smoothing.'
+        )

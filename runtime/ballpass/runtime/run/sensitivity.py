@@ -16,7 +16,7 @@ from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS
 from ballpass.runtime.run.directions import Directions
-from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, check_kinks
+from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, check_kinks, refuse_jumps
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution
@@ -69,12 +69,7 @@ def sensitivities(model: LoadedModel, numbers: Numbers, request: Request, names:
         The computation failed.
     """
     refuse_located(request.kinks)
-    jumping = [law for law, smoothness in model.manifest.smoothness if smoothness == "discontinuous"]
-    if jumping:
-        raise RequestError(
-            f"sensitivities: the {' and '.join(jumping)} law of this scene is discontinuous (its force jumps at "
-            "contact), so the derivative of the steps is not that of the motion. Take the law tangent or one-sided."
-        )
+    refuse_jumps(model.manifest, "sensitivities")
     method = request.method or model.manifest.run.method
     if method not in ("auto", *METHODS):
         raise RequestError(

@@ -84,7 +84,7 @@ class Solution:
     x : states, shape (samples, states), in the order of the manifest
     outputs : output name to samples; at a breakpoint, the value behind it
     parameters, constants : numbers of the run by name
-    cycle_length : time of one turn [s]; None where nothing turns
+    cycle_length : time of one turn [s], where a torque drives at the initial speed; None where nothing turns
     transient_cycles : turns at the start that `steady` leaves out
     manifest : names, units and descriptions
     statistics : how the solution came about
@@ -175,6 +175,12 @@ class Solution:
             )
         outputs = {name: samples[keep] for name, samples in self.outputs.items()}
         return replace(self, t=self.t[keep], x=self.x[keep], outputs=outputs, reductions=self.steady_reductions)
+
+    @property
+    def period(self) -> float | None:
+        """Time after which the machine is where it was [s]; None where nothing turns, or a torque drives."""
+        mechanism = self.manifest.mechanism
+        return None if mechanism is not None and mechanism.angle else self.cycle_length
 
     def to_xarray(self) -> xarray.Dataset:
         """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions."""

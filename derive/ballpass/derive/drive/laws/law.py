@@ -10,6 +10,7 @@ import sympy as sp
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import Quantity
 from ballpass.derive.scene.schema import Table
+from ballpass.derive.terms import Smoothness
 
 
 class TorqueLaw(ABC):
@@ -18,10 +19,12 @@ class TorqueLaw(ABC):
     Attributes
     ----------
     name : what stands in the scene file
+    smoothness : of the torque over the speed
     """
 
     __slots__ = ()
     name: ClassVar[str]
+    smoothness: ClassVar[Smoothness] = Smoothness.TWICE_SMOOTH
 
     @classmethod
     @abstractmethod

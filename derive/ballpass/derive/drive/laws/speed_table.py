@@ -13,7 +13,7 @@ from ballpass.derive.drive.piecewise_linear import piecewise_linear
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import Quantity
 from ballpass.derive.scene.schema import Table
-from ballpass.derive.terms import symbol_of
+from ballpass.derive.terms import Smoothness, symbol_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,6 +21,7 @@ class SpeedTable(TorqueLaw):
     """Rows of `speed` [rad/s], increasing, and `amount` [N*m]; constant before the first and behind the last."""
 
     name: ClassVar[str] = "table"
+    smoothness: ClassVar[Smoothness] = Smoothness.KINKED
 
     speed: tuple[Quantity, ...]
     amount: tuple[Quantity, ...]

@@ -10,18 +10,22 @@ from ballpass.derive.mechanism.forces.force import Setting
 from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.records import Force, Mechanism
-from ballpass.derive.terms import Definition
+from ballpass.derive.terms import Definition, Smoothness
 from ballpass.derive.variables import Input, Output
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Forces:
-    """What acts on the bodies, and the definitions, inputs and outputs that come with it."""
+    """What acts on the bodies, and the definitions, inputs and outputs that come with it.
+
+    `smoothness` is that of what is a function of the state, by name.
+    """
 
     loads: tuple[Load, ...]
     definitions: tuple[Definition, ...]
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
+    smoothness: tuple[tuple[str, Smoothness], ...] = ()
 
 
 def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Forces:
@@ -36,6 +40,7 @@ def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Force
         definitions=(*setting.switched, *setting.ledger.definitions),
         inputs=tuple(setting.inputs),
         outputs=tuple(setting.outputs),
+        smoothness=tuple(setting.smoothness),
     )
 
 

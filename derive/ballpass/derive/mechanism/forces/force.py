@@ -24,7 +24,7 @@ from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import Force, Mechanism
 from ballpass.derive.scene.schema import Table, listing
-from ballpass.derive.terms import Definition
+from ballpass.derive.terms import Definition, Smoothness
 from ballpass.derive.variables import Input, Output
 
 #: Names of the points of every body and of the frame.
@@ -45,11 +45,13 @@ class Setting:
     inputs: list[Input] = field(default_factory=list)
     outputs: list[Output] = field(default_factory=list)
     switched: list[Definition] = field(default_factory=list)
+    smoothness: list[tuple[str, Smoothness]] = field(default_factory=list)
 
     def over_angle(self, found: OverAngle) -> sp.Expr:
         """Take what changes with the driver's angle; its value."""
         self.inputs.extend(found.inputs)
         self.switched.extend(found.definitions)
+        self.smoothness.extend(found.smoothness)
         return found.value
 
 

@@ -162,7 +162,7 @@ def phase_portrait(record: Record) -> Figure:
     figure = new_figure(5.2, layout=None)
     axes = figure.add_subplot()
     axes.plot(1e6 * x, 1e3 * v, color=INK, linewidth=0.8, alpha=0.85, label="steady turns" if record.turns else "path")
-    text = "Nothing turns: no stroboscopic points."
+    text = "There is no period: no stroboscopic points."
     if record.cycle_length is not None:
         points = stroboscopic_points(
             record.t, record.values("inner.x"), record.values("inner.vx"), cycle_length=record.cycle_length

@@ -92,6 +92,8 @@ class Record:
         """Angle of the driven body (shaft: from its place at t = 0) at `t` or the samples, not wrapped, (n,) [rad]."""
         time = self.t if t is None else t
         mechanism, bearing = self.manifest.mechanism, self.bearing
+        if mechanism is not None and mechanism.angle:
+            return np.asarray(np.interp(time, self.t, self.solution[mechanism.angle]))
         if mechanism is not None:
             return self.parameter(mechanism.start_angle) + self.parameter(mechanism.speed) * time
         if bearing is not None:
@@ -113,9 +115,9 @@ class Record:
         return tuple(found)
 
     def frequencies(self) -> KinematicFrequencies | None:
-        """Kinematic frequencies of the bearing [Hz]; None without a bearing."""
-        bearing = self.bearing
-        if bearing is None:
+        """Kinematic frequencies of the bearing [Hz]; None without a bearing, or where the speed is a state."""
+        bearing, mechanism = self.bearing, self.manifest.mechanism
+        if bearing is None or (mechanism is not None and mechanism.angle):
             return None
         return kinematic_frequencies(
             bearing.balls,
@@ -233,7 +235,7 @@ def _unit(angle: float) -> Array:
 def gather(model: Model, solution: Solution, bearing: BearingInfo | None = None) -> Record:
     """The steady part of `solution`, with its turns, for figures of a bearing; the first one if none is given."""
     steady = solution.steady()
-    length = steady.cycle_length
+    length = steady.period
     return Record(
         model=model,
         solution=steady,
