@@ -2,19 +2,18 @@
 
 In: a checked scene.  Out: accelerations, reactions, drive torque, energies at a state.
 
-Unknowns are x, y of the centre of mass and the angle of every body, and x, y of every outer ring on an elastic housing.
-Ideal joints and the driver are constraints; a bearing is a force between two points, ball by ball.  Nothing of the
-derivation is used but the records that hold the scene.
+Ideal joints and a driver at constant speed are constraints; a bearing is a force between two points, ball by ball.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from absolute import QUARTER, TURN, Absolute, Array, rotation
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
@@ -22,230 +21,20 @@ from ballpass.derive.mechanism.forces import BodyTorque, PointForce, Windows
 from ballpass.derive.mechanism.forces.spring_damper import SpringDamper
 from ballpass.derive.mechanism.forces.two_bodies import TwoBodies
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
-from ballpass.derive.scene.records import FRAME, Bearing, GivenContact, Joint, Scene, Vector
-
-Array = np.ndarray
-QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
-TURN = 2 * math.pi
-
-
-def rotation(angle: float) -> Array:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s], [s, c]])
-
-
-@dataclass
-class Place:
-    """A point: where it is, how fast, its velocity as ``jacobian @ v``, its acceleration as ``jacobian @ a + rest``."""
-
-    position: Array
-    velocity: Array
-    jacobian: Array
-    rest: Array
-
-    def __sub__(self, other: Place) -> Place:
-        return Place(
-            self.position - other.position,
-            self.velocity - other.velocity,
-            self.jacobian - other.jacobian,
-            self.rest - other.rest,
-        )
+from ballpass.derive.scene.records import Bearing, GivenContact
 
 
 @dataclass
 class Found:
-    """Accelerations by coordinate of the scene, reactions by output, and the rates of all absolute coordinates."""
+    """Accelerations by coordinate of the scene, reactions by output, and accelerations of the absolute coordinates."""
 
     accelerations: dict[str, float]
     outputs: dict[str, float]
-    rates: Array
+    absolute: Array
 
 
-class Multibody:
-    """A scene's machine in absolute coordinates.
-
-    Parameters
-    ----------
-    scene : with bearings coupled two-way, or none
-    changes : other values of parameters, by path
-    guess : where points of bodies are at the start, to choose the branch of the assembly: (body, point) to (x, y) [m]
-    """
-
-    def __init__(
-        self, scene: Scene, guess: Mapping[tuple[str, str], tuple[float, float]], changes: Mapping[str, float] = {}
-    ) -> None:
-        assert scene.mechanism is not None
-        self.mechanism, self.bearings = scene.mechanism, scene.bearings
-        self.values = {q.path: q.value for q in scene.quantities} | dict(changes)
-        self.bodies = [b.name for b in self.mechanism.bodies]
-        self.elastic = [b.name for b in self.bearings if b.outer is not None]
-        self.size = 3 * len(self.bodies) + 2 * len(self.elastic)
-        self.in_play = {b.joint: b for b in self.bearings}
-        self.speed = self.values[self.mechanism.driver.speed.path]
-        self.start = self.values[self.mechanism.driver.start_angle.path]
-        joint = self.mechanism.joint(self.mechanism.driver.joint)
-        self.driven = joint.other(FRAME)
-        self.motor = self.mechanism.driver.torque  # None: constant speed
-        self._chain = [(self.start, self._closed(self.start, self._guessed(guess)))]
-
-    # numbers of the scene
-
-    def value(self, quantity: object) -> float:
-        return 0.0 if quantity is None else self.values[quantity.path]  # type: ignore[attr-defined]
-
-    def vector(self, vector: Vector, axis: tuple[float, float] = (1.0, 0.0)) -> Array:
-        numbers = [self.values[q.path] for q in vector.quantities()]
-        if not numbers:
-            return np.zeros(2)
-        if len(numbers) == 1:
-            return numbers[0] * np.array(axis)
-        if vector.kind == "cartesian":
-            return np.array(numbers)
-        return numbers[0] * np.array([math.cos(numbers[1]), math.sin(numbers[1])])
-
-    def arm(self, body: str, point: str) -> Array:
-        """A point in body axes, from the centre of mass; on the frame from the origin."""
-        if body == FRAME:
-            return self.vector(next(p.position for p in self.mechanism.frame_points if p.name == point))
-        record = self.mechanism.body(body)
-        return self.vector(record.point(point)) - self.vector(record.center_of_mass)
-
-    def row(self, body: str) -> Array:
-        """Rate of a body's angle as a linear form."""
-        out = np.zeros(self.size)
-        if body != FRAME:
-            out[3 * self.bodies.index(body) + 2] = 1.0
-        return out
-
-    def angle(self, body: str, q: Array) -> float:
-        return float(self.row(body) @ q)
-
-    def place(self, body: str, arm: Array, q: Array, v: Array) -> Place:
-        if body == FRAME:
-            return Place(arm, np.zeros(2), np.zeros((2, self.size)), np.zeros(2))
-        k = 3 * self.bodies.index(body)
-        turned = rotation(q[k + 2]) @ arm
-        jacobian = np.zeros((2, self.size))
-        jacobian[:, k : k + 2] = np.eye(2)
-        jacobian[:, k + 2] = QUARTER @ turned
-        return Place(q[k : k + 2] + turned, jacobian @ v, jacobian, -turned * v[k + 2] ** 2)
-
-    def at(self, joint: Joint, body: str, q: Array, v: Array) -> Place:
-        return self.place(body, self.arm(body, joint.point(body)), q, v)
-
-    def ring(self, name: str, q: Array, v: Array) -> Place:
-        k = 3 * len(self.bodies) + 2 * self.elastic.index(name)
-        jacobian = np.zeros((2, self.size))
-        jacobian[:, k : k + 2] = np.eye(2)
-        return Place(q[k : k + 2], v[k : k + 2], jacobian, np.zeros(2))
-
-    # constraints: residual, rows, and what accelerations leave over
-
-    def constraints(
-        self, q: Array, v: Array, angle: float, rate: float
-    ) -> tuple[Array, Array, Array, Array, dict[str, slice]]:
-        """Residuals, Jacobian, prescribed rates, right-hand sides for accelerations; rows of each ideal joint."""
-        residual, rows, rates, rest, where = [], [], [], [], dict[str, slice]()
-        for joint in self.mechanism.joints:
-            if joint.name in self.in_play:
-                continue
-            first, second = joint.bodies
-            apart = self.at(joint, second, q, v) - self.at(joint, first, q, v)
-            where[joint.name] = slice(len(residual), len(residual) + 2)
-            if joint.kind == "revolute":
-                residual += [*apart.position]
-                rows += [*apart.jacobian]
-                rest += [*-apart.rest]
-            else:
-                alpha, turning = self.angle(first, q) + self.value(joint.direction), float(self.row(first) @ v)
-                normal = np.array([-math.sin(alpha), math.cos(alpha)])
-                sideways = QUARTER @ normal  # derivative of the normal by the guide's angle
-                turned = math.remainder(self.angle(second, q) - self.angle(first, q), TURN)
-                residual += [normal @ apart.position, turned]
-                rows.append(normal @ apart.jacobian + (sideways @ apart.position) * self.row(first))
-                rows.append(self.row(second) - self.row(first))
-                rest.append(
-                    -normal @ apart.rest
-                    - 2 * turning * (sideways @ apart.velocity)
-                    + turning**2 * (normal @ apart.position)
-                )
-                rest.append(0.0)
-            rates += [0.0, 0.0]
-        where["driver"] = slice(len(residual), len(residual) + 1)
-        driven = self.row(self.driven)
-        residual.append(driven @ q - angle)
-        rows.append(driven)
-        rates.append(rate)
-        rest.append(0.0)
-        return np.array(residual), np.array(rows), np.array(rates), np.array(rest), where
-
-    def play(self, bearing: Bearing, q: Array, v: Array) -> tuple[Place, Place, Place]:
-        """Points of a bearing: of the inner ring's body, of the housing's body, and the centre of the outer ring."""
-        joint = self.mechanism.joint(bearing.joint or "")
-        inner, housing = (self.at(joint, body, q, v) for body in (bearing.inner_body, joint.other(bearing.inner_body)))
-        return inner, housing, housing if bearing.outer is None else self.ring(bearing.name, q, v)
-
-    def _guessed(self, guess: Mapping[tuple[str, str], tuple[float, float]]) -> Array:
-        """Poses from two known points of each body; a body with one point starts at the angle zero."""
-        q = np.zeros(self.size)
-        for k, body in enumerate(self.bodies):
-            known = [(self.arm(body, point), np.array(guess[body, point])) for point in self._points(body)]
-            (arm, at), (other, there) = max(
-                ((a, b) for a in known for b in known), key=lambda pair: float(np.linalg.norm(pair[1][0] - pair[0][0]))
-            )
-            local, world = other - arm, there - at
-            if np.linalg.norm(local) > 0.0:
-                q[3 * k + 2] = math.atan2(world[1], world[0]) - math.atan2(local[1], local[0])
-            q[3 * k : 3 * k + 2] = at - rotation(q[3 * k + 2]) @ arm
-        q[3 * self.bodies.index(self.driven) + 2] = self.start
-        return q
-
-    def _points(self, body: str) -> list[str]:
-        return [p.name for p in self.mechanism.body(body).points]
-
-    def _closed(
-        self, angle: float, q: Array, displaced: Mapping[str, Array] = {}, rings: Sequence[Array] = ()
-    ) -> Array:
-        """Newton's method from a near pose: constraints, and the play of each bearing as given."""
-        still = np.zeros(self.size)
-        for _ in range(40):
-            residual, rows, *_ = self.constraints(q, still, angle, 0.0)
-            parts, slopes = [residual], [rows]
-            for bearing in self.bearings:
-                inner, housing, _ = self.play(bearing, q, still)
-                parts.append(inner.position - housing.position - displaced.get(bearing.name, np.zeros(2)))
-                slopes.append((inner - housing).jacobian)
-            for name, shift in zip(self.elastic, rings or [np.zeros(2)] * len(self.elastic), strict=True):
-                bearing = next(b for b in self.bearings if b.name == name)
-                _, housing, ring = self.play(bearing, q, still)
-                parts.append(ring.position - housing.position - shift)
-                slopes.append((ring - housing).jacobian)
-            step = np.linalg.solve(np.vstack(slopes), np.concatenate(parts))
-            q = q - step
-            if np.max(np.abs(step)) < 1e-15:
-                break
-        assert np.max(np.abs(np.concatenate(parts))) < 1e-12, "Newton's method found no pose"
-        return q
-
-    def ideal(self, angle: float) -> Array:
-        """Pose of the linkage without play, followed from the start in small steps: angles do not jump."""
-        last, q = min(self._chain, key=lambda entry: abs(entry[0] - angle))
-        step = 0.03
-        while last != angle:
-            there = angle if abs(angle - last) < step else last + math.copysign(step, angle - last)
-            moved = self._closed(there, q)
-            if np.max(np.abs((moved - q)[2 : 3 * len(self.bodies) : 3])) > 0.2:  # another branch is near
-                step = abs(there - last) / 4
-                continue
-            last, q, step = there, moved, 0.03
-            self._chain.append((last, q))
-        return q
-
-    def drive(self, t: float, x: Array) -> tuple[float, float]:
-        """Angle and speed of the driven body: last of the state's positions and velocities where a torque drives."""
-        if self.motor is None:
-            return self.start + self.speed * t, self.speed
-        return float(x[len(x) // 2 - 1]), float(x[-1])
+class Multibody(Absolute):
+    """Forces on a scene's machine, and how it moves under them."""
 
     def torque(self, speed: float) -> float:
         """Of the motor."""
@@ -262,35 +51,6 @@ class Multibody:
         assert motor.name == "asynchronous"  # Kloss
         ratio = (1 - speed / self.value(motor.synchronous_speed)) / self.value(motor.breakdown_slip)
         return 2 * self.value(motor.breakdown_torque) / (ratio + 1 / ratio)
-
-    def absolute(self, t: float, x: Array) -> tuple[Array, Array]:
-        """Positions and velocities of all bodies and rings, from a state of the scene: positions, then velocities."""
-        (angle, rate), half = self.drive(t, x), len(x) // 2
-        shifts: dict[str, Array] = {}
-        speeds: dict[str, Array] = {}
-        rings, ring_rates, k = [], [], 0
-        for bearing in self.bearings:
-            shifts[bearing.name], speeds[bearing.name] = x[k : k + 2], x[half + k : half + k + 2]
-            k += 2
-            if bearing.outer is not None:
-                rings.append(x[k : k + 2])
-                ring_rates.append(x[half + k : half + k + 2])
-                k += 2
-        q = self._closed(angle, self.ideal(angle), shifts, rings)
-        _, rows, wanted, *_ = self.constraints(q, np.zeros(self.size), angle, rate)
-        slopes, ends = [rows], [wanted]
-        for bearing in self.bearings:
-            inner, housing, _ = self.play(bearing, q, np.zeros(self.size))
-            slopes.append((inner - housing).jacobian)
-            ends.append(speeds[bearing.name])
-        for name, ring_rate in zip(self.elastic, ring_rates, strict=True):
-            bearing = next(b for b in self.bearings if b.name == name)
-            _, housing, ring = self.play(bearing, q, np.zeros(self.size))
-            slopes.append((ring - housing).jacobian)
-            ends.append(ring_rate)
-        return q, np.linalg.solve(np.vstack(slopes), np.concatenate(ends))
-
-    # forces
 
     def ball_angle(self, bearing: Bearing, q: Array) -> float:
         """Pure rolling from the ideal linkage at the start: each ring's turn with its weight."""
@@ -462,8 +222,11 @@ class Multibody:
 
     def evaluate(self, t: float, x: Array) -> Found:
         """Accelerations, reactions and drive torque at a state."""
-        q, v = self.absolute(t, x)
-        angle, rate = self.drive(t, x)
+        return self.move(*self.absolute(t, x))
+
+    def move(self, q: Array, v: Array) -> Found:
+        """The same at positions and velocities of the absolute coordinates."""
+        angle, rate = self.angle(self.driven, q), float(self.row(self.driven) @ v)
         _, rows, _, rest, where = self.constraints(q, v, angle, rate)
         pushed = self.weight() + self.applied(q, v, angle)
         for bearing in self.bearings:
@@ -502,7 +265,7 @@ class Multibody:
                 found |= {f"{prefix}{name}.{axis}": float(s) for axis, s in zip("xy", second, strict=True)}
             force = self.ring_force(bearing, q, v)
             outputs |= {f"{prefix}ring_force.{axis}": float(f) for axis, f in zip("xy", force, strict=True)}
-        return Found(found, outputs, np.concatenate([v, a]))
+        return Found(found, outputs, a)
 
     def _solve(self, rows: Array, pushed: Array, rest: Array) -> tuple[Array, Array]:
         """Accelerations and multipliers, scaled by the masses; one step of refinement."""
@@ -515,10 +278,23 @@ class Multibody:
         found = found + np.linalg.solve(matrix, (exact[1] - exact[0] @ found).astype(float))
         return found[: self.size] / scale, found[self.size :]
 
-    def energy(self, t: float, x: Array) -> float:
-        """Kinetic and potential energy [J]: of weight, balls, housings and springs."""
+    def state(self, q: Array, v: Array) -> Array:
+        """State of the scene at absolute coordinates, that of a driver with a torque included."""
+        positions, velocities = [], []
+        for bearing in self.bearings:
+            inner, housing, outer = self.play(bearing, q, v)
+            for apart in [inner - housing] + ([outer - housing] if bearing.outer is not None else []):
+                positions += [*apart.position]
+                velocities += [*apart.velocity]
+        if self.motor is not None:
+            positions.append(self.angle(self.driven, q))
+            velocities.append(float(self.row(self.driven) @ v))
+        return np.array([*positions, *velocities])
+
+    def energy(self, t: float, x: Array) -> tuple[float, float]:
+        """Kinetic energy, and potential energy of weight, balls, housings and springs [J]."""
         q, v = self.absolute(t, x)
-        total = 0.5 * float(self.masses() @ v**2) - float(self.weight() @ q)
+        total = -float(self.weight() @ q)
         for bearing in self.bearings:
             stiffness = self.stiffnesses[bearing.name]
             pressed = (max(delta, 0.0) for delta, *_ in self.balls(bearing, q, v))
@@ -532,4 +308,4 @@ class Multibody:
                 size, _ = self._size(force.pathway, q, v)
                 beyond = self._beyond(force.pathway, size, self.value(force.law.free))
                 total += 0.5 * self.value(force.law.stiffness) * beyond**2 + self.value(force.law.preload) * size
-        return total
+        return 0.5 * float(self.masses() @ v**2), total
