@@ -14,7 +14,7 @@
 
    The most loaded ball has kinks where two balls change rank.  Its largest value is the largest of any ball, whose tops are looked for
    one ball after the other; its smallest is looked for where the ranks change as well.  Where a law jumps at contact, the force has its
-   extreme beside the jump: a contact that begins or ends between two quarters is bisected, and both of its sides are looked at.
+   extreme beside the jump: a contact that begins or ends between two quarters is located, and both of its sides are looked at.
 
    A reduction is a row of BP_REDUCTION numbers, which a run adds to: it can go on in another call. */
 #ifndef BALLPASS_REDUCTIONS_H
@@ -46,9 +46,12 @@ enum {
 enum {
     BP_REFINEMENTS = 40, /* evaluations spent on a top at most, besides the first; that of a state takes no more */
     BP_CELLS = 16,       /* parts of a step in which the slope of a channel may change its sign */
-    BP_BISECTIONS = 48,  /* of a quarter of a step, down to rounding */
+    BP_TRIES = 48,       /* to locate a jump or a change of ranks in a quarter of a step */
     BP_RANKS = 3         /* times that a change of ranks is cut into two */
 };
+
+/* Of what few steps call: kept out of the code that all of them run. */
+#define BP_SELDOM __attribute__((noinline)) static
 
 /* Channels wanted, a bit each; whether those of the balls are among them. */
 static inline unsigned long bp_wanted(const double *reduction) { return (unsigned long)reduction[BP_WANTED]; }
@@ -56,6 +59,9 @@ static inline int bp_balls_wanted(const double *reduction) { return bp_wanted(re
 
 /* How far a channel may reach beyond its values at the quarters of a step, as a part of their range. */
 static const double BP_BEYOND = 0.5;
+
+/* Parts of a step closer than this are one place. */
+static const double BP_HAIR = 1e-14;
 
 /* Weights of Boole's rule. */
 static const double bp_boole[BP_POINTS] = {7.0 / 90.0, 32.0 / 90.0, 12.0 / 90.0, 32.0 / 90.0, 7.0 / 90.0};
@@ -219,7 +225,7 @@ static inline double bp_probe(const bp_search *search, double theta)
 }
 
 /* The top that is near theta, where `promised` was expected; u holds the channel at the quarters, with the sign of a maximum. */
-static inline void bp_climb(const bp_search *search, const double *u, double theta, double promised)
+BP_SELDOM void bp_climb(const bp_search *search, const double *u, double theta, double promised)
 {
     const double found_there = bp_probe(search, theta);
     /* the polynomial is the channel: there is its top */
@@ -296,90 +302,136 @@ static inline const double *bp_balls_at(const bp_within *step, double theta, int
     return bp_ball_row(q, channel - BP_NX, balls);
 }
 
-/* Both sides of the place where a ball's contact begins or ends; `channel` is its deflection. */
-static inline void bp_jump(const bp_search *search, double from, double to, int channel, int ball, int touches)
+/* Where a function changes its sign within a step: two places and the values there.  By regula falsi (Illinois), every fourth time by
+   bisection; never closer to an end than a hair, so that the other side is met as well. */
+typedef struct {
+    double a, b, fa, fb;
+    int tries, kept;
+} bp_root;
+
+static inline int bp_is_open(const bp_root *root) { return root->tries < BP_TRIES && root->b - root->a > 3.0 * BP_HAIR; }
+
+static inline double bp_next_place(const bp_root *root)
 {
-    for (int k = 0; k < BP_BISECTIONS; k++) {
-        const double place = 0.5 * (from + to);
-        if ((bp_channel(search->step, place, channel, &ball) > 0.0) == touches) from = place;
-        else to = place;
+    const double place = root->b - root->fb * (root->b - root->a) / (root->fb - root->fa);
+    if (root->tries % 4 == 3 || !(place >= root->a && place <= root->b)) return 0.5 * (root->a + root->b);
+    return place < root->a + BP_HAIR ? root->a + BP_HAIR : place > root->b - BP_HAIR ? root->b - BP_HAIR : place;
+}
+
+/* The function is f at a place between, which takes the place of a or b. */
+static inline void bp_narrow(bp_root *root, double place, double f, int of_a)
+{
+    root->tries++;
+    if (of_a) {
+        root->fb *= root->kept > 0 ? 0.5 : 1.0;
+        root->a = place, root->fa = f, root->kept = 1;
+    } else {
+        root->fa *= root->kept < 0 ? 0.5 : 1.0;
+        root->b = place, root->fb = f, root->kept = -1;
     }
-    bp_probe(search, from);
-    bp_probe(search, to);
+}
+
+/* Both sides of the place where a ball's contact begins or ends; `channel` is its deflection, which is `start` and `end` at both ends. */
+BP_SELDOM void bp_jump(const bp_search *search, double from, double to, double start, double end, int channel, int ball)
+{
+    bp_root root = {from, to, start, end, 0, 0};
+    while (bp_is_open(&root)) {
+        const double place = bp_next_place(&root), deflection = bp_channel(search->step, place, channel, &ball);
+        bp_narrow(&root, place, deflection, (deflection > 0.0) == (start > 0.0));
+    }
+    bp_probe(search, root.a);
+    bp_probe(search, root.b);
 }
 
 /* Where the most loaded ball changes from one to another, and from and to those that are most loaded in between; `start` and `end` are the
-   values of all balls at both ends.  By regula falsi (Illinois), given up where one ball stays above the extreme known while the other one
-   rises. */
-static inline void bp_rank_changes(const bp_search *search, double from, double to, const double *start, const double *end, int depth)
+   values of all balls at both ends.  Given up where one ball stays above the extreme known while the other one rises. */
+BP_SELDOM void bp_rank_changes(const bp_search *search, double from, double to, const double *start, const double *end, int depth)
 {
     int balls;
     bp_ball_row(search->step->balls[0], search->channel - BP_NX, &balls);
     const int first = bp_most_loaded(start, balls) - 1, last = bp_most_loaded(end, balls) - 1;
     if (first == last) return;
-    double a = from, b = to, fa = start[first] - start[last], fb = end[first] - end[last], q[BP_BALL_QUANTITIES];
-    double before = start[last], behind = end[first];
+    bp_root root = {from, to, start[first] - start[last], end[first] - end[last], 0, 0};
+    double before = start[last], behind = end[first], q[BP_BALL_QUANTITIES];
     const double *of = start;
-    int kept = 0;
-    for (int k = 0; k < BP_BISECTIONS; k++) {
+    while (bp_is_open(&root)) {
         if (before >= *search->best || behind >= *search->best) return;
-        const double root = b - fb * (b - a) / (fb - fa), place = root > a && root < b && k % 4 != 3 ? root : 0.5 * (a + b);
+        const double place = bp_next_place(&root);
         of = bp_balls_at(search->step, place, search->channel, q, &balls);
         const double f = of[first] - of[last], most = of[bp_most_loaded(of, balls) - 1];
         if (most < *search->best) bp_probe(search, place);
-        if (f > 0.0) {
-            fb *= kept > 0 ? 0.5 : 1.0;
-            a = place, fa = f, kept = 1, before = of[last];
-        } else {
-            fa *= kept < 0 ? 0.5 : 1.0;
-            b = place, fb = f, kept = -1, behind = of[first];
-        }
-        if (fabs(f) <= 1e-12 * fabs(most) || !(b - a > 1e-14)) break;
+        bp_narrow(&root, place, f, f > 0.0);
+        if (f > 0.0) before = of[last];
+        else behind = of[first];
+        if (fabs(f) <= 1e-12 * fabs(most)) break;
     }
     const int most = bp_most_loaded(of, balls) - 1;
     if (most == first || most == last || depth == 0) return;
-    bp_rank_changes(search, from, a, start, of, depth - 1);
-    bp_rank_changes(search, b, to, of, end, depth - 1);
+    bp_rank_changes(search, from, root.a, start, of, depth - 1);
+    bp_rank_changes(search, root.b, to, of, end, depth - 1);
+}
+
+/* Least that the most loaded ball carries within a step, from what all carry at its quarters; `least`: between two quarters each. */
+static inline double bp_least(const double *const of[BP_POINTS], int balls, double least[BP_POINTS - 1])
+{
+    double whole = -INFINITY;
+    for (int i = 0; i + 1 < BP_POINTS; i++) least[i] = -INFINITY;
+    for (int j = 0; j < balls; j++) {
+        double low = of[0][j], high = of[0][j];
+        for (int i = 1; i < BP_POINTS; i++) {
+            high = of[i][j] > high ? of[i][j] : high;
+            low = of[i][j] < low ? of[i][j] : low;
+        }
+        const double reach = BP_BEYOND * (high - low);
+        whole = low - reach > whole ? low - reach : whole;
+        for (int i = 0; i + 1 < BP_POINTS; i++) {
+            const double lower = (of[i][j] < of[i + 1][j] ? of[i][j] : of[i + 1][j]) - reach;
+            least[i] = lower > least[i] ? lower : least[i];
+        }
+    }
+    return whole;
 }
 
 /* The same for a channel of the balls, whose value of the most loaded ball at the quarters is u, with the sign of a maximum. */
 static inline void bp_ball_extreme(bp_search search, const double *u)
 {
-    const double(*q)[BP_BALL_QUANTITIES] = search.step->balls;
     const int row = search.channel - BP_NX, kind = row % BP_BALL_CHANNELS, deflection = BP_BALL_CHANNELS - 1;
+    const int touching = search.channel - kind + deflection;
     const double *of[BP_POINTS], *gap[BP_POINTS];
     int balls;
     for (int i = 0; i < BP_POINTS; i++) {
-        of[i] = bp_ball_row(q[i], row, &balls);
-        gap[i] = bp_ball_row(q[i], row - kind + deflection, &balls);
+        of[i] = bp_ball_row(search.step->balls[i], row, &balls);
+        gap[i] = of[i] + (deflection - kind) * balls;
     }
     /* forces jump where a contact begins or ends, and no ball carries more than the most loaded one */
     const int jumps = kind == 0 || kind == 2;
-    double least = -INFINITY;
+    if (search.sign < 0.0) {
+        double least[BP_POINTS - 1];
+        if (!(bp_least(of, balls, least) < *search.best)) return;
+        bp_tops(&search, u);
+        int most[BP_POINTS];
+        for (int i = 0; i < BP_POINTS; i++) most[i] = bp_most_loaded(of[i], balls);
+        for (int i = 0; i + 1 < BP_POINTS; i++) {
+            const double from = 0.25 * i, to = 0.25 * (i + 1);
+            if (!(least[i] < *search.best)) continue;
+            if (most[i] != most[i + 1]) bp_rank_changes(&search, from, to, of[i], of[i + 1], BP_RANKS);
+            for (int j = 0; j < balls && jumps; j++)
+                if ((gap[i][j] > 0.0) != (gap[i + 1][j] > 0.0)) bp_jump(&search, from, to, gap[i][j], gap[i + 1][j], touching, j + 1);
+        }
+        return;
+    }
     for (int j = 0; j < balls; j++) {
         double own[BP_POINTS], high = -INFINITY, low = INFINITY;
         for (int i = 0; i < BP_POINTS; i++) {
-            own[i] = search.sign * of[i][j];
+            own[i] = of[i][j];
             high = own[i] > high ? own[i] : high;
             low = own[i] < low ? own[i] : low;
         }
-        const double reach = BP_BEYOND * (high - low);
-        least = -high - reach > least ? -high - reach : least;
-        if (search.sign < 0.0) continue;
         search.ball = j + 1;
         bp_tops(&search, own);
-        for (int i = 0; i + 1 < BP_POINTS && jumps && high + reach > *search.best; i++)
+        for (int i = 0; i + 1 < BP_POINTS && jumps && high + BP_BEYOND * (high - low) > *search.best; i++)
             if ((gap[i][j] > 0.0) != (gap[i + 1][j] > 0.0))
-                bp_jump(&search, 0.25 * i, 0.25 * (i + 1), BP_NX + row - kind + deflection, j + 1, gap[i][j] > 0.0);
-    }
-    if (search.sign > 0.0 || !(least < *search.best)) return;
-    bp_tops(&search, u);
-    for (int i = 0; i + 1 < BP_POINTS; i++) {
-        const double from = 0.25 * i, to = 0.25 * (i + 1);
-        bp_rank_changes(&search, from, to, of[i], of[i + 1], BP_RANKS);
-        for (int j = 0; j < balls && jumps; j++)
-            if ((gap[i][j] > 0.0) != (gap[i + 1][j] > 0.0))
-                bp_jump(&search, from, to, BP_NX + row - kind + deflection, j + 1, gap[i][j] > 0.0);
+                bp_jump(&search, 0.25 * i, 0.25 * (i + 1), gap[i][j], gap[i + 1][j], touching, j + 1);
     }
 }
 
@@ -389,7 +441,7 @@ static inline void bp_ball_extreme(bp_search search, const double *u)
    value       place of the extreme in the row; its time and ball follow
    sign        1 for a maximum, -1 for a minimum
    v           the channel at the quarters, `stride` apart */
-static inline void bp_extreme(double *reduction, int value, int channel, double sign, const double *v, int stride, const bp_within *step)
+BP_SELDOM void bp_extreme(double *reduction, int value, int channel, double sign, const double *v, int stride, const bp_within *step)
 {
     const bp_search search = {reduction + value + channel, sign, step, channel, 0};
     double *best = search.best, u[BP_POINTS];
