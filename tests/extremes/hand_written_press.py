@@ -141,7 +141,7 @@ class Machine:
         info = model.manifest.bearing
         if info is None:
             raise ValueError(f"{model.manifest.scene} has no bearing")
-        shaft = p[info.shaft_speed]
+        shaft = p[info.ring_speed]
         cage = 0.5 * shaft * (1.0 - p["bearing.ball_diameter"] / p["bearing.pitch_diameter"])  # Eq. (7)
         bearing = Bearing(
             balls=info.balls,
