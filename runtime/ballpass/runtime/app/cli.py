@@ -124,11 +124,12 @@ def run(
 
     Derives and compiles what is stale in generated/<scene>. What is not given here is as the scene's run table says.
     """
-    from ballpass.runtime.app.summary import add_turns, render_accuracy, render_summary, summarize
-    from ballpass.runtime.app.tables import wide_console
-    from ballpass.runtime.run.settle import look_further
-
     with command(scene) as stages:
+        # within: an interrupt while they are imported is one of the command
+        from ballpass.runtime.app.summary import add_turns, render_accuracy, render_summary, summarize
+        from ballpass.runtime.app.tables import wide_console
+        from ballpass.runtime.run.settle import look_further
+
         stages("read")
         settles = read_turns(turns, duration if cycles is None else cycles)
         seconds = read_duration(duration, cycles)
