@@ -55,8 +55,10 @@ class Peak:
     time : when [s]
     ball : which ball, counted from 1; None for outputs without balls
     sampled : the value that the samples alone show
-    searched : where was looked for it.  ``every step``: in each step of the run.  ``dense samples``: on a grid of its
-        own, for the output follows from time alone.  ``samples``: nowhere else; more samples may show more
+    searched : where was looked for it.  ``every step``: in each step of the run, looked at in its quarters (those of
+        ``stepper-dop853`` in eighths); what begins and ends between two of them, as a brief contact, is not seen.
+        ``dense samples``: on a grid of its own, for the output follows from time alone.  ``samples``: nowhere else;
+        more samples may show more
     """
 
     value: float
