@@ -17,7 +17,7 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.bearing.hertz import ellipticity
-from ballpass.derive.mechanism.swing import OF_IDEAL_LINKAGE, POINTS, Ideal, Turns, positions_of
+from ballpass.derive.mechanism.swing import FARTHEST, OF_IDEAL_LINKAGE, POINTS, Ideal, Turns, positions_of
 from ballpass.derive.variables import DRIVER_ANGLE
 
 #: Arithmetic-geometric means from k' = 0.01 (kappa = 100) settle to rounding in six steps; one more for closer
@@ -251,7 +251,9 @@ class Visitor:
         if isinstance(expression, Turns):
             pairs = [(k, (k + 1) % POINTS) for k in range(POINTS)]
             turned = [ca.atan2(cos[i] * sin[j] - sin[i] * cos[j], cos[i] * cos[j] + sin[i] * sin[j]) for i, j in pairs]
-            return ca.SX(ca.floor(reduce(add, turned) / (2.0 * ca.pi) + 0.5))
+            whole = ca.floor(reduce(add, turned) / (2.0 * ca.pi) + 0.5)
+            most = reduce(ca.fmax, (ca.fabs(step) for step in turned))
+            return ca.SX(ca.if_else(most < FARTHEST, whole, ca.inf))
         turns = self(expression.args[2])
         rest = [(ca.cos(turns * a), ca.sin(turns * a)) for a in angles]
         across = reduce(add, (s * c0 - c * s0 for c, s, (c0, s0) in zip(cos, sin, rest, strict=True)))

@@ -9,6 +9,7 @@ and m follow from the ideal linkage, at `POINTS` angles of a turn; the result do
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import sympy as sp
@@ -17,8 +18,11 @@ from ballpass.derive.mechanism.kinematics import Pose, subscript
 from ballpass.derive.terms import Definition
 from ballpass.derive.variables import DRIVER_ANGLE
 
-#: Angles of the driver at which the ideal linkage is looked at: neighbours less than half a turn of any body apart.
-POINTS = 24
+#: Angles of the driver at which the ideal linkage is looked at.
+POINTS = 48
+
+#: How far a body may turn from one to the next: by more, and nobody could tell which way it went [rad].
+FARTHEST = 0.75 * math.pi
 
 
 class Ideal(sp.Function):  # type: ignore[misc]
@@ -29,7 +33,8 @@ class Ideal(sp.Function):  # type: ignore[misc]
 
 
 class Turns(sp.Function):  # type: ignore[misc]
-    """``Turns(cos, sin, *positions)``: whole turns of a direction in a turn of the driver."""
+    """``Turns(cos, sin, *positions)``: whole turns of a direction in a turn of the driver; infinite where it turns by
+    more than `FARTHEST` between neighbours."""
 
 
 class Mean(sp.Function):  # type: ignore[misc]

@@ -28,7 +28,8 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
     Raises
     ------
     RequestError
-        A dyad cannot be assembled; names its joint and the crank angle at which it is worst.
+        A dyad cannot be assembled; names its joint and the crank angle at which it is worst.  A body with a bearing
+        turns too fast for its angle to be followed.
     """
     mechanism = model.manifest.mechanism
     if mechanism is None or not mechanism.margins:
@@ -53,6 +54,13 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
             )
     if faults:
         raise RequestError("\n".join(faults) + "\nChange the lengths of the bodies that meet at the joint.")
+    for constant in model.manifest.constants:
+        if constant.name.endswith(".turns") and not math.isfinite(numbers.values[constant.name]):
+            body = constant.name.removeprefix("body.").removesuffix(".turns")
+            raise RequestError(
+                f"The {body} turns by more than three eighths of a turn while the driver turns by 7.5 degrees: which "
+                "way its bearings' balls went cannot be told. Change lengths so that no joint passes another so near."
+            )
 
 
 def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mapping[str, Any]) -> None:
