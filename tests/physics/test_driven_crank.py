@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from ballpass.derive.mechanism.numeric import Evaluator
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.system import System
-from ballpass.runtime import Model, Solution, load
+from ballpass.runtime import IntegrationError, Model, Solution, load
 from ballpass.runtime.contract.errors import RequestError
 
 HERE = Path(__file__).parent
@@ -258,3 +259,34 @@ def test_what_counts_on_a_constant_speed_is_refused_with_reason(andrews: Model, 
             andrews.sensitivity(quantity, "mechanism.driver.torque.torque")
     with pytest.raises(RequestError, match=r"driver's angle is a state.*'driver.angle' instead"):
         press.jacobian("reaction.A.y", "crank_angle")
+
+
+def test_a_motor_that_is_too_weak_stalls_at_its_window(press: Model) -> None:
+    """It swings back and forth there, less each time, until the run ends and says what is missing.
+
+    With a breakdown slip above one the torque falls with the speed from rest on, which damps.
+    """
+    slip = "mechanism.driver.torque.breakdown_slip"
+    weak = {TORQUE: 2.0, slip: 2.0, "mechanism.driver.speed": 10.0, WHEEL: 0.01}
+    with pytest.raises(IntegrationError, match="The driver has stalled") as stalled:
+        press.simulate(duration=60.0, rtol=1e-6, parameters=weak)
+    partial = stalled.value.partial
+    assert len(np.flatnonzero(np.diff(np.sign(partial["driver.speed"])))) > 10
+    assert partial["driver.angle"][-1] == pytest.approx(START, abs=1e-3)
+    step = 1e-30j
+    slider, rod = (np.imag(part(START + step)) / 1e-30 for part in (_height, lambda a: CRANK_LENGTH * np.sin(a)))
+    holding = (FORCE - 16.7965 * 9.81) * slider - 2.55 * 9.81 * (slider + rod) / 2.0
+    start = 2.0 * 2.0 * 2.0 / (1.0 + 2.0**2)  # Kloss at rest
+    words = re.search(r"window.start = 237 deg; within that window of punch it lacks ([\d.]+) N\*m", str(stalled.value))
+    assert words is not None
+    assert float(words[1]) == pytest.approx(-(holding + start), rel=1e-3)
+
+
+def test_steps_end_on_the_edges_of_windows_either_way_round(press: Model) -> None:
+    """Located edges: few steps to a tight tolerance, and turning backwards gives the mirrored motion back."""
+    there = press.simulate(rtol=1e-11, cycles=1.0, parameters={TORQUE: 0.0})
+    assert there.statistics.located == 2
+    turned = there.x[-1] * [1.0, -1.0]
+    back = press.simulate(rtol=1e-11, cycles=1.0, parameters={TORQUE: 0.0}, initial=turned)
+    assert back.statistics.located == 2
+    assert back.x[-1] == pytest.approx(there.x[0] * [1.0, -1.0], abs=1e-8)

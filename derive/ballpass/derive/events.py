@@ -14,6 +14,7 @@ from typing import Literal
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
+from ballpass.derive.drive import WindowEdges
 from ballpass.derive.terms import TIME
 from ballpass.derive.variables import Input
 
@@ -38,10 +39,17 @@ class Event:
     changes: str
 
 
-def events_of(inputs: Iterable[Input], bearings: Iterable[BearingModel]) -> tuple[Event, ...]:
-    """Events of a model, in the order of its inputs and bearings."""
+def events_of(
+    inputs: Iterable[Input], bearings: Iterable[BearingModel], edges: Iterable[WindowEdges]
+) -> tuple[Event, ...]:
+    """Events of a model, in the order of its inputs, bearings and windows of an angle that is a state."""
     found = [event for item in inputs for event in _of_input(item)]
-    return (*found, *(event for bearing in bearings for event in _of_balls(bearing)))
+    found += [event for bearing in bearings for event in _of_balls(bearing)]
+    found += [
+        Event(name=edge.border.name, kind="state", function=edge.function, rate=edge.rate, changes=edge.changes)
+        for edge in edges
+    ]
+    return tuple(found)
 
 
 def _of_input(item: Input) -> Iterator[Event]:

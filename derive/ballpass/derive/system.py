@@ -25,7 +25,7 @@ from ballpass.derive.bearing.equations import (
 from ballpass.derive.bearing.equivalent_mass import inner_mass
 from ballpass.derive.bearing.ring_load import RingLoad, own_load, reaction_share
 from ballpass.derive.bearing.two_way import couple, play_of
-from ballpass.derive.drive import Drive, constant_speed, drive_of
+from ballpass.derive.drive import Drive, WindowEdges, constant_speed, drive_of
 from ballpass.derive.events import Event, events_of
 from ballpass.derive.mechanism.forces import Forces, derive_forces
 from ballpass.derive.mechanism.kinematics import Play
@@ -68,6 +68,7 @@ class System:
     outputs: tuple[Output, ...]
     smoothness: tuple[tuple[str, Smoothness], ...]
     events: tuple[Event, ...]
+    edges: tuple[WindowEdges, ...] = ()
 
     @property
     def late(self) -> dict[sp.Symbol, sp.Expr]:
@@ -240,6 +241,7 @@ def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sys
         inputs=(*drive.inputs, *forces.inputs, *(i for cage in cages for i in cage.inputs)),
         driven=driven,
         smoothness=(*(("driver.torque", drive.smoothness) for _ in driven), *forces.smoothness),
+        edges=forces.edges,
         definitions=(*known, *reactions.definitions, *motion.definitions),
         linear_forms=motion.definitions,
         constants=(
@@ -326,6 +328,7 @@ def _system(
     linear_forms: tuple[Definition, ...] = (),
     driven: tuple[Coordinate, ...] = (),
     smoothness: tuple[tuple[str, Smoothness], ...] = (),
+    edges: tuple[WindowEdges, ...] = (),
 ) -> System:
     outputs: tuple[Output, ...] = ()
     with _noted(errors):
@@ -355,7 +358,8 @@ def _system(
             *((f"{bearing.names.prefix}{name}", law.anywhere) for bearing in bearings for name, law in bearing.laws),
             *smoothness,
         ),
-        events=events_of(inputs, bearings),
+        events=events_of(inputs, bearings, edges),
+        edges=edges,
     )
 
 

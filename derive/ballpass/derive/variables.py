@@ -29,7 +29,7 @@ class Input:
 
     name: str
     symbol: sp.Symbol
-    kind: Literal["phase", "gate", "table", "table_rate"]
+    kind: Literal["phase", "gate", "table", "table_rate", "border"]
     unit: str
     description: str
     latex: str

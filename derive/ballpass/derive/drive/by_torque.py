@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.drive.drive import Drive, OverAngle
+from ballpass.derive.drive.drive import Drive, OverAngle, WindowEdges
 from ballpass.derive.drive.piecewise_linear import piecewise_linear
 from ballpass.derive.scene.records import Driver
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
-from ballpass.derive.variables import DRIVER_ANGLE, Coordinate
+from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,7 +20,8 @@ class ByTorque(Drive):
 
     def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> OverAngle:
         """1 where the switching function of a window is positive."""
-        inside = [sp.Piecewise((1, inside_window(*window) > 0), (0, True)) for window in windows]
+        edges = [self._edges(name, number, *window) for number, window in enumerate(windows, start=1)]
+        inside = [sp.Piecewise((1, edge.function > edge.border.symbol), (0, True)) for edge in edges]
         gate = Definition(
             symbol=sp.Symbol(f"gate.{name}", real=True),
             expression=sp.Max(*inside, evaluate=False) if len(inside) > 1 else inside[0],
@@ -29,7 +30,30 @@ class ByTorque(Drive):
             latex=rf"g_{{\mathrm{{{name}}}}}",
         )
         jumps = ((gate.symbol.name, Smoothness.DISCONTINUOUS),)
-        return OverAngle(value=gate.symbol, definitions=(gate,), smoothness=jumps)
+        return OverAngle(
+            value=gate.symbol,
+            inputs=tuple(edge.border for edge in edges),
+            definitions=(gate,),
+            smoothness=jumps,
+            edges=tuple(edges),
+        )
+
+    def _edges(self, name: str, number: int, start: str, end: str) -> WindowEdges:
+        function, path = inside_window(start, end), f"border.{name}.{number}"
+        return WindowEdges(
+            border=Input(
+                name=path,
+                symbol=sp.Symbol(path, real=True),
+                kind="border",
+                unit="1",
+                description=f"Border of the switching function of window {number} of {name}",
+                latex=rf"b_{{\mathrm{{{name}}},{number}}}",
+                windows=((start, end),),
+            ),
+            function=function,
+            rate=sp.diff(function, DRIVER_ANGLE) * self.speed,
+            changes=f"`gate.{name}`",
+        )
 
     def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str]) -> OverAngle:
         """Value over the angle behind the first knot, whole turns taken off."""

@@ -66,6 +66,7 @@ class Kernels:
     tangents : directional derivatives of the functions, for sensitivities
     stage_slopes : what these share for the stages, of `stage_slopes_size` entries
     bearings : kernels of the balls
+    windows : (x, p, c) -> g, rate of the windows of an angle that is a state; None without
     """
 
     stage_size: int
@@ -78,6 +79,7 @@ class Kernels:
     tangents: tuple[Kernel, ...]
     stage_slopes: Kernel
     bearings: tuple[BallKernels, ...]
+    windows: Kernel | None = None
 
     def __getitem__(self, name: str) -> Kernel:
         for kernel in (*self.functions, *self.turned, *self.tangents):
@@ -119,6 +121,7 @@ class KernelBuilder:
         self._definitions = definitions
         self._of_state = Visitor(values, definitions, constant=timed, hoist=self._hoist)
         self._balls = [BallBuilder(bearing, visit, self._of_state) for bearing in system.bearings]
+        self._windows = [[visit(e) for e in (edge.function, edge.rate)] for edge in system.edges]
         self._bodies = self._build()
 
     def _hoist(self, expression: sp.Basic) -> ca.SX:
@@ -251,7 +254,14 @@ class KernelBuilder:
             tangents=(*tangents, stage_moved),
             stage_slopes=stage_slopes,
             bearings=bearings,
+            windows=self._of_windows(c) if self._windows else None,
         )
+
+    def _of_windows(self, c: ca.SX) -> Kernel:
+        takes = {"x": self._arguments["x"], "p": self._arguments["p"], "c": c}
+        gives = [ca.densify(ca.vertcat(*column)) for column in zip(*self._windows, strict=True)]
+        function = ca.Function("windows", [*takes.values()], ca.cse(gives), [*takes], ["g", "rate"])
+        return Kernel(function=function, description="Switching functions of windows, and their rates")
 
 
 def _needed(stage: ca.Function, relative: ca.Function, bearings: tuple[BallKernels, ...]) -> Kernel:

@@ -111,10 +111,12 @@ class InputInfo:
     kind ``table``: value at the reference time of the piecewise linear table with the knots `times` and `values`
     (names of parameters); kind ``table_rate``: its slope there.  Where `rate` is named, `times` are values of the angle
     ``offset + rate * t`` [rad], the table is periodic over a turn, and its slope is that over the angle.
+    kind ``border``: 0.  A window of a driver's angle that is a state is open where its switching function is above it;
+    the stepper holds the sides of `windows`, of which there is one, by an infinite border.
     """
 
     name: str
-    kind: Literal["phase", "gate", "table", "table_rate"]
+    kind: Literal["phase", "gate", "table", "table_rate", "border"]
     offset: str = ""
     rate: str = ""
     windows: tuple[tuple[str, str], ...] = ()

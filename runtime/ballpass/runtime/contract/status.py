@@ -22,6 +22,10 @@ class Status(Enum):
         "The run took more steps than allowed. Take a shorter run or a looser rtol, and check damping and stiffness: "
         "an explicit method crawls on a stiff model."
     )
+    STALLED = (
+        "The driver has stalled: at the edge of a window it turns back again and again. Give the drive more torque or "
+        "a heavier flywheel, a higher initial speed, or less load."
+    )
     INTEGRATOR_FAILED = (
         "The integrator could not go on: the tolerance asks for steps too small or too many. "
         'Try method="rosenbrock" for a stiff model, a looser rtol, or check initial state and parameters.'

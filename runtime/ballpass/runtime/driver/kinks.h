@@ -59,6 +59,9 @@ static inline void bp_switch_values(const bp_numbers *n, double t, const double 
     }
     BP_EACH_BEARING(BP_SWITCH)
 #undef BP_SWITCH
+#ifdef BP_HAS_WINDOWS
+    bp_windows(x, n->p, n->c, g + BP_FIRST_WINDOW, slope + BP_FIRST_WINDOW);
+#endif
 }
 
 static inline void bp_set_side(bp_sides *s, int e, double side)
@@ -79,6 +82,9 @@ static inline void bp_sides_start(bp_sides *restrict s, const bp_numbers *n, dou
             const double of = weight[bp_of_rate[e] > 0.0 ? BP_NQ + k : k];
             least = of < least ? of : least;
         }
+#ifdef BP_HAS_WINDOWS
+        if (e >= BP_FIRST_WINDOW) least = weight[BP_DRIVER];
+#endif
         s->band[e] = BP_BAND / least;
         bp_set_side(s, e, s->seen[0][e] > 0.0 ? 1.0 : -1.0);
         s->last[e] = -INFINITY;

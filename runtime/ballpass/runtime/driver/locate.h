@@ -238,9 +238,45 @@ static int locate(bp_run *run, double start, double t, double *h, double *error,
 }
 
 /* Turn the sides marked: the slopes at (t, x) are new. */
+#ifdef BP_HAS_WINDOWS
+/* Borders of the sides of windows, among the inputs. */
+static void hold_windows(bp_run *run)
+{
+    for (int w = 0; w < BP_WINDOWS; w++) run->driver.held[bp_window_input[w]] = run->sides.border[BP_FIRST_WINDOW + w];
+}
+
+/* Inputs of the segment, and those that hold the sides of windows. */
+static void segment_inputs(bp_run *run, const double *u)
+{
+    memcpy(run->driver.held, u, sizeof run->driver.held);
+    run->numbers.u = run->driver.held;
+    hold_windows(run);
+}
+
+/* Note passages of edges: a driver that comes back at once, again and again, has stalled there. */
+static void note_passages(bp_run *run, double time)
+{
+    const double speed = fabs(run->x[BP_NQ + BP_DRIVER]);
+    for (int e = BP_FIRST_WINDOW; e < BP_FIRST_WINDOW + BP_WINDOWS; e++)
+        if (run->sides.turn[e])
+            run->driver.come_back = (time - run->sides.last[e]) * speed < BP_STALL_ANGLE ? run->driver.come_back + 1 : 0;
+}
+
+#define start_passages(run) ((run)->driver.come_back = 0)
+#define has_stalled(run) ((run)->driver.come_back >= BP_STALLED)
+#else
+#define segment_inputs(run, values) ((run)->numbers.u = (values))
+#define hold_windows(run) ((void)0)
+#define note_passages(run, time) ((void)0)
+#define start_passages(run) ((void)0)
+#define has_stalled(run) 0
+#endif
+
 static void turn_sides(bp_run *run, double time, double step)
 {
+    note_passages(run, time);
     bp_turn_sides(&run->sides, time, step);
+    hold_windows(run);
     run->onset = bp_onset(&run->sides);
     if (run->onset == time && run->step > run->touch) run->step = run->touch;
     run->release.time = NAN;
@@ -248,17 +284,26 @@ static void turn_sides(bp_run *run, double time, double step)
 }
 
 /* The numbers point into the run itself. */
-static void sides_here(bp_run *run) { run->numbers.border = run->sides.border; }
+static void sides_here(bp_run *run)
+{
+    run->numbers.border = run->sides.border;
+    hold_windows(run);
+}
 
 static void sides_start(bp_run *run, double t)
 {
     bp_sides_start(&run->sides, &run->numbers, t, run->x, run->weight);
     sides_here(run);
+    start_passages(run);
     run->onset = -INFINITY;
     run->touch = INFINITY;
 }
 
-static void sides_move_on(bp_run *run) { bp_sides_move_on(&run->sides); }
+static void sides_move_on(bp_run *run)
+{
+    bp_sides_move_on(&run->sides);
+    hold_windows(run);
+}
 
 /* Behind the first step from an onset: how long it might have been. */
 static void remember_touch(bp_run *run, double h, double factor)
@@ -285,6 +330,8 @@ static int aim(bp_run *run, double t, double longest, double resolution, double 
 #else
 #define locate(run, start, t, h, error, resolution, aimed, longest) ((void)(aimed), NO_KINK)
 #define turn_sides(run, time, step) ((void)(time), (void)(step))
+#define segment_inputs(run, values) ((run)->numbers.u = (values))
+#define has_stalled(run) 0
 #define sides_start(run, t) ((void)0)
 #define sides_here(run) ((void)0)
 #define sides_move_on(run) ((void)0)

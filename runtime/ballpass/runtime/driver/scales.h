@@ -80,10 +80,10 @@ static inline double bp_largest(const double *v)
 /* Masses of the coordinates: what a force through the balls accelerates. */
 static inline void bp_masses(const bp_numbers *n, double *mass)
 {
-    const double force = 1e12, x[BP_NX] = {0.0}, none[BP_NS] = {0.0};
-    double both[BP_NS];
+    const double force = 1e12, x[BP_NX] = {0.0};
+    double both[BP_NS], none[BP_NS]; /* of length zero without bearings */
     double w[BP_NW], r[BP_NR], a[BP_NQ], b[BP_NQ];
-    for (int k = 0; k < BP_NS; k++) both[k] = force;
+    for (int k = 0; k < BP_NS; k++) both[k] = force, none[k] = 0.0;
     bp_stage(0.0, n->u, n->p, n->c, w);
     bp_relative(x, n->u, n->p, n->c, w, r);
     bp_acceleration(x, none, r, n->u, n->p, n->c, w, a);

@@ -121,6 +121,8 @@ void schedule_inputs(const schedule_input *inputs, int count, const double *valu
                 window(values[input->edges[2 * k]], values[input->edges[2 * k + 1]], &start, &width);
                 if (covers(angle, start, width)) u[i] = 1.0;
             }
+        } else if (input->kind == SCHEDULE_BORDER) {
+            u[i] = 0.0;
         } else {
             u[i] = table(input, values, t, inside);
         }
@@ -218,7 +220,7 @@ double schedule_most_segments(const schedule_input *inputs, int count, const dou
     double most = 1.0 + length / turn + length * fastest_phase(inputs, count, values) / LARGEST_PHASE;
     for (int i = 0; i < count; i++) {
         const double turns = inputs[i].rate >= 0 ? 1.0 + length * fabs(values[inputs[i].rate]) / TURN : 1.0;
-        most += (2.0 * inputs[i].windows + inputs[i].knots) * turns;
+        most += ((inputs[i].kind == SCHEDULE_GATE ? 2.0 * inputs[i].windows : 0.0) + inputs[i].knots) * turns;
     }
     return most;
 }

@@ -2,7 +2,7 @@
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
 
-enum schedule_kind { SCHEDULE_PHASE, SCHEDULE_GATE, SCHEDULE_TABLE, SCHEDULE_TABLE_RATE };
+enum schedule_kind { SCHEDULE_PHASE, SCHEDULE_GATE, SCHEDULE_TABLE, SCHEDULE_TABLE_RATE, SCHEDULE_BORDER };
 
 /* An input that is constant within a segment.  Numbers are named by their place among parameters and, behind these, derived constants.
 
@@ -10,6 +10,7 @@ enum schedule_kind { SCHEDULE_PHASE, SCHEDULE_GATE, SCHEDULE_TABLE, SCHEDULE_TAB
    gate         1 while that angle lies in one of the windows, else 0
    table        value of the piecewise linear table at the segment's start
    table rate   its slope there
+   border       0: of a switching function of the state
    A table with a rate is one over that angle, periodic over a turn; others are over time. */
 typedef struct {
     enum schedule_kind kind;

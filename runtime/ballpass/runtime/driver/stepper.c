@@ -154,6 +154,10 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
             t = last ? length : t + h;
             if (met == CUT) turn_sides(run, start + t, tried);
             sides_move_on(run);
+            if (has_stalled(run)) {
+                result->time = start + t;
+                return BALLPASS_STALLED;
+            }
             rejected_last = 0;
             if (chosen != run->method) {
                 run->method = chosen;
@@ -199,7 +203,7 @@ static int run_segments(bp_run *run, double *x, long first, long segments, const
     const ballpass_options *options = run->options;
     for (long i = first; i < segments; i++) {
         result->segment = i;
-        run->numbers.u = inputs + i * BP_NU;
+        segment_inputs(run, inputs + i * BP_NU);
         result->status = run_segment(run, times[i], times[i + 1], restarts[i], options->method == BALLPASS_AUTO, resumed && i == first);
         if (result->status != BALLPASS_DONE) break;
 #ifdef BALLPASS_SENSITIVITIES

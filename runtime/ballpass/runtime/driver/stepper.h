@@ -28,6 +28,7 @@ enum ballpass_status {
     BALLPASS_TOO_MANY_STEPS = 1, /* max_steps reached */
     BALLPASS_STEP_TOO_SMALL = 2, /* the error test fails at the smallest step */
     BALLPASS_NOT_FINITE = 3,     /* the state or its rate is not a number even for the smallest step */
+    BALLPASS_STALLED = 5,        /* the driver comes back to the edge of a window again and again */
     BALLPASS_BAD_ARGUMENT = 4    /* method unknown, times out of order, an output time outside the run, a count below zero, a tolerance or a
                                    largest step that is not positive, another step that is negative; a number that is none */
 };

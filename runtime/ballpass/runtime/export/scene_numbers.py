@@ -29,6 +29,7 @@ _KINDS = {
     "gate": "SCHEDULE_GATE",
     "table": "SCHEDULE_TABLE",
     "table_rate": "SCHEDULE_TABLE_RATE",
+    "border": "SCHEDULE_BORDER",
 }
 
 

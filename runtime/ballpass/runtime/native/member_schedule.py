@@ -15,7 +15,7 @@ from ballpass.runtime.contract import Manifest
 from ballpass.runtime.native.driver_library import DOUBLES, LONGS, address, declare
 
 #: Kinds of inputs in the order of schedule.h.
-KINDS = ("phase", "gate", "table", "table_rate")
+KINDS = ("phase", "gate", "table", "table_rate", "border")
 
 #: Moments between edges, and as many evenly spread; as in schedule.h.
 MOMENTS = 32

@@ -59,6 +59,7 @@ class End(IntEnum):
     STEP_TOO_SMALL = 2
     NOT_FINITE = 3
     BAD_ARGUMENT = 4
+    STALLED = 5
 
 
 class _Options(ctypes.Structure):

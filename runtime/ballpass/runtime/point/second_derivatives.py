@@ -120,6 +120,8 @@ def _input(item: InputInfo, known: dict[str, ca.SX], numbers: Numbers, t: float)
         # the angle within the turn, for rounding; what is subtracted and added has the same value
         whole = numbers.values[item.offset] + numbers.values[item.rate] * t
         return known[item.offset] + known[item.rate] * t + (now - whole)
+    if item.kind == "border":
+        return ca.SX(0.0)
     if item.kind == "gate":
         return ca.SX(float(clock.inputs_at([item], numbers.values, t)[0]))
     piece = clock.table_piece(item, numbers.values, t)

@@ -109,6 +109,8 @@ def inputs_over(inputs: Sequence[InputInfo], values: Values, t: np.ndarray, insi
             for start, width in _windows(item, values):
                 covered |= _covers(angle, start, width)
             found[:, k] = covered
+        elif item.kind == "border":
+            found[:, k] = 0.0
         else:
             found[:, k] = _table(item, values, t, inside)
     return found

@@ -27,6 +27,9 @@ CHOICES: tuple[Kinks, ...] = (STEPPED_OVER, LOCATED)
 #: where the motion has kinks, then where a law jumps [1].
 TIGHT, TIGHT_JUMPS = 3e-7, 1e-6
 
+#: The same where loads act within windows of an angle that is a state: any tolerance [1].
+ALWAYS = 1.0
+
 
 def check_kinks(asked: str) -> Kinks:
     """One of `CHOICES`.
@@ -66,7 +69,8 @@ def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float
     Returns
     -------
     Kinks
-        By default ``located`` at tight tolerances of ``stepper``, else ``stepped-over``.
+        By default ``located`` at tight tolerances of ``stepper``, and at all where loads act within windows of an
+        angle that is a state; else ``stepped-over``.
 
     Raises
     ------
@@ -81,6 +85,8 @@ def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float
 
 def tight_below(manifest: Manifest) -> float:
     """Tolerance from which on `stepper` locates kinks by itself [1]."""
+    if any(item.kind == "border" for item in manifest.inputs):
+        return ALWAYS
     return TIGHT_JUMPS if any(word == "discontinuous" for _, word in manifest.smoothness) else TIGHT
 
 

@@ -36,6 +36,7 @@ from ballpass.runtime.run.reductions import joined, reduced_channels, reductions
 from ballpass.runtime.run.request import Plan, Request, make_plan
 from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.run.solution import Solution, Statistics
+from ballpass.runtime.run.stall import stall_words
 from ballpass.runtime.run.stepping import step_through
 from ballpass.runtime.run.trajectory import Cost, Interrupted, Trajectory, evaluate_outputs, start_trajectory
 
@@ -141,6 +142,8 @@ def simulate(
     if failure is not None:
         state = trajectory.x[max(done - 1, 0)] if failure.state is None else failure.state
         place = whereabouts(model, numbers, failure.time, state)
+        if failure.status is Status.STALLED:
+            failure.detail += f" {stall_words(model, numbers, state)}"
         raise IntegrationError(
             failure.status, time=failure.time, place=place, method=method, detail=failure.detail, partial=solution
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ballpass.derive.drive import Drive
+from ballpass.derive.drive import Drive, WindowEdges
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Setting
 from ballpass.derive.mechanism.forces.point_force import PointForce
@@ -18,7 +18,7 @@ from ballpass.derive.variables import Input, Output
 class Forces:
     """What acts on the bodies, and the definitions, inputs and outputs that come with it.
 
-    `smoothness` is that of what is a function of the state, by name.
+    `smoothness` is that of what is a function of the state, by name, and `edges` are where it jumps.
     """
 
     loads: tuple[Load, ...]
@@ -26,6 +26,7 @@ class Forces:
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
     smoothness: tuple[tuple[str, Smoothness], ...] = ()
+    edges: tuple[WindowEdges, ...] = ()
 
 
 def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Forces:
@@ -41,6 +42,7 @@ def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Force
         inputs=tuple(setting.inputs),
         outputs=tuple(setting.outputs),
         smoothness=tuple(setting.smoothness),
+        edges=tuple(setting.edges),
     )
 
 

@@ -17,7 +17,7 @@ from typing import ClassVar, Self
 
 import sympy as sp
 
-from ballpass.derive.drive import Drive, OverAngle
+from ballpass.derive.drive import Drive, OverAngle, WindowEdges
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.linkage import Linkage
@@ -46,12 +46,14 @@ class Setting:
     outputs: list[Output] = field(default_factory=list)
     switched: list[Definition] = field(default_factory=list)
     smoothness: list[tuple[str, Smoothness]] = field(default_factory=list)
+    edges: list[WindowEdges] = field(default_factory=list)
 
     def over_angle(self, found: OverAngle) -> sp.Expr:
         """Take what changes with the driver's angle; its value."""
         self.inputs.extend(found.inputs)
         self.switched.extend(found.definitions)
         self.smoothness.extend(found.smoothness)
+        self.edges.extend(found.edges)
         return found.value
 
 

@@ -34,6 +34,7 @@ static const char *const STATUS[] = {
     "the step size fell to the resolution of time: the force jumps there, or the motion grows without bound",
     "the motion stopped being finite: check parameters and initial state",
     "the request cannot be run",
+    "the driver has stalled: it comes back to the edge of a window again and again",
 };
 
 typedef struct {
