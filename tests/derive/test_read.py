@@ -5,7 +5,9 @@ from __future__ import annotations
 import copy
 import math
 import tomllib
+from collections.abc import Callable
 from dataclasses import FrozenInstanceError, fields, is_dataclass
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scene_texts import PRESS, ROTOR, SCENES, edited
 
+from ballpass.derive.emit.signature import source_key
 from ballpass.derive.reading.read import parse_override, read_scene, scene_from_text, with_values
 from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.scene.records import (
@@ -378,3 +381,54 @@ def test_a_torn_file_is_read_or_refused_but_never_breaks(cut: int, junk: str) ->
     except SceneError:
         return
     assert all(math.isfinite(quantity.value) for quantity in scene.quantities)
+
+
+CUT = """[mechanism.forces.cut]
+body = "slider"
+point = "C"
+direction = "90 deg"
+table = {{ angle = {angle}, force = {force} }}
+"""
+
+
+def press_with_cut(scene_text: Callable[..., str], angle: str, force: str) -> str:
+    return scene_text("punching_press", ("[bearing]\n", CUT.format(angle=angle, force=force) + "[bearing]\n"))
+
+
+def test_columns_of_a_csv_file_are_the_numbers_in_it(scene_text: Callable[..., str], tmp_path: Path) -> None:
+    pairs = (("a", "deg"), ("F", "kN"))
+    columns = [f'{{ file = "cut.csv", column = "{name}", unit = "{unit}" }}' for name, unit in pairs]
+    place = tmp_path / "press.toml"
+    place.write_text(press_with_cut(scene_text, *columns), encoding="utf-8")
+    (tmp_path / "cut.csv").write_text("# measured\na, t, F\n230, 0, 0\n250, 1, 9.5\n267, 2, 0\n", encoding="utf-8")
+    read = read_scene(place)
+    lists = ('["230 deg", "250 deg", "267 deg"]', '["0 kN", "9.5 kN", "0 kN"]')
+    written = scene_from_text(press_with_cut(scene_text, *lists), "press")
+    assert [(q.path, q.value, q.unit) for q in read.quantities] == [
+        (q.path, q.value, q.unit) for q in written.quantities
+    ]
+    before = source_key(place)
+    (tmp_path / "cut.csv").write_text("a, F\n230, 0\n250, 9.6\n267, 0\n", encoding="utf-8")
+    assert source_key(place) != before
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, "the file cannot be read"),
+        ("a, f\n1, 2\n", "has no such column"),
+        ("a, F\n230, 1\n240, 1 kN\n", "line 3 of cut.csv has no number there"),
+        ("a, F\n" + "1, 1\n" * 1001, "has too many rows"),
+    ],
+)
+def test_a_csv_file_without_the_column_is_refused(
+    scene_text: Callable[..., str], tmp_path: Path, content: str | None, words: str
+) -> None:
+    place = tmp_path / "press.toml"
+    column = '{ file = "cut.csv", column = "F", unit = "kN" }'
+    place.write_text(press_with_cut(scene_text, '["230 deg", "240 deg"]', column), encoding="utf-8")
+    if content is not None:
+        (tmp_path / "cut.csv").write_text(content, encoding="utf-8")
+    with pytest.raises(SceneError, match=words) as caught:
+        read_scene(place)
+    assert all(fault.line for fault in caught.value.faults)

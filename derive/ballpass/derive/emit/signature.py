@@ -6,11 +6,14 @@ signature: a changed number rewrites the manifest's defaults and nothing else.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import tomllib
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ballpass.derive.scene.csv_columns import named_files
 from ballpass.runtime import contract as mf
 from ballpass.runtime.contract.errors import ArtefactError
 
@@ -25,7 +28,7 @@ def signature(scene: Scene) -> str:
 
 
 def source_key(path: Path) -> str:
-    """Digest of a scene file, whatever its ends of lines, of the deriving sources and of the versions.
+    """Digest of a scene file and the CSV files it names, whatever ends of lines; of deriving sources and versions.
 
     Raises
     ------
@@ -33,7 +36,13 @@ def source_key(path: Path) -> str:
         The file cannot be read.
     """
     digest = hashlib.sha256(repr((mf.SCHEMA, path.stem, _sources(), versions())).encode())
-    digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
+    text = path.read_bytes().replace(b"\r\n", b"\n")
+    digest.update(text)
+    if b"file" in text:
+        with contextlib.suppress(ValueError):  # a file that is no TOML has no digest to compare with
+            for name in named_files(tomllib.loads(text.decode("utf-8-sig"))):
+                with contextlib.suppress(OSError, ValueError):  # reading the scene says what is wrong with it
+                    digest.update((path.parent / name).read_bytes().replace(b"\r\n", b"\n"))
     return digest.hexdigest()
 
 

@@ -19,6 +19,7 @@ from typing import Any
 from ballpass.derive.reading.read_bearing import read_bearing, read_load, read_shaft
 from ballpass.derive.reading.read_mechanism import read_mechanism
 from ballpass.derive.reading.values import parse_override, quantities_of, replaced, value_faults, with_values
+from ballpass.derive.scene.csv_columns import with_columns
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.records import Bearing, Mechanism, Run, Scene
 from ballpass.derive.scene.schema import Collector, Table, listing
@@ -112,6 +113,7 @@ def _scene(text: str, name: str, source: str | None) -> Scene:
             remedy="copy one of the files in scenes/ and change it",
         )
         raise SceneError(collector.faults, source=source)
+    data = with_columns(data, None if source is None else Path(source).parent, collector.faults)
     scene = _read(Table(collector, (), data), name)
     faults = [*collector.faults, *value_faults(scene, collector.given)]
     if not faults:
