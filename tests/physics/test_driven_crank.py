@@ -12,6 +12,7 @@ import sympy as sp
 from scipy.integrate import simpson
 
 from ballpass.derive import derive, generate, read_scene
+from ballpass.derive.lower.functions import lower
 from ballpass.derive.mechanism.numeric import Evaluator
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
@@ -290,3 +291,67 @@ def test_steps_end_on_the_edges_of_windows_either_way_round(press: Model) -> Non
     back = press.simulate(rtol=1e-11, cycles=1.0, parameters={TORQUE: 0.0}, initial=turned)
     assert back.statistics.located == 2
     assert back.x[-1] == pytest.approx(there.x[0] * [1.0, -1.0], abs=1e-8)
+
+
+@pytest.mark.parametrize("bearing", [False, True])
+def test_torque_that_the_reactions_take_is_that_of_the_motor(bearing: bool) -> None:
+    """At random states: the walk over the dyads knows the accelerations, and nothing of the equations of motion."""
+    text = _press(MOTOR)
+    if bearing:
+        press = (ROOT / "scenes/punching_press.toml").read_text()
+        part = press[press.index("[bearing]") : press.index("[run]")].replace(
+            "share = 0.5 ", 'coupling = "two-way"\ncount = 2 #'
+        )
+        ring = part.index("[bearing.inner_ring.equivalent_mass]")
+        part = part[:ring] + part[part.index("[bearing.outer_ring]") :]
+        text = text.replace("[run]", part + "\n[run]")
+    system = derive(scene_from_text(text, "press"))
+    functions = lower(system)
+    names = [c.name for c in system.coordinates]
+    assert names[-1] == "driver.angle"
+    assert len(names) == (5 if bearing else 1)
+    p = [q.default for q in system.parameters]
+    c = functions["constants"](p)
+    draws = np.random.default_rng(4)
+    sizes = np.array([2e-5] * (len(names) - 1) + [6.0] + [0.05] * (len(names) - 1) + [60.0])
+    for _ in range(20):
+        arguments = {"t": 0.0, "x": sizes * draws.uniform(-1.0, 1.0, 2 * len(names)), "u": [0.0], "p": p, "c": c}
+        results = {}
+        for name in ("reaction_system", "outputs"):
+            function = functions[name]
+            results |= function(**{k: arguments[k] for k in function.name_in()})
+        motor = float(results["drive_torque"])
+        assert float(results["r"][-1]) == pytest.approx(motor, rel=1e-9, abs=1e-9)
+        assert float(results["drive_power"]) == pytest.approx(motor * arguments["x"][-1], rel=1e-12)
+
+
+def test_windows_and_tables_over_an_angle_that_is_a_state_are_those_of_constant_speed() -> None:
+    """At random angles of several turns either way: windows by arcs, also through zero; a table by NumPy."""
+    loads = """[mechanism.forces.many]
+body = "slider"
+point = "S"
+force = ["1 N", "0 N"]
+window = [
+    { start = "237 deg", end = "267 deg" },
+    { start = "350 deg", end = "20 deg" },
+    { start = "-3 rad", end = "-1 rad" },
+]
+
+[mechanism.torques.rows]
+body = "crank"
+table = { angle = ["10 deg", "90 deg", "300 deg"], torque = ["1 N*m", "5 N*m", "-2 N*m"] }
+
+[run]"""
+    system = derive(scene_from_text(CRANK.replace("[run]", loads), "crank"))
+    numbers = {p.symbol: p.default for p in system.parameters} | {i.symbol: 0.0 for i in system.inputs}
+    wanted = [sp.Symbol(name, real=True) for name in ("gate.many", "torque.rows.value")]
+    known = {d.symbol: d.expression for d in system.definitions}
+    inner = known[sp.Symbol("torque.rows.angle", real=True)]
+    gate, table = (known[s].subs(sp.Symbol("torque.rows.angle", real=True), inner).subs(numbers) for s in wanted)
+    arcs = [(237.0, 30.0), (350.0, 30.0), (math.degrees(-3.0), math.degrees(2.0))]
+    for angle in np.random.default_rng(3).uniform(-20.0, 20.0, 200).tolist():
+        at = {system.coordinates[0].position: angle}
+        degrees = math.degrees(angle)
+        assert float(gate.subs(at)) == any((degrees - start) % 360.0 < width for start, width in arcs)
+        expected = np.interp(degrees, [10.0, 90.0, 300.0], [1.0, 5.0, -2.0], period=360.0)
+        assert float(table.subs(at)) == pytest.approx(expected, abs=1e-12)
