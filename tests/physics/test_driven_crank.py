@@ -18,7 +18,7 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.system import System
 from ballpass.runtime import IntegrationError, Model, Solution, load
-from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.errors import RequestError, SimulationError
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -271,6 +271,8 @@ def test_a_motor_that_is_too_weak_stalls_at_its_window(press: Model) -> None:
     weak = {TORQUE: 2.0, slip: 2.0, "mechanism.driver.speed": 10.0, WHEEL: 0.01}
     with pytest.raises(IntegrationError, match="The driver has stalled") as stalled:
         press.simulate(duration=60.0, rtol=1e-6, parameters=weak)
+    with pytest.raises(SimulationError, match="within that window of punch it lacks"):
+        press.reduce(duration=60.0, rtol=1e-6, parameters=weak)
     partial = stalled.value.partial
     assert len(np.flatnonzero(np.diff(np.sign(partial["driver.speed"])))) > 10
     assert partial["driver.angle"][-1] == pytest.approx(START, abs=1e-3)

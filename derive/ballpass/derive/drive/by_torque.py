@@ -87,7 +87,10 @@ def inside_window(start: str, end: str) -> sp.Expr:
     first, last = (sp.Symbol(path, real=True) for path in (start, end))
     span = last - first
     half = sp.Min(sp.Abs(span) / 2, sp.pi, evaluate=False)
-    return sp.sign(span, evaluate=False) * (sp.cos(DRIVER_ANGLE - (first + last) / 2) - sp.cos(half))
+    middle = (first + last) / 2
+    # cosine and sine of the angle are there already: the driven body's
+    along = sp.cos(DRIVER_ANGLE) * sp.cos(middle) + sp.sin(DRIVER_ANGLE) * sp.sin(middle)
+    return sp.sign(span, evaluate=False) * (along - sp.cos(half))
 
 
 def by_torque(driver: Driver) -> ByTorque:

@@ -27,6 +27,7 @@ from ballpass.runtime.run.magnitudes import stepper_magnitudes
 from ballpass.runtime.run.reductions import Reductions, channel_names, reductions_of
 from ballpass.runtime.run.request import Request, check_length, run_length, start_state, tolerance
 from ballpass.runtime.run.segments import edge_windows, make_segments, rest_of
+from ballpass.runtime.run.stall import stall_words
 from ballpass.runtime.run.stepping import STATUS_OF_END
 
 #: Steps, accepted and rejected, that one call of the stepper takes: a fraction of a second.  Between calls progress is
@@ -177,7 +178,8 @@ def integrate_reduced(
             gives_up = allowed.spend(more, outcome.time)
             if outcome.end is not End.DONE and (gives_up or outcome.end is not End.TOO_MANY_STEPS):
                 place = whereabouts(model, numbers, outcome.time, state)
-                raise RunFailed(outcome.end, outcome.time, outcome.step, place)
+                detail = stall_words(model, numbers, state) if outcome.end is End.STALLED else ""
+                raise RunFailed(outcome.end, outcome.time, outcome.step, place, detail)
             if progress is not None:
                 progress(outcome.time / duration)
             if stop is not None and stop.value:
@@ -200,9 +202,9 @@ class Begun:
 class RunFailed(SimulationError):
     """The driver could not reach the end of a run."""
 
-    def __init__(self, end: End, time: float, step: float, place: Whereabouts | None = None) -> None:
+    def __init__(self, end: End, time: float, step: float, place: Whereabouts | None = None, detail: str = "") -> None:
         self.end, self.time, self.step, self.place = end, time, step, place
         self.status = STATUS_OF_END[end]
         angle = f", crank angle {math.degrees(place.crank_angle):.4f} deg" if place is not None else ""
-        words = f" {place.words}" if place is not None else ""
+        words = f" {place.words} {detail}" if place is not None else ""
         super().__init__(f"{self.status.value}\nt = {time:.9g} s{angle}, step size {step:.3g} s.{words}".rstrip())
