@@ -5,10 +5,9 @@ In: the tables.  Out: records, possibly with placeholders where faults were note
 
 from __future__ import annotations
 
-from typing import Literal
-
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.laws import LAWS
+from ballpass.derive.reading.read_coupling import read_count, read_coupling, read_inner_body, refuse_effects
 from ballpass.derive.scene.records import (
     FRAME,
     BallEffect,
@@ -77,20 +76,20 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
     with table:
         table.know("joint", "share", "balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle", "contact")
         table.know("coupling", "count", "damping", "inner_ring", "outer_ring", "initial", *EFFECTS)
-        coupling = _read_coupling(table, mechanism)
+        coupling = read_coupling(table, mechanism)
         joint, share = _read_place(table, mechanism, driven, coupling)
         support = _read_outer_ring(table)
         inner_body = ""
         if coupling == "two-way":
-            _refuse_effects(table)
-            inner_body = _read_inner_body(table, mechanism, joint)
+            refuse_effects(table)
+            inner_body = read_inner_body(table, mechanism, joint)
         return Bearing(
             name=name,
             joint=joint,
             share=share,
             coupling=coupling,
             inner_body=inner_body,
-            count=_read_count(table, coupling),
+            count=read_count(table, coupling),
             balls=table.integer("balls", FEWEST_BALLS, MOST_BALLS, example="8"),
             ball_diameter=table.quantity("ball_diameter", "m", "Ball diameter", "D_w", example="7.9375 mm"),
             pitch_diameter=table.quantity(
@@ -112,102 +111,6 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             outer=support,
             initial=_read_initial(table, moving_outer=support is not None),
         )
-
-
-def _read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-way", "two-way"]:
-    coupling = table.choice("coupling", ("one-way", "two-way"), default="one-way")
-    if coupling == "one-way" and mechanism is not None and mechanism.driver.torque is not None:
-        _refuse_one_way(table)
-        return "two-way"
-    if coupling == "two-way" and mechanism is None:
-        table.fault(
-            "coupling",
-            "there is no mechanism that the bearing could act back on",
-            given='"two-way"',
-            allowed='"one-way" in a scene without [mechanism]',
-            remedy="delete the key, or describe the mechanism",
-        )
-        return "one-way"
-    return "two-way" if coupling == "two-way" else "one-way"
-
-
-def _refuse_one_way(table: Table) -> None:
-    table.fault(
-        "coupling",
-        "a bearing loaded one-way takes the reaction of a linkage at constant speed",
-        given=show(table.data.get("coupling", "nothing, which is one-way")),
-        allowed='coupling = "two-way" where [mechanism.driver.torque] drives',
-        remedy='write coupling = "two-way", and what such a bearing needs; or delete [mechanism.driver.torque]',
-    )
-
-
-def _read_count(table: Table, coupling: str) -> Quantity | None:
-    """How many bearings stand side by side in a joint with play."""
-    if not table.has("count"):
-        return None
-    if coupling == "one-way":
-        table.fault(
-            "count",
-            "a bearing that is loaded one-way carries a share of the reaction",
-            given=show(table.data["count"]),
-            allowed='share, as in 0.5 for one of a pair; count only with coupling = "two-way"',
-            remedy="write share = 0.5 for one of two bearings",
-        )
-    return table.quantity("count", "1", "Bearings side by side at the joint", "n_b", example="2")
-
-
-def _read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None) -> str:
-    """The body that carries the inner ring: at the frame the other one, where it is not named."""
-    joint = next((j for j in mechanism.joints if j.name == name), None) if mechanism is not None else None
-    with table.table("inner_ring", "body", required=False) as ring:
-        ring.know("body")
-        for key in ("mass", "equivalent_mass", "damping"):
-            if key in ring.data:
-                ring.know(key)
-                ring.fault(
-                    key,
-                    "the inner ring moves with the body that carries it, whose mass contains the ring",
-                    given=show(ring.data[key]),
-                    allowed='nothing but body with coupling = "two-way"',
-                    remedy="delete the key",
-                )
-        if joint is None:
-            return ring.text("body", "crank") or "" if ring.has("body") else ""
-        moving = [body for body in joint.bodies if body != FRAME]
-        if not ring.has("body"):
-            if len(moving) == 1:
-                return moving[0]
-            ring.fault(
-                "body",
-                f"both bodies of the joint {show(joint.name)} move: which one carries the inner ring is not said",
-                given="nothing",
-                allowed=listing(joint.bodies),
-                remedy=f'add the table inner_ring with body = "{moving[0]}"',
-            )
-            return moving[0]
-        body = ring.text("body", moving[0]) or ""
-        if body not in joint.bodies:
-            ring.fault(
-                "body",
-                f"the joint {show(joint.name)} does not join this body",
-                given=show(body),
-                allowed=listing(joint.bodies),
-                remedy=suggest(body, joint.bodies, "name one of the two"),
-            )
-            return moving[0]
-        return body
-
-
-def _refuse_effects(table: Table) -> None:
-    for kind in EFFECTS:
-        if table.has(kind):
-            table.fault(
-                kind,
-                "effects on the balls are modelled for rings that turn at constant speed",
-                given=f"{kind}, and coupling two-way",
-                allowed=f'{kind} with coupling = "one-way"',
-                remedy=f"delete {kind}, or load the bearing one-way",
-            )
 
 
 def _read_place(

@@ -1,0 +1,112 @@
+"""Keys of a bearing that say how it and its linkage move each other.
+
+In: the table of a bearing.  Out: coupling, bearings side by side, body of the inner ring; faults where keys of one
+coupling stand beside the other.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from ballpass.derive.bearing.effects import EFFECTS
+from ballpass.derive.scene.records import FRAME, Mechanism, Quantity
+from ballpass.derive.scene.schema import Table, listing, suggest
+from ballpass.derive.scene.units import show
+
+
+def read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-way", "two-way"]:
+    """How a bearing and its linkage move each other; faults where the scene has no room for it."""
+    coupling = table.choice("coupling", ("one-way", "two-way"), default="one-way")
+    if coupling == "one-way" and mechanism is not None and mechanism.driver.torque is not None:
+        _refuse_one_way(table)
+        return "two-way"
+    if coupling == "two-way" and mechanism is None:
+        table.fault(
+            "coupling",
+            "there is no mechanism that the bearing could act back on",
+            given='"two-way"',
+            allowed='"one-way" in a scene without [mechanism]',
+            remedy="delete the key, or describe the mechanism",
+        )
+        return "one-way"
+    return "two-way" if coupling == "two-way" else "one-way"
+
+
+def _refuse_one_way(table: Table) -> None:
+    table.fault(
+        "coupling",
+        "a bearing loaded one-way takes the reaction of a linkage at constant speed",
+        given=show(table.data.get("coupling", "nothing, which is one-way")),
+        allowed='coupling = "two-way" where [mechanism.driver.torque] drives',
+        remedy='write coupling = "two-way", and what such a bearing needs; or delete [mechanism.driver.torque]',
+    )
+
+
+def read_count(table: Table, coupling: str) -> Quantity | None:
+    """How many bearings stand side by side in a joint with play."""
+    if not table.has("count"):
+        return None
+    if coupling == "one-way":
+        table.fault(
+            "count",
+            "a bearing that is loaded one-way carries a share of the reaction",
+            given=show(table.data["count"]),
+            allowed='share, as in 0.5 for one of a pair; count only with coupling = "two-way"',
+            remedy="write share = 0.5 for one of two bearings",
+        )
+    return table.quantity("count", "1", "Bearings side by side at the joint", "n_b", example="2")
+
+
+def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None) -> str:
+    """The body that carries the inner ring: at the frame the other one, where it is not named."""
+    joint = next((j for j in mechanism.joints if j.name == name), None) if mechanism is not None else None
+    with table.table("inner_ring", "body", required=False) as ring:
+        ring.know("body")
+        for key in ("mass", "equivalent_mass", "damping"):
+            if key in ring.data:
+                ring.know(key)
+                ring.fault(
+                    key,
+                    "the inner ring moves with the body that carries it, whose mass contains the ring",
+                    given=show(ring.data[key]),
+                    allowed='nothing but body with coupling = "two-way"',
+                    remedy="delete the key",
+                )
+        if joint is None:
+            return ring.text("body", "crank") or "" if ring.has("body") else ""
+        moving = [body for body in joint.bodies if body != FRAME]
+        if not ring.has("body"):
+            if len(moving) == 1:
+                return moving[0]
+            ring.fault(
+                "body",
+                f"both bodies of the joint {show(joint.name)} move: which one carries the inner ring is not said",
+                given="nothing",
+                allowed=listing(joint.bodies),
+                remedy=f'add the table inner_ring with body = "{moving[0]}"',
+            )
+            return moving[0]
+        body = ring.text("body", moving[0]) or ""
+        if body not in joint.bodies:
+            ring.fault(
+                "body",
+                f"the joint {show(joint.name)} does not join this body",
+                given=show(body),
+                allowed=listing(joint.bodies),
+                remedy=suggest(body, joint.bodies, "name one of the two"),
+            )
+            return moving[0]
+        return body
+
+
+def refuse_effects(table: Table) -> None:
+    """Note a fault for each effect on the balls of a bearing coupled two-way."""
+    for kind in EFFECTS:
+        if table.has(kind):
+            table.fault(
+                kind,
+                "effects on the balls are modelled for rings that turn at constant speed",
+                given=f"{kind}, and coupling two-way",
+                allowed=f'{kind} with coupling = "one-way"',
+                remedy=f"delete {kind}, or load the bearing one-way",
+            )
