@@ -143,6 +143,7 @@ def test_a_wrong_derivative_among_many_right_ones_does_not_hide(wrong: Mapping[i
         assert check.verdict is (Verdict.DISAGREES if k in wrong else Verdict.VERIFIED), k
 
 
+@pytest.mark.long
 def test_of_two_numbers_the_one_known_better_is_given(make_model: Callable[..., Model]) -> None:
     """By speed the steps know the peak's derivative to a tenth, differences to a part in ten thousand."""
     model = make_model("punching_press_tangent")

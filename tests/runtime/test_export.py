@@ -243,6 +243,7 @@ def test_table_of_loads_and_many_segments_equal_python(exported: Callable[..., P
     assert "increase" in refused.stderr
 
 
+@pytest.mark.long
 def test_table_over_the_drivers_angle_equals_python(exported: Callable[..., Program]) -> None:
     rows = 'angle = ["-20 deg", "30 deg", "190 deg"], force = ["0 N", "1200 N", "-60 N"]'
     program = exported(

@@ -272,6 +272,7 @@ def test_derivatives_are_those_of_steps_over_the_kinks_whoever_says_so(make_mode
             ask("bearing.clearance", cycles=1, kinks="locate")  # type: ignore[operator]
 
 
+@pytest.mark.long
 def test_two_loads_that_switch_together_have_no_derivative(
     make_model: Callable[..., Model],
 ) -> None:
