@@ -122,7 +122,12 @@ class Derived:
     def at(self, t: float, x: np.ndarray, gates: Mapping[str, float]) -> list[np.ndarray]:
         """Rates of the states, outputs, angles of the first balls, places of points, torque by the balances."""
         inputs = [
-            self.values[i.offset] if i.kind == "phase" else gates[i.name.removeprefix("gate.")]
+            # no side of a window is held
+            0.0
+            if i.kind == "border"
+            else self.values[i.offset]
+            if i.kind == "phase"
+            else gates[i.name.removeprefix("gate.")]
             for i in self.system.inputs
         ]
         return [part.full()[:, 0] for part in self._function(t, x, inputs, self._p, self._c)]
