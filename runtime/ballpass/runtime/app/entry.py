@@ -9,7 +9,7 @@ from __future__ import annotations
 import signal
 import sys
 
-from ballpass.runtime.app.interrupted import INTERRUPTED
+from ballpass.runtime.app.interrupted import has_said, say_interrupted
 
 
 def main() -> None:
@@ -19,8 +19,12 @@ def main() -> None:
 
         app()
     except KeyboardInterrupt:
-        print(f"error: {INTERRUPTED}", file=sys.stderr)
+        say_interrupted()
         sys.exit(130)
+    except SystemExit as done:
+        if done.code == 130 and not has_said():
+            say_interrupted()
+        raise
     finally:
         # Python gives the signal back to the system while it ends, and that would kill a command that has succeeded
         signal.signal(signal.SIGINT, signal.SIG_IGN)

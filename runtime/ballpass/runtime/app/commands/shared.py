@@ -22,7 +22,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from ballpass.runtime.app.interrupted import INTERRUPTED
+from ballpass.runtime.app.interrupted import say_interrupted
 from ballpass.runtime.contract.errors import BallpassError, RequestError
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def command(scene: Path) -> Iterator[Stages]:
         complain(f"cannot read or write{where}: {why}. Check the path, its permissions and the free space.")
         raise typer.Exit(2) from None
     except KeyboardInterrupt:
-        complain(INTERRUPTED)
+        say_interrupted()
         raise typer.Exit(130) from None
 
 

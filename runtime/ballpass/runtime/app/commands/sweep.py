@@ -24,7 +24,7 @@ from ballpass.runtime.app.commands.shared import (
     show_json,
     warn,
 )
-from ballpass.runtime.app.interrupted import INTERRUPTED
+from ballpass.runtime.app.interrupted import say_interrupted
 from ballpass.runtime.app.tables import wide_console
 from ballpass.runtime.contract.errors import RequestError
 
@@ -167,7 +167,7 @@ def sweep(
             "statistics over more turns (--cycles), and compare no single extremes of them."
         )
     if result.interrupted:
-        complain(INTERRUPTED)
+        say_interrupted()
         raise typer.Exit(130)
     if len(result.failures) == count:
         complain(f"none of the {count} members has results: {result.failures[0].message}")
