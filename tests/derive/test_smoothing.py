@@ -160,6 +160,7 @@ def test_scenes_without_the_key_know_nothing_of_it(scene_text: Callable[..., str
     assert law.count("<") + law.count(">") <= {"none": 1, "one-sided": 2, "tangent": 2}[damping]
 
 
+@pytest.mark.long
 def test_motion_goes_to_that_of_hertz_with_the_width(make_model: Callable[..., Model]) -> None:
     """The width is a run-time number; a quarter of it brings the motion nearer by more than a factor of four."""
     plain, smoothed = make_model("varying_compliance"), make_model("varying_compliance", CONTACT)

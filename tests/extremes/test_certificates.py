@@ -15,7 +15,8 @@ from ballpass.runtime.certify.certificate import Verdict
 pytestmark = pytest.mark.extreme
 
 
-@pytest.mark.parametrize("number", [pytest.param(2, marks=pytest.mark.long), 4])
+@pytest.mark.long
+@pytest.mark.parametrize("number", [2, 4])
 def test_what_is_verified_is_so(make_model: Callable[..., Model], number: int, holds: Callable[..., None]) -> None:
     """What a certificate calls verified agrees with differences of SciPy's runs."""
     scene = "varying_compliance"

@@ -90,6 +90,7 @@ def test_steps_end_at_the_knots_and_a_turn_has_each_of_them(shaper: Model) -> No
     np.testing.assert_allclose(times, [t for t in expected if 0.0 < t < 1.0], rtol=1e-14)
 
 
+@pytest.mark.long
 def test_sensitivities_by_knots_are_those_of_differences(shaper: Model) -> None:
     """A value of the table, and an angle, which moves the time of a breakpoint."""
     for name, step in ((f"{TABLE}force.2", 1.0), (f"{TABLE}angle.3", 1e-5)):

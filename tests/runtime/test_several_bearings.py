@@ -98,7 +98,8 @@ def test_the_manifest_lists_them_and_their_coordinates(pair: Model) -> None:
     assert len(pair.states) == 12
 
 
-@pytest.mark.parametrize("smooth_first", [False, pytest.param(True, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("smooth_first", [False, True])
 def test_kinks_are_located_beside_a_bearing_that_has_none(
     scene_text: Callable[..., str], alone: dict[str, Model], tmp_path: Path, smooth_first: bool
 ) -> None:
