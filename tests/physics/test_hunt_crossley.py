@@ -89,6 +89,7 @@ def test_a_smoothed_contact_keeps_the_law(tmp_path: Path) -> None:
     assert speed == pytest.approx(-rebound(FACTOR), rel=5e-7)
 
 
+@pytest.mark.long
 def test_lankarani_and_nikravesh_lose_what_restitution_says(tmp_path: Path) -> None:
     restitution = 0.98
     elastic = impact(tmp_path, f'restitution = {restitution}\nimpact_speed = "{SPEED} m/s"')

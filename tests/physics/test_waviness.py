@@ -64,6 +64,7 @@ def test_the_rate_is_that_of_the_deflection(held: Model, order: int) -> None:
     assert rate == pytest.approx(difference, rel=1e-7, abs=1e-9 * np.max(np.abs(rate)))
 
 
+@pytest.mark.long
 def test_stepper_lanes_and_virtual_machine_agree(held: Model) -> None:
     waves = {"bearing.outer_waviness.7.amplitude": 0.5e-6, "bearing.outer_waviness.9.amplitude": 0.2e-6}
     runs = [held.simulate(cycles=0.5, transient=0, parameters=waves, method=m, rtol=1e-9).x for m in METHODS]

@@ -105,7 +105,7 @@ def test_lanes_take_the_steps_of_single_runs(make_model: ModelMaker, law: str, r
     assert result.statistics.rejected == pytest.approx(sum(single.rejected for single in singles), rel=0.05)
 
 
-@pytest.mark.parametrize("method", ["auto", "stepper-dp54"])
+@pytest.mark.parametrize("method", [pytest.param("auto", marks=pytest.mark.long), "stepper-dp54"])
 def test_members_that_locate_kinks_are_single_runs_that_do(make_model: ModelMaker, method: str) -> None:
     """The same bits, one member at a time; without being told, members locate kinks where single runs do."""
     model, columns = press(make_model, "one-sided-gated"), table(3)
@@ -161,7 +161,8 @@ def test_members_of_smoothed_laws_have_no_kinks_to_locate(make_model: ModelMaker
     assert same(located, model.simulate_many(columns, ["rms:inner.y"], cycles=1, transient=0, lanes=False))
 
 
-@pytest.mark.parametrize("method", [pytest.param("stepper-dp54", marks=pytest.mark.long), "stepper-rodas5p"])
+@pytest.mark.long
+@pytest.mark.parametrize("method", ["stepper-dp54", "stepper-rodas5p"])
 def test_lanes_serve_balls_without_an_opposite_one(make_model: ModelMaker, method: str) -> None:
     """An odd number of balls has no pairs that share a direction."""
     model, columns = make_model("punching_press", ("balls = 8 ", "balls = 7 ")), table(3)
@@ -382,6 +383,7 @@ TABLE = (
 )
 
 
+@pytest.mark.long
 def test_loads_from_tables_run_in_ensembles(make_model: ModelMaker) -> None:
     model = make_model("varying_compliance", (LOAD, TABLE), ('force = ["196 N", "0 N"] ', ""))
     times = next(name for name in model.parameters if "time" in name and name.endswith("2"))

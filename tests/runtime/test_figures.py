@@ -77,6 +77,7 @@ def test_a_scene_without_mechanism_gets_the_bearing_s_figures(shaft: Run, tmp_pa
     assert [path.stem for path in draw_all(*shaft, tmp_path)] == [*NAMES[1:]]
 
 
+@pytest.mark.long
 def test_every_bearing_gets_its_figures(
     make_model: Callable[..., Model], scene_text: Callable[..., str], tmp_path: Path
 ) -> None:

@@ -15,6 +15,8 @@ from ballpass.runtime import Model
 from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.certify.sensitivity_report import Sensitivity
 
+pytestmark = pytest.mark.long
+
 TABLE = Path(__file__).resolve().parents[2] / "build" / "sensitivity_pairs.md"
 
 

@@ -79,6 +79,7 @@ def test_reductions_and_lanes_tell_the_bearings_apart(pair: Model, alone: dict[s
         assert many[f"max:{name}.ball.force"] == pytest.approx(own["ball.force"].maximum, rel=1e-4)
 
 
+@pytest.mark.long
 def test_derivatives_by_one_bearing_move_that_bearing_alone(pair: Model, alone: dict[str, Model]) -> None:
     run = {"cycles": 0.05, "rtol": 1e-10, "method": "stepper-dp54"}
     both = pair.sensitivities(["bearings.left.share", "bearings.right.clearance"], **run)
