@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -74,6 +75,9 @@ SPRUNG = (
 )
 OFF_CENTRE = (('{ distance = "0 mm", angle = "0 deg" }', '{ distance = "4 mm", angle = "50 deg" }'),)
 
+
+#: BALLPASS_LONG=1 takes minutes more.
+LONG = bool(os.environ.get("BALLPASS_LONG"))
 
 FRAME_POINTS = "[mechanism.frame.points]"
 MOTOR = """[mechanism.driver.torque]
@@ -284,7 +288,9 @@ def test_energy_changes_by_the_work_of_the_drive_alone(clearance: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["press, A", "press, A B C elastic", "four-bar", "sprung shaper", "run-down", "motor"])
+@pytest.mark.parametrize(
+    "name", ["press, A B C elastic", "run-down", "motor", *(("press, A", "four-bar", "sprung shaper") if LONG else ())]
+)
 def test_energy_changes_by_the_work_of_the_drive_alone_in_long_runs(name: str) -> None:
     press = text("punching_press", *IDLE_PRESS)
     scene, turns = {
@@ -469,7 +475,7 @@ def test_random_linkages_move_as_in_absolute_coordinates(topology: int) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [13, 22, 47, 57, 79])
+@pytest.mark.parametrize("seed", [13, 57, *((22, 47, 79) if LONG else ())])
 def test_random_linkages_run_alike_by_an_explicit_and_an_implicit_method(seed: int, tmp_path: Path) -> None:
     """And as SciPy integrates the equations."""
     scene = random_scene(seed)
