@@ -38,7 +38,7 @@ class Effort:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Motion:
+class EquationsOfMotion:
     """Equations of motion ``mass * accelerations = forcing``, both of symbols that `definitions` explain."""
 
     mass: sp.ImmutableMatrix
@@ -125,7 +125,7 @@ class LinearForms:
             )
         return self._biases[symbol]
 
-    def motion(self, inertias: Sequence[Inertia], efforts: Sequence[Effort]) -> Motion:
+    def motion(self, inertias: Sequence[Inertia], efforts: Sequence[Effort]) -> EquationsOfMotion:
         """M and Q - h of what has inertia and what does work: the sums of J^T m J and of J^T (F - m a0)."""
         size = len(self._coordinates)
         mass = [[sp.S.Zero] * size for _ in range(size)]
@@ -160,4 +160,4 @@ class LinearForms:
                 f"f_{{{symbols[i]}}}",
             )
         full = sp.ImmutableMatrix(size, size, lambda i, j: mass[max(i, j)][min(i, j)])
-        return Motion(mass=full, forcing=sp.ImmutableMatrix(size, 1, forcing), definitions=self.definitions)
+        return EquationsOfMotion(mass=full, forcing=sp.ImmutableMatrix(size, 1, forcing), definitions=self.definitions)

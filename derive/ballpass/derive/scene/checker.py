@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 from ballpass.derive.scene.errors import Fault
 from ballpass.derive.scene.records import Bounds, Quantity, Vector
@@ -66,3 +67,34 @@ class Checker:
             problem = "the value is negative" if value < 0.0 else "the value is out of its bounds"
             allowed = "a value " + " ".join(f"{words} {bound:g}" for bound, words, _ in given)
             self.fault(quantity.path, problem, self.show(quantity), allowed, "correct the value")
+
+    def rows(self, path: str, argument: Sequence[Quantity], values: Sequence[Quantity], word: str, remedy: str) -> bool:
+        """Two columns of a table: one length, two rows or more, the first one increasing; whether there are rows.
+
+        Parameters
+        ----------
+        path : of the table
+        word : what the first column holds, "angle"
+        remedy : for columns that differ in length, or are too short
+        """
+        counts = len(argument), len(values)
+        if min(counts) == 0:  # reported when it was read
+            return False
+        if counts[0] != counts[1] or counts[0] < 2:
+            self.fault(
+                path,
+                "the columns of the table differ in length" if counts[0] != counts[1] else "the table has too few rows",
+                " and ".join(str(count) for count in counts),
+                "two columns of one length, two rows or more",
+                remedy,
+            )
+        for before, behind in pairwise(argument):
+            if behind.value <= before.value:
+                self.fault(
+                    behind.path,
+                    f"the {word} does not increase",
+                    f"{self.show(behind)} after {self.show(before)}",
+                    f"strictly increasing {word}s",
+                    f"sort the rows by {word}; write a jump as two rows with a small step of {word} between them",
+                )
+        return True

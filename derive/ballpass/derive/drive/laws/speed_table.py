@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import ClassVar, Self
 
 import sympy as sp
@@ -42,23 +41,7 @@ class SpeedTable(TorqueLaw):
 
     def check(self, checker: Checker) -> None:
         """Columns of one length, of two rows or more; speeds increase."""
-        rows = len(self.speed), len(self.amount)
-        if min(rows) == 0:  # reported when it was read
-            return
-        if rows[0] != rows[1] or rows[0] < 2:
-            checker.fault(
-                self.speed[0].path.rpartition(".")[0].rpartition(".")[0],
-                "the columns of the table differ in length" if rows[0] != rows[1] else "the table has too few rows",
-                " and ".join(str(count) for count in rows),
-                "two columns of one length, two rows or more",
-                'give every row a speed and a torque, or write law = "constant"',
-            )
-        for before, behind in pairwise(self.speed):
-            if behind.value <= before.value:
-                checker.fault(
-                    behind.path,
-                    "the speed does not increase",
-                    f"{checker.show(behind)} after {checker.show(before)}",
-                    "strictly increasing speeds",
-                    "sort the rows by speed; write a jump as two rows with a small step of speed between them",
-                )
+        if self.speed:
+            path = self.speed[0].path.rpartition(".")[0].rpartition(".")[0]
+            remedy = 'give every row a speed and a torque, or write law = "constant"'
+            checker.rows(path, self.speed, self.amount, "speed", remedy)

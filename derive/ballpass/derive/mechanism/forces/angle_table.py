@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import ClassVar, Self
 
 import sympy as sp
@@ -49,27 +48,11 @@ class AngleTable(Law):
 
     def check(self, checker: Checker) -> None:
         """Columns of one length, of two rows or more; angles increase within a turn."""
-        rows = len(self.angle), len(self.values)
-        if min(rows) == 0:  # reported when it was read
+        if not self.angle:
             return
-        path = self.angle[0].path.rpartition(".")[0]
-        if rows[0] != rows[1] or rows[0] < 2:
-            checker.fault(
-                path,
-                "the columns of the table differ in length" if rows[0] != rows[1] else "the table has too few rows",
-                " and ".join(str(count) for count in rows),
-                "two columns of one length, two rows or more",
-                "give every row an angle and a value, or delete the table for a load that does not change",
-            )
-        for before, behind in pairwise(self.angle):
-            if behind.value <= before.value:
-                checker.fault(
-                    behind.path,
-                    "the angle does not increase",
-                    f"{checker.show(behind)} after {checker.show(before)}",
-                    "strictly increasing angles",
-                    "sort the rows by angle; write a jump as two rows with a small angle between them",
-                )
+        remedy = "give every row an angle and a value, or delete the table for a load that does not change"
+        if not checker.rows(self.angle[0].path.rpartition(".")[0], self.angle, self.values, "angle", remedy):
+            return
         if self.angle[-1].value - self.angle[0].value >= _TURN * (1.0 - 1e-12):
             checker.fault(
                 self.angle[-1].path,
