@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from ballpass.runtime.native.compilers import find_compiler
-from benchmarks import ensembles, page, preparation, sensitivities, work_precision
+from benchmarks import coupling, ensembles, page, preparation, sensitivities, work_precision
 from benchmarks.problem import CASES, ROOT
 
-PACKAGES = ("casadi", "numpy", "scipy", "sympy", "numba", "numbalsoda", "scikit-sundae", "jax", "diffrax")
+PACKAGES = ("casadi", "numpy", "scipy", "sympy", "numba", "numbalsoda", "scikit-sundae", "jax", "diffrax", "exudyn")
 
 
 def parts(quick: bool) -> dict[str, Callable[[], dict[str, Any]]]:
@@ -26,6 +26,7 @@ def parts(quick: bool) -> dict[str, Callable[[], dict[str, Any]]]:
     effort = work_precision.QUICK if quick else work_precision.Effort()
     return {
         "work_precision": lambda: {case.key: work_precision.measure(case, effort) for case in CASES},
+        "coupling": lambda: coupling.measure(1 if quick else 15),
         "ensembles": lambda: ensembles.measure(64 if quick else 10_000, 1 if quick else 5),
         "sensitivities": lambda: sensitivities.measure(1 if quick else 9, not quick),
         "preparation": lambda: preparation.measure(1 if quick else 5),

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.native.stepper import METHODS, End, Family
+from ballpass.runtime.native.stepper import METHODS, End
 from ballpass.runtime.run.locating import choose_kinks, stepper_for
-from benchmarks.problem import POINTS, Member
+from benchmarks.problem import POINTS, Cycle, Member
 
 DECADES = tuple(10.0**-k for k in range(2, 11))
 HALVES = tuple(10.0**-k for k in np.arange(1.5, 11.1, 0.5))
@@ -54,26 +54,29 @@ class Kept:
         return self._made[id(member)][1]
 
 
-def _stepper(name: str, family: Family) -> Contender:
-    def solve(member: Member, tolerance: float) -> np.ndarray:
-        """One raw call on prepared arrays."""
-        stepper = stepper_for(member.model, choose_kinks(None, name, member.model.manifest, tolerance))
-        states = np.empty((POINTS, len(member.start)))
-        outcome = stepper.run(
-            family=family,
-            tolerance=tolerance * member.magnitude,
-            p=member.numbers.p,
-            c=member.numbers.c,
-            x=member.start.copy(),
-            segments=member.segments,
-            output_times=member.times,
-            output_states=states,
-        )
-        if outcome.end is not End.DONE:
-            states[outcome.written :] = np.nan
-        return states
+def stepped(cycle: Cycle, name: str, tolerance: float) -> np.ndarray:
+    """States at the output points by one raw call of the stepper on prepared arrays; NaN behind a failure."""
+    stepper = stepper_for(cycle.model, choose_kinks(None, name, cycle.model.manifest, tolerance))
+    states = np.empty((POINTS, len(cycle.start)))
+    outcome = stepper.run(
+        family=METHODS[name],
+        tolerance=tolerance * cycle.magnitude,
+        p=cycle.numbers.p,
+        c=cycle.numbers.c,
+        x=cycle.start.copy(),
+        segments=cycle.segments,
+        output_times=cycle.times,
+        output_states=states,
+    )
+    if outcome.end is not End.DONE:
+        states[outcome.written :] = np.nan
+    return states
 
-    return Contender(label=name, group="ballpass", solve=solve, tolerances=HALVES)
+
+def _stepper(name: str) -> Contender:
+    return Contender(
+        label=name, group="ballpass", solve=lambda member, tol: stepped(member, name, tol), tolerances=HALVES
+    )
 
 
 def _simulated(method: str, outputs: list[str] | None) -> Solve:
@@ -90,7 +93,7 @@ def _simulated(method: str, outputs: list[str] | None) -> Solve:
 def own_contenders() -> list[Contender]:
     """All of them, in the order of tables; plain `stepper`, to which ratios are, first."""
     return [
-        *(_stepper(name, family) for name, family in METHODS.items()),
+        *(_stepper(name) for name in METHODS),
         Contender(label="model.simulate, outputs included", group="model.simulate", solve=_simulated("stepper", None),
                   tolerances=HALVES),
         *(Contender(label=f"CasADi {name}, virtual machine", group="CasADi", solve=_simulated(name, []))

@@ -92,45 +92,27 @@ def parameter_sets(case: Case, model: Model, count: int) -> list[dict[str, float
     return sets
 
 
-class Member:
-    """One parameter set of a case, ready to be run by any contender.
+class Cycle:
+    """One turn of a machine with given numbers and start, as the stepper takes it.
 
     Attributes
     ----------
+    model : that is run
     parameters : overrides of the model's defaults, SI
     numbers : all parameters and constants as the runtime has them
-    press : the same for the formulas written by hand
-    magnitude : of the states, shape (8,): tolerances are relative to it
-    start : state at the start of the cycle, shape (8,)
+    start : state at the start, shape (states,)
+    magnitude : of the states, shape (states,): tolerances are relative to it
     times : output points [s], shape (POINTS,)
-    edges, gates : ends of the segments of constant punch force [s], and whether the punch acts in each
-    reference : states at the output points, shape (POINTS, 8); the mean of two methods at a tight tolerance
-    agreement : largest difference of the two over the range of the ring's motion [1]
+    edges : ends of the segments with one input each [s]
     """
 
-    def __init__(self, case: Case, model: Model, parameters: dict[str, float]) -> None:
-        self.case = case
-        self.model = model
-        transient = model.simulate(
-            cycles=TRANSIENT, parameters=parameters, method="stepper-dop853", rtol=1e-11, samples_per_cycle=2
-        )
-        values = model.numbers(parameters).values
-        turned = values["bearing.ball_angle"] + values["bearing.cage_speed"] * float(transient.t[-1])
-        self.parameters = {**parameters, "bearing.ball_angle": math.fmod(turned, 2.0 * math.pi)}
-        self.start = np.array(transient.x[-1])
-        self.magnitude = np.array(transient.statistics.magnitudes)
-        self.numbers: Numbers = model.numbers(self.parameters)
-        self.press: Press = press_numbers(model, self.parameters)
-        self.period = model.period(self.parameters)
+    def __init__(self, model: Model, parameters: dict[str, float], start: np.ndarray, magnitude: np.ndarray) -> None:
+        self.model, self.parameters, self.start, self.magnitude = model, parameters, start, magnitude
+        self.numbers: Numbers = model.numbers(parameters)
+        self.period = model.period(parameters)
         # the quotient may lie a last digit behind the end
         self.times = np.minimum(self.period * np.arange(1, POINTS + 1) / POINTS, self.period)
         self.edges = segment_edges(model, self.numbers, 0.0, self.period, self.period)
-        self.gates = tuple(
-            float(self.press.window_start <= self.press.speed * 0.5 * (a + b) < self.press.window_end)
-            for a, b in pairwise(self.edges)
-        )
-        self.reference = np.zeros((0, 0))
-        self.agreement = math.nan
 
     @cached_property
     def segments(self) -> Segments:
@@ -140,6 +122,36 @@ class Member:
             clock.inputs_at(infos, self.numbers.values, float(a), 0.5 * float(a + b)) for a, b in pairwise(self.edges)
         ]
         return Segments(times=self.edges, inputs=np.array(inputs), restarts=np.ones(len(inputs), dtype=bool))
+
+
+class Member(Cycle):
+    """One parameter set of a case, ready to be run by any contender.
+
+    Attributes
+    ----------
+    press : the numbers for the formulas written by hand
+    gates : whether the punch acts, in each segment
+    reference : states at the output points, shape (POINTS, 8); the mean of two methods at a tight tolerance
+    agreement : largest difference of the two over the range of the ring's motion [1]
+    """
+
+    def __init__(self, case: Case, model: Model, parameters: dict[str, float]) -> None:
+        self.case = case
+        transient = model.simulate(
+            cycles=TRANSIENT, parameters=parameters, method="stepper-dop853", rtol=1e-11, samples_per_cycle=2
+        )
+        values = model.numbers(parameters).values
+        turned = values["bearing.ball_angle"] + values["bearing.cage_speed"] * float(transient.t[-1])
+        parameters = {**parameters, "bearing.ball_angle": math.fmod(turned, 2.0 * math.pi)}
+        magnitude = np.array(transient.statistics.magnitudes)
+        super().__init__(model, parameters, np.array(transient.x[-1]), magnitude)
+        self.press: Press = press_numbers(model, self.parameters)
+        self.gates = tuple(
+            float(self.press.window_start <= self.press.speed * 0.5 * (a + b) < self.press.window_end)
+            for a, b in pairwise(self.edges)
+        )
+        self.reference = np.zeros((0, 0))
+        self.agreement = math.nan
 
     @cached_property
     def pieces(self) -> tuple[tuple[float, float, float, np.ndarray], ...]:
