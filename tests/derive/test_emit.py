@@ -28,7 +28,9 @@ def test_committed_artefact_is_reproduced_byte_for_byte() -> None:
     assert check(ROOT / "scenes/punching_press.toml", ROOT / "generated/punching_press").stale == ()
 
 
-@pytest.mark.parametrize("name", ["punching_press", pytest.param("crank_shaper", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "name", ["punching_press", *(pytest.param(n, marks=pytest.mark.long) for n in ("crank_shaper", "andrews"))]
+)
 def test_same_bytes_in_another_process_with_another_hash_seed(name: str, tmp_path: Path) -> None:
     scene = ROOT / "scenes" / f"{name}.toml"
     generate(scene, tmp_path / "here")

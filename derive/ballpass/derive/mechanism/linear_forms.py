@@ -102,7 +102,7 @@ class LinearForms:
     def bias(self, acceleration: sp.Expr) -> sp.Expr:
         """An acceleration with all generalized accelerations zero."""
         acceleration = sp.sympify(acceleration)
-        return acceleration.xreplace({s: self._bias_of(s) for s in acceleration.free_symbols})
+        return acceleration.xreplace({s: self._bias_of(s) for s in sorted(acceleration.free_symbols, key=str)})
 
     def _bias_of(self, symbol: sp.Symbol) -> sp.Expr:
         if symbol in self._at_rest:
