@@ -17,7 +17,7 @@ from absolute import QUARTER, TURN, Absolute, Array, rotation
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
-from ballpass.derive.mechanism.forces import BodyTorque, PointForce, Windows
+from ballpass.derive.mechanism.forces import BodyTorque, Friction, PointForce, Windows
 from ballpass.derive.mechanism.forces.spring_damper import SpringDamper
 from ballpass.derive.mechanism.forces.two_bodies import TwoBodies
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
@@ -194,6 +194,13 @@ class Multibody(Absolute):
                 out += gate * self.vector(path.force) @ place.jacobian
             elif isinstance(path, BodyTorque):
                 out += gate * self.value(path.torque) * self.row(path.body)
+            elif isinstance(law, Friction):
+                slope = self._joint_slope(path.joint, q, v)
+                rate = float(slope @ v)
+                amount = self.value(law.viscous) * rate
+                if law.coulomb is not None:
+                    amount += self.value(law.coulomb) * math.tanh(rate / self.value(law.smoothing))
+                out -= amount * slope
             else:
                 assert isinstance(law, SpringDamper)
                 size, slope = self._size(path, q, v)
@@ -202,6 +209,15 @@ class Multibody(Absolute):
                     amount += self.value(law.stiffness) * self._beyond(path, size, self.value(law.free))
                 out -= amount * slope
         return out
+
+    def _joint_slope(self, name: str, q: Array, v: Array) -> Array:
+        """Gradient of the angle, or of the travel, that a joint leaves free."""
+        joint = self.mechanism.joint(name)
+        if joint.kind == "revolute":
+            return self.row(joint.bodies[1]) - self.row(joint.bodies[0])
+        one, two = (self.place(b, self.arm(b, p), q, v) for b, p in zip(joint.bodies, joint.points, strict=True))
+        angle = self.angle(joint.bodies[0], q) + self.value(joint.direction)
+        return np.array([math.cos(angle), math.sin(angle)]) @ (two - one).jacobian
 
     def _size(self, path: TwoPoints | TwoBodies, q: Array, v: Array) -> tuple[float, Array]:
         """Length or angle of a spring and its gradient."""

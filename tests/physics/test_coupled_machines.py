@@ -51,6 +51,25 @@ preload = "3 N*m"
 [mechanism.forces.cut]
 """
 
+FRICTION = """[mechanism.friction.pin]
+joint = "B"
+viscous = "0.4 N*m*s/rad"
+torque = "30 N*m"
+smoothing = "5 rad/s"
+
+[mechanism.friction.pivot]
+joint = "A"
+viscous = "0.3 N*m*s/rad"
+
+[mechanism.guide_friction.slot]
+joint = "S"
+viscous = "60 N*s/m"
+force = "250 N"
+smoothing = "0.4 m/s"
+
+[mechanism.forces.cut]
+"""
+
 
 @cache
 def text(name: str, *changes: tuple[str, str]) -> str:
@@ -156,6 +175,11 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         "crank_shaper",
         SPRUNG,
         (bearing("A", elastic=True), bearing("B", "block", elastic=True), bearing("O", "lever", count=2)),
+    ),
+    "shaper with friction and motor": (
+        "crank_shaper",
+        (("[mechanism.forces.cut]\n", FRICTION), *driven_by(DIRECT_CURRENT)),
+        (bearing("B", "block", elastic=True),),
     ),
     "Whitworth": (
         "crank_shaper",

@@ -43,7 +43,10 @@ METHODS = (
 #: Largest file that is read [bytes]; the largest sensible one is a table of loads.
 MAX_FILE_SIZE = 8_000_000
 #: First parts of the names of a mechanism's variables and of inputs: a bearing's names may not begin so.
-RESERVED = ("body", "driver", "gate", "input", "joint", "load", "phase", "reaction", "spring", "torsion_spring")
+RESERVED = (
+    *("body", "driver", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "reaction"),
+    *("spring", "torsion_spring"),
+)
 _TABLES = ("mechanism", "shaft", "load", "bearing", "bearings", "run")
 
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 from itertools import groupby
 
+from ballpass.derive.mechanism.forces.friction import Friction
 from ballpass.derive.mechanism.forces.windows import Windows
 from ballpass.derive.scene.records import Bearing, HertzContact, Mechanism, Quantity, Scene
 from ballpass.runtime.contract.manifest import UsualInfo
@@ -28,6 +29,8 @@ SHARES = (1.0 - 1e-9, 1.0 + 1e-9)
 #: An angle of the driver [rad].  Both edges of a window between zero and 2 pi degrees are probably meant in radians.
 ANGLE = (-4.0 * math.pi, 4.0 * math.pi)
 RADIANS = math.radians(2.0 * math.pi)
+#: Speed within which Coulomb friction turns round, over the speed of a constant drive: above it is mostly viscous.
+TURNS_ROUND = (None, 0.1)
 
 
 def usual_ranges(scene: Scene) -> tuple[UsualInfo, ...]:
@@ -35,6 +38,7 @@ def usual_ranges(scene: Scene) -> tuple[UsualInfo, ...]:
     found: list[UsualInfo] = []
     if scene.mechanism is not None:
         found += _of_windows(scene.mechanism)
+        found += _of_friction(scene.mechanism)
     for bearing in scene.bearings:
         found += _of_bearing(bearing)
     at_joint = sorted((b for b in scene.bearings if b.joint is not None), key=lambda bearing: bearing.joint or "")
@@ -65,6 +69,15 @@ def _of_windows(mechanism: Mechanism) -> Iterator[UsualInfo]:
             names = (window.start.path, window.end.path)
             hint = "Check whether radians were given as degrees."
             yield UsualInfo(names=names, least=RADIANS, each=True, hint=hint)
+
+
+def _of_friction(mechanism: Mechanism) -> Iterator[UsualInfo]:
+    for force in mechanism.forces:
+        law, driver = force.law, mechanism.driver
+        smoothing = law.smoothing if isinstance(law, Friction) and driver.torque is None else None
+        if smoothing is not None and smoothing.unit == driver.speed.unit:
+            hint = "Coulomb friction is whole only at rates well above it: give a smaller one."
+            yield _range(smoothing, TURNS_ROUND, hint, driver.speed)
 
 
 def _of_bearing(bearing: Bearing) -> Iterator[UsualInfo]:

@@ -8,14 +8,26 @@ from ballpass.derive.mechanism.forces.applied import Forces, derive_forces, draw
 from ballpass.derive.mechanism.forces.body_torque import BodyTorque
 from ballpass.derive.mechanism.forces.constant import Constant
 from ballpass.derive.mechanism.forces.force import ForceTable, Law, Pathway
+from ballpass.derive.mechanism.forces.friction import Friction
+from ballpass.derive.mechanism.forces.joint_motion import JointMotion, JointTravel, JointTurn
 from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.forces.spring_damper import SpringDamper
 from ballpass.derive.mechanism.forces.two_bodies import TwoBodies
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.mechanism.forces.windows import Windows
 
-__all__ = ["FORCE_TABLES", "BodyTorque", "Constant", "ForceTable", "Forces", "Law", "Pathway", "PointForce", "Windows"]
-__all__ += ["derive_forces", "drawn_forces"]
+__all__ = [
+    "FORCE_TABLES",
+    "BodyTorque",
+    "Constant",
+    "ForceTable",
+    "Forces",
+    "Friction",
+    "JointMotion",
+    "Law",
+    "Pathway",
+]
+__all__ += ["PointForce", "Windows", "derive_forces", "drawn_forces"]
 
 #: In the order in which their numbers are listed; of the laws of a table the one whose key is there, else the last.
 FORCE_TABLES: tuple[ForceTable, ...] = (
@@ -23,4 +35,6 @@ FORCE_TABLES: tuple[ForceTable, ...] = (
     ForceTable("torques", "torque", "body and torque", BodyTorque, (Windows, AngleTable, Constant)),
     ForceTable("springs", "spring", "bodies, points and stiffness", TwoPoints, (SpringDamper,)),
     ForceTable("torsion_springs", "spring", "bodies and stiffness", TwoBodies, (SpringDamper,)),
+    ForceTable("friction", "friction", "joint and viscous", JointTurn, (Friction,)),
+    ForceTable("guide_friction", "friction", "joint and viscous", JointTravel, (Friction,)),
 )
