@@ -83,11 +83,11 @@ def with_bearings(text: str, *bearings: str) -> Scene:
 class Derived:
     """Accelerations, outputs and ball angles of a scene, from the derived equations as CasADi evaluates them.
 
-    `changes` are other values of parameters, by path.
+    `changes` are other values of parameters, by path; `further` are patterns of outputs on request.
     """
 
-    def __init__(self, scene: Scene, changes: Mapping[str, float] = {}) -> None:
-        self.scene = replace(scene, outputs=("*",))
+    def __init__(self, scene: Scene, changes: Mapping[str, float] = {}, further: tuple[str, ...] = ()) -> None:
+        self.scene = replace(scene, outputs=("*", *further))
         self.system = system = derive(self.scene)
         lowering = _Lowering(system)  # less than `lower`: no derivatives, which take seconds
         balls, visit = lowering._balls(lowering.visit), lowering.visit

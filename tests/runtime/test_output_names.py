@@ -32,6 +32,12 @@ def test_what_the_scene_did_not_ask_for_is_told_with_the_line_that_asks(model: M
             ask()
 
 
+@pytest.mark.parametrize("name", ["point.slider.C.ay", "ball.inner_pressure", "force.punch.power", "kinetic_energy"])
+def test_outputs_on_request_are_told_with_their_own_names(model: Model, name: str) -> None:
+    with pytest.raises(RequestError, match=re.escape(f"{name!r} is computed only for a scene that names it")):
+        model.sensitivity(of=[f"max:{name}"], wrt=["bearing.clearance"])
+
+
 def test_the_remedy_works(
     model: Model, scene_text: Callable[..., str], tmp_path_factory: pytest.TempPathFactory
 ) -> None:

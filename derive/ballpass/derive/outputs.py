@@ -5,6 +5,7 @@ In: the derived parts of a model.  Out: `Output` after `Output`, each an express
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
 
 import sympy as sp
@@ -107,26 +108,41 @@ def is_asked(patterns: tuple[str, ...], name: str) -> bool:
     return any(fnmatchcase(name, p) for p in patterns)
 
 
-def select_outputs(available: list[Output], patterns: tuple[str, ...]) -> tuple[Output, ...]:
-    """Outputs that the patterns name, in the order of `available`.
+def select_outputs(
+    available: Sequence[Output], requested: Sequence[Output], patterns: tuple[str, ...]
+) -> tuple[Output, ...]:
+    """Outputs that the patterns name, in the order of `available`, then of `requested`.
+
+    A pattern means those of `available` that it matches; only where there are none, those of `requested`.
 
     Raises
     ------
     SceneError
         A pattern names none of them.
     """
-    names = [o.name for o in available]
+    names, further = [o.name for o in available], [o.name for o in requested]
+    beyond = tuple(p for p in patterns if not any(fnmatchcase(name, p) for name in names))
     faults = [
         Fault(
             key="run.outputs",
             problem="no output of this scene matches",
             given=repr(pattern),
-            allowed=", ".join(names),
+            allowed=", ".join(names) + f"; on request {_grouped(further)}" * bool(further),
             remedy="correct or remove the pattern",
         )
-        for pattern in patterns
-        if not any(fnmatchcase(name, pattern) for name in names)
+        for pattern in beyond
+        if not any(fnmatchcase(name, pattern) for name in further)
     ]
     if faults:
         raise SceneError(faults)
-    return tuple(o for o in available if is_asked(patterns, o.name))
+    asked = (o for o in available if is_asked(patterns, o.name))
+    return (*asked, *(o for o in requested if is_asked(beyond, o.name)))
+
+
+def _grouped(names: Sequence[str]) -> str:
+    """Names with what stands before the last dot once: point.rod.B.{x,y,vx,vy}."""
+    ends: dict[str, list[str]] = {}
+    for name in names:
+        stem, dot, end = name.rpartition(".")
+        ends.setdefault(stem + dot if dot else name, []).append(end)
+    return ", ".join(stem + f"{{{','.join(found)}}}" if stem.endswith(".") else stem for stem, found in ends.items())

@@ -29,12 +29,13 @@ from ballpass.derive.drive import Drive, WindowEdges, constant_speed, drive_of
 from ballpass.derive.events import Event, events_of
 from ballpass.derive.mechanism.forces import Forces, derive_forces
 from ballpass.derive.mechanism.kinematics import Play
-from ballpass.derive.mechanism.linear_forms import LinearForms
+from ballpass.derive.mechanism.linear_forms import Effort, Inertia, LinearForms
 from ballpass.derive.mechanism.linkage import NO_PLAY, Linkage, check_assembly, derive_linkage
 from ballpass.derive.mechanism.power import inertia_of, loads_of_drive, work_of, work_of_drive
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
 from ballpass.derive.mechanism.swing import STILL, WITH_DRIVER, swing_of
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
+from ballpass.derive.requested import bearing_power_outputs, contact_outputs, motion_outputs, power_outputs
 from ballpass.derive.scene.errors import LinkageError, SceneError
 from ballpass.derive.scene.records import FRAME, Bearing, Mechanism, Scene
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
@@ -47,8 +48,8 @@ class System:
 
     `constants` are the derived constants (functions of the parameters only).  `definitions` is the ordered rest.
     `mass * d(velocities)/dt = forcing`; both empty without a bearing.  `linear_forms` are the definitions of their
-    entries, where bearings and linkage move each other.  `quantities` is all that the model can report,
-    `outputs` what the scene asks for.
+    entries, where bearings and linkage move each other.  `quantities` is all that the model can report
+    without request, and what the scene names beyond; `outputs` is what the scene asks for.
     """
 
     scene: Scene
@@ -184,6 +185,7 @@ def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sy
         inputs=(*drive.inputs, *forces.inputs),
         definitions=(*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions),
         quantities=(*mechanism_outputs(mechanism, linkage, reactions), *forces.outputs),
+        requested=_requested(mechanism, linkage, reactions, forces, *inertia_of(mechanism, linkage)),
         linkage=linkage,
         reactions=reactions,
     )
@@ -253,11 +255,44 @@ def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sys
             *mechanism_outputs(mechanism, linkage, reactions),
             *forces.outputs,
         ),
+        requested=(
+            *_requested(
+                mechanism,
+                linkage,
+                reactions,
+                forces,
+                (*inertias, *turning, *(i for part in coupled for i in part.inertias)),
+                (*weights, *(e for part in coupled for e in part.weights)),
+            ),
+            *(
+                output
+                for bearing, model in zip(scene.bearings, models, strict=True)
+                for output in (
+                    *contact_outputs(bearing, model),
+                    *bearing_power_outputs(
+                        bearing, model, None, linkage.pose(joints[bearing.name].other(bearing.inner_body)).rate
+                    ),
+                )
+            ),
+        ),
         mass=motion.mass,
         forcing=motion.forcing,
         linkage=linkage,
         reactions=reactions,
     )
+
+
+def _requested(
+    mechanism: Mechanism,
+    linkage: Linkage,
+    reactions: Reactions,
+    forces: Forces,
+    inertias: Sequence[Inertia],
+    weights: Sequence[Effort],
+) -> tuple[Output, ...]:
+    """What a mechanism reports on request."""
+    powers = power_outputs(linkage, reactions, loads=forces.of_each, inertias=inertias, weights=weights)
+    return (*motion_outputs(mechanism, linkage, reactions), *powers)
 
 
 def _moments(scene: Scene, mechanism: Mechanism) -> frozenset[str]:
@@ -291,6 +326,7 @@ def _of_rings(
     definitions: tuple[Definition, ...],
     constants: tuple[Definition, ...] = (),
     quantities: tuple[Output, ...] = (),
+    requested: tuple[Output, ...] = (),
     linkage: Linkage | None = None,
     reactions: Reactions | None = None,
 ) -> System:
@@ -303,6 +339,17 @@ def _of_rings(
         definitions=definitions,
         constants=(*(c for one in rings for c in (*one.model.constants, *one.motion.constants)), *constants),
         quantities=(*(q for one in rings for q in bearing_outputs(one.model, one.motion.load)), *quantities),
+        requested=(
+            *requested,
+            *(
+                output
+                for bearing, one in zip(scene.bearings, rings, strict=True)
+                for output in (
+                    *contact_outputs(bearing, one.model),
+                    *bearing_power_outputs(bearing, one.model, one.motion.load),
+                )
+            ),
+        ),
         mass=sp.ImmutableMatrix(sp.diag(*(one.motion.mass for one in rings))),
         forcing=sp.ImmutableMatrix(
             sum(len(one.motion.forcing) for one in rings), 1, [e for one in rings for e in one.motion.forcing]
@@ -321,6 +368,7 @@ def _system(
     definitions: tuple[Definition, ...],
     constants: tuple[Definition, ...],
     quantities: tuple[Output, ...],
+    requested: tuple[Output, ...],
     mass: sp.ImmutableMatrix,
     forcing: sp.ImmutableMatrix,
     linkage: Linkage | None,
@@ -332,7 +380,9 @@ def _system(
 ) -> System:
     outputs: tuple[Output, ...] = ()
     with _noted(errors):
-        outputs = select_outputs(list(quantities), scene.outputs)
+        outputs = select_outputs(quantities, requested, scene.outputs)
+    known = {o.name for o in quantities}
+    named = tuple(o for o in outputs if o.name not in known)
     return System(
         scene=scene,
         parameters=tuple(
@@ -344,7 +394,7 @@ def _system(
         inputs=inputs,
         coordinates=(*(c for bearing in bearings for c in bearing.coordinates), *driven),
         initial=_initial(scene, driven),
-        constants=constants,
+        constants=(*constants, *dict.fromkeys(c for o in named for c in o.constants)),
         definitions=definitions,
         mass=mass,
         forcing=forcing,
@@ -352,7 +402,7 @@ def _system(
         reactions=reactions,
         linear_forms=linear_forms,
         bearings=tuple(bearings),
-        quantities=quantities,
+        quantities=(*quantities, *named),
         outputs=outputs,
         smoothness=(
             *((f"{bearing.names.prefix}{name}", law.anywhere) for bearing in bearings for name, law in bearing.laws),

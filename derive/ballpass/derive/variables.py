@@ -7,6 +7,8 @@ from typing import Literal
 
 import sympy as sp
 
+from ballpass.derive.terms import Definition
+
 #: Angle of the body that the drive turns [rad].
 DRIVER_ANGLE = sp.Symbol("driver.angle", real=True)
 
@@ -100,7 +102,8 @@ class Output:
     """Something a run can report.
 
     `per_ball` outputs have one value for each ball of the bearing with the prefix `balls_of` and use the symbols of its
-    generic ball.
+    generic ball; with `over_balls` the output is the sum of these.  `constants` are derived constants that nothing
+    else needs.
     """
 
     name: str
@@ -109,3 +112,5 @@ class Output:
     description: str
     per_ball: bool = False
     balls_of: str = ""
+    over_balls: bool = False
+    constants: tuple[Definition, ...] = ()

@@ -1,7 +1,7 @@
 """Hertz point contact between ball and raceway: the load-deflection factor from geometry.
 
-In: radii and elastic constants as SymPy expressions.  Out: k in Q = k * delta^1.5, exact (elliptic integrals), as
-an expression.
+In: radii and elastic constants as SymPy expressions.  Out: k in Q = k * delta^1.5, half axes of the contact ellipse and
+peak pressure, exact (elliptic integrals), as expressions.
 
 The ellipticity kappa = a/b solves one transcendental equation (Harris & Kotzalas, Essential Concepts of Bearing
 Technology,
@@ -89,6 +89,20 @@ def contact_stiffness(*, kappa: sp.Expr, curvature_sum: sp.Expr, compliance: sp.
         * sp.sqrt(2)
         / (compliance * sp.sqrt(curvature_sum) * deflection_factor(kappa) ** sp.Rational(3, 2))
     )
+
+
+def half_axes(*, kappa: sp.Expr, curvature_sum: sp.Expr, compliance: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+    """Half axes a >= b of the contact ellipse over the cube root of the force [m/N^(1/3)].
+
+    `compliance` as in `contact_stiffness`; Harris & Kotzalas 2006, Eqs. 6.29 and 6.30.
+    """
+    size = sp.cbrt(3 * compliance * kappa**2 * sp.elliptic_e(1 - kappa**-2) / (sp.pi * curvature_sum))
+    return size, size / kappa
+
+
+def peak_pressure(major: sp.Expr, minor: sp.Expr) -> sp.Expr:
+    """Peak pressure 3 Q/(2 pi a b) over the cube root of the force Q, from `half_axes` [Pa/N^(1/3)]."""
+    return 3 / (2 * sp.pi * major * minor)
 
 
 def series_stiffness(inner: sp.Expr, outer: sp.Expr) -> sp.Expr:

@@ -1,4 +1,4 @@
-"""Stiffness of a ball between both raceways: given, or from geometry by Hertz's theory, Eq. (5)."""
+"""Contact of a ball with both raceways: stiffness, given or from geometry by Hertz's theory, Eq. (5); its ellipses."""
 
 from __future__ import annotations
 
@@ -49,6 +49,38 @@ def stiffness_constants(bearing: Bearing, names: Names) -> list[Definition]:
         ]
         factors.append(factor)
     out.append(names.define(stiffness, hertz.series_stiffness(*factors), "N/m^1.5", total, "k_b"))
+    return out
+
+
+def ellipse_constants(bearing: Bearing, names: Names) -> dict[str, tuple[Definition, Definition, Definition]]:
+    """By ring, half axes of the contact ellipse and peak pressure, all over the cube root of the ball's force.
+
+    They use constants of `stiffness_constants`; none where the stiffness is given.
+    """
+    contact = bearing.contact
+    if isinstance(contact, GivenContact):
+        return {}
+    out = {}
+    for ring in ("inner", "outer"):
+        letter = ring[0]
+        major, minor, pressure = (names.constant(f"{ring}_{n}") for n in ("major_axis", "minor_axis", "pressure"))
+        axes = hertz.half_axes(
+            kappa=names.constant(f"{ring}_ellipticity"),
+            curvature_sum=names.constant(f"{ring}_curvature_sum"),
+            compliance=_compliance(contact),
+        )
+        words, over = f"of the {ring} contact's ellipse", "over the cube root of the force"
+        out[ring] = (
+            names.define(major, axes[0], "m/N^(1/3)", f"Half axis {words} across the groove, {over}", f"a_{letter}"),
+            names.define(minor, axes[1], "m/N^(1/3)", f"Half axis {words} along the groove, {over}", f"b_{letter}"),
+            names.define(
+                pressure,
+                hertz.peak_pressure(major, minor),
+                "Pa/N^(1/3)",
+                f"Peak pressure of the {ring} contact, {over}",
+                f"p_{letter}",
+            ),
+        )
     return out
 
 

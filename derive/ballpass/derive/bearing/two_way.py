@@ -31,11 +31,13 @@ class Coupled:
     Attributes
     ----------
     inertias, efforts : to the equations of motion
+    weights : those of the efforts that are weight
     loads : on the bodies, besides the joint's reaction, which is the force of the housing
     """
 
     inertias: tuple[Inertia, ...]
     efforts: tuple[Effort, ...]
+    weights: tuple[Effort, ...]
     loads: tuple[Load, ...]
 
 
@@ -80,7 +82,7 @@ def couple(bearing: Bearing, model: BearingModel, mechanism: Mechanism, linkage:
     ratio = names.constant("cage_ratio")
     points = [body_point(mechanism, body, joint.point(body)) for body in bodies]
     torques = [ratio * moment, (1 - ratio) * moment]
-    carried, inertias = ZERO, list[Inertia]()
+    carried, inertias, weights = ZERO, list[Inertia](), list[Effort]()
     if bearing.outer is not None:
         housing, turning = linkage.motion(mechanism, bodies[1], joint.point(bodies[1])), linkage.pose(bodies[1]).rate
         mass, stiffness, damping = (
@@ -94,13 +96,15 @@ def couple(bearing: Bearing, model: BearingModel, mechanism: Mechanism, linkage:
         velocity, acceleration = add(housing.velocity, outer.velocity), add(housing.acceleration, outer.acceleration)
         inertias = [Inertia(amount=mass, rate=v, acceleration=a) for v, a in zip(velocity, acceleration, strict=True)]
         weight = ZERO if mechanism.gravity is None else scale(mass, components(mechanism.gravity, axis=(0, -1)))
-        efforts += [Effort(amount=f, rate=v) for f, v in zip(weight, velocity, strict=True) if f != 0]
+        weights = [Effort(amount=f, rate=v) for f, v in zip(weight, velocity, strict=True) if f != 0]
+        efforts += weights
         # the reaction is that of the housing: the inner ring's body feels it less what moves the outer ring
         carried = subtract(weight, scale(mass, acceleration))
     forces = (carried, ZERO)
     return Coupled(
         inertias=tuple(inertias),
         efforts=tuple(efforts),
+        weights=tuple(weights),
         loads=tuple(
             Load(body=body, point=point, force=push, torque=torque)
             for body, point, push, torque in zip(bodies, points, forces, torques, strict=True)

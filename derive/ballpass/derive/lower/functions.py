@@ -321,12 +321,14 @@ class _Lowering:
     def _values_of(self, outputs: Sequence[Output], balls: Balls, visit: Visitor) -> list[ca.SX]:
         """A number or a column with a row for each ball, for each output."""
         visit = self._moving(visit, balls)
-        return [
-            ca.vertcat(*(ball(output.expression) for ball in balls[output.balls_of]))
-            if output.per_ball
-            else visit(output.expression)
-            for output in outputs
-        ]
+
+        def value(output: Output) -> ca.SX:
+            if not (output.per_ball or output.over_balls):
+                return visit(output.expression)
+            each = [ball(output.expression) for ball in balls[output.balls_of]]
+            return ca.vertcat(*each) if output.per_ball else reduce(add, each)
+
+        return [value(output) for output in outputs]
 
     def _contact(self, bearing: BearingModel) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
         """Elastic and damping force of one ball over deflection [m] and its rate [m/s]."""

@@ -44,8 +44,8 @@ METHODS = (
 MAX_FILE_SIZE = 8_000_000
 #: First parts of the names of a mechanism's variables and of inputs: a bearing's names may not begin so.
 RESERVED = (
-    *("body", "driver", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "reaction"),
-    *("spring", "torsion_spring"),
+    *("body", "driver", "force", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "point"),
+    *("reaction", "spring", "torque", "torsion_spring", "weight"),
 )
 _TABLES = ("mechanism", "shaft", "load", "bearing", "bearings", "run")
 

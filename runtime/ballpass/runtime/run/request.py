@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,12 @@ MOST_TURNS, MOST_TIME = 1e9, 1e9
 
 #: Most numbers that the samples of a run may hold, its derivatives, or its segments: 4 GiB.
 MAX_NUMBERS = 2**29
+
+#: Outputs that a manifest does not know unless the scene names them.
+ON_REQUEST = (
+    *("point.*", "body.*.speed", "body.*.acceleration", "reaction.*.magnitude", "*.power", "drive_power", "*.loss"),
+    *("*kinetic_energy", "*ball.stiffness", "*ball.*_pressure", "*ball.*_axis", "*ball.*_approach"),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -234,6 +241,11 @@ def no_output(manifest: Manifest, name: object, known: Sequence[str], what: str 
         return (
             f'{name!r} is not among this scene\'s run.outputs: add "{f"{part}.*" if dot else name}" there; the model '
             "is then derived anew."
+        )
+    if any(fnmatchcase(str(name), pattern) for pattern in ON_REQUEST):
+        return (
+            f"{name!r} is computed only for a scene that names it: add it to run.outputs; the model is then derived "
+            "anew. Points, bodies and joints have the scene's names."
         )
     return f"{unknown_name(what, name, known)} The scene's run.outputs says which are computed."
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from ballpass.derive.drive import Drive, WindowEdges
 from ballpass.derive.mechanism.balance import Load
@@ -18,10 +20,12 @@ from ballpass.derive.variables import Input, Output
 class Forces:
     """What acts on the bodies, and the definitions, inputs and outputs that come with it.
 
-    `smoothness` is that of what is a function of the state, by name, and `edges` are where it jumps.
+    `of_each` are the loads by the label of their force, `smoothness` is that of what is a function of the state, by
+    name, and `edges` are where it jumps.
     """
 
     loads: tuple[Load, ...]
+    of_each: Mapping[str, tuple[Load, ...]]
     definitions: tuple[Definition, ...]
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
@@ -32,12 +36,13 @@ class Forces:
 def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Forces:
     """Derive the loads of all forces and torques of a mechanism."""
     setting = Setting(mechanism=mechanism, linkage=linkage, drive=drive)
-    loads: list[Load] = []
+    loads: dict[str, tuple[Load, ...]] = {}
     for force in mechanism.forces:
         action = force.pathway.act(force, setting)
-        loads += action.loads(force.law.amount(force, action, setting))
+        loads[force.label] = action.loads(force.law.amount(force, action, setting))
     return Forces(
-        loads=tuple(loads),
+        loads=tuple(load for those in loads.values() for load in those),
+        of_each=MappingProxyType(loads),
         definitions=(*setting.switched, *setting.ledger.definitions),
         inputs=tuple(setting.inputs),
         outputs=tuple(setting.outputs),

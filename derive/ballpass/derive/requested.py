@@ -1,0 +1,197 @@
+"""Outputs on request: computed, differentiated and generated only where a scene names them.
+
+In: the derived parts of a model.  Out: `Output` after `Output`, each an expression in the model's symbols.
+
+Powers are positive where they add to the machine's kinetic energy; losses are what dampers take, never negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import sympy as sp
+
+from ballpass.derive.bearing.equations import BearingModel
+from ballpass.derive.bearing.stiffness import ellipse_constants
+from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.kinematics import Pair, cross, dot, quarter_turn, scale, subtract
+from ballpass.derive.mechanism.linear_forms import Effort, Inertia
+from ballpass.derive.mechanism.linkage import CENTER_OF_MASS, Linkage
+from ballpass.derive.mechanism.power import work_of
+from ballpass.derive.mechanism.reactions import Reactions
+from ballpass.derive.scene.records import Bearing, Mechanism
+from ballpass.derive.terms import symbol_of
+from ballpass.derive.variables import Output
+
+Words = tuple[str, sp.Expr, str, str]
+
+
+def _made(rows: Iterable[Words]) -> list[Output]:
+    return [Output(name=n, expression=e, unit=u, description=d) for n, e, u, d in rows]
+
+
+def power_of(efforts: Iterable[Effort]) -> sp.Expr:
+    """Power of forces and torques along their rates [W]."""
+    return sp.Add(*(effort.amount * effort.rate for effort in efforts))
+
+
+def motion_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactions) -> list[Output]:
+    """Motion of every point and body, and magnitudes of the reactions."""
+    out: list[Words] = []
+    for body in mechanism.bodies:
+        pose = linkage.poses[body.name]
+        points = {p.name: linkage.motion(mechanism, body.name, p.name) for p in body.points}
+        for point, motion in (points | {CENTER_OF_MASS: pose.center_of_mass}).items():
+            rows = (("", motion.position, "m"), ("v", motion.velocity, "m/s"), ("a", motion.acceleration, "m/s^2"))
+            words = f"of {point} of the {body.name}"
+            for (mark, pair, unit), what in zip(rows, ("Position", "Velocity", "Acceleration"), strict=True):
+                for axis, value in zip("xy", pair, strict=True):
+                    name = f"point.{body.name}.{point}.{mark}{axis}"
+                    out.append((name, value, unit, f"{what} {words} along {axis}"))
+        turning = f"of the {body.name}, counter-clockwise"
+        out.append((f"body.{body.name}.speed", pose.rate, "rad/s", f"Angular velocity {turning}"))
+        out.append((f"body.{body.name}.acceleration", pose.acceleration, "rad/s^2", f"Angular acceleration {turning}"))
+    for joint in mechanism.joints:
+        force = reactions.joint_force[joint.name]
+        words = f"Magnitude of the force of the {joint.bodies[1]} on the {joint.bodies[0]} at {joint.name}"
+        out.append((f"reaction.{joint.name}.magnitude", sp.sqrt(dot(force, force)), "N", words))
+    return _made(out)
+
+
+def power_outputs(
+    linkage: Linkage,
+    reactions: Reactions,
+    *,
+    loads: Mapping[str, Sequence[Load]],
+    inertias: Sequence[Inertia],
+    weights: Sequence[Effort],
+) -> list[Output]:
+    """Power of everything that acts on a linkage, and its kinetic energy.
+
+    Parameters
+    ----------
+    loads : of each force, by its label
+    inertias : all that moves
+    weights : work of gravity
+    """
+    out: list[Words] = [
+        (f"{label}.power", power_of(work_of(those, linkage)), "W", f"Power of {label.rpartition('.')[2]} on the bodies")
+        for label, those in loads.items()
+    ]
+    if weights:
+        out.append(("weight.power", power_of(weights), "W", "Power of all weights"))
+    if linkage.drive.coordinate is None:
+        power = reactions.drive_torque * linkage.drive.speed
+        out.append(("drive_power", power, "W", "Power of the drive"))
+    energy = sp.Add(*(inertia.amount * inertia.rate**2 for inertia in inertias)) / 2
+    out.append(("kinetic_energy", energy, "J", "Kinetic energy of all that moves, without rings loaded one-way"))
+    return _made(out)
+
+
+def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
+    """Hertz's contact of every ball with both raceways, under its elastic force, and its stiffness."""
+    ball, names = model.ball, model.names
+    of = f" of {bearing.name}" if bearing.name else ""
+    force = ball.elastic_force
+    elastic = next(d.expression for d in ball.definitions if d.symbol == force)
+    out = [
+        Output(
+            name=f"{names.prefix}ball.stiffness",
+            expression=sp.diff(elastic, ball.deflection),
+            unit="N/m",
+            description=f"Slope of the elastic force of each ball{of} by its deflection",
+            per_ball=True,
+            balls_of=names.prefix,
+        )
+    ]
+    for ring, constants in ellipse_constants(bearing, names).items():
+        major, minor, pressure = (c.symbol for c in constants)
+        factor = names.constant(f"k_{ring[0]}")
+        words = f"each ball's contact{of} with the {ring} ring"
+        rows = (
+            ("pressure", pressure * sp.cbrt(force), "Pa", f"Peak pressure of {words}"),
+            ("major_axis", major * sp.cbrt(force), "m", f"Half axis of the ellipse of {words}, across the groove"),
+            ("minor_axis", minor * sp.cbrt(force), "m", f"Half axis of the ellipse of {words}, along the groove"),
+            ("approach", (force / factor) ** sp.Rational(2, 3), "m", f"Approach of {words}"),
+        )
+        out += [
+            Output(
+                name=f"{names.prefix}ball.{ring}_{name}",
+                expression=sp.Piecewise((value, force > 0), (0, True)),
+                unit=unit,
+                description=text,
+                per_ball=True,
+                balls_of=names.prefix,
+                constants=constants,
+            )
+            for name, value, unit, text in rows
+        ]
+    return out
+
+
+def bearing_power_outputs(
+    bearing: Bearing, model: BearingModel, load: Pair | None, turning: sp.Expr = sp.S.Zero
+) -> list[Output]:
+    """Power of the balls and of the housing's spring and damper on the rings, and what the dampers take of it.
+
+    Parameters
+    ----------
+    load : on the inner ring, where it is loaded one-way [N]
+    turning : angular velocity of the housing [rad/s]
+    """
+    ball, names, c = model.ball, model.names, model.coordinates
+    of = f" of {bearing.name}" if bearing.name else ""
+    count = sp.S.One if bearing.count is None else symbol_of(bearing.count)
+    place, speed = ((c[0].position, c[1].position), (c[0].velocity, c[1].velocity))
+    apart, parting = place, speed
+    rows: list[Words] = []
+    if bearing.outer is not None:
+        stiffness, damping = symbol_of(bearing.outer.stiffness), symbol_of(bearing.outer.damping)
+        out, moving = (c[2].position, c[3].position), (c[2].velocity, c[3].velocity)
+        apart, parting = subtract(place, out), subtract(speed, moving)
+        seen = subtract(moving, scale(turning, quarter_turn(out)))  # the damper turns with the housing
+        loss = count * damping * dot(seen, seen)
+        spring = -count * stiffness * dot(out, moving)
+        rows = [
+            ("housing.power", spring - loss, "W", f"Power of the housing's spring and damper{of}"),
+            ("housing.loss", loss, "W", f"What the housing's damper{of} takes"),
+        ]
+    force = (ball.sums[0].symbol, ball.sums[1].symbol)  # of the inner ring on the balls
+    # where rings are loaded one-way nothing feels the cage's moments
+    moment = cross(apart, force) if load is None else sp.S.Zero
+    power = count * (moment * ball.cage_speed - dot(force, parting))
+    rows.append(("contact.power", power, "W", f"Power of all ball forces{of}"))
+    if load is not None:
+        rows.append(("load.power", dot(load, speed), "W", f"Power of the load on the inner ring{of}"))
+        masses = [(names.constant("m_ei"), speed)]
+        if bearing.outer is not None:
+            masses.append((symbol_of(bearing.outer.mass), moving))
+        energy = sp.Add(*(mass * dot(v, v) for mass, v in masses)) / 2
+        rows.append(("rings.kinetic_energy", energy, "J", f"Kinetic energy of the rings{of}"))
+        if bearing.inner is not None and bearing.inner.damping is not None:
+            loss = symbol_of(bearing.inner.damping) * dot(speed, speed)
+            rows.append(("inner.loss", loss, "W", f"What the damper of the inner ring{of} takes"))
+    made = _made((f"{names.prefix}{n}", e, u, d) for n, e, u, d in rows)
+    if ball.damping_force is not None:
+        taken = ball.damping_force * ball.deflection_rate
+        made.append(
+            Output(
+                name=f"{names.prefix}ball.loss",
+                expression=taken,
+                unit="W",
+                description=f"What the damping force of each ball{of} takes",
+                per_ball=True,
+                balls_of=names.prefix,
+            )
+        )
+        made.append(
+            Output(
+                name=f"{names.prefix}contact.loss",
+                expression=count * taken,
+                unit="W",
+                description=f"What the damping forces of all balls{of} take",
+                balls_of=names.prefix,
+                over_balls=True,
+            )
+        )
+    return made
