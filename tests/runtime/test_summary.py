@@ -13,9 +13,10 @@ import pytest
 from rich.console import Console
 
 from ballpass.runtime import Model, Solution
-from ballpass.runtime.app.summary import render_summary, summarize
+from ballpass.runtime.app.summary import add_turns, render_summary, summarize
 from ballpass.runtime.app.tables import simple_table, wide_console
 from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.run.settle import look_further
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +152,8 @@ def test_a_run_with_some_outputs_has_the_summary_of_these(
     press: tuple[Model, Solution], summary: dict[str, Any]
 ) -> None:
     model = press[0]
-    found = summarize(model, model.simulate(cycles=4, outputs=["ball.force", "drive_torque"]))
+    run = model.simulate(cycles=4, outputs=["ball.force", "drive_torque"])
+    found = summarize(model, run)
     peak, told = found["peak_ball_force"], summary["peak_ball_force"]
     assert (peak["total"], peak["time"]["total"]) == (told["total"], told["time"]["total"])
     assert "elastic" not in peak
@@ -159,4 +161,7 @@ def test_a_run_with_some_outputs_has_the_summary_of_these(
     # states are there without being asked for
     assert found["inner.y"] == summary["inner.y"]
     assert "reaction.A.x" not in found
+    longer = look_further(model, model.numbers(), run)
+    assert longer is not None
+    assert "peak_ball_force.total" in add_turns(found, longer, instead=False)
     render_summary(found)

@@ -157,7 +157,10 @@ def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str
     lines: list[tuple[float, str]] = []
     for name, found in longer.reductions.items():
         entry, numbers = _printed(name, found)
-        if entry not in summary or not numbers:
+        if entry not in summary:
+            continue
+        numbers = {kind: value for kind, value in numbers.items() if kind in summary[entry]}
+        if not numbers:
             continue
         unit, (peak, mean) = summary[entry]["unit"], longer.changes.get(name, (0.0, 0.0))
         told[entry] = told.get(entry, {}) | _numbers(entry, unit, **numbers)
