@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.run.reductions import Reduction, Reductions
     from ballpass.runtime.run.sensitivity import Sensitivities
     from ballpass.runtime.run.solution import Solution, Statistics, load_solution
+    from ballpass.runtime.run.start import RunEnd
 
 __all__ = [
     "ArtefactError",
@@ -63,6 +64,7 @@ __all__ = [
     "Reductions",
     "RequestError",
     "Results",
+    "RunEnd",
     "Sensitivities",
     "SensitivityReport",
     "SimulationError",
@@ -114,6 +116,7 @@ _HOME = {
     "Solution": "run.solution",
     "Statistics": "run.solution",
     "load_solution": "run.solution",
+    "RunEnd": "run.start",
 }
 
 

@@ -12,7 +12,7 @@ from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.error_target import simulate_to_error
 from ballpass.runtime.certify.growth import Growth, find_growth, simulate_members
 from ballpass.runtime.contract import Manifest, read_artefact
-from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
 from ballpass.runtime.many.members import Table
@@ -27,6 +27,10 @@ from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.sensitivity import Sensitivities, refuse_located, sensitivities
 from ballpass.runtime.run.settle import MOST, Settled, settle
 from ballpass.runtime.run.simulate import method_names, simulate
+from ballpass.runtime.run.start import RunEnd, Start
+
+#: State at the start: given, "equilibrium", or the end of a run that another goes on from; None takes the scene's.
+Initial = Sequence[float] | np.ndarray | RunEnd | Literal["equilibrium"] | None
 
 if TYPE_CHECKING:
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport
@@ -97,6 +101,20 @@ class Model(PointModel):
             self._assembled = looked_at
         return numbers
 
+    def _start(self, numbers: Numbers, initial: Initial) -> Start:
+        """What a run begins with; RequestError for words that are none."""
+        if initial is None or isinstance(initial, RunEnd):
+            return initial
+        if not isinstance(initial, str):
+            return vector(initial)
+        if initial != "equilibrium":
+            raise RequestError(
+                f'initial: {initial!r} was given. Allowed: a state, "equilibrium", or the end of a run (Solution.end).'
+            )
+        from ballpass.runtime.point.equilibrium import start_at_rest  # with SciPy
+
+        return start_at_rest(self, numbers)
+
     def simulate(
         self,
         cycles: float | None = None,
@@ -108,14 +126,14 @@ class Model(PointModel):
         samples_per_cycle: int | None = None,
         times: Sequence[float] | np.ndarray | None = None,
         outputs: Sequence[str] | None = None,
-        initial: Sequence[float] | np.ndarray | None = None,
+        initial: Initial = None,
         transient: float | None = None,
         kinks: Kinks | None = None,
         progress: Callable[[float], None] | None = None,
         error: float | None = None,
         of: str | Sequence[str] | None = None,
     ) -> Solution:
-        """Simulate from t = 0.  What is not given is taken from the scene's run settings.
+        """Simulate, from t = 0 or from where another run ended.  What is not given is as the scene's run settings say.
 
         Parameters
         ----------
@@ -130,8 +148,10 @@ class Model(PointModel):
             other methods go from sample to sample [s]
         outputs : names of the outputs to keep, none of them for ``[]``, where none is evaluated.  Default: all of the
             scene
-        initial : state at the start, shape (states,)
-        transient : turns at the start that `Solution.steady` leaves out
+        initial : state at the start, shape (states,); ``"equilibrium"`` for rings at rest under the load of t = 0, with
+            the driver at its speed (`static_equilibrium`); or `Solution.end` of a run of this scene, whose time and
+            motion go on.  Default: the scene's
+        transient : turns from t = 0 on that `Solution.steady` leaves out, also where the run goes on from another one
         kinks : ``stepped-over`` leaves kinks of the laws to error control; with ``located`` steps of the project's own
             stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 3e-7
             (1e-6 where a law jumps), else stepped over
@@ -159,7 +179,7 @@ class Model(PointModel):
             samples_per_cycle=samples_per_cycle,
             times=times,
             outputs=outputs,
-            initial=None if initial is None else vector(initial),
+            initial=self._start(numbers, initial),
             transient_cycles=transient,
             kinks=kinks,
             progress=progress,
@@ -286,7 +306,7 @@ class Model(PointModel):
         parameters: Mapping[str, float] | None = None,
         method: str | None = None,
         rtol: float | None = None,
-        initial: Sequence[float] | np.ndarray | None = None,
+        initial: Initial = None,
         kinks: Kinks | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Reductions:
@@ -303,17 +323,18 @@ class Model(PointModel):
         SimulationError
             The computation failed.
         """
+        numbers = self._runnable(parameters)
         request = Request(
             cycles=cycles,
             duration=duration,
             method=method,
             rtol=rtol,
-            initial=None if initial is None else vector(initial),
+            initial=self._start(numbers, initial),
             transient_cycles=transient,
             kinks=kinks,
             progress=progress,
         )
-        return reduce_run(self, self._runnable(parameters), request)
+        return reduce_run(self, numbers, request)
 
     def settle(
         self,
@@ -322,7 +343,7 @@ class Model(PointModel):
         parameters: Mapping[str, float] | None = None,
         method: str | None = None,
         rtol: float | None = None,
-        initial: Sequence[float] | np.ndarray | None = None,
+        initial: Initial = None,
         kinks: Kinks | None = None,
         most: int = MOST,
         progress: Callable[[float], None] | None = None,
@@ -342,15 +363,16 @@ class Model(PointModel):
         SimulationError
             The computation failed.
         """
+        numbers = self._runnable(parameters)
         request = Request(
             method=method,
             rtol=rtol,
-            initial=None if initial is None else vector(initial),
+            initial=self._start(numbers, initial),
             transient_cycles=transient,
             kinks=kinks,
             progress=progress,
         )
-        return settle(self, self._runnable(parameters), request, most)
+        return settle(self, numbers, request, most)
 
     def simulate_many(
         self,
@@ -433,7 +455,7 @@ class Model(PointModel):
         transient: float | None = None,
         parameters: Mapping[str, float] | None = None,
         rtol: float | None = None,
-        initial: Sequence[float] | np.ndarray | None = None,
+        initial: Initial = None,
     ) -> Growth:
         """What a start moved by the tolerance changes in the extremes of a run (see `ballpass.runtime.certify.growth`).
 
@@ -446,14 +468,15 @@ class Model(PointModel):
         SimulationError
             The computation failed.
         """
+        numbers = self._runnable(parameters)
         request = Request(
             cycles=cycles,
             duration=duration,
             rtol=rtol,
-            initial=None if initial is None else vector(initial),
+            initial=self._start(numbers, initial),
             transient_cycles=transient,
         )
-        return find_growth(self, self._runnable(parameters), request)
+        return find_growth(self, numbers, request)
 
     def refine_peak(self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max") -> Peak:
         """Peak of an output of a run of this model, between its samples too (see `ballpass.runtime.ask.peaks`).

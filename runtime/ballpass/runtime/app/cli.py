@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 import typer
 
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.locating import Kinks
     from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.run.start import RunEnd
 
 #: Bytes of samples that are written without a word.
 LARGE = 200_000_000
@@ -86,6 +87,14 @@ def run(
     duration: options.Duration = None,
     transient: Annotated[
         float | None, typer.Option(metavar="N", help="Turns at the start that summary and figures leave out.")
+    ] = None,
+    initial: Annotated[
+        str | None,
+        typer.Option(
+            metavar="START",
+            help="Where the run starts: equilibrium, the rings at rest under the load of t = 0, or the solution.nc of "
+            "another run, which goes on. Default: as the scene says.",
+        ),
     ] = None,
     set_: options.Settings = None,
     rtol: options.Tolerance = None,
@@ -134,7 +143,8 @@ def run(
         settles = read_turns(turns, duration if cycles is None else cycles)
         seconds = read_duration(duration, cycles)
         asked = read_asked(scene, set_, seconds, transient)
-        _check_request(asked, cycles, transient, rtol, method)
+        start = _read_start(initial)
+        _check_request(asked, cycles, transient, rtol, method, goes_on=start not in (None, "equilibrium"))
         at_kinks = checked_kinks(kinks, method or asked.run.method, error)
         target = read_error(error, of, method, rtol)
         folder = results_folder(out, scene)
@@ -151,6 +161,7 @@ def run(
             progress=stages.fraction,
             error=target,
             of=of,
+            initial=start,
         )
         if solution.nbytes > LARGE:
             size = _size(solution.nbytes)
@@ -158,7 +169,12 @@ def run(
         growth = None
         if solution.states and model.has_stepper:
             growth = model.growth(
-                cycles, duration=seconds, transient=transient, parameters=asked.overrides, rtol=solution.statistics.rtol
+                cycles,
+                duration=seconds,
+                transient=transient,
+                parameters=asked.overrides,
+                rtol=solution.statistics.rtol,
+                initial=start,
             )
             if growth.uncertain:
                 warn(growth.words)
@@ -170,6 +186,7 @@ def run(
                 parameters=asked.overrides,
                 method=taken.method,
                 rtol=taken.rtol,
+                initial=start,
                 kinks=cast("Kinks | None", taken.kinks),
                 progress=stages.fraction,
             )
@@ -272,10 +289,27 @@ for _command in (explain, jacobian, linearize, sensitivity, sweep, trade):
     app.command()(_command)
 
 
+def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:
+    """Where a run starts, as people write it: equilibrium, or a file of a run that goes on."""
+    if text is None:
+        return None
+    if text == "equilibrium":
+        return "equilibrium"
+    from ballpass.runtime.run.solution import load_solution
+
+    return load_solution(text).end
+
+
 def _check_request(
-    asked: Asked, cycles: float | None, transient: float | None, rtol: float | None, method: str | None
+    asked: Asked,
+    cycles: float | None,
+    transient: float | None,
+    rtol: float | None,
+    method: str | None,
+    *,
+    goes_on: bool = False,
 ) -> None:
-    """Refuse options that no model can follow, before anything is derived or written."""
+    """Refuse options that no model can follow, before anything is derived or written; `goes_on` from another run."""
     from ballpass.runtime.contract.parameters import unknown_name
     from ballpass.runtime.native.casadi_integrators import METHODS
     from ballpass.runtime.native.stepper import METHODS as STEPPERS
@@ -297,7 +331,7 @@ def _check_request(
     if turns is None:
         turns = (asked.run.duration or 0.0) * speed / math.tau
     dropped = asked.run.transient_cycles if transient is None else transient
-    if dropped > 0.0 and turns <= dropped:
+    if dropped > 0.0 and turns <= dropped and not goes_on:
         raise RequestError(
             f"The run of {turns:g} turns lies within its {dropped:g} transient turns: nothing is left to report. "
             f"Allowed: fewer transient turns than turns. Simulate more (--cycles {dropped + 2:g}) or drop fewer "

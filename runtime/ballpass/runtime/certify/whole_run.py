@@ -20,7 +20,7 @@ from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, Kinks, stepper_for
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
-from ballpass.runtime.run.reduced_run import SCALED_TURNS, check_span, choose_family, integrate_reduced
+from ballpass.runtime.run.reduced_run import SCALED_TURNS, Begun, check_span, choose_family, integrate_reduced
 from ballpass.runtime.run.reductions import channel_names, observable_aliases, observe
 from ballpass.runtime.run.request import Request, make_plan
 
@@ -75,13 +75,14 @@ class WholeRun:
     ----------
     initial : state at the start, shape (states,)
     magnitude : of the states, shape (states,)
-    duration, turn, start : length, time of a turn, time from which on is reduced [s]
+    begin, duration, turn, start : time at the start, length, time of a turn, time from which on is reduced [s]
     """
 
     model: LoadedModel
     numbers: Numbers
     initial: np.ndarray
     magnitude: np.ndarray
+    begin: float
     duration: float
     turn: float
     start: float
@@ -125,8 +126,9 @@ class WholeRun:
             way.rtol * self.magnitude,
             state,
             row[0],
-            (self.duration, self.turn, self.start),
+            (self.begin + self.duration, self.turn, self.start),
             progress=progress,
+            begun=Begun(time=self.begin),
         )
         seconds = _now() - begin
 
@@ -144,7 +146,7 @@ class WholeRun:
 
 
 def prepare(model: LoadedModel, numbers: Numbers, request: Request) -> WholeRun:
-    """Prepare a run from t = 0.  What the request leaves open is taken from the scene's run settings.
+    """Prepare a run.  What the request leaves open is taken from the scene's run settings.
 
     Raises
     ------
@@ -159,10 +161,11 @@ def prepare(model: LoadedModel, numbers: Numbers, request: Request) -> WholeRun:
         model=model,
         numbers=numbers,
         initial=plan.initial,
-        magnitude=stepper_magnitudes(model, model.stepper, numbers, plan.initial, looked_at, turn),
+        magnitude=stepper_magnitudes(model, model.stepper, numbers, plan.initial, looked_at, turn, plan.begin),
+        begin=plan.begin,
         duration=length,
         turn=turn,
-        start=check_span(length, turn, plan.transient_cycles),
+        start=check_span(length, turn, plan.transient_cycles, plan.begin),
     )
 
 

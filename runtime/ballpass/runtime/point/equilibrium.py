@@ -201,7 +201,47 @@ def held_coordinates(model: LoadedModel) -> Array:
 def static_equilibrium(
     model: LoadedModel, numbers: Numbers, *, t: float = 0.0, load: tuple[float, float] | None = None
 ) -> StaticEquilibrium:
-    """Positions at which the rings rest; see `ballpass.runtime.Model.static_equilibrium`.
+    """Positions at which the rings rest; see `ballpass.runtime.Model.static_equilibrium`."""
+    found = _equilibrium(model, numbers, t, load)
+    free = found.free_directions
+    if len(free):
+        warnings.warn(
+            f"static_equilibrium: the rings can move without force along {len(free)} direction(s), mostly "
+            f"{_mostly(found)}: the place given is one of many (one loaded ball does not hold a ring sideways).",
+            FreeRingWarning,
+            stacklevel=3,
+        )
+    return found
+
+
+def start_at_rest(model: LoadedModel, numbers: Numbers) -> Array:
+    """State of a run that starts with its rings at rest under the load of t = 0, shape (states,).
+
+    Raises
+    ------
+    RequestError
+        As for `static_equilibrium`, or rings that the load does not hold along some direction.
+    SimulationError
+        Nothing holds the rings.
+    """
+    found = _equilibrium(model, numbers, 0.0, None)
+    if len(found.free_directions):
+        raise RequestError(
+            f'initial = "equilibrium": the load at the start does not hold the rings: along '
+            f"{len(found.free_directions)} direction(s), mostly {_mostly(found)}, they can move without force, so that "
+            "they have no one place of rest. Give a negative clearance (preload), another start or ball angle, where "
+            "two balls carry, or a state: initial = model.static_equilibrium().x takes one of the many."
+        )
+    return found.x
+
+
+def _mostly(found: StaticEquilibrium) -> str:
+    """The coordinate that each free direction moves most."""
+    return ", ".join(found.coordinates[int(np.argmax(np.abs(row)))] for row in found.free_directions)
+
+
+def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[float, float] | None) -> StaticEquilibrium:
+    """Positions at which the rings rest, one of them where there are many.
 
     Raises
     ------
@@ -286,14 +326,6 @@ def static_equilibrium(
         raise RequestError(
             "static_equilibrium: the inner ring carries no load and no ball touches: it may stand anywhere in its "
             "clearance. Give a load, or a negative clearance (preload)."
-        )
-    if len(free):
-        names = [model.states[int(np.argmax(np.abs(row)))] for row in free]
-        warnings.warn(
-            f"static_equilibrium: the rings can move without force along {len(free)} direction(s), mostly "
-            f"{', '.join(names)}: the place given is one of many (one loaded ball does not hold a ring sideways).",
-            FreeRingWarning,
-            stacklevel=3,
         )
     deflection, ball_force = _balls(model, numbers, t, state)
     return StaticEquilibrium(

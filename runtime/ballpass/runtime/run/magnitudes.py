@@ -27,6 +27,7 @@ def stepper_magnitudes(
     initial: np.ndarray,
     duration: float,
     turn: float,
+    begin: float = 0.0,
     edges: np.ndarray | None = None,
 ) -> np.ndarray:
     """Magnitudes as the stepper finds them, shape (states,).
@@ -35,22 +36,24 @@ def stepper_magnitudes(
     ----------
     stepper : one of the model's
     initial : state at the start, shape (states,)
-    duration, turn : of the run, and of a turn [s]
+    duration, turn, begin : of the run, of a turn, and time at the start [s]
     edges : of the run's segments, where they are known [s]
     """
-    inputs, horizon = _moments(model, numbers, duration, turn, edges)
+    inputs, horizon = _moments(model, numbers, duration, turn, begin, edges)
     return stepper.magnitudes(numbers.p, numbers.c, initial, inputs, horizon)
 
 
-def model_scales(model: LoadedModel, numbers: Numbers, initial: np.ndarray, duration: float, turn: float) -> Scales:
+def model_scales(
+    model: LoadedModel, numbers: Numbers, initial: np.ndarray, duration: float, turn: float, begin: float = 0.0
+) -> Scales:
     """Magnitudes and stiffness of a run, by Python.
 
     Parameters
     ----------
     initial : state at the start, shape (states,)
-    duration, turn : of the run, and of a turn, infinite where nothing turns [s]
+    duration, turn, begin : of the run, of a turn, infinite where nothing turns, and time at the start [s]
     """
-    inputs, horizon = _moments(model, numbers, duration, turn)
+    inputs, horizon = _moments(model, numbers, duration, turn, begin)
     fixed = {"t": 0.0, "p": numbers.p, "c": numbers.c}
     rhs, jacobian = model.kernel("rhs"), model.kernel("rhs_jac_x")
     return find_scales(
@@ -83,13 +86,18 @@ def mass_matrix(model: LoadedModel, there: Mapping[str, object]) -> np.ndarray:
 
 
 def _moments(
-    model: LoadedModel, numbers: Numbers, duration: float, turn: float, edges: np.ndarray | None = None
+    model: LoadedModel,
+    numbers: Numbers,
+    duration: float,
+    turn: float,
+    begin: float,
+    edges: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
     """Inputs at the moments that are looked at, shape (moments, inputs), and the time that bounds travel [s]."""
     horizon = min(duration, turn)
     if edges is None:
-        edges = segment_edges(model, numbers, 0.0, duration, turn)
+        edges = segment_edges(model, numbers, begin, begin + duration, turn)
     middles = 0.5 * (edges[:-1] + edges[1:])
     picked = middles[np.unique(np.linspace(0, len(middles) - 1, MOMENTS).astype(int))]
-    moments = np.concatenate([picked, horizon * (np.arange(MOMENTS) + 0.5) / MOMENTS])
+    moments = np.concatenate([picked, begin + horizon * (np.arange(MOMENTS) + 0.5) / MOMENTS])
     return clock.inputs_over(model.manifest.inputs, numbers.values, moments, moments), horizon

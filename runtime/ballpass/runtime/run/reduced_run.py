@@ -25,9 +25,10 @@ from ballpass.runtime.run.limits import allowance
 from ballpass.runtime.run.locating import choose_kinks, stepper_for
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
 from ballpass.runtime.run.reductions import Reductions, channel_names, reductions_of
-from ballpass.runtime.run.request import Request, check_length, run_length, start_state, tolerance
+from ballpass.runtime.run.request import Request, check_length, run_length, tolerance
 from ballpass.runtime.run.segments import edge_windows, make_segments, rest_of
 from ballpass.runtime.run.stall import stall_words
+from ballpass.runtime.run.start import start_state, start_time
 from ballpass.runtime.run.stepping import STATUS_OF_END
 
 #: Steps, accepted and rejected, that one call of the stepper takes: a fraction of a second.  Between calls progress is
@@ -38,7 +39,7 @@ STEPS_A_CALL = 50_000
 SCALED_TURNS = 16
 
 
-def check_span(duration: float, turn: float, transient: float) -> float:
+def check_span(duration: float, turn: float, transient: float, begin: float = 0.0) -> float:
     """Time from which on is reduced [s].
 
     Raises
@@ -46,15 +47,16 @@ def check_span(duration: float, turn: float, transient: float) -> float:
     RequestError
         The run is too long, the transient no number of turns from 0 on, nothing turns, or nothing is left of the run.
     """
-    check_length(duration, turn)
+    end = begin + duration
+    check_length(end, turn)
     if not 0.0 <= transient < math.inf:
         raise RequestError(f"transient: a number of cycles from 0 on is expected, not {transient!r}.")
     if transient > 0.0 and not math.isfinite(turn):
         raise RequestError("transient: its cycles are turns, and nothing turns in this model. Set it to 0.")
-    start = transient * turn if transient > 0.0 else 0.0
-    if start >= duration * (1.0 - 1e-9):
+    start = max(begin, transient * turn if transient > 0.0 else 0.0)
+    if start >= end * (1.0 - 1e-9):
         raise RequestError(
-            f"The run of {duration / turn:g} cycles lies within its {transient:g} transient cycles: nothing is left. "
+            f"The run of {end / turn:g} cycles lies within its {transient:g} transient cycles: nothing is left. "
             "Run more cycles, or set fewer transient ones."
         )
     return start
@@ -79,7 +81,7 @@ def choose_family(asked: str) -> Family:
 
 
 def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reductions:
-    """Integrate from t = 0 and reduce; what the request leaves open is as the scene's run settings say.
+    """Integrate and reduce; what the request leaves open is as the scene's run settings say.
 
     Raises
     ------
@@ -95,18 +97,20 @@ def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reduct
     turn = clock.period(model.manifest, numbers.values)
     duration = run_length(model, request, turn)
     transient = run.transient_cycles if request.transient_cycles is None else real(request.transient_cycles)
-    start = check_span(duration, turn, transient)
+    begin = start_time(request.initial)
+    start = check_span(duration, turn, transient, begin)
     family = choose_family(method)
     named = "stepper" if method == "auto" else method
     chosen = choose_kinks(request.kinks, named, model.manifest, rtol)
     looked_at = min(duration, SCALED_TURNS * turn)
-    allowed = rtol * stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn)
+    allowed = rtol * stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn, begin)
     names = channel_names(model.manifest)
     row = reduction_rows(model.manifest).empty(1, start, names)[0]
     state = initial.copy()
     steps, rejected = integrate_reduced(
-        *(model, stepper_for(model, chosen), numbers, family, allowed, state, row, (duration, turn, start)),
+        *(model, stepper_for(model, chosen), numbers, family, allowed, state, row, (begin + duration, turn, start)),
         progress=request.progress,
+        begun=Begun(time=begin),
     )
     found = reductions_of(model.manifest, row, names, end=state, steps=steps, rejected=rejected, turn=turn)
     assert found is not None  # `check_span` leaves some time
@@ -134,7 +138,7 @@ def integrate_reduced(
     Parameters
     ----------
     stepper : a driver with reductions
-    span : duration, time of a turn, time from which on is reduced [s]
+    span : time at the end, time of a turn, time from which on is reduced [s]
     progress : told the finished part between calls
     stop : ends the run between calls, with the reduction as it is, when it becomes nonzero
     begun : of a run that goes on where another driver ended, with its `state` and `row`

@@ -17,6 +17,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real, unknown_name, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.start import Start, start_state, start_time
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract import Manifest, RunInfo
@@ -51,8 +52,8 @@ class Request:
     samples_per_cycle : samples in a turn; in the whole run where nothing turns
     times : sample times instead, increasing, shape (samples,) [s]
     outputs : names of the outputs to evaluate; None: all of the scene
-    initial : state at the start, shape (states,)
-    transient_cycles : turns at the start that `Solution.steady` leaves out
+    initial : state at the start, shape (states,), or the end of a run that this one goes on from
+    transient_cycles : turns from t = 0 on that `Solution.steady` leaves out
     kinks : "stepped-over" or "located"; None: as the tolerance is
     progress : called with the finished fraction of the run
     """
@@ -65,7 +66,7 @@ class Request:
     samples_per_cycle: int | None = None
     times: Sequence[float] | np.ndarray | None = None
     outputs: Sequence[str] | None = None
-    initial: np.ndarray | None = None
+    initial: Start = None
     transient_cycles: float | None = None
     kinks: str | None = None
     progress: Callable[[float], None] | None = None
@@ -78,16 +79,17 @@ class Plan:
     Attributes
     ----------
     turn : time of a turn, infinite where nothing turns [s]
-    duration : length of the run [s]
-    times : of the samples, increasing, from 0 to `duration`, shape (samples,) [s]
+    begin, duration : of the run [s]
+    times : of the samples, increasing, from `begin` on, shape (samples,) [s]
     even : whether they are the ends of equal intervals of the whole run
     rtol, sensitivity_rtol : relative tolerances [1]
     outputs : names of the outputs to evaluate
     initial : state at the start, shape (states,)
-    transient_cycles : turns at the start that `Solution.steady` leaves out
+    transient_cycles : turns from t = 0 on that `Solution.steady` leaves out
     """
 
     turn: float
+    begin: float
     duration: float
     times: np.ndarray
     even: bool
@@ -96,6 +98,11 @@ class Plan:
     outputs: tuple[str, ...]
     initial: np.ndarray
     transient_cycles: float
+
+    @property
+    def end(self) -> float:
+        """Time at which the run ends [s]."""
+        return self.begin + self.duration
 
 
 def make_plan(model: LoadedModel, numbers: Numbers, request: Request) -> Plan:
@@ -115,6 +122,7 @@ def make_plan(model: LoadedModel, numbers: Numbers, request: Request) -> Plan:
     duration, times = _sample_times(model, request, turn, outputs)
     return Plan(
         turn=turn,
+        begin=start_time(request.initial),
         duration=duration,
         times=times,
         even=request.times is None,
@@ -132,14 +140,15 @@ def _sample_times(
     model: LoadedModel, request: Request, turn: float, outputs: Sequence[str]
 ) -> tuple[float, np.ndarray]:
     """Length of the run, and the times of its samples."""
+    begin = start_time(request.initial)
     if request.times is None:
         duration = run_length(model, request, turn)
-        check_length(duration, turn)
+        check_length(begin + duration, turn)
         per_cycle = _whole("samples_per_cycle", request.samples_per_cycle, model.manifest.run.samples_per_cycle)
         wanted = np.rint(float(per_cycle) * duration / turn) if math.isfinite(turn) else float(per_cycle)
         _check_memory(model, wanted, outputs)
         count = max(1, int(wanted))
-        return duration, duration * (np.arange(count + 1) / count)
+        return duration, begin + duration * (np.arange(count + 1) / count)
     if request.samples_per_cycle is not None:
         raise RequestError(
             f"samples_per_cycle = {request.samples_per_cycle!r} and times were both given: give one of them."
@@ -158,22 +167,23 @@ def _sample_times(
             f"(places {k} and {k + 1}). Sort them, each once: numpy.unique does."
         )
     if request.cycles is None and request.duration is None:
-        duration = float(times[-1])
+        duration = float(times[-1]) - begin
         if not duration > 0.0:
             raise RequestError(
-                f"times: the run ends at the last one, which must be above 0 s, not {duration!r}. Or give cycles."
+                f"times: the run ends at the last one, which must be above {begin:g} s, not {float(times[-1])!r}. Or "
+                "give cycles."
             )
     else:
         duration = run_length(model, request, turn)
-        if times[-1] > duration * (1.0 + clock.TIME_RESOLUTION):
+        if times[-1] > (begin + duration) * (1.0 + clock.TIME_RESOLUTION):
             raise RequestError(
-                f"times: the run ends at {duration!r} s, and {float(times[-1])!r} s lies behind it. Run longer, or "
-                "leave cycles and duration out: the run then ends at the last time."
+                f"times: the run ends at {begin + duration!r} s, and {float(times[-1])!r} s lies behind it. Run "
+                "longer, or leave cycles and duration out: the run then ends at the last time."
             )
-    check_length(duration, turn)
-    if times[0] < 0.0:
+    check_length(begin + duration, turn)
+    if times[0] < begin:
         raise RequestError(
-            f"times: the run starts at 0 s, and {float(times[0])!r} s lies before it. Leave earlier times out."
+            f"times: the run starts at {begin:g} s, and {float(times[0])!r} s lies before it. Leave earlier times out."
         )
     _check_memory(model, len(times), outputs)
     return duration, times
@@ -301,20 +311,6 @@ def check_length(duration: float, turn: float) -> None:
             f"A run of {words} is too long to be computed. Allowed: up to {MOST_TURNS:g} turns and {MOST_TIME:g} s. "
             "Give fewer cycles or a shorter duration."
         )
-
-
-def start_state(model: LoadedModel, numbers: Numbers, given: np.ndarray | None) -> np.ndarray:
-    """State at the start, shape (states,): as given, else from the parameters; RequestError for another shape."""
-    if given is None:
-        return np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
-    names = [state.name for state in model.manifest.states]
-    initial = vector(given)
-    if initial.shape != (len(names),) or not np.all(np.isfinite(initial)):
-        raise RequestError(
-            f"initial: {len(names)} finite numbers are expected ({', '.join(names)}), "
-            f"not an array of shape {initial.shape}{'' if np.all(np.isfinite(initial)) else ' with NaN or inf'}."
-        )
-    return initial
 
 
 def tolerance(name: str, given: float) -> float:

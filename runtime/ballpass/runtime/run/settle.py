@@ -16,10 +16,12 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.reduced_run import reduce_run
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.solution import Solution
+from ballpass.runtime.run.start import RunEnd, start_time
 
 #: Change of extremes, relative to the channel's range, and of rms, relative to itself, that counts as none [1].
 PEAKS, MEANS = 5e-3, 1e-2
@@ -82,10 +84,11 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     run = model.manifest.run
     transient = run.transient_cycles if request.transient_cycles is None else request.transient_cycles
     turns = LEAST
-    before = reduce_run(model, numbers, replace(request, cycles=transient + turns))
+    dropped = _dropped(transient, start_time(request.initial), clock.period(model.manifest, numbers.values))
+    before = reduce_run(model, numbers, replace(request, cycles=dropped + turns))
     while True:
         turns *= 2
-        found = reduce_run(model, numbers, replace(request, cycles=transient + turns))
+        found = reduce_run(model, numbers, replace(request, cycles=dropped + turns))
         changes = changed(before, found)
         settled = _settled(changes)
         if settled or 2 * turns > most:
@@ -106,21 +109,31 @@ def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Se
     few, statistics = solution.steady_reductions, solution.statistics
     if few is None or solution.cycle_length is None or not statistics.steps:
         return None
-    whole = (few.start + few.duration) / solution.cycle_length
+    whole = (few.start + few.duration - statistics.begin) / solution.cycle_length
     turns = min(LEAST, int(STEPS * whole / statistics.steps))
     if turns < 2.0 * few.duration / solution.cycle_length:
         return None
     request = Request(
-        cycles=solution.transient_cycles + turns,
+        cycles=_dropped(solution.transient_cycles, statistics.begin, solution.cycle_length) + turns,
         transient_cycles=solution.transient_cycles,
         method=statistics.method,
         rtol=statistics.rtol,
         kinks=statistics.kinks,
-        initial=np.array(statistics.initial),
+        initial=RunEnd(
+            time=statistics.begin,
+            x=np.array(statistics.initial),
+            states=solution.states,
+            parameters=solution.parameters,
+        ),
     )
     found = reduce_run(model, numbers, request)
     changes = changed(few, found)
     return Settled(reductions=found, turns=turns, settled=_settled(changes), changes=changes)
+
+
+def _dropped(transient: float, begin: float, turn: float) -> float:
+    """Turns of the transient that a run from `begin` on has before it."""
+    return max(transient - begin / turn, 0.0)
 
 
 def _settled(changes: Mapping[str, tuple[float, float]]) -> bool:

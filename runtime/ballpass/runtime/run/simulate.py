@@ -65,8 +65,8 @@ def simulate(
     plan = make_plan(model, numbers, request)
     # derivatives first: what would not fit into memory is told before there is memory for the rest
     directions = prepare(len(plan.times)) if prepare is not None else None
-    interval = (0.0, plan.duration)
-    start = plan.transient_cycles * plan.turn if plan.transient_cycles > 0.0 else 0.0
+    interval = (plan.begin, plan.end)
+    start = max(plan.begin, plan.transient_cycles * plan.turn if plan.transient_cycles > 0.0 else 0.0)
     trajectory = start_trajectory(
         model, numbers, plan.times, plan.initial, interval, plan.turn, even=plan.even, start=start
     )
@@ -129,6 +129,7 @@ def simulate(
             kinks=cost.kinks,
             located=cost.located,
             initial=tuple(plan.initial.tolist()),
+            begin=plan.begin,
             duration=plan.duration,
             segments=trajectory.passed,
             calls=trajectory.calls,
@@ -159,14 +160,16 @@ def _choose(
     name = asked or model.manifest.run.method
     scales = None
     if not (model.has_stepper and name in ("auto", *STEPPERS)):
-        scales = model_scales(model, numbers, plan.initial, plan.duration, plan.turn)
+        scales = model_scales(model, numbers, plan.initial, plan.duration, plan.turn, plan.begin)
     method, reason = choose_method(model, name, scales)
     if scales is not None:
         if method == "erk":
             refuse_crawl(method, scales, plan.duration, plan.turn)
         return method, reason, scales.magnitude
     edges = trajectory.segments.times
-    magnitude = stepper_magnitudes(model, model.stepper, numbers, plan.initial, plan.duration, plan.turn, edges)
+    magnitude = stepper_magnitudes(
+        model, model.stepper, numbers, plan.initial, plan.duration, plan.turn, plan.begin, edges
+    )
     return method, reason, magnitude
 
 

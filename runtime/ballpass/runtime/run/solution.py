@@ -19,6 +19,7 @@ from ballpass.runtime.contract.status import Status
 from ballpass.runtime.run.accuracy import Accuracy
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import no_output
+from ballpass.runtime.run.start import RunEnd
 
 if TYPE_CHECKING:
     import xarray
@@ -53,7 +54,8 @@ class Statistics:
     kinks : "stepped-over" or "located"; None for methods that do not know the kinks of the laws
     located : kinks located, None where they are stepped over
     initial : state at its start; None where an earlier version wrote the solution
-    duration : length of the run, which may end behind the last sample [s]; None as above
+    begin : time at its start, above 0 where it goes on from another run [s]
+    duration : length of the run, which may end behind the last sample [s]; None as for `initial`
     """
 
     method: str
@@ -69,6 +71,7 @@ class Statistics:
     kinks: str | None = None
     located: int | None = None
     initial: tuple[float, ...] | None = None
+    begin: float = 0.0
     duration: float | None = None
 
 
@@ -85,7 +88,7 @@ class Solution:
     outputs : output name to samples; at a breakpoint, the value behind it
     parameters, constants : numbers of the run by name
     cycle_length : time of one turn [s], where a torque drives at the initial speed; None where nothing turns
-    transient_cycles : turns at the start that `steady` leaves out
+    transient_cycles : turns from t = 0 on that `steady` leaves out
     manifest : names, units and descriptions
     statistics : how the solution came about
     status : how the simulation ended
@@ -175,6 +178,19 @@ class Solution:
             )
         outputs = {name: samples[keep] for name, samples in self.outputs.items()}
         return replace(self, t=self.t[keep], x=self.x[keep], outputs=outputs, reductions=self.steady_reductions)
+
+    @property
+    def end(self) -> RunEnd:
+        """Where the run has come to at its last sample: ``simulate(initial=solution.end)`` goes on from there.
+
+        Raises
+        ------
+        RequestError
+            There is no sample.
+        """
+        if not len(self.t):
+            raise RequestError("end: the run has no samples, so that its end is not known. Run longer.")
+        return RunEnd(time=float(self.t[-1]), x=self.x[-1], states=self.states, parameters=self.parameters)
 
     @property
     def period(self) -> float | None:

@@ -1,0 +1,103 @@
+"""Where runs start: at the scene's initial state, at one that is given, or where another run ended.
+
+In: a model, numbers, what was asked for.  Out: time and state.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers, vector
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.ball_angles import ball_angles
+
+#: Angles of driver and balls that differ by less are one, but for the rounding of many turns [rad].
+SAME_ANGLE = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RunEnd:
+    """Where a run has come to: another one goes on from it, ``initial=solution.end``.
+
+    Attributes
+    ----------
+    time : [s]
+    x : state then, shape (states,)
+    states : names of the states
+    parameters : of the run, by name
+    """
+
+    time: float
+    x: np.ndarray
+    states: tuple[str, ...]
+    parameters: Mapping[str, float]
+
+
+#: What may be given as start; None is the scene's.
+Start = np.ndarray | RunEnd | None
+
+
+def start_time(given: Start) -> float:
+    """Time at which a run begins [s]."""
+    return given.time if isinstance(given, RunEnd) else 0.0
+
+
+def start_state(model: LoadedModel, numbers: Numbers, given: Start) -> np.ndarray:
+    """State at the start, shape (states,): as given, else from the parameters.
+
+    Raises
+    ------
+    RequestError
+        Another shape, a run of other states, or of parameters with which driver or balls stood elsewhere.
+    """
+    if given is None:
+        return np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
+    names = tuple(state.name for state in model.manifest.states)
+    if isinstance(given, RunEnd):
+        if given.states != names:
+            raise RequestError(
+                f"initial: it is the end of a run with other states ({', '.join(given.states)}); those of this model "
+                f"are {', '.join(names)}. Give the end of a run of this scene."
+            )
+        _refuse_jump(model, numbers, given)
+        return given.x
+    initial = vector(given)
+    if initial.shape != (len(names),) or not np.all(np.isfinite(initial)):
+        raise RequestError(
+            f"initial: {len(names)} finite numbers are expected ({', '.join(names)}), "
+            f"not an array of shape {initial.shape}{'' if np.all(np.isfinite(initial)) else ' with NaN or inf'}."
+        )
+    return initial
+
+
+def _refuse_jump(model: LoadedModel, numbers: Numbers, end: RunEnd) -> None:
+    """Refuse to go on with numbers that put driver or balls elsewhere at that time than the run before."""
+    known = {name: value for name, value in end.parameters.items() if name in numbers.parameters}
+    changed = [name for name, value in known.items() if numbers.parameters[name] != value]
+    if not changed:
+        return
+    before = model.numbers({**numbers.parameters, **known})
+    angles, others = (
+        np.concatenate(
+            [
+                [clock.crank_angle(model.manifest, one.values, end.time, end.x)],
+                *ball_angles(model, one, end.time, end.x),
+            ]
+        )
+        for one in (before, numbers)
+    )
+    moved = np.abs((others - angles + math.pi) % clock.TURN - math.pi)
+    if np.max(moved) > SAME_ANGLE * max(1.0, end.time / clock.period(model.manifest, numbers.values)):
+        what = "the driver" if moved[0] == np.max(moved) else "balls"
+        raise RequestError(
+            f"initial: with {', '.join(changed)} changed, {what} would jump by "
+            f"{math.degrees(float(np.max(moved))):.4g} deg at t = {end.time:.6g} s, where the run goes on. Allowed: "
+            "parameters that leave driver and balls where they are. Give them as they were, or start anew from the "
+            "state alone: initial=solution.end.x."
+        )
