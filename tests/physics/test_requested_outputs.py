@@ -169,6 +169,15 @@ def test_contacts_take_what_they_store_and_what_dampers_take() -> None:
         assert stored + loss == pytest.approx(-values[f"{prefix}contact.power"], rel=1e-8)
 
 
+def test_a_spring_takes_its_tension_along_its_length_and_its_damper_the_square_of_the_rate() -> None:
+    model = machine("torque")
+    for t, x in states(model):
+        values, rates = along_motion(model, t, x)
+        rate, name = rates["spring.return.length"], "spring.return"
+        assert values[f"{name}.power"] == pytest.approx(-values[f"{name}.tension"] * rate, rel=1e-8)
+        assert values[f"{name}.loss"] == pytest.approx(40.0 * rate**2, rel=1e-8)
+
+
 def test_magnitude_of_a_reaction_is_that_of_its_components() -> None:
     model = machine("torque")
     t, x = states(model)[1]

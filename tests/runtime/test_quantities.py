@@ -48,7 +48,8 @@ def test_drive_work_is_the_work_of_the_punch_and_falls_with_its_window(make_mode
     model = make_model("punching_press")
     punch = "mechanism.forces.punch"
     names = [f"{punch}.force.y", f"{punch}.window.start", f"{punch}.window.end", "mechanism.driver.speed"]
-    report = model.sensitivity("drive_work", names, 2, transient=1, check=False)
+    report = model.sensitivity(["drive_work", "integral:drive_torque"], names, 2, transient=1, check=False)
+    speed = model.parameters[names[3]]
     force = model.parameters[names[0]]
     start, end = model.parameters[names[1]], model.parameters[names[2]]
     crank, rod = (model.parameters[f"mechanism.bodies.{name}"] for name in ("crank.points.B", "rod.points.C"))
@@ -66,6 +67,11 @@ def test_drive_work_is_the_work_of_the_punch_and_falls_with_its_window(make_mode
     for name, number in zip(names, expected, strict=False):
         assert report["drive_work", name].derivative == pytest.approx(number, rel=1e-8), name
     assert abs(report["drive_work", names[3]].dimensionless) < 1e-10
+    # the integral over time of one turn is work over speed
+    assert report.quantities[1].unit == "N*m*s"
+    assert report.quantities[1].value == pytest.approx(work / speed, rel=1e-9)
+    assert report["integral:drive_torque", names[0]].derivative == pytest.approx(work / force / speed, rel=1e-8)
+    assert report["integral:drive_torque", names[3]].dimensionless == pytest.approx(-1.0, abs=1e-10)
 
 
 def test_an_unloaded_press_does_no_work(make_model: Callable[..., Model]) -> None:

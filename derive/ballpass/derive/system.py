@@ -292,7 +292,7 @@ def _requested(
 ) -> tuple[Output, ...]:
     """What a mechanism reports on request."""
     powers = power_outputs(linkage, reactions, loads=forces.of_each, inertias=inertias, weights=weights)
-    return (*motion_outputs(mechanism, linkage, reactions), *powers)
+    return (*motion_outputs(mechanism, linkage, reactions), *powers, *forces.requested)
 
 
 def _moments(scene: Scene, mechanism: Mechanism) -> frozenset[str]:

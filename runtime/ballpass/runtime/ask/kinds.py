@@ -29,6 +29,7 @@ class Kind:
     place : what is expected behind ``@``, "" for nothing
     channel : output it always takes; "" when the name says it
     unit : of the value; "" for that of the channel
+    over_time : whether the unit is that of the channel times a second
     static : whether it is one of the rings at rest, for which nothing is run (`ballpass.runtime.ask.study`)
     """
 
@@ -39,6 +40,7 @@ class Kind:
     channel: str = ""
     unit: str = ""
     static: bool = False
+    over_time: bool = False
 
 
 def _mean(view: View, quantity: Quantity) -> Estimate:
@@ -47,6 +49,12 @@ def _mean(view: View, quantity: Quantity) -> Estimate:
     length, longer = view.length
     mean = total.real / length
     return Estimate(value=mean, slope=(moved.real - mean * longer) / length)
+
+
+def _integral(view: View, quantity: Quantity) -> Estimate:
+    value, slope = view.channel(quantity)
+    total, moved = view.integral(value, slope)
+    return Estimate(value=total.real, slope=moved.real)
 
 
 def _rms(view: View, quantity: Quantity) -> Estimate:
@@ -138,6 +146,7 @@ KINDS: Mapping[str, Kind] = {
     "min": Kind(summary="smallest value", evaluate=lambda v, q: _extreme(v, q, "min"), extremes=("min",)),
     "range": Kind(summary="largest less smallest value", evaluate=_range, extremes=("max", "min")),
     "mean": Kind(summary="mean over time", evaluate=_mean),
+    "integral": Kind(summary="integral over time; of a power the work", evaluate=_integral, over_time=True),
     "rms": Kind(summary="root mean square over time, with the mean in it", evaluate=_rms),
     "value": Kind(
         summary="value at a crank angle of the last turn, or at a time",

@@ -34,6 +34,9 @@ DEFAULTS = (
     *(("range", "inner.y"), ("rms", "outer.y")),
 )
 
+#: Units of integrals over time that have names.
+_OVER_TIME = {"W": "J", "m/s": "m", "m/s^2": "m/s", "rad/s": "rad", "rad/s^2": "rad/s"}
+
 #: Words people use for kinds.
 _SYNONYMS = {"peak": "max"}
 
@@ -92,6 +95,8 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
         raise RequestError(f"{text}: ball {ball} was given; {form['channel']} allows {allowed}.")
     place = form["place"] or ""
     _check_place(manifest, text, KINDS[name], name, place)
+    if KINDS[name].over_time:
+        unit = _OVER_TIME.get(unit, f"{unit}*s")
     return Quantity(name=text, kind=name, channel=form["channel"], ball=ball, place=place, unit=unit)
 
 

@@ -159,7 +159,7 @@ def simulate_many(
     started = clocks.perf_counter()
     manifest = model.manifest
     aliases = observable_aliases(channel_names(manifest))
-    chosen = _observables(observables, aliases)
+    chosen = _observables(manifest, observables, aliases)
     asked = method or manifest.run.method
     family = choose_family(asked)
     tolerance = relative_tolerance("rtol", manifest.run.rtol if rtol is None else rtol)
@@ -229,16 +229,30 @@ def simulate_many(
     )
 
 
-def _observables(names: str | Sequence[str], aliases: Mapping[str, tuple[str, str]]) -> dict[str, tuple[str, str]]:
+def _observables(
+    manifest: Manifest, names: str | Sequence[str], aliases: Mapping[str, tuple[str, str]]
+) -> dict[str, tuple[str, str]]:
     names = [names] if isinstance(names, str) else list(names)
     if not names:
         raise RequestError(
             "observables: one name or more is expected, none was given. Example: ['max:ball.force', 'rms:inner.y']."
         )
-    faults = [unknown_name("observable", name, aliases) for name in names if name not in aliases]
+    faults = [_fault(manifest, name, aliases) for name in names if name not in aliases]
     if faults:
         raise RequestError("\n".join(faults))
     return {name: aliases[name] for name in names}
+
+
+def _fault(manifest: Manifest, name: str, aliases: Mapping[str, tuple[str, str]]) -> str:
+    """Why a name is no observable: the steps reduce states and forces of balls, not what follows from them."""
+    channel = str(name).rpartition(":")[2].partition("[")[0].partition("@")[0]
+    reduced = channel_names(manifest)
+    if channel in {info.name for info in manifest.quantities} and channel not in reduced:
+        return (
+            f"{name!r}: ensembles and sweeps reduce what steps give: {', '.join(reduced)}; {channel} is not among "
+            "them. Ask Model.sensitivity or ballpass sensitivity for it, member by member."
+        )
+    return unknown_name("observable", name, aliases)
 
 
 def _threads(given: int | None) -> int:

@@ -20,8 +20,8 @@ from ballpass.derive.variables import Input, Output
 class Forces:
     """What acts on the bodies, and the definitions, inputs and outputs that come with it.
 
-    `of_each` are the loads by the label of their force, `smoothness` is that of what is a function of the state, by
-    name, and `edges` are where it jumps.
+    `of_each` are the loads by the label of their force, `requested` are outputs on request, `smoothness` is that of
+    what is a function of the state, by name, and `edges` are where it jumps.
     """
 
     loads: tuple[Load, ...]
@@ -29,6 +29,7 @@ class Forces:
     definitions: tuple[Definition, ...]
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
+    requested: tuple[Output, ...] = ()
     smoothness: tuple[tuple[str, Smoothness], ...] = ()
     edges: tuple[WindowEdges, ...] = ()
 
@@ -46,6 +47,7 @@ def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Force
         definitions=(*setting.switched, *setting.ledger.definitions),
         inputs=tuple(setting.inputs),
         outputs=tuple(setting.outputs),
+        requested=tuple(setting.requested),
         smoothness=tuple(setting.smoothness),
         edges=tuple(setting.edges),
     )

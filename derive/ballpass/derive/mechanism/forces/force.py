@@ -35,7 +35,8 @@ Points = Mapping[str, Sequence[str]]
 class Setting:
     """What forces act in, and what they add: definitions, inputs, outputs.
 
-    `switched` are the definitions of what changes with the driver's angle, which others use.
+    `requested` are outputs on request, `switched` are the definitions of what changes with the driver's angle, which
+    others use.
     """
 
     mechanism: Mechanism
@@ -44,6 +45,7 @@ class Setting:
     ledger: Ledger = field(default_factory=Ledger)
     inputs: list[Input] = field(default_factory=list)
     outputs: list[Output] = field(default_factory=list)
+    requested: list[Output] = field(default_factory=list)
     switched: list[Definition] = field(default_factory=list)
     smoothness: list[tuple[str, Smoothness]] = field(default_factory=list)
     edges: list[WindowEdges] = field(default_factory=list)

@@ -76,6 +76,8 @@ class SpringDamper(Law):
                 rf"\dot\Delta_{{{mark}}}",
             )
             terms.append(symbol_of(self.damping) * rate)
+            taken, words = symbol_of(self.damping) * rate**2, f"What the damper of {force.name} takes"
+            setting.requested.append(Output(name=f"{label}.loss", expression=taken, unit="W", description=words))
         words = f"{measure.amount} of {force.name}, spring and damper"
         amount = ledger.define(f"{label}.{measure.amount}", sp.Add(*terms), measure.amount_unit, words, f"F_{{{mark}}}")
         output = Output(name=amount.name, expression=amount, unit=measure.amount_unit, description=words.capitalize())
