@@ -31,7 +31,7 @@ from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kink
 from ballpass.runtime.run.printed import printed
 from ballpass.runtime.run.reduced_run import check_span, choose_family
 from ballpass.runtime.run.reductions import channel_names, observable_aliases, observe
-from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, check_memory
+from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, check_memory, on_request
 from ballpass.runtime.run.request import tolerance as relative_tolerance
 
 if TYPE_CHECKING:
@@ -247,7 +247,8 @@ def _fault(manifest: Manifest, name: str, aliases: Mapping[str, tuple[str, str]]
     """Why a name is no observable: the steps reduce states and forces of balls, not what follows from them."""
     channel = str(name).rpartition(":")[2].partition("[")[0].partition("@")[0]
     reduced = channel_names(manifest)
-    if channel in {info.name for info in manifest.quantities} and channel not in reduced:
+    computed = channel in {info.name for info in manifest.quantities} or bool(on_request(channel))
+    if computed and channel not in reduced:
         return (
             f"{name!r}: ensembles and sweeps reduce what steps give: {', '.join(reduced)}; {channel} is not among "
             "them. Ask Model.sensitivity or ballpass sensitivity for it, member by member."

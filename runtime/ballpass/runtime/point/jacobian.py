@@ -26,6 +26,7 @@ from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.request import on_request
 
 Array = NDArray[np.float64]
 
@@ -83,7 +84,7 @@ def rows_of(model: LoadedModel, of: str | Sequence[str]) -> list[Rows]:
     manifest = model.manifest
     known = [*((RHS,) if model.has(RHS) else ()), *(item.name for item in manifest.quantities)]
     faults = [
-        unknown_name("function to differentiate", name, known)
+        on_request(name) or unknown_name("function to differentiate", name, known)
         for name in names
         if not any(fnmatchcase(candidate, name) for candidate in known)
     ]

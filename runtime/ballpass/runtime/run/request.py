@@ -238,6 +238,16 @@ def output_names(model: LoadedModel, asked: Sequence[str] | None) -> tuple[str, 
     return names
 
 
+def on_request(name: object) -> str:
+    """What to do about a name of an output that a model has on request only; "" for another name."""
+    if not any(fnmatchcase(str(name), pattern) for pattern in ON_REQUEST):
+        return ""
+    return (
+        f"{name!r} is computed only for a scene that names it: add it to run.outputs; the model is then derived anew. "
+        "Points, bodies and joints have the scene's names."
+    )
+
+
 def no_output(manifest: Manifest, name: object, known: Sequence[str], what: str = "output") -> str:
     """Why a name is no output, and what to do: the scene may not ask for it, or there is no such thing.
 
@@ -252,12 +262,7 @@ def no_output(manifest: Manifest, name: object, known: Sequence[str], what: str 
             f'{name!r} is not among this scene\'s run.outputs: add "{f"{part}.*" if dot else name}" there; the model '
             "is then derived anew."
         )
-    if any(fnmatchcase(str(name), pattern) for pattern in ON_REQUEST):
-        return (
-            f"{name!r} is computed only for a scene that names it: add it to run.outputs; the model is then derived "
-            "anew. Points, bodies and joints have the scene's names."
-        )
-    return f"{unknown_name(what, name, known)} The scene's run.outputs says which are computed."
+    return on_request(name) or f"{unknown_name(what, name, known)} The scene's run.outputs says which are computed."
 
 
 def asked_length(run: RunInfo, cycles: float | None, duration: float | None) -> tuple[float | None, float | None]:
