@@ -19,9 +19,9 @@ from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.scene.records import Scene
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
-MOTION = ("point.*", "body.*.speed", "body.*.acceleration", "reaction.*.magnitude")
+MOTION = ("*inner.a[xy]", "*outer.a[xy]", "point.*", "body.*.speed", "body.*.acceleration", "reaction.*.magnitude")
 POWER = ("*.power", "*.loss", "*kinetic_energy", "drive_power")
-HERTZ = ("ball.stiffness", "ball.*_pressure", "ball.*_axis", "ball.*_approach")
+HERTZ = ("contact.stiffness.*", "ball.stiffness", "ball.*_pressure", "ball.*_axis", "ball.*_approach")
 
 SPRINGS = """[mechanism.springs.return]
 bodies = ["frame", "slider"]
@@ -105,13 +105,15 @@ def test_velocities_and_accelerations_are_the_time_derivatives(which: str) -> No
         for name in values:
             stem, _, end = name.rpartition(".")
             pairs = {"x": "vx", "y": "vy", "vx": "ax", "vy": "ay"} if stem.startswith("point.") else {}
+            pairs |= {"vx": "ax", "vy": "ay"} if stem.endswith(("inner", "outer")) else {}
             pairs |= {"angle": "speed", "speed": "acceleration"} if stem.startswith("body.") else {}
             if end in pairs:
                 there = values[f"{stem}.{pairs[end]}"]
                 scale = max(abs(v) for n, v in values.items() if n.rpartition(".")[2] == pairs[end])
                 assert rates[name] == pytest.approx(there, rel=1e-8, abs=1e-8 * scale), name
                 checked += 1
-    assert checked == 3 * (8 * 4 + 3 * 2)
+    rings = 4 if which == "one-way" else 10
+    assert checked == 3 * (8 * 4 + 3 * 2 + rings)
 
 
 def test_acceleration_of_the_slider_is_that_of_the_textbook() -> None:
@@ -236,6 +238,19 @@ def test_approaches_of_both_contacts_add_up_to_the_deflection() -> None:
         contact(1234.1)["ball.deflection"] - contact(1233.9)["ball.deflection"]
     )
     assert found["ball.stiffness"] == pytest.approx(slope, rel=1e-7)
+
+
+def test_stiffness_matrix_is_the_slope_of_the_ring_force() -> None:
+    """Differences of the balls' forces on the rings, without damping, at an eccentric place."""
+    model = Derived(scene_from_text(press(), "press"), {"bearing.damping.ratio": 0.0}, further=HERTZ)
+    x, h = np.array([2.1e-5, -1.7e-5, 1e-6, 2e-6, 0.0, 0.0, 0.0, 0.0]), 1e-9
+    found = model.outputs(0.02, x, model.gates())
+    for column, axis in enumerate("xy"):
+        ahead, behind = (model.outputs(0.02, x + s * h * np.eye(8)[column], model.gates()) for s in (1, -1))
+        for other in "xy":
+            slope = (ahead[f"ring_force.{other}"] - behind[f"ring_force.{other}"]) / (2 * h)
+            name = f"contact.stiffness.{min(axis, other)}{max(axis, other)}"
+            assert slope == pytest.approx(found[name], rel=1e-6), name
 
 
 def test_static_rating_of_iso_76_is_where_the_pressure_is_4200_mpa() -> None:

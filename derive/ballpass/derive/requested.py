@@ -88,16 +88,42 @@ def power_outputs(
     return _made(out)
 
 
+def ring_outputs(model: BearingModel) -> list[Output]:
+    """Accelerations of the rings' centres."""
+    return [
+        Output(
+            name=c.name[:-1] + f"a{c.name[-1]}",
+            expression=c.acceleration,
+            unit=f"{c.unit}/s^2",
+            description=f"Acceleration {c.description}",
+        )
+        for c in model.coordinates
+    ]
+
+
 def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
     """Hertz's contact of every ball with both raceways, under its elastic force, and its stiffness."""
     ball, names = model.ball, model.names
     of = f" of {bearing.name}" if bearing.name else ""
     force = ball.elastic_force
     elastic = next(d.expression for d in ball.definitions if d.symbol == force)
+    slope, count = sp.diff(elastic, ball.deflection), _count(bearing)
+    directions = {"xx": ball.cos**2, "xy": ball.cos * ball.sin, "yy": ball.sin**2}
     out = [
         Output(
+            name=f"{names.prefix}contact.stiffness.{axes}",
+            expression=count * slope * along,
+            unit="N/m",
+            description=f"Entry {axes} of the stiffness matrix of all balls{of}",
+            balls_of=names.prefix,
+            over_balls=True,
+        )
+        for axes, along in directions.items()
+    ]
+    out += [
+        Output(
             name=f"{names.prefix}ball.stiffness",
-            expression=sp.diff(elastic, ball.deflection),
+            expression=slope,
             unit="N/m",
             description=f"Slope of the elastic force of each ball{of} by its deflection",
             per_ball=True,
@@ -129,6 +155,11 @@ def contact_outputs(bearing: Bearing, model: BearingModel) -> list[Output]:
     return out
 
 
+def _count(bearing: Bearing) -> sp.Expr:
+    """Bearings side by side."""
+    return sp.S.One if bearing.count is None else symbol_of(bearing.count)
+
+
 def bearing_power_outputs(
     bearing: Bearing, model: BearingModel, load: Pair | None, turning: sp.Expr = sp.S.Zero
 ) -> list[Output]:
@@ -141,7 +172,7 @@ def bearing_power_outputs(
     """
     ball, names, c = model.ball, model.names, model.coordinates
     of = f" of {bearing.name}" if bearing.name else ""
-    count = sp.S.One if bearing.count is None else symbol_of(bearing.count)
+    count = _count(bearing)
     place, speed = ((c[0].position, c[1].position), (c[0].velocity, c[1].velocity))
     apart, parting = place, speed
     rows: list[Words] = []

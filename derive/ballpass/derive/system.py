@@ -35,7 +35,13 @@ from ballpass.derive.mechanism.power import inertia_of, loads_of_drive, work_of,
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
 from ballpass.derive.mechanism.swing import STILL, WITH_DRIVER, swing_of
 from ballpass.derive.outputs import bearing_outputs, is_asked, mechanism_outputs, select_outputs
-from ballpass.derive.requested import bearing_power_outputs, contact_outputs, motion_outputs, power_outputs
+from ballpass.derive.requested import (
+    bearing_power_outputs,
+    contact_outputs,
+    motion_outputs,
+    power_outputs,
+    ring_outputs,
+)
 from ballpass.derive.scene.errors import LinkageError, SceneError
 from ballpass.derive.scene.records import FRAME, Bearing, Mechanism, Scene
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
@@ -268,6 +274,7 @@ def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sys
                 output
                 for bearing, model in zip(scene.bearings, models, strict=True)
                 for output in (
+                    *ring_outputs(model),
                     *contact_outputs(bearing, model),
                     *bearing_power_outputs(
                         bearing, model, None, linkage.pose(joints[bearing.name].other(bearing.inner_body)).rate
@@ -345,6 +352,7 @@ def _of_rings(
                 output
                 for bearing, one in zip(scene.bearings, rings, strict=True)
                 for output in (
+                    *ring_outputs(one.model),
                     *contact_outputs(bearing, one.model),
                     *bearing_power_outputs(bearing, one.model, one.motion.load),
                 )

@@ -302,7 +302,8 @@ class _Lowering:
     def _moving(self, visit: Visitor, balls: Balls) -> Visitor:
         """A visitor that knows the sums over the balls, and the accelerations where anything uses them."""
         sums = self._sums(balls)
-        if not self._late:
+        used = {symbol for o in self.system.outputs for symbol in o.expression.free_symbols}
+        if not self._late and used.isdisjoint(c.acceleration for c in self.system.coordinates):
             return visit.child(sums, {})
         found = accelerations(self.system, visit.child(sums, self._late))
         named = {c.acceleration: a for c, a in zip(self.system.coordinates, found, strict=True)}

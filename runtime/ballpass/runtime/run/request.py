@@ -36,6 +36,7 @@ MAX_NUMBERS = 2**29
 ON_REQUEST = (
     *("point.*", "body.*.speed", "body.*.acceleration", "reaction.*.magnitude", "*.power", "drive_power", "*.loss"),
     *("*kinetic_energy", "*ball.stiffness", "*ball.*_pressure", "*ball.*_axis", "*ball.*_approach"),
+    *("*contact.stiffness.*", "*inner.a[xy]", "*outer.a[xy]"),
 )
 
 
