@@ -397,7 +397,7 @@ def test_single_mistakes_give_single_faults() -> None:
             assert len(error.faults) == 1, f"{label}: {error}"
 
 
-@pytest.mark.parametrize("name", ["reaction", "body", "spring", "torsion_spring", "friction", "load", "phase"])
+@pytest.mark.parametrize("name", ["reaction", "body", "spring", "torsion_spring", "friction", "stop", "load", "phase"])
 def test_a_bearing_is_not_named_like_a_group_of_outputs(name: str) -> None:
     error = faults(PRESS.replace("[bearing", f"[bearings.{name}"))
     assert [fault.key for fault in error.faults] == [f"bearings.{name}"]

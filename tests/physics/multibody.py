@@ -18,7 +18,9 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 from ballpass.derive.mechanism.forces import BodyTorque, Friction, PointForce, Windows
+from ballpass.derive.mechanism.forces.along_direction import AlongDirection
 from ballpass.derive.mechanism.forces.spring_damper import SpringDamper
+from ballpass.derive.mechanism.forces.stop import Stop
 from ballpass.derive.mechanism.forces.two_bodies import TwoBodies
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.scene.records import Bearing, GivenContact
@@ -201,6 +203,11 @@ class Multibody(Absolute):
                 if law.coulomb is not None:
                     amount += self.value(law.coulomb) * math.tanh(rate / self.value(law.smoothing))
                 out -= amount * slope
+            elif isinstance(law, Stop):
+                size, slope = self._size(path, q, v)
+                pressed = max(-self._beyond(path, size, self.value(law.free)), 0.0)
+                factor = max(1.0 - self.value(law.hysteresis) * float(slope @ v), 0.0)
+                out += self.value(law.stiffness) * pressed * factor * slope
             else:
                 assert isinstance(law, SpringDamper)
                 size, slope = self._size(path, q, v)
@@ -219,20 +226,25 @@ class Multibody(Absolute):
         angle = self.angle(joint.bodies[0], q) + self.value(joint.direction)
         return np.array([math.cos(angle), math.sin(angle)]) @ (two - one).jacobian
 
-    def _size(self, path: TwoPoints | TwoBodies, q: Array, v: Array) -> tuple[float, Array]:
-        """Length or angle of a spring and its gradient."""
+    def _size(self, path: TwoPoints | TwoBodies | AlongDirection, q: Array, v: Array) -> tuple[float, Array]:
+        """Length or angle of a spring, distance of a stop, and its gradient."""
         if isinstance(path, TwoBodies):
             return self.angle(path.bodies[1], q) - self.angle(path.bodies[0], q), self.row(path.bodies[1]) - self.row(
                 path.bodies[0]
             )
         one, two = (self.place(b, self.arm(b, p), q, v) for b, p in zip(path.bodies, path.points, strict=True))
         line = two - one
+        if isinstance(path, AlongDirection):
+            angle = self.angle(path.bodies[0], q) + self.value(path.direction)
+            normal = np.array([math.cos(angle), math.sin(angle)])
+            turned = float(QUARTER @ normal @ line.position) * self.row(path.bodies[0])
+            return float(normal @ line.position), normal @ line.jacobian + turned
         length = float(np.linalg.norm(line.position))
         return length, line.position / length @ line.jacobian
 
     @staticmethod
-    def _beyond(path: TwoPoints | TwoBodies, size: float, free: float) -> float:
-        return size - free if isinstance(path, TwoPoints) else math.remainder(size - free, TURN)
+    def _beyond(path: TwoPoints | TwoBodies | AlongDirection, size: float, free: float) -> float:
+        return math.remainder(size - free, TURN) if isinstance(path, TwoBodies) else size - free
 
     # what is compared
 

@@ -51,7 +51,7 @@ preload = "3 N*m"
 [mechanism.forces.cut]
 """
 
-FRICTION = """[mechanism.friction.pin]
+FRICTION_AND_STOPS = """[mechanism.friction.pin]
 joint = "B"
 viscous = "0.4 N*m*s/rad"
 torque = "30 N*m"
@@ -66,6 +66,26 @@ joint = "S"
 viscous = "60 N*s/m"
 force = "250 N"
 smoothing = "0.4 m/s"
+
+[mechanism.stops.wall]
+bodies = ["lever", "crank"]
+points = ["O", "B"]
+direction = "20 deg"
+stiffness = "2e5 N/m"
+free_distance = "190 mm"
+hysteresis = "0.4 s/m"
+
+[mechanism.stops.strut]
+bodies = ["frame", "lever"]
+points = ["A", "tip"]
+stiffness = "1e5 N/m"
+free_length = "211 mm"
+
+[mechanism.torsion_stops.limit]
+bodies = ["frame", "lever"]
+stiffness = "3e4 N*m/rad"
+free_angle = "88 deg"
+hysteresis = "0.02 s/rad"
 
 [mechanism.forces.cut]
 """
@@ -176,9 +196,9 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         SPRUNG,
         (bearing("A", elastic=True), bearing("B", "block", elastic=True), bearing("O", "lever", count=2)),
     ),
-    "shaper with friction and motor": (
+    "shaper with friction, stops and motor": (
         "crank_shaper",
-        (("[mechanism.forces.cut]\n", FRICTION), *driven_by(DIRECT_CURRENT)),
+        (("[mechanism.forces.cut]\n", FRICTION_AND_STOPS), *driven_by(DIRECT_CURRENT)),
         (bearing("B", "block", elastic=True),),
     ),
     "Whitworth": (

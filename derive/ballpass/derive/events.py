@@ -14,9 +14,8 @@ from typing import Literal
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.drive import WindowEdges
 from ballpass.derive.terms import TIME
-from ballpass.derive.variables import Input
+from ballpass.derive.variables import Input, StateSwitch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,14 +39,14 @@ class Event:
 
 
 def events_of(
-    inputs: Iterable[Input], bearings: Iterable[BearingModel], edges: Iterable[WindowEdges]
+    inputs: Iterable[Input], bearings: Iterable[BearingModel], switches: Iterable[StateSwitch]
 ) -> tuple[Event, ...]:
-    """Events of a model, in the order of its inputs, bearings and windows of an angle that is a state."""
+    """Events of a model, in the order of its inputs, bearings and loads that switch where the motion decides."""
     found = [event for item in inputs for event in _of_input(item)]
     found += [event for bearing in bearings for event in _of_balls(bearing)]
     found += [
-        Event(name=edge.border.name, kind="state", function=edge.function, rate=edge.rate, changes=edge.changes)
-        for edge in edges
+        Event(name=one.border.name, kind="state", function=one.function, rate=one.rate, changes=one.changes)
+        for one in switches
     ]
     return tuple(found)
 

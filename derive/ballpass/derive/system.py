@@ -25,7 +25,7 @@ from ballpass.derive.bearing.equations import (
 from ballpass.derive.bearing.equivalent_mass import inner_mass
 from ballpass.derive.bearing.ring_load import RingLoad, own_load, reaction_share
 from ballpass.derive.bearing.two_way import couple, play_of
-from ballpass.derive.drive import Drive, WindowEdges, constant_speed, drive_of
+from ballpass.derive.drive import Drive, constant_speed, drive_of
 from ballpass.derive.events import Event, events_of
 from ballpass.derive.mechanism.forces import Forces, derive_forces
 from ballpass.derive.mechanism.kinematics import Play
@@ -45,7 +45,7 @@ from ballpass.derive.requested import (
 from ballpass.derive.scene.errors import LinkageError, SceneError
 from ballpass.derive.scene.records import FRAME, Bearing, Mechanism, Scene
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
-from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State
+from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, StateSwitch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +75,7 @@ class System:
     outputs: tuple[Output, ...]
     smoothness: tuple[tuple[str, Smoothness], ...]
     events: tuple[Event, ...]
-    edges: tuple[WindowEdges, ...] = ()
+    switches: tuple[StateSwitch, ...] = ()
 
     @property
     def late(self) -> dict[sp.Symbol, sp.Expr]:
@@ -194,6 +194,8 @@ def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sy
         requested=_requested(mechanism, linkage, reactions, forces, *inertia_of(mechanism, linkage)),
         linkage=linkage,
         reactions=reactions,
+        smoothness=forces.smoothness,
+        switches=forces.switches,
     )
 
 
@@ -249,7 +251,7 @@ def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sys
         inputs=(*drive.inputs, *forces.inputs, *(i for cage in cages for i in cage.inputs)),
         driven=driven,
         smoothness=(*(("driver.torque", drive.smoothness) for _ in driven), *forces.smoothness),
-        edges=forces.edges,
+        switches=forces.switches,
         definitions=(*known, *reactions.definitions, *motion.definitions),
         linear_forms=motion.definitions,
         constants=(
@@ -336,6 +338,8 @@ def _of_rings(
     requested: tuple[Output, ...] = (),
     linkage: Linkage | None = None,
     reactions: Reactions | None = None,
+    smoothness: tuple[tuple[str, Smoothness], ...] = (),
+    switches: tuple[StateSwitch, ...] = (),
 ) -> System:
     """The system of bearings that do not act back on what loads them."""
     return _system(
@@ -364,6 +368,8 @@ def _of_rings(
         ),
         linkage=linkage,
         reactions=reactions,
+        smoothness=smoothness,
+        switches=switches,
     )
 
 
@@ -384,7 +390,7 @@ def _system(
     linear_forms: tuple[Definition, ...] = (),
     driven: tuple[Coordinate, ...] = (),
     smoothness: tuple[tuple[str, Smoothness], ...] = (),
-    edges: tuple[WindowEdges, ...] = (),
+    switches: tuple[StateSwitch, ...] = (),
 ) -> System:
     outputs: tuple[Output, ...] = ()
     with _noted(errors):
@@ -416,8 +422,8 @@ def _system(
             *((f"{bearing.names.prefix}{name}", law.anywhere) for bearing in bearings for name, law in bearing.laws),
             *smoothness,
         ),
-        events=events_of(inputs, bearings, edges),
-        edges=edges,
+        events=events_of(inputs, bearings, switches),
+        switches=switches,
     )
 
 

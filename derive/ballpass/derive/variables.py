@@ -42,6 +42,21 @@ class Input:
     values: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateSwitch:
+    """A place of the motion at which a load switches: what it switches on acts where `function` is above `border`.
+
+    `function` is zero there, and `rate` its time derivative; the input `border` is zero, or infinite while a step holds
+    the side on which it started.  That of a window of the driver's angle names the edges, [1]; others are sizes, in [m]
+    or [rad].
+    """
+
+    border: Input
+    function: sp.Expr
+    rate: sp.Expr
+    changes: str
+
+
 def phase(name: str, description: str, latex: str, *, offset: str, rate: str) -> Input:
     """An angle that turns at a constant rate: `offset` names it at t = 0 [rad], `rate` its speed [rad/s]."""
     return Input(

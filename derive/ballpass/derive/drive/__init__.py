@@ -2,11 +2,11 @@
 
 from ballpass.derive.drive.by_torque import by_torque
 from ballpass.derive.drive.constant_speed import constant_speed
-from ballpass.derive.drive.drive import Drive, OverAngle, WindowEdges
+from ballpass.derive.drive.drive import Drive, OverAngle
 from ballpass.derive.drive.laws import LAWS
 from ballpass.derive.scene.records import Driver
 
-__all__ = ["LAWS", "Drive", "OverAngle", "WindowEdges", "constant_speed", "drive_of"]
+__all__ = ["LAWS", "Drive", "OverAngle", "constant_speed", "drive_of"]
 
 
 def drive_of(driver: Driver) -> Drive:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.drive.drive import Drive, OverAngle, WindowEdges
+from ballpass.derive.drive.drive import Drive, OverAngle
 from ballpass.derive.drive.piecewise_linear import piecewise_linear
 from ballpass.derive.scene.records import Driver
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
-from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input
+from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, StateSwitch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,12 +35,12 @@ class ByTorque(Drive):
             inputs=tuple(edge.border for edge in edges),
             definitions=(gate,),
             smoothness=jumps,
-            edges=tuple(edges),
+            switches=tuple(edges),
         )
 
-    def _edges(self, name: str, number: int, start: str, end: str) -> WindowEdges:
+    def _edges(self, name: str, number: int, start: str, end: str) -> StateSwitch:
         function, path = inside_window(start, end), f"border.{name}.{number}"
-        return WindowEdges(
+        return StateSwitch(
             border=Input(
                 name=path,
                 symbol=sp.Symbol(path, real=True),

@@ -12,35 +12,21 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.terms import Definition, Smoothness
-from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WindowEdges:
-    """Edges of a window of an angle that is a state: what acts there does so where `function` is above `border`.
-
-    `function` [1] is zero at the edges and positive inside, `rate` its time derivative; the input `border` is zero, or
-    infinite while a step holds the side on which it started.
-    """
-
-    border: Input
-    function: sp.Expr
-    rate: sp.Expr
-    changes: str
+from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, StateSwitch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OverAngle:
     """Something that changes with the driver's angle: its value, and the inputs and definitions that this needs.
 
-    `smoothness` is that of what is a function of the state, by name, and `edges` are where it jumps.
+    `smoothness` is that of what is a function of the state, by name, and `switches` are where it jumps.
     """
 
     value: sp.Expr
     inputs: tuple[Input, ...] = ()
     definitions: tuple[Definition, ...] = ()
     smoothness: tuple[tuple[str, Smoothness], ...] = ()
-    edges: tuple[WindowEdges, ...] = ()
+    switches: tuple[StateSwitch, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

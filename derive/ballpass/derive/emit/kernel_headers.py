@@ -217,13 +217,20 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
             parts.append(_WITHOUT_SWITCHES.format(b=index))
     first = len(flags["of_rate"])
     if kernels.windows is not None:
-        borders = [k for k, item in enumerate(system.inputs) if item.kind == "border"]
+        borders = [k for k, item in enumerate(system.inputs) if item.kind == "border" and item.windows]
         angle = next(k for k, c in enumerate(system.coordinates) if c.kind == "angle")
         sizes |= {"BP_WINDOWS": len(borders), "BP_FIRST_WINDOW": first, "BP_DRIVER": angle}
         flags["has_rate"] += [1.0] * len(borders)
         for key in ("ends_above", "ends_below", "of_rate"):
             flags[key] += [0.0] * len(borders)
         parts += ["#define BP_HAS_WINDOWS", _integers("bp_window_input", borders), _single(kernels.windows)]
+    if kernels.stops:
+        borders = [k for k, item in enumerate(system.inputs) if item.kind == "border" and not item.windows]
+        sizes |= {"BP_STOPS": len(borders), "BP_FIRST_STOP": len(flags["of_rate"])}
+        flags["has_rate"] += [1.0] * len(borders)
+        for key in ("ends_above", "ends_below", "of_rate"):
+            flags[key] += [0.0] * len(borders)
+        parts += ["#define BP_HAS_STOPS", _integers("bp_stop_input", borders), *map(_single, kernels.stops)]
     if not flags["of_rate"]:
         return None
     tables = "\n".join(print_array(f"bp_{name}", values) for name, values in flags.items())

@@ -67,6 +67,7 @@ class Kernels:
     stage_slopes : what these share for the stages, of `stage_slopes_size` entries
     bearings : kernels of the balls
     windows : (x, p, c) -> g, rate of the windows of an angle that is a state; None without
+    stops : (t, x, u, p, c) -> g, rate of the stops, and -> J, derivatives of g by the states (row-major); none without
     """
 
     stage_size: int
@@ -80,6 +81,7 @@ class Kernels:
     stage_slopes: Kernel
     bearings: tuple[BallKernels, ...]
     windows: Kernel | None = None
+    stops: tuple[Kernel, ...] = ()
 
     def __getitem__(self, name: str) -> Kernel:
         for kernel in (*self.functions, *self.turned, *self.tangents):
@@ -121,7 +123,8 @@ class KernelBuilder:
         self._definitions = definitions
         self._of_state = Visitor(values, definitions, constant=timed, hoist=self._hoist)
         self._balls = [BallBuilder(bearing, visit, self._of_state) for bearing in system.bearings]
-        self._windows = [[visit(e) for e in (edge.function, edge.rate)] for edge in system.edges]
+        windows, stops = ([s for s in system.switches if bool(s.border.windows) is kind] for kind in (True, False))
+        self._windows, self._stops = ([[visit(e) for e in (s.function, s.rate)] for s in of] for of in (windows, stops))
         self._bodies = self._build()
 
     def _hoist(self, expression: sp.Basic) -> ca.SX:
@@ -255,6 +258,7 @@ class KernelBuilder:
             stage_slopes=stage_slopes,
             bearings=bearings,
             windows=self._of_windows(c) if self._windows else None,
+            stops=self._of_stops(c) if self._stops else (),
         )
 
     def _of_windows(self, c: ca.SX) -> Kernel:
@@ -262,6 +266,17 @@ class KernelBuilder:
         gives = [ca.densify(ca.vertcat(*column)) for column in zip(*self._windows, strict=True)]
         function = ca.Function("windows", [*takes.values()], ca.cse(gives), [*takes], ["g", "rate"])
         return Kernel(function=function, description="Switching functions of windows, and their rates")
+
+    def _of_stops(self, c: ca.SX) -> tuple[Kernel, Kernel]:
+        takes = {**{k: self._arguments[k] for k in "txup"}, "c": c}
+        g, rate = (ca.densify(ca.vertcat(*column)) for column in zip(*self._stops, strict=True))
+        slopes = ca.densify(ca.vec(ca.jacobian(g, takes["x"]).T))
+        value = ca.Function("stops", [*takes.values()], ca.cse([g, rate]), [*takes], ["g", "rate"])
+        moved = ca.Function("stops_by_state", [*takes.values()], ca.cse([slopes]), [*takes], ["J"])
+        return (
+            Kernel(function=value, description="Switching functions of stops, and their rates"),
+            Kernel(function=moved, description="Derivatives of the switching functions of stops by the states"),
+        )
 
 
 def _needed(stage: ca.Function, relative: ca.Function, bearings: tuple[BallKernels, ...]) -> Kernel:

@@ -45,7 +45,7 @@ MAX_FILE_SIZE = 8_000_000
 #: First parts of the names of a mechanism's variables and of inputs: a bearing's names may not begin so.
 RESERVED = (
     *("body", "driver", "force", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "point"),
-    *("reaction", "spring", "torque", "torsion_spring", "weight"),
+    *("reaction", "spring", "stop", "torque", "torsion_spring", "torsion_stop", "weight"),
 )
 _TABLES = ("mechanism", "shaft", "load", "bearing", "bearings", "run")
 

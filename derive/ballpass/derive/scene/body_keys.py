@@ -55,6 +55,16 @@ def refuse_unknown_point(data: Table, key: str, body: str, point: str, points: P
     )
 
 
+def read_two_points(data: Table, points: Points) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Two different bodies and a point of each, of the keys bodies and points; empty names, with faults noted."""
+    bodies = read_two_bodies(data, points)
+    ends = read_pair(data, "points", '["anchor", "tip"]') or ("", "")
+    for body, point in zip(bodies, ends, strict=True):
+        if point:
+            refuse_unknown_point(data, "points", body, point, points)
+    return bodies, ends
+
+
 def read_moving_body(data: Table, points: Points) -> str:
     """The moving body a load acts on; empty, with a fault, where there is none."""
     body = data.text("body", "slider")

@@ -99,7 +99,7 @@ def find_kinks(
     Parameters
     ----------
     t, segment : nodes, shape (n,)
-    deflections : of the balls of each bearing, shape (n, balls) [m]
+    deflections : of the balls of each bearing, shape (n, balls), and of each stop, shape (n, 1) [m]
     ranked : channels of which only the most loaded ball's value counts, shape (n, balls)
     one_sided : whether a damping law has a corner at rate zero
     length : of the time that counts [s]

@@ -278,19 +278,20 @@ class Study:
 
     @property
     def _kinked(self) -> bool:
-        """Whether an integral over an output of the balls is asked for."""
+        """Whether an integral over an output with kinks is asked for: of the balls, or any where a stop is."""
+        stops = self.model.manifest.stops
         broken = tuple(bearing.prefix + name for bearing in self.model.manifest.bearings for name in BROKEN)
         return any(
-            not KINDS[item.kind].extremes and item.kind != "value" and item.channel.startswith(broken)
+            not KINDS[item.kind].extremes and item.kind != "value" and (stops or item.channel.startswith(broken))
             for item in self._moving
         )
 
     def _kinks(self, numbers: Numbers, track: Track) -> list[float]:
-        """Times of kinks of the outputs of the balls."""
+        """Times of kinks of the outputs of the balls, and of those that a stop changes."""
         nodes, edges, bearings = track.nodes, track.edges, self.model.manifest.bearings
         ranked = {item.channel for item in self._moving if ".ball." in f".{item.channel}" and item.ball is None}
         # among the quantities of every bearing, whether or not the scene's outputs name it
-        deflections = [bearing.prefix + DEFLECTION for bearing in bearings]
+        deflections = [bearing.prefix + DEFLECTION for bearing in bearings] + [*self.model.manifest.stops]
         signals = Outlook(self.model, [*sorted(ranked), *deflections]).look(track, numbers)
         return find_kinks(
             nodes.t,

@@ -112,7 +112,8 @@ class InputInfo:
     (names of parameters); kind ``table_rate``: its slope there.  Where `rate` is named, `times` are values of the angle
     ``offset + rate * t`` [rad], the table is periodic over a turn, and its slope is that over the angle.
     kind ``border``: 0.  A window of a driver's angle that is a state is open where its switching function is above it;
-    the stepper holds the sides of `windows`, of which there is one, by an infinite border.
+    the stepper holds the sides of `windows`, of which there is one, by an infinite border.  So with stops, which have
+    no windows.
     """
 
     name: str
@@ -263,6 +264,12 @@ class Manifest:
     def bearing(self) -> BearingInfo | None:
         """The first bearing, None where the scene has none."""
         return self.bearings[0] if self.bearings else None
+
+    @property
+    def stops(self) -> tuple[str, ...]:
+        """Compressions of all stops, among the quantities."""
+        borders = (item.name for item in self.inputs if item.kind == "border" and not item.windows)
+        return tuple(f"{name.removeprefix('border.')}.compression" for name in borders)
 
     def function(self, name: str) -> FunctionInfo:
         """Signature of a generated function; KeyError where there is none of that name."""

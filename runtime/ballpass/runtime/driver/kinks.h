@@ -29,6 +29,14 @@ static const double BP_BAND = 0.01, BP_BRIEF = 1.5, BP_CLOSE = 0.1;
    the way there has arrived. */
 static const double BP_FAR = 2.0, BP_LEAST_PACE = 0.25, BP_NEAREST = 0.1, BP_ASTRAY = 1.5, BP_ARRIVED = 1e-6;
 
+/* Events before this one are let go for good.  The derivative of a force of a ball does not jump at its kinks, and the clock of sqrt_time.h is
+   not differentiated: a run with derivatives locates the events of loads alone. */
+#if defined BALLPASS_SENSITIVITIES && defined BP_HAS_STOPS
+enum { BP_FIRST_LOCATED = BP_FIRST_STOP };
+#else
+enum { BP_FIRST_LOCATED = 0 };
+#endif
+
 typedef struct {
     double border[BP_EVENTS]; /* in place of the zero of g in the held law: -infinity, infinity, or 0 for an event let go */
     double side[BP_EVENTS];   /* 1 where g > 0, else -1; 0 for an event let go */
@@ -62,6 +70,9 @@ static inline void bp_switch_values(const bp_numbers *n, double t, const double 
 #ifdef BP_HAS_WINDOWS
     bp_windows(x, n->p, n->c, g + BP_FIRST_WINDOW, slope + BP_FIRST_WINDOW);
 #endif
+#ifdef BP_HAS_STOPS
+    bp_stops(t, x, n->u, n->p, n->c, g + BP_FIRST_STOP, slope + BP_FIRST_STOP);
+#endif
 }
 
 static inline void bp_set_side(bp_sides *s, int e, double side)
@@ -75,6 +86,10 @@ static inline void bp_sides_start(bp_sides *restrict s, const bp_numbers *n, dou
 {
     memset(s, 0, sizeof *s);
     bp_switch_values(n, t, x, s->seen[0], s->slope[0]);
+#ifdef BP_HAS_STOPS
+    double moved[BP_STOPS * BP_NX];
+    bp_stops_by_state(t, x, n->u, n->p, n->c, moved);
+#endif
     for (int e = 0; e < BP_EVENTS; e++) {
         double least = INFINITY; /* weight: of the coarsest state */
         for (int k = 0; k < BP_NQ; k++) {
@@ -86,7 +101,13 @@ static inline void bp_sides_start(bp_sides *restrict s, const bp_numbers *n, dou
         if (e >= BP_FIRST_WINDOW) least = weight[BP_DRIVER];
 #endif
         s->band[e] = BP_BAND / least;
-        bp_set_side(s, e, s->seen[0][e] > 0.0 ? 1.0 : -1.0);
+#ifdef BP_HAS_STOPS
+        if (e >= BP_FIRST_STOP) { /* of what the states move; none where the drive alone does */
+            s->band[e] = 0.0;
+            for (int k = 0; k < BP_NX; k++) s->band[e] += BP_BAND * fabs(moved[(e - BP_FIRST_STOP) * BP_NX + k]) / weight[k];
+        }
+#endif
+        bp_set_side(s, e, e < BP_FIRST_LOCATED ? 0.0 : s->seen[0][e] > 0.0 ? 1.0 : -1.0);
         s->last[e] = -INFINITY;
     }
 }
@@ -196,7 +217,7 @@ static inline void bp_sides_move_on(bp_sides *s)
     memcpy(s->seen[0], s->seen[BP_LOOKS], sizeof s->seen[0]);
     memcpy(s->slope[0], s->slope[1], sizeof s->slope[0]);
     if (!s->resting) return;
-    for (int e = 0; e < BP_EVENTS; e++) {
+    for (int e = BP_FIRST_LOCATED; e < BP_EVENTS; e++) {
         if (s->side[e] != 0.0 || --s->rest[e] > 0) continue;
         /* the side that the law takes by itself: nothing jumps */
         bp_set_side(s, e, s->seen[0][e] > 0.0 ? 1.0 : -1.0);

@@ -237,22 +237,31 @@ static int locate(bp_run *run, double start, double t, double *h, double *error,
     return CUT;
 }
 
-/* Turn the sides marked: the slopes at (t, x) are new. */
-#ifdef BP_HAS_WINDOWS
-/* Borders of the sides of windows, among the inputs. */
-static void hold_windows(bp_run *run)
+#ifdef BP_HAS_BORDERS
+/* Borders of the sides, among the inputs. */
+static void hold_borders(bp_run *run)
 {
+#ifdef BP_HAS_WINDOWS
     for (int w = 0; w < BP_WINDOWS; w++) run->driver.held[bp_window_input[w]] = run->sides.border[BP_FIRST_WINDOW + w];
+#endif
+#ifdef BP_HAS_STOPS
+    for (int k = 0; k < BP_STOPS; k++) run->driver.held[bp_stop_input[k]] = run->sides.border[BP_FIRST_STOP + k];
+#endif
 }
 
-/* Inputs of the segment, and those that hold the sides of windows. */
+/* Inputs of the segment, and those that hold sides. */
 static void segment_inputs(bp_run *run, const double *u)
 {
     memcpy(run->driver.held, u, sizeof run->driver.held);
     run->numbers.u = run->driver.held;
-    hold_windows(run);
+    hold_borders(run);
 }
+#else
+#define segment_inputs(run, values) ((run)->numbers.u = (values))
+#define hold_borders(run) ((void)0)
+#endif
 
+#ifdef BP_HAS_WINDOWS
 /* Note passages of edges: a driver that comes back at once, again and again, has stalled there. */
 static void note_passages(bp_run *run, double time)
 {
@@ -265,18 +274,17 @@ static void note_passages(bp_run *run, double time)
 #define start_passages(run) ((run)->driver.come_back = 0)
 #define has_stalled(run) ((run)->driver.come_back >= BP_STALLED)
 #else
-#define segment_inputs(run, values) ((run)->numbers.u = (values))
-#define hold_windows(run) ((void)0)
 #define note_passages(run, time) ((void)0)
 #define start_passages(run) ((void)0)
 #define has_stalled(run) 0
 #endif
 
+/* Turn the sides marked: the slopes at (t, x) are new. */
 static void turn_sides(bp_run *run, double time, double step)
 {
     note_passages(run, time);
     bp_turn_sides(&run->sides, time, step);
-    hold_windows(run);
+    hold_borders(run);
     run->onset = bp_onset(&run->sides);
     if (run->onset == time && run->step > run->touch) run->step = run->touch;
     run->release.time = NAN;
@@ -287,7 +295,7 @@ static void turn_sides(bp_run *run, double time, double step)
 static void sides_here(bp_run *run)
 {
     run->numbers.border = run->sides.border;
-    hold_windows(run);
+    hold_borders(run);
 }
 
 static void sides_start(bp_run *run, double t)
@@ -302,7 +310,7 @@ static void sides_start(bp_run *run, double t)
 static void sides_move_on(bp_run *run)
 {
     bp_sides_move_on(&run->sides);
-    hold_windows(run);
+    hold_borders(run);
 }
 
 /* Behind the first step from an onset: how long it might have been. */

@@ -10,6 +10,10 @@
 #include "kernels.h"
 #ifdef BALLPASS_LOCATED
 #include "switches.h"
+/* Whether inputs hold the sides of loads that switch where the motion decides. */
+#if defined BP_HAS_WINDOWS || defined BP_HAS_STOPS
+#define BP_HAS_BORDERS
+#endif
 #endif
 
 /* Numbers of a run and of its present segment. */

@@ -29,12 +29,12 @@ typedef struct {
 } bp_release;
 #endif
 
-#ifdef BP_HAS_WINDOWS
+#ifdef BP_HAS_BORDERS
 /* Passages of a window's edge in a row, each less than the angle BP_STALL_ANGLE [rad] behind the last: so many are a stall. */
 enum { BP_STALLED = 100 };
 static const double BP_STALL_ANGLE = 1e-3;
 
-/* The driver at windows of its angle: inputs with the borders of the sides held, and passages that come back at once. */
+/* Inputs with the borders of the sides held, and passages of the driver through windows of its angle that come back at once. */
 typedef struct {
     double held[BP_NU];
     int come_back;
@@ -45,7 +45,7 @@ typedef struct {
     const ballpass_options *options;
     ballpass_result *result;
     bp_numbers numbers;
-#ifdef BP_HAS_WINDOWS
+#ifdef BP_HAS_BORDERS
     bp_driver driver;
 #endif
     double weight[BP_NX]; /* 1 / tolerance */

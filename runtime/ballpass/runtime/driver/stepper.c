@@ -122,7 +122,6 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
         }
         set_pace(run, start, t, h);
         double error = try_step(run, t, h);
-        if (error >= 0.0 && error <= 1.0 && within_reach(run)) error = tangent_step(run, t, h, error);
         const double tried = h;
         const int met = error >= 0.0 && error <= 1.0 && within_reach(run)
                             ? locate(run, start, t, &h, &error, resolution, aimed, longest)
@@ -131,7 +130,12 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
             turn_sides(run, start + t, tried);
             if (is_explicit(run->method)) first_slope(run, t);
             else linearize(run, t, 1);
+            tangent_start(run, t);
             continue;
+        }
+        if (error >= 0.0 && error <= 1.0 && within_reach(run)) {
+            const double theirs = tangent_step(run, t, h, error);
+            if (met == NO_KINK) error = theirs; /* a step that was cut is shorter than one that both errors allowed */
         }
         if (h != tried) last = 0;
         const double accepted = error >= 0.0 && error <= 1.0 && within_reach(run), rejected_before = rejected_last;
@@ -171,6 +175,7 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
                 }
             } else if (met == CUT && is_explicit(run->method)) {
                 first_slope(run, t);
+                tangent_start(run, t);
             } else if (is_explicit(run->method)) {
                 next_slope(run, t);
             } else if (t < length) {

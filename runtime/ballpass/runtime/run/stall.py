@@ -26,7 +26,7 @@ def stall_words(model: LoadedModel, numbers: Numbers, state: np.ndarray) -> str:
     edges = [
         (abs(math.remainder(state[driver] - values[path], clock.TURN)), row, path)
         for row, item in enumerate(manifest.inputs)
-        if item.kind == "border"
+        if item.kind == "border" and item.windows
         for path in item.windows[0]
     ]
     _, row, path = min(edges)

@@ -1,8 +1,9 @@
-"""Forces and torques on a linkage: tables of the scene file, each with a pathway and the laws that go with it.
+"""Forces and torques on a linkage: tables of the scene file, each with its pathways and the laws that go with them.
 
 A new pathway or law is a file here; an entry in `FORCE_TABLES` says in which table of the scene it may stand.
 """
 
+from ballpass.derive.mechanism.forces.along_direction import AlongDirection
 from ballpass.derive.mechanism.forces.angle_table import AngleTable
 from ballpass.derive.mechanism.forces.applied import Forces, derive_forces, drawn_forces
 from ballpass.derive.mechanism.forces.body_torque import BodyTorque
@@ -12,6 +13,7 @@ from ballpass.derive.mechanism.forces.friction import Friction
 from ballpass.derive.mechanism.forces.joint_motion import JointMotion, JointTravel, JointTurn
 from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.forces.spring_damper import SpringDamper
+from ballpass.derive.mechanism.forces.stop import Stop
 from ballpass.derive.mechanism.forces.two_bodies import TwoBodies
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.mechanism.forces.windows import Windows
@@ -29,12 +31,14 @@ __all__ = [
 ]
 __all__ += ["PointForce", "Windows", "derive_forces", "drawn_forces"]
 
-#: In the order in which their numbers are listed; of the laws of a table the one whose key is there, else the last.
+#: In the order in which their numbers are listed; of its pathways and laws those whose key is there, else the last.
 FORCE_TABLES: tuple[ForceTable, ...] = (
-    ForceTable("forces", "force", "body, point and force", PointForce, (Windows, AngleTable, Constant)),
-    ForceTable("torques", "torque", "body and torque", BodyTorque, (Windows, AngleTable, Constant)),
-    ForceTable("springs", "spring", "bodies, points and stiffness", TwoPoints, (SpringDamper,)),
-    ForceTable("torsion_springs", "spring", "bodies and stiffness", TwoBodies, (SpringDamper,)),
-    ForceTable("friction", "friction", "joint and viscous", JointTurn, (Friction,)),
-    ForceTable("guide_friction", "friction", "joint and viscous", JointTravel, (Friction,)),
+    ForceTable("forces", "force", "body, point and force", (PointForce,), (Windows, AngleTable, Constant)),
+    ForceTable("torques", "torque", "body and torque", (BodyTorque,), (Windows, AngleTable, Constant)),
+    ForceTable("springs", "spring", "bodies, points and stiffness", (TwoPoints,), (SpringDamper,)),
+    ForceTable("torsion_springs", "spring", "bodies and stiffness", (TwoBodies,), (SpringDamper,)),
+    ForceTable("stops", "stop", "bodies, points, stiffness and free_length", (AlongDirection, TwoPoints), (Stop,)),
+    ForceTable("torsion_stops", "stop", "bodies, stiffness and free_angle", (TwoBodies,), (Stop,)),
+    ForceTable("friction", "friction", "joint and viscous", (JointTurn,), (Friction,)),
+    ForceTable("guide_friction", "friction", "joint and viscous", (JointTravel,), (Friction,)),
 )

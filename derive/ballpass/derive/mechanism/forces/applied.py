@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from ballpass.derive.drive import Drive, WindowEdges
+from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Setting
 from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.records import Force, Mechanism
 from ballpass.derive.terms import Definition, Smoothness
-from ballpass.derive.variables import Input, Output
+from ballpass.derive.variables import Input, Output, StateSwitch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +21,7 @@ class Forces:
     """What acts on the bodies, and the definitions, inputs and outputs that come with it.
 
     `of_each` are the loads by the label of their force, `requested` are outputs on request, `smoothness` is that of
-    what is a function of the state, by name, and `edges` are where it jumps.
+    what jumps or has a kink where the motion decides, by name, and `switches` are the places.
     """
 
     loads: tuple[Load, ...]
@@ -31,7 +31,7 @@ class Forces:
     outputs: tuple[Output, ...]
     requested: tuple[Output, ...] = ()
     smoothness: tuple[tuple[str, Smoothness], ...] = ()
-    edges: tuple[WindowEdges, ...] = ()
+    switches: tuple[StateSwitch, ...] = ()
 
 
 def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Forces:
@@ -49,7 +49,7 @@ def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Force
         outputs=tuple(setting.outputs),
         requested=tuple(setting.requested),
         smoothness=tuple(setting.smoothness),
-        edges=tuple(setting.edges),
+        switches=tuple(setting.switches),
     )
 
 

@@ -17,7 +17,7 @@ from typing import ClassVar, Self
 
 import sympy as sp
 
-from ballpass.derive.drive import Drive, OverAngle, WindowEdges
+from ballpass.derive.drive import Drive, OverAngle
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.linkage import Linkage
@@ -25,7 +25,7 @@ from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import Force, Mechanism
 from ballpass.derive.scene.schema import Table, listing
 from ballpass.derive.terms import Definition, Smoothness
-from ballpass.derive.variables import Input, Output
+from ballpass.derive.variables import Input, Output, StateSwitch
 
 #: Names of the points of every body and of the frame.
 Points = Mapping[str, Sequence[str]]
@@ -48,14 +48,14 @@ class Setting:
     requested: list[Output] = field(default_factory=list)
     switched: list[Definition] = field(default_factory=list)
     smoothness: list[tuple[str, Smoothness]] = field(default_factory=list)
-    edges: list[WindowEdges] = field(default_factory=list)
+    switches: list[StateSwitch] = field(default_factory=list)
 
     def over_angle(self, found: OverAngle) -> sp.Expr:
         """Take what changes with the driver's angle; its value."""
         self.inputs.extend(found.inputs)
         self.switched.extend(found.definitions)
         self.smoothness.extend(found.smoothness)
-        self.edges.extend(found.edges)
+        self.switches.extend(found.switches)
         return found.value
 
 
@@ -91,11 +91,13 @@ class Pathway(ABC):
 
     Attributes
     ----------
+    key : the key of the scene that asks for it; empty for the pathway of a table where no other is asked for
     measure : what a law may depend on; None where there is nothing to measure
     column, unit : what a law gives that is no factor: "force" in "N"
     """
 
     __slots__ = ()
+    key: ClassVar[str] = ""
     column: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
     measure: ClassVar[Measure | None] = None
@@ -149,21 +151,22 @@ class Law(ABC):
 
 @dataclass(frozen=True, slots=True)
 class ForceTable:
-    """A table of the scene file, ``[mechanism.<key>.<name>]``: what one entry is called and holds for example, its
-    pathway, and the laws that may stand there."""
+    """A table of the scene file, ``[mechanism.<key>.<name>]``: what one entry is called and holds for example, the
+    pathways and the laws that may stand there: each the one whose key is there, else the last."""
 
     key: str
     word: str
     example: str
-    pathway: type[Pathway]
+    pathways: tuple[type[Pathway], ...]
     laws: tuple[type[Law], ...]
 
     def read(self, data: Table, name: str, points: Points) -> Force:
         """One force of the table."""
+        pathway = next((p for p in self.pathways if p.key and data.has(p.key)), self.pathways[-1])
         asked = [law for law in self.laws if law.key and data.has(law.key)]
         law = asked[0] if asked else self.laws[-1]
         if len(asked) > 1:
-            keys, column = [law.key for law in asked], self.pathway.column
+            keys, column = [law.key for law in asked], pathway.column
             data.fault(
                 keys[-1],
                 f"{' and '.join(keys)} exclude each other",
@@ -176,6 +179,6 @@ class ForceTable:
         return Force(
             name=name,
             table=self.key,
-            pathway=self.pathway.read(data, name, points, law),
-            law=law.read(data, name, self.pathway),
+            pathway=pathway.read(data, name, points, law),
+            law=law.read(data, name, pathway),
         )

@@ -10,7 +10,7 @@ import sympy as sp
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Law, Measure, Pathway, Points, Setting
 from ballpass.derive.mechanism.kinematics import body_point, dot, scale, subscript, subtract
-from ballpass.derive.scene.body_keys import read_pair, read_two_bodies, refuse_unknown_point
+from ballpass.derive.scene.body_keys import read_two_points
 from ballpass.derive.scene.errors import Fault, LinkageError
 from ballpass.derive.scene.records import FRAME, Force, Mechanism
 from ballpass.derive.scene.schema import Table
@@ -31,11 +31,7 @@ class TwoPoints(Pathway):
     @classmethod
     def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
         """Keys bodies and points."""
-        bodies = read_two_bodies(data, points)
-        ends = read_pair(data, "points", '["anchor", "tip"]') or ("", "")
-        for body, point in zip(bodies, ends, strict=True):
-            if point:
-                refuse_unknown_point(data, "points", body, point, points)
+        bodies, ends = read_two_points(data, points)
         return cls(bodies=bodies, points=ends)
 
     def act(self, force: Force, setting: Setting) -> Action:

@@ -1,0 +1,83 @@
+"""Pathway: the distance of a body's point from a wall of another body, or of the frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import sympy as sp
+
+from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.forces.force import Action, Law, Measure, Pathway, Points, Setting
+from ballpass.derive.mechanism.kinematics import body_point, cross, dot, scale, subscript, subtract
+from ballpass.derive.scene.body_keys import read_two_points
+from ballpass.derive.scene.records import FRAME, Force, Quantity
+from ballpass.derive.scene.schema import Table, upright
+from ballpass.derive.terms import symbol_of
+from ballpass.derive.variables import Output
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlongDirection(Pathway):
+    """A wall through ``points[0]`` that ``bodies[0]`` carries, normal to `direction` [rad] in its axes.
+
+    The size is the distance of ``points[1]`` of ``bodies[1]`` from it, positive where the direction points.
+    """
+
+    key: ClassVar[str] = "direction"
+    measure: ClassVar[Measure] = Measure(
+        size="distance", size_unit="m", example="2 mm", amount="tension", amount_unit="N"
+    )
+
+    bodies: tuple[str, str]
+    points: tuple[str, str]
+    direction: Quantity
+
+    @classmethod
+    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
+        """Keys bodies, points and direction."""
+        bodies, ends = read_two_points(data, points)
+        words = f"Direction of {name} in the axes of its first body"
+        direction = data.quantity("direction", "rad", words, rf"\alpha_{{{upright(name)}}}", example="90 deg")
+        return cls(bodies=bodies, points=ends, direction=direction)
+
+    def act(self, force: Force, setting: Setting) -> Action:
+        """Distance and its rate; the force on the wall acts where the point is."""
+        mechanism, ledger, label, mark = setting.mechanism, setting.ledger, force.label, subscript(force.name)
+        places = [body_point(mechanism, *end) for end in zip(self.bodies, self.points, strict=True)]
+        poses = [setting.linkage.pose(body) for body in self.bodies]
+        one, two = (pose.motion(place) for pose, place in zip(poses, places, strict=True))
+        angle, wall = symbol_of(self.direction), poses[0]
+        words = f"the point of {force.name} from its wall"
+        along = wall.rotate((sp.cos(angle), sp.sin(angle)))
+        along = ledger.name_pair(
+            f"{label}.normal", "", along, "1", f"component of the normal of {force.name}", f"n_{{{mark},AXIS}}"
+        )
+        line = ledger.name_pair(
+            f"{label}.line",
+            "",
+            subtract(two.position, one.position),
+            "m",
+            f"distance of {words}",
+            f"d_{{{mark},AXIS}}",
+        )
+        distance = ledger.define(f"{label}.distance", dot(along, line), "m", f"distance of {words}", f"L_{{{mark}}}")
+        setting.outputs.append(
+            Output(name=distance.name, expression=distance, unit="m", description=f"Distance of {words}")
+        )
+
+        def loads(tension: sp.Expr) -> tuple[Load, ...]:
+            pull = scale(tension, along)
+            both = (
+                Load(body=self.bodies[0], point=places[0], force=pull, torque=cross(line, pull)),
+                Load(body=self.bodies[1], point=places[1], force=scale(sp.Integer(-1), pull)),
+            )
+            return tuple(load for load in both if load.body != FRAME)
+
+        rate = dot(along, subtract(two.velocity, one.velocity)) + wall.rate * cross(along, line)
+        return Action(loads=loads, excess=lambda free: distance - free, rate=rate)
+
+    def words(self) -> str:
+        """Point and wall."""
+        wall, point = (".".join(end) for end in zip(self.bodies, self.points, strict=True))
+        return f"force on {point} from a wall at {wall}"
