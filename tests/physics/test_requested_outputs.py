@@ -17,6 +17,7 @@ from ballpass.derive import derive
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.scene.records import Scene
+from ballpass.runtime.run.request import on_request
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 MOTION = ("*inner.a[xy]", "*outer.a[xy]", "point.*", "body.*.speed", "body.*.acceleration", "reaction.*.magnitude")
@@ -257,6 +258,17 @@ def test_static_rating_of_iso_76_is_where_the_pressure_is_4200_mpa() -> None:
     """C_0 = f_0 Z D_w^2 with f_0 = 13.1 at gamma = 0.237; the most loaded ball takes 5 C_0/Z."""
     load = 5 * 13.06 * 7.9375**2
     assert contact(load)["ball.inner_pressure"] == pytest.approx(4200e6, rel=3e-3)
+
+
+@pytest.mark.parametrize("which", ["one-way", "two-way", "torque"])
+def test_the_runtime_knows_what_is_on_request(which: str) -> None:
+    """It can say how to get an output that the manifest does not know, and says it of no other."""
+    model = machine(which)
+    plain = [o.name for o in derive(replace(model.scene, outputs=("*",))).outputs]
+    further = [o.name for o in model.system.outputs if o.name not in plain]
+    assert len(further) > 70
+    assert [name for name in further if not on_request(name)] == []
+    assert [name for name in plain if on_request(name) and name != "drive_power"] == []
 
 
 def test_what_nobody_names_is_not_there() -> None:
