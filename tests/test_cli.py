@@ -407,6 +407,21 @@ def test_equations_are_markdown_with_the_matrix_of_eq_1(ballpass: Callable[..., 
     assert result.stdout == (ROOT / "generated" / "punching_press" / "EQUATIONS.md").read_text(encoding="utf-8")
 
 
+def test_bearings_that_can_be_named_are_printed_within_80_columns(
+    ballpass: Callable[..., Result], tmp_path: Path
+) -> None:
+    printed = ballpass(tmp_path, "bearings", "63*")
+    assert printed.exit_code == 0
+    rows = [line.split() for line in printed.stdout.splitlines() if line.startswith(" 63")]
+    assert len(rows) == 17
+    assert rows[6][:5] == ["6306", "30", "72", "19", "8"]
+    assert max(len(line) for line in printed.stdout.splitlines()) <= 80
+    (bearing,) = json.loads(ballpass(tmp_path, "bearings", "6204", "--json").stdout)["bearings"]
+    assert bearing["clearance"]["CN"] == [5e-6, 20e-6]
+    assert bearing["catalogues"]["skf"] == {"dynamic": 13500.0, "static": 6550.0, "fatigue_limit": 280.0}
+    says_no(ballpass(tmp_path, "bearings", "6204-2RS"), "6204-2RS", "ballpass bearings")
+
+
 def test_version_and_help_are_printed(ballpass: Callable[..., Result], tmp_path: Path) -> None:
     assert re.fullmatch(r"ballpass \d+\.\d+\.\d+\S*\n", ballpass(tmp_path, "--version").stdout)
     help_text = ballpass(tmp_path, "--help").stdout

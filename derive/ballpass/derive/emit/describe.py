@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from ballpass.derive.emit.signature import run_info, signature, versions
+from ballpass.derive.emit.signature import catalogue_info, run_info, signature, versions
 from ballpass.derive.lower.functions import Functions, operations
 from ballpass.derive.mechanism.forces import drawn_forces
 from ballpass.derive.reading.usual import usual_ranges
@@ -147,6 +147,7 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             else mf.DampingInfo(
                 law=bearing.damping.law, in_deflection=law.in_deflection.value, in_rate=law.in_rate.value
             ),
+            catalogue=catalogue_info(bearing),
         )
         for bearing, law in zip(scene.bearings, laws, strict=True)
     )

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ballpass.derive.emit.signature import (
+    catalogue_info,
     folder_of,
     fresh_manifest,
     intact_manifest,
@@ -161,6 +162,10 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> N
         title=scene.title,
         parameters=tuple(replace(p, default=values[p.name]) for p in present.parameters),
         run=run_info(scene),
+        bearings=tuple(
+            replace(info, catalogue=catalogue_info(bearing))
+            for info, bearing in zip(present.bearings, scene.bearings, strict=True)
+        ),
     )
     if updated != present or source:
         updated = replace(updated, source=source)

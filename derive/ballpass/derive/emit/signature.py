@@ -18,7 +18,7 @@ from ballpass.runtime import contract as mf
 from ballpass.runtime.contract.errors import ArtefactError
 
 if TYPE_CHECKING:
-    from ballpass.derive.scene.records import Scene
+    from ballpass.derive.scene.records import Bearing, Scene
 
 
 def signature(scene: Scene) -> str:
@@ -92,9 +92,27 @@ def run_info(scene: Scene) -> mf.RunInfo:
     )
 
 
+def catalogue_info(bearing: Bearing) -> mf.CatalogueInfo | None:
+    """What a bearing takes from a catalogue."""
+    catalogue = bearing.catalogue
+    if catalogue is None:
+        return None
+    least, most = catalogue.clearance_range or (None, None)
+    return mf.CatalogueInfo(
+        designation=catalogue.designation,
+        clearance_group=catalogue.clearance_group,
+        clearance_least=least,
+        clearance_most=most,
+        dynamic_rating=catalogue.dynamic_rating,
+        static_rating=catalogue.static_rating,
+        fatigue_limit=catalogue.fatigue_limit,
+    )
+
+
 def _sources() -> str:
-    """Digest of the deriving modules: a changed derivation makes every artefact stale."""
+    """Digest of the deriving modules and the table of bearings: a changed derivation makes every artefact stale."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.parent.rglob("*.py")):
+    folder = Path(__file__).parent.parent
+    for path in sorted([*folder.rglob("*.py"), *folder.rglob("*.csv")]):
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()

@@ -8,6 +8,8 @@ from __future__ import annotations
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.reading.read_coupling import read_count, read_coupling, read_inner_body, refuse_effects
+from ballpass.derive.reading.read_designation import fill_by_designation
+from ballpass.derive.reading.read_fit import mounted
 from ballpass.derive.scene.records import (
     FRAME,
     BallEffect,
@@ -77,12 +79,19 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         table.know("joint", "share", "balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle", "contact")
         table.know("coupling", "count", "damping", "inner_ring", "outer_ring", "initial", *EFFECTS)
         coupling = read_coupling(table, mechanism)
+        catalogue = fill_by_designation(table)
         joint, share = _read_place(table, mechanism, driven, coupling)
         support = _read_outer_ring(table)
         inner_body = ""
         if coupling == "two-way":
             refuse_effects(table)
             inner_body = read_inner_body(table, mechanism, joint)
+        ball = table.quantity("ball_diameter", "m", "Ball diameter", "D_w", example="7.9375 mm")
+        pitch = table.quantity(
+            "pitch_diameter", "m", "Diameter of the circle of ball centres", "D_{pw}", example="33.5 mm"
+        )
+        clearance = table.quantity("clearance", "m", "Diametral clearance of the bearing", "P_d", example="10 um")
+        clearance, catalogue = mounted(table, catalogue, clearance, ball.value, pitch.value)
         return Bearing(
             name=name,
             joint=joint,
@@ -91,11 +100,9 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             inner_body=inner_body,
             count=read_count(table, coupling),
             balls=table.integer("balls", FEWEST_BALLS, MOST_BALLS, example="8"),
-            ball_diameter=table.quantity("ball_diameter", "m", "Ball diameter", "D_w", example="7.9375 mm"),
-            pitch_diameter=table.quantity(
-                "pitch_diameter", "m", "Diameter of the circle of ball centres", "D_{pw}", example="33.5 mm"
-            ),
-            clearance=table.quantity("clearance", "m", "Diametral clearance of the bearing", "P_d", example="10 um"),
+            ball_diameter=ball,
+            pitch_diameter=pitch,
+            clearance=clearance,
             ball_angle=table.quantity(
                 "ball_angle",
                 "rad",
@@ -110,6 +117,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             inner=_read_inner_ring(table, mechanism is not None) if coupling == "one-way" else None,
             outer=support,
             initial=_read_initial(table, moving_outer=support is not None),
+            catalogue=catalogue,
         )
 
 

@@ -311,6 +311,22 @@ class InitialState:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Catalogue:
+    """What a catalogue says of a bearing, for its ratings; nothing that is derived depends on it.
+
+    `designation` and `clearance_group` are empty where the scene names none; `clearance_range` is that of the group
+    [m].  Ratings and fatigue load limit [N] are None where the scene does not give them.
+    """
+
+    designation: str
+    clearance_group: str
+    clearance_range: tuple[float, float] | None
+    dynamic_rating: float | None
+    static_rating: float | None
+    fatigue_limit: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Bearing:
     """A deep groove ball bearing.
 
@@ -320,7 +336,7 @@ class Bearing:
     `coupling` two-way: its play moves the bodies of the joint; `inner_body` carries the inner ring, `count` bearings
     stand side by side (None: one).
     `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
-    `outer` is None for a fixed outer ring.
+    `outer` is None for a fixed outer ring.  `catalogue` is None where the scene says nothing of that kind.
     """
 
     name: str
@@ -340,6 +356,7 @@ class Bearing:
     inner: InnerRing | None
     outer: OuterRing | None
     initial: InitialState
+    catalogue: Catalogue | None = None
 
     @property
     def prefix(self) -> str:
@@ -408,6 +425,8 @@ class Scene:
 def _structure(value: Any) -> object:
     if isinstance(value, Quantity):
         return (value.path, value.unit, value.description, value.latex)
+    if isinstance(value, Catalogue):
+        return None
     if is_dataclass(value) and not isinstance(value, type):
         return (type(value).__name__, *((f.name, _structure(getattr(value, f.name))) for f in fields(value)))
     if isinstance(value, tuple):

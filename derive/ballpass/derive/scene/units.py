@@ -74,6 +74,7 @@ KINDS: dict[str, tuple[str, str]] = {
     "s*m^0.5": ("a damping ratio c_b/k_b", "0.25e-5 s*mm^0.5"),
     "Pa": ("an elastic modulus", "207 GPa"),
     "Hz": ("a frequency", "50 Hz"),
+    "K": ("a difference of temperatures", "10 K"),
 }
 
 

@@ -15,6 +15,7 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import Asked, faults_of_numbers, read_asked, read_duration, read_turns
+from ballpass.runtime.app.commands.bearings import bearings
 from ballpass.runtime.app.commands.explain import explain
 from ballpass.runtime.app.commands.jacobian import jacobian, linearize
 from ballpass.runtime.app.commands.sensitivity import sensitivity
@@ -285,7 +286,7 @@ def export(
     typer.echo(str(folder))
 
 
-for _command in (explain, jacobian, linearize, sensitivity, sweep, trade):
+for _command in (bearings, explain, jacobian, linearize, sensitivity, sweep, trade):
     app.command()(_command)
 
 

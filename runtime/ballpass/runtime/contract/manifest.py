@@ -191,6 +191,22 @@ class DampingInfo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CatalogueInfo:
+    """What the scene takes from a catalogue: see `ballpass.derive.scene.records.Catalogue`.
+
+    `clearance_least` and `clearance_most` bound the group of clearance [m]; ratings are in N.
+    """
+
+    designation: str
+    clearance_group: str
+    clearance_least: float | None
+    clearance_most: float | None
+    dynamic_rating: float | None
+    static_rating: float | None
+    fatigue_limit: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BearingInfo:
     """What observables need of a bearing: balls, and the names of its kinematic parameters and constants.
 
@@ -208,6 +224,7 @@ class BearingInfo:
     ring_speed: str
     outer_ring: bool
     damping: DampingInfo
+    catalogue: CatalogueInfo | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

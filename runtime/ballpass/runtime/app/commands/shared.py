@@ -53,12 +53,12 @@ STAGES = {
 
 
 @contextlib.contextmanager
-def command(scene: Path) -> Iterator[Stages]:
+def command(scene: Path | None = None) -> Iterator[Stages]:
     """The stages of a command; its warnings as messages, each once, and its errors as messages with an exit code.
 
     Parameters
     ----------
-    scene : named in faults that a later stage than reading finds
+    scene : named in faults that a later stage than reading finds; None for a command without one
     """
     try:
         with warnings.catch_warnings(), Stages() as stages:

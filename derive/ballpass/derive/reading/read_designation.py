@@ -1,0 +1,132 @@
+"""A bearing by its designation: what the table of bearings knows is put where the scene says nothing.
+
+In: the table of a bearing.  Out: the same with balls, diameters, clearance and grooves filled in, as text that the
+reading rules of these keys take like the scene's own; and the record of what a catalogue says.
+"""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+from ballpass.derive.scene.designations import GROOVES, GROUPS, BearingType, bearing_types
+from ballpass.derive.scene.records import Catalogue
+from ballpass.derive.scene.schema import Table, listing, suggest
+from ballpass.derive.scene.units import QuantityError, parse_quantity, show
+
+#: Bearing steel of rings and balls, where a designation gives the geometry.
+YOUNG_MODULUS, POISSON_RATIO = "207 GPa", 0.3
+_RATINGS = ("dynamic_rating", "static_rating", "fatigue_limit")
+
+
+def fill_by_designation(table: Table) -> Catalogue | None:
+    """Fill in what the designation of a bearing gives; None where the scene takes nothing from a catalogue."""
+    table.know("designation", *_RATINGS)
+    kind = _bearing_type(table) if table.has("designation") else None
+    group = _clearance_group(table, kind)
+    span = kind.clearance(group) if kind is not None and group else None
+    if kind is not None:
+        filled: dict[str, object] = {
+            "balls": kind.balls,
+            "ball_diameter": f"{kind.ball_diameter} mm",
+            "pitch_diameter": f"{kind.pitch_diameter} mm",
+        }
+        if span is not None:
+            filled["clearance"] = f"{Decimal(sum(span)) / 2} um"
+        given = {key: value for key, value in table.data.items() if key != "clearance" or not group}
+        table.data = filled | given
+        _fill_contact(table)
+    ratings = {key: _rating(table, key) for key in _RATINGS}
+    if kind is None and not any(key in table.data for key in _RATINGS):
+        return None
+    return Catalogue(
+        designation=kind.designation if kind is not None else "",
+        clearance_group=group if span is not None else "",
+        clearance_range=(span[0] / 1e6, span[1] / 1e6) if span is not None else None,
+        **ratings,
+    )
+
+
+def _bearing_type(table: Table) -> BearingType:
+    name = table.text("designation", "6204")
+    types = bearing_types()
+    if name is None or name in types:
+        return types[name or "6204"]
+    table.fault(
+        "designation",
+        "the table of bearings does not have it",
+        given=show(name),
+        allowed="6000 to 6016, 6200 to 6216, 6300 to 6316, 618/3 to 61805, 619/3 to 61905, without suffixes",
+        remedy=suggest(name, list(types), "see `ballpass bearings`, or give balls and diameters as numbers"),
+    )
+    return types["6204"]  # so that no fault follows from this one; what is read never leaves
+
+
+def _clearance_group(table: Table, kind: BearingType | None) -> str:
+    """Name of the clearance group; empty where the clearance is a number."""
+    given = table.data.get("clearance", "CN" if kind is not None else None)
+    if given not in GROUPS:
+        if kind is not None and isinstance(given, str) and given[:1].isalpha():
+            table.fault(
+                "clearance",
+                "this is no group of clearance",
+                given=show(given),
+                allowed=f'{listing(GROUPS)}, or a length, as in "10 um"',
+                remedy=suggest(given, GROUPS, 'write clearance = "CN" for the normal group'),
+            )
+            table.data = {**table.data, "clearance": "0 um"}
+        return ""
+    if kind is None:
+        table.fault(
+            "clearance",
+            "a group of clearance holds for a bore, and none is known",
+            given=show(given),
+            allowed='a length, as in "10 um"; a group only together with designation',
+            remedy='add designation = "6204", or write the clearance as a number',
+        )
+        table.data = {**table.data, "clearance": "0 um"}  # the fault is told; no second one
+        return ""
+    if kind.clearance(given) is None:
+        table.fault(
+            "clearance",
+            f"ISO 5753-1 has no such group for a bore of {kind.bore} mm",
+            given=show(given),
+            allowed=listing([group for group in GROUPS if kind.clearance(group) is not None]),
+            remedy="name one of them, or write the clearance as a number",
+        )
+        table.data = {**table.data, "clearance": "0 um"}
+        return ""
+    return str(given)
+
+
+def _fill_contact(table: Table) -> None:
+    """Grooves and steel, where the scene gives no stiffness."""
+    contact = table.data.get("contact", {})
+    if not isinstance(contact, dict) or "stiffness" in contact:
+        return
+    ball = table.data["ball_diameter"]
+    own = str(ball)
+    filled: dict[str, object] = {"young_modulus": YOUNG_MODULUS, "poisson_ratio": POISSON_RATIO}
+    for ring, ratio in zip(("inner", "outer"), GROOVES, strict=True):
+        number, _, unit = own.partition(" ")
+        if unit == "mm" and number.replace(".", "", 1).isdigit():
+            filled[f"{ring}_groove_radius"] = f"{Decimal(number) * ratio} mm"
+            continue
+        try:
+            filled[f"{ring}_groove_radius"] = f"{parse_quantity(ball, 'm') * float(ratio)!r} m"
+        except QuantityError:  # told where the ball diameter is read
+            filled[f"{ring}_groove_radius"] = "1 m"
+    table.data = {**table.data, "contact": filled | contact}
+
+
+def _rating(table: Table, key: str) -> float | None:
+    words = f"the {key.replace('_', ' ')} of the catalogue"
+    given = table.optional_quantity(key, "N", words, "")
+    if given is not None and given.value <= 0.0:
+        table.fault(
+            key,
+            "the rating is not positive",
+            given=show(table.data[key]),
+            allowed="a force above zero",
+            remedy="delete the key for the value that follows from the geometry",
+        )
+    return None if given is None else given.value

@@ -1,0 +1,82 @@
+"""``ballpass bearings``: the table of bearings that a scene can name by designation."""
+
+from __future__ import annotations
+
+from fnmatch import fnmatchcase
+from typing import Annotated, Any
+
+import typer
+
+from ballpass.runtime.app.commands import options
+from ballpass.runtime.app.commands.shared import command, show_json
+from ballpass.runtime.contract.errors import RequestError
+
+
+def bearings(
+    pattern: Annotated[
+        str, typer.Argument(metavar="[PATTERN]", help="Designations wanted: 6204, 63*, 61?/*.", show_default=False)
+    ] = "*",
+    json_: options.Json = False,
+) -> None:
+    """Print the bearings that a scene can name by designation: dimensions, balls, ratings and normal clearance."""
+    with command():
+        from ballpass.derive.scene.designations import bearing_types
+        from ballpass.runtime.app.tables import simple_table, wide_console
+
+        types = bearing_types()
+        found = [_row(kind) for name, kind in types.items() if fnmatchcase(name, pattern)]
+        if not found:
+            raise RequestError(
+                f"No bearing of the table is called {pattern!r:.60}. Allowed: designations and patterns, as 6204, 63*. "
+                f"There are {len(types)}, from {next(iter(types))} to {list(types)[-1]}: `ballpass bearings`."
+            )
+        if json_:
+            show_json({"bearings": found})
+            return
+        heads = ("bearing", "d", "D", "B", "balls", "D_w", "D_pw", "C_r", "C_0r", "C_u", "CN")
+        table = simple_table(
+            "Deep groove ball bearings (mm, kN; clearance in µm)",
+            heads,
+            right=heads[1:],
+            caption="Balls, D_w, D_pw: derived from ratings of a catalogue.\n"
+            "C_r, C_0r, C_u: from these, by ISO 281 and ISO 76.",
+        )
+        for row in found:
+            least, most = row["clearance"]["CN"]
+            table.add_row(
+                row["designation"],
+                *(f"{1e3 * row[key]:g}" for key in ("bore", "outside_diameter", "width")),
+                str(row["balls"]),
+                *(f"{1e3 * row[key]:.4g}" for key in ("ball_diameter", "pitch_diameter")),
+                *(f"{1e-3 * row[key]:.3g}" for key in ("dynamic_rating", "static_rating", "fatigue_limit")),
+                f"{1e6 * least:.0f}–{1e6 * most:.0f}",
+            )
+        wide_console(table).print(table)
+
+
+def _row(kind: Any) -> dict[str, Any]:
+    """A bearing in SI."""
+    from ballpass.derive.scene.designations import GROUPS
+    from ballpass.runtime.ratings import load_ratings
+
+    ball, pitch = float(kind.ball_diameter) / 1e3, float(kind.pitch_diameter) / 1e3
+    static = load_ratings.static_rating(kind.balls, ball, pitch)
+    groups = {group: kind.clearance(group) for group in GROUPS}
+    return {
+        "designation": kind.designation,
+        "bore": float(kind.bore) / 1e3,
+        "outside_diameter": float(kind.outside) / 1e3,
+        "width": float(kind.width) / 1e3,
+        "balls": kind.balls,
+        "ball_diameter": ball,
+        "pitch_diameter": pitch,
+        "dynamic_rating": load_ratings.dynamic_rating(kind.balls, ball, pitch),
+        "static_rating": static,
+        "fatigue_limit": load_ratings.fatigue_limit(static, pitch),
+        "clearance": {group: [end / 1e6 for end in span] for group, span in groups.items() if span is not None},
+        "catalogues": {
+            rating.maker: {"dynamic": rating.dynamic, "static": rating.static}
+            | ({"fatigue_limit": rating.limit} if rating.limit is not None else {})
+            for rating in kind.catalogues
+        },
+    }
