@@ -18,6 +18,7 @@ from typing import Any
 
 from ballpass.derive.reading.read_bearing import read_bearing, read_load, read_shaft
 from ballpass.derive.reading.read_mechanism import read_mechanism
+from ballpass.derive.reading.recouple import Coupling, recoupled
 from ballpass.derive.reading.values import parse_override, quantities_of, replaced, value_faults, with_values
 from ballpass.derive.scene.csv_columns import with_columns
 from ballpass.derive.scene.errors import Fault, SceneError
@@ -50,10 +51,11 @@ RESERVED = (
 _TABLES = ("mechanism", "shaft", "load", "bearing", "bearings", "run")
 
 
-def read_scene(path: str | Path) -> Scene:
+def read_scene(path: str | Path, coupling: Coupling | None = None) -> Scene:
     """Read a scene file.
 
-    The scene's name is the file's stem.
+    The scene's name is the file's stem.  With a `coupling` it is the variant of the scene whose bearings are all
+    coupled so (see `recouple`), and of another name.
 
     Raises
     ------
@@ -77,7 +79,7 @@ def read_scene(path: str | Path) -> Scene:
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise _unreadable(file, "the file is not text in UTF-8", "save the file as UTF-8", line) from None
-    return _scene(text, file.stem, str(file))
+    return _scene(text, file.stem, str(file), coupling)
 
 
 def scene_from_text(text: str, name: str) -> Scene:
@@ -103,8 +105,10 @@ def _unreadable(file: Path, problem: str, remedy: str, line: int | None = None) 
     return SceneError([fault], source=file)
 
 
-def _scene(text: str, name: str, source: str | None) -> Scene:
+def _scene(text: str, name: str, source: str | None, coupling: Coupling | None = None) -> Scene:
     data = _parse(text, source)
+    if coupling is not None:
+        data, name = recoupled(data, coupling), f"{name}_{coupling.replace('-', '_')}"
     collector = Collector(lines=index_lines(text))
     collector.check_name((), name, "scene")
     if not any(key in data for key in _TABLES):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 from rich.console import Console
@@ -17,7 +17,10 @@ from ballpass.runtime.app.commands.shared import Stages, command, load_model, re
 from ballpass.runtime.contract.errors import RequestError
 
 if TYPE_CHECKING:
+    from ballpass.derive.reading.recouple import Coupling
+    from ballpass.runtime.certify.simplification import Simplification
     from ballpass.runtime.certify.trade import Trade
+    from ballpass.runtime.model import Model
 
 
 def trade(
@@ -31,6 +34,14 @@ def trade(
             "repeated.",
         ),
     ] = None,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHAT",
+            help="Measure another model of the machine instead of methods: one-way or two-way, the same scene with "
+            "its bearings coupled so, or another scene file.",
+        ),
+    ] = None,
     set_: options.Settings = None,
     members: Annotated[
         int | None, typer.Option(metavar="N", help="Parameter sets around the scene's; 40 if not given.")
@@ -39,7 +50,8 @@ def trade(
     json_: options.Json = False,
     figures: options.Figures = True,
 ) -> None:
-    """Measure error against time for methods and tolerances on a scene, with kinks located or not."""
+    """Measure error against time on a scene: of methods and tolerances, or of a simpler model (--against)."""
+    from ballpass.runtime.certify.simplification import measure_simplification
     from ballpass.runtime.certify.trade import MEMBERS, measure_trade
     from ballpass.runtime.certify.trade_report import table, to_plain, words
 
@@ -48,8 +60,16 @@ def trade(
         overrides = read_asked(scene, set_).overrides
         folder = results_folder(out, scene)
         model = load_model(scene, stages, "stepper", overrides=overrides)
-        stages("measuring")
         count = MEMBERS if members is None else members
+        if against is not None:
+            simpler = _simpler(scene, against, stages)
+            stages("measuring")
+            compared = measure_simplification(
+                model, simpler, of, parameters=overrides, members=count, progress=stages.fraction
+            )
+            _show_simplification(compared, json_=json_)
+            return
+        stages("measuring")
         measured = measure_trade(model, of, parameters=overrides, members=count, progress=stages.fraction)
         files = _draw(measured, folder, stages) if figures else []
     if json_:
@@ -65,6 +85,30 @@ def trade(
         show(line)
     if files:
         show(f"in {folder}: {', '.join(files)}")
+
+
+def _simpler(scene: Path, against: str, stages: Stages) -> Model:
+    """Model of a scene's variant, or of another scene file."""
+    from ballpass.derive import generate, read_scene
+    from ballpass.runtime.model import load
+
+    if against in ("one-way", "two-way"):
+        return load(generate(read_scene(scene, coupling=cast("Coupling", against)), progress=stages))
+    return load_model(Path(against), stages, "stepper", overrides={})
+
+
+def _show_simplification(found: Simplification, *, json_: bool) -> None:
+    from ballpass.runtime.certify.simplification import rows, to_plain
+
+    if json_:
+        show_json(to_plain(found))
+        return
+    heads, lines = rows(found)
+    shown = Table(*heads, title=f"{found.title}; other: {found.simpler_title}", title_justify="left")
+    for line in lines:
+        shown.add_row(*line)
+    Console().print(shown)
+    show(found.words)
 
 
 def read_error(text: str | None, of: list[str] | None, method: str | None, rtol: float | None) -> float | None:

@@ -1,0 +1,203 @@
+"""What a simpler model of the same machine costs and gains: its error in quantities, and its time, measured.
+
+In: a model, a simpler one, quantities of interest.  Out: a `Simplification`.
+
+Both are integrated with the same parameter sets around the user's, for contact makes single runs a lottery.  Values are
+those of a tight tolerance, so that only the models differ; a second method says how uncertain they are.  Times are
+those of the scene's own tolerance, taken in turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ballpass.runtime.certify.trade import MEMBERS, PROMISED, SPREAD, perturbed, reference
+from ballpass.runtime.certify.trade_report import milliseconds, percent
+from ballpass.runtime.certify.whole_run import Way, check_observables, default_observables, prepare
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.point.evaluate import neighbour
+from ballpass.runtime.run.request import Request
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simplification:
+    """A simpler model beside the one that counts as true.
+
+    Attributes
+    ----------
+    title, simpler_title : of both scenes
+    quantities : what is compared
+    units : of the quantities, by name
+    values, simpler_values : of the quantities, medians over the members, in SI
+    change : relative change by the simpler model, median over the members [1]
+    error : 95 % point of its size [1]
+    uncertainty : relative, of the values of either model: 95 % point of the difference of two methods [1]
+    way : how times were taken
+    time, simpler_time : of the integration of a cycle, median over the members [s]
+    members : parameter sets
+    spread : half the width of the interval they are drawn from [1]
+    cycles : turns of a run
+    """
+
+    title: str
+    simpler_title: str
+    quantities: tuple[str, ...]
+    units: Mapping[str, str]
+    values: Mapping[str, float]
+    simpler_values: Mapping[str, float]
+    change: Mapping[str, float]
+    error: Mapping[str, float]
+    uncertainty: Mapping[str, float]
+    way: str
+    time: float
+    simpler_time: float
+    members: int
+    spread: float
+    cycles: float
+
+    @property
+    def gain(self) -> float:
+        """Time of the model over that of the simpler one [1]."""
+        return self.time / self.simpler_time
+
+    @property
+    def words(self) -> str:
+        """What it gains and costs, a sentence for people."""
+        worst = max(self.quantities, key=lambda name: self.error[name])
+        faster = f"{self.gain:.2g} times as fast" if self.gain >= 1.0 else f"{1.0 / self.gain:.2g} times as slow"
+        return (
+            f"{self.simpler_title}: {milliseconds(self.simpler_time)} a cycle instead of {milliseconds(self.time)} "
+            f"({self.way}), {faster}; it differs most in {worst}, by at most {percent(self.error[worst])} for "
+            f"{PROMISED:.0%} of {self.members} parameter sets."
+        )
+
+
+def rows(found: Simplification) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Head and rows of a table: quantity, both values, change, and what the change stays within."""
+    head = ("quantity", "unit", "this scene", "other", "change", f"{PROMISED:.0%} within")
+    return head, [
+        (
+            name,
+            found.units[name],
+            f"{found.values[name]:.4g}",
+            f"{found.simpler_values[name]:.4g}",
+            f"{100.0 * found.change[name]:+.3g} %",
+            percent(found.error[name]),
+        )
+        for name in found.quantities
+    ]
+
+
+def to_plain(found: Simplification) -> dict[str, Any]:
+    """Plain data for JSON."""
+    return {"simplification": {**asdict(found), "gain": found.gain}, "words": found.words}
+
+
+def measure_simplification(
+    model: LoadedModel,
+    simpler: LoadedModel,
+    of: Sequence[str] | None = None,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    members: int = MEMBERS,
+    spread: float = SPREAD,
+    progress: Callable[[float], None] | None = None,
+) -> Simplification:
+    """Measure errors and time of a simpler model.
+
+    Parameters
+    ----------
+    model : what counts as true
+    simpler : of the same machine; parameters of one name are the same in both, others keep their defaults
+    of : quantities, ``peak_ball_force``, ``rms:inner.y``, ...  Default: those of `measure_trade` that both have
+    parameters : overrides of parameters that both have, SI; the members lie around them
+    progress : called with the finished fraction
+
+    Raises
+    ------
+    RequestError
+        A wrong request, or scenes without a common quantity.
+    SimulationError
+        A run of either model failed.
+    """
+    if not (model.states and simpler.states):
+        raise RequestError("Both scenes need a bearing: without one there is nothing to integrate. Add a [bearing].")
+    if members < 2:
+        raise RequestError(f"members: at least 2 are needed for a 95 % point, not {members!r}.")
+    others = {info.name for info in simpler.manifest.parameters}
+    alone = [name for name in parameters or {} if name not in others]
+    if alone:
+        raise RequestError(
+            f"{', '.join(alone)}: the simpler scene has no such parameter, so that both would differ in more than the "
+            "model. Allowed: parameters of both scenes. Change it in the files."
+        )
+    names = tuple(of) if of is not None else _common(model, simpler)
+    observables = [check_observables(one, names) for one in (model, simpler)]
+    way = Way(method="stepper", rtol=model.manifest.run.rtol)
+    user = model.numbers(parameters)
+    shared = {info.name for info in model.manifest.parameters} & others
+    base = simpler.numbers({name: user.parameters[name] for name in shared})
+    values = np.empty((2, members, len(names)))
+    doubt, times = np.empty_like(values), np.empty((2, members))
+    cycles = 1.0
+    for member, drawn in enumerate(perturbed(model, dict(user.parameters), members, spread)):
+        varied = {name: drawn[name] for name in shared}
+        numbers = (
+            neighbour(model, user, {**user.parameters, **varied}),
+            neighbour(simpler, base, {**base.parameters, **varied}),
+        )
+        runs = [prepare(model, numbers[0], Request())]
+        cycles = runs[0].cycles
+        length = Request(duration=runs[0].duration, transient_cycles=runs[0].start / runs[0].turn)
+        runs.append(prepare(simpler, numbers[1], length))
+        for k, run in enumerate(runs):
+            values[k, member], doubt[k, member] = reference(run, observables[k])
+            times[k, member] = run.integrate(observables[k], way).seconds / cycles
+        if progress is not None:
+            progress((member + 1) / members)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        changes = values[1] / values[0] - 1.0
+    both = np.median(values, axis=1)
+    time, other = np.median(times, axis=1).tolist()
+    known = np.quantile(np.max(doubt, axis=0), PROMISED, axis=0)
+    largest = np.maximum(np.quantile(np.abs(changes), PROMISED, axis=0, method="higher"), known)
+
+    units = {info.name: info.unit for info in model.manifest.states}
+    units |= {info.name: info.unit for info in model.manifest.quantities}
+
+    def by_name(numbers: np.ndarray) -> dict[str, float]:
+        return dict(zip(names, numbers.tolist(), strict=True))
+
+    return Simplification(
+        title=model.manifest.title,
+        simpler_title=simpler.manifest.title,
+        quantities=names,
+        units={name: units[channel] for name, (_, channel) in zip(names, observables[0], strict=True)},
+        values=by_name(both[0]),
+        simpler_values=by_name(both[1]),
+        change=by_name(np.median(changes, axis=0)),
+        error=by_name(largest),
+        uncertainty=by_name(known),
+        way=way.words,
+        time=time,
+        simpler_time=other,
+        members=members,
+        spread=spread,
+        cycles=cycles,
+    )
+
+
+def _common(model: LoadedModel, simpler: LoadedModel) -> tuple[str, ...]:
+    theirs = default_observables(simpler)
+    names = tuple(name for name in default_observables(model) if name in theirs)
+    if not names:
+        raise RequestError(
+            "The two scenes have no quantity in common: their bearings have other names. Give both the same names "
+            "([bearings.<name>]), or name quantities that both have with --of."
+        )
+    return names
