@@ -12,9 +12,10 @@ from scene_texts import PRESS, ROTOR, edited
 
 from ballpass.derive import SceneError, generate
 from ballpass.derive.emit.signature import signature
-from ballpass.derive.reading.read import scene_from_text
+from ballpass.derive.reading.read import parse_override, scene_from_text
 from ballpass.derive.scene.designations import CatalogueRating, bearing_types
 from ballpass.derive.scene.records import Bearing, Scene
+from ballpass.runtime.app.commands.ranges import read_ranges
 from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.ratings import load_ratings, of_bearing
 
@@ -208,6 +209,27 @@ def test_fits_and_temperatures_reduce_clearance_and_group() -> None:
     assert found.clearance.value == pytest.approx(20.5e-6 - lost, rel=1e-9)
     assert found.catalogue is not None
     assert found.catalogue.clearance_range == pytest.approx((13e-6 - lost, 28e-6 - lost), rel=1e-9)
+
+
+def test_a_group_may_stand_where_a_number_is_written() -> None:
+    scene = read(named("6204", more='fit = { inner_warming = "8 K" }\n'))
+    lost = 11.5e-6 * ((33.5 - 7.9375) * 8.0 + 2 * 7.9375 * 4.0) * 1e-3
+    path, value = parse_override(scene, "bearing.clearance=C3")
+    assert (path, value) == ("bearing.clearance", pytest.approx(20.5e-6 - lost, rel=1e-12))
+    for group in ("C2", "CN", "C3", "C4", "C5"):
+        assert (
+            parse_override(read(named("6316")), f"bearing.clearance={group}")[1]
+            == bearing(named("6316", group)).clearance.value
+        )
+    (vary,) = read_ranges(scene, ["bearing.clearance=CN:4"], {})
+    np.testing.assert_allclose(vary.values, np.array([5, 10, 15, 20]) * 1e-6 - lost, rtol=1e-9)
+    assert vary.shown_unit == "um"
+    with pytest.raises(SceneError, match="no bore is known"):
+        parse_override(read(PRESS), "bearing.clearance=C3")
+    with pytest.raises(SceneError, match="no such group for a bore of 3 mm"):
+        parse_override(read(named("618/3")), "bearing.clearance=C5")
+    with pytest.raises(SceneError, match="decides which equations are derived"):
+        parse_override(scene, "bearing.designation=6306")
 
 
 @pytest.mark.parametrize(

@@ -35,14 +35,16 @@ def fill_by_designation(table: Table) -> Catalogue | None:
         given = {key: value for key, value in table.data.items() if key != "clearance" or not group}
         table.data = filled | given
         _fill_contact(table)
-    ratings = {key: _rating(table, key) for key in _RATINGS}
+    dynamic, static, limit = (_rating(table, key) for key in _RATINGS)
     if kind is None and not any(key in table.data for key in _RATINGS):
         return None
     return Catalogue(
         designation=kind.designation if kind is not None else "",
         clearance_group=group if span is not None else "",
         clearance_range=(span[0] / 1e6, span[1] / 1e6) if span is not None else None,
-        **ratings,
+        dynamic_rating=dynamic,
+        static_rating=static,
+        fatigue_limit=limit,
     )
 
 

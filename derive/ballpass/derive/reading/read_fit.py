@@ -31,9 +31,10 @@ def mounted(
             for ring in ("inner", "outer")
         )
         lost += thermal_reduction(inner, (inner + outer) / 2.0, outer, ball_diameter, pitch_diameter)
-    if catalogue is not None and catalogue.clearance_range is not None:
-        least, most = catalogue.clearance_range
-        catalogue = replace(catalogue, clearance_range=(least - lost, most - lost))
+    if catalogue is not None:
+        span = catalogue.clearance_range
+        span = None if span is None else (span[0] - lost, span[1] - lost)
+        catalogue = replace(catalogue, clearance_range=span, mounting_loss=lost)
     return replace(clearance, value=clearance.value - lost), catalogue
 
 

@@ -14,6 +14,7 @@ from typing import Any, cast
 
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.laws import LAWS
+from ballpass.derive.reading.clearance_groups import clearance_of_group
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.records import (
@@ -32,6 +33,7 @@ from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 #: Ends of keys that stand in the file beside quantities, for the message where somebody asks to override one.
 _STRUCTURE = (
     "balls",
+    "designation",
     "joint",
     "law",
     "support",
@@ -138,7 +140,7 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
 
 
 def parse_override(scene: Scene, text: str) -> tuple[str, float]:
-    """Path and SI value of ``"bearing.clearance=20 um"``.
+    """Path and SI value of ``"bearing.clearance=20 um"``; a group of clearance gives its middle.
 
     Raises
     ------
@@ -159,6 +161,9 @@ def parse_override(scene: Scene, text: str) -> tuple[str, float]:
             ]
         )
     check_path(scene, path)
+    group = clearance_of_group(scene, path, value)
+    if group is not None:
+        return path, group[1]
     units = {quantity.path: quantity.unit for quantity in scene.quantities}
     try:
         return path, parse_quantity(value, units[path])

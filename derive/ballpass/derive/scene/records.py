@@ -315,7 +315,8 @@ class Catalogue:
     """What a catalogue says of a bearing, for its ratings; nothing that is derived depends on it.
 
     `designation` and `clearance_group` are empty where the scene names none; `clearance_range` is that of the group
-    [m].  Ratings and fatigue load limit [N] are None where the scene does not give them.
+    [m] in operation, after `mounting_loss` [m].  Ratings and fatigue load limit [N] are None where the scene does not
+    give them.
     """
 
     designation: str
@@ -324,6 +325,7 @@ class Catalogue:
     dynamic_rating: float | None
     static_rating: float | None
     fatigue_limit: float | None
+    mounting_loss: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

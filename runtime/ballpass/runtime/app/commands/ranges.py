@@ -1,4 +1,4 @@
-"""Ranges of a scene's numbers, as ``--vary`` writes them: ``bearing.clearance=5 um:40 um:8``.
+"""Ranges of a scene's numbers, as ``--vary`` writes them: ``bearing.clearance=5 um:40 um:8``, or ``=CN:8`` for a group.
 
 In: a scene and texts.  Out: a `Range` for each, checked, and the grid of all their combinations.
 """
@@ -116,6 +116,7 @@ def grid(ranges: Sequence[Range]) -> dict[str, np.ndarray]:
 
 def _read_range(scene: Scene, text: str) -> Range:
     from ballpass.derive import SceneError
+    from ballpass.derive.reading.clearance_groups import clearance_of_group
     from ballpass.derive.reading.read import parse_override
     from ballpass.derive.reading.values import check_path, value_bounds
     from ballpass.derive.scene.errors import Fault
@@ -131,6 +132,9 @@ def _read_range(scene: Scene, text: str) -> Range:
     # structure and settings of the run are no numbers of the model
     refuse_run_setting(path)
     check_path(scene, path)
+    group = clearance_of_group(scene, path, parts[0])
+    if group is not None and len(parts) == 2:
+        parts = [*(f"{1e6 * end:.12g} um" for end in group[::2]), parts[1]]
     logarithmic = len(parts) == 4 and parts[3] == "log"
     whole = bool(equals) and (len(parts) == 3 or logarithmic)
     require(whole, "this is no range", "PATH=A:B:N or PATH=A:B:N:log", f"write it as in {_EXAMPLE}")
