@@ -256,7 +256,7 @@ def test_derivatives_across_a_window_of_a_driven_crank_are_refused(press: Model)
 @pytest.mark.long
 def test_what_counts_on_a_constant_speed_is_refused_with_reason(andrews: Model, press: Model) -> None:
     for quantity in ("value:driver.speed@240deg", "amplitude:driver.speed@2x", "drive_work"):
-        with pytest.raises(RequestError, match="a torque drives this scene"):
+        with pytest.raises(RequestError, match="the driver's speed changes in this scene"):
             andrews.sensitivity(quantity, "mechanism.driver.torque.torque")
     with pytest.raises(RequestError, match=r"driver's angle is a state.*'driver.angle' instead"):
         press.jacobian("reaction.A.y", "crank_angle")
@@ -293,6 +293,14 @@ def test_steps_end_on_the_edges_of_windows_either_way_round(press: Model) -> Non
     back = press.simulate(rtol=1e-11, cycles=1.0, parameters={TORQUE: 0.0}, initial=turned)
     assert back.statistics.located == 2
     assert back.x[-1] == pytest.approx(there.x[0] * [1.0, -1.0], abs=1e-8)
+
+
+def test_no_step_passes_over_a_narrow_window(press: Model) -> None:
+    """Of a fifth of a degree, with a flywheel that lets steps become long; the work of the punch is in the speed."""
+    narrow = {"mechanism.forces.punch.window.end": START + math.radians(0.2), TORQUE: 0.0, WHEEL: 100.0}
+    run = press.simulate(rtol=1e-3, cycles=3.0, parameters=narrow)
+    assert run.statistics.located == 6
+    assert run.statistics.steps < 60
 
 
 @pytest.mark.parametrize("bearing", [False, True])

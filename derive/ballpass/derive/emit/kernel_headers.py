@@ -223,7 +223,11 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
         flags["has_rate"] += [1.0] * len(borders)
         for key in ("ends_above", "ends_below", "of_rate"):
             flags[key] += [0.0] * len(borders)
-        parts += ["#define BP_HAS_WINDOWS", _integers("bp_window_input", borders), _single(kernels.windows)]
+        place = {parameter.name: k for k, parameter in enumerate(system.parameters)}
+        edges = [[place[system.inputs[k].windows[0][end]] for k in borders] for end in (0, 1)]
+        parts += ["#define BP_HAS_WINDOWS", _integers("bp_window_input", borders)]
+        parts += [_integers(f"bp_window_{word}", column) for word, column in zip(("start", "end"), edges, strict=True)]
+        parts.append(_single(kernels.windows))
     if kernels.stops:
         borders = [k for k, item in enumerate(system.inputs) if item.kind == "border" and not item.windows]
         sizes |= {"BP_STOPS": len(borders), "BP_FIRST_STOP": len(flags["of_rate"])}

@@ -175,12 +175,47 @@ static void foresee(bp_run *run, double t, double h, double *next)
     run->release = (bp_release){t + *next, which};
 }
 
+#ifdef BP_HAS_WINDOWS
+static const double BP_TURN = 6.283185307179586476925286766559;
+
+/* How far an edge is ahead of an angle, in the direction of a way [rad]. */
+static double ahead_of(double edge, double angle, double way)
+{
+    const double rest = fmod(way < 0.0 ? angle - edge : edge - angle, BP_TURN);
+    return rest < 0.0 ? rest + BP_TURN : rest;
+}
+
+/* Part of the step tried that passes no window whole, nor the gap beside one: a look at its ends would see nothing of that. */
+static double within_windows(const bp_run *run)
+{
+    const double from = run->x[BP_DRIVER], way = run->next[BP_DRIVER] - from;
+    double part = 1.0;
+    for (int w = 0; w < BP_WINDOWS; w++) {
+        const double start = run->numbers.p[bp_window_start[w]], end = run->numbers.p[bp_window_end[w]];
+        if (start == end || fabs(end - start) >= BP_TURN) continue;
+        const double one = ahead_of(start, from, way), other = ahead_of(end, from, way);
+        const double last = one > other ? one : other, between = 0.5 * (one + other);
+        if (last < fabs(way) && between < part * fabs(way)) part = between / fabs(way);
+    }
+    return part;
+}
+#else
+#define within_windows(run) 1.0
+#endif
+
 /* Whether the step tried changes a side.  Then it is repeated with a length that ends on the first kink, and `h` is that length; the sides
    to turn there are marked.  `aimed`: it was made to end where a contact does, and may become longer for it, up to `longest`. */
 static int locate(bp_run *run, double start, double t, double *h, double *error, double resolution, int aimed, double longest)
 {
     bp_sides *s = &run->sides;
     ballpass_result *result = run->result;
+    for (double part = within_windows(run); part < 1.0; part = within_windows(run)) {
+        result->rejected++;
+        *h *= part;
+        set_pace(run, start, t, *h);
+        *error = try_step(run, t, *h);
+        if (!(*error >= 0.0 && *error <= 1.0 && within_reach(run))) return NO_KINK;
+    }
     const double tried = *h;
     unsigned char changed[BP_EVENTS] = {0};
     const double farthest = aimed && BP_ASTRAY * tried < longest ? BP_ASTRAY * tried : aimed ? longest : tried;
