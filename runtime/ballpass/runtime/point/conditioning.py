@@ -83,7 +83,8 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
         """At a time, or so far past the start angle."""
         if by_angle:
             (x,) = clock.turned_states(model.manifest, numbers.values, np.array([t]))
-            return np.asarray(kernel({"t": 0.0, "x": x, "u": np.zeros(0), "p": numbers.p, "c": numbers.c}))
+            u = clock.inputs_at(model.manifest.inputs, numbers.values, 0.0)
+            return np.asarray(kernel({"t": 0.0, "x": x, "u": u, "p": numbers.p, "c": numbers.c}))
         u = clock.inputs_at(model.manifest.inputs, numbers.values, t)
         return np.asarray(kernel({"t": 0.0, "u": u, "p": numbers.p, "c": numbers.c}))
 

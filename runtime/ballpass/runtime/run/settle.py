@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -89,7 +90,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     while True:
         turns *= 2
         found = reduce_run(model, numbers, replace(request, cycles=dropped + turns))
-        changes = changed(before, found)
+        changes = changed(before, found, _counter(model))
         settled = _settled(changes)
         if settled or 2 * turns > most:
             return Settled(reductions=found, turns=turns, settled=settled, changes=changes)
@@ -99,7 +100,8 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
 def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Settled | None:
     """What `LEAST` turns, or as many as `STEPS` steps reach, change in the extremes and rms of a run.
 
-    None where the run is about as long, nothing turns, or another method than the project's own stepper ran.
+    None where the run is about as long, nothing turns, a table gives the speed over time, or another method than the
+    project's own stepper ran.
 
     Raises
     ------
@@ -107,6 +109,8 @@ def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Se
         The longer run failed.
     """
     few, statistics = solution.steady_reductions, solution.statistics
+    if any(item.name == DRIVER_ACCELERATION for item in model.manifest.inputs):
+        return None
     if few is None or solution.cycle_length is None or not statistics.steps:
         return None
     whole = (few.start + few.duration - statistics.begin) / solution.cycle_length
@@ -127,7 +131,7 @@ def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Se
         ),
     )
     found = reduce_run(model, numbers, request)
-    changes = changed(few, found)
+    changes = changed(few, found, _counter(model))
     return Settled(reductions=found, turns=turns, settled=_settled(changes), changes=changes)
 
 
@@ -140,10 +144,18 @@ def _settled(changes: Mapping[str, tuple[float, float]]) -> bool:
     return all(peak <= PEAKS and mean <= MEANS for peak, mean in changes.values())
 
 
-def changed(few: Reductions, many: Reductions) -> dict[str, tuple[float, float]]:
-    """Change of the extremes of each channel, over its range, and of its rms [1]."""
+def _counter(model: LoadedModel) -> str:
+    """The channel that counts turns: the driver's angle where it is a state; empty without."""
+    mechanism = model.manifest.mechanism
+    return "" if mechanism is None else mechanism.angle
+
+
+def changed(few: Reductions, many: Reductions, counter: str = "") -> dict[str, tuple[float, float]]:
+    """Change of the extremes of each channel but the `counter`, over its range, and of its rms [1]."""
     found = {}
     for name, less in few.items():
+        if name == counter:
+            continue
         more, span = many[name], many[name].range
         peak = max(abs(more.maximum - less.maximum), abs(more.minimum - less.minimum))
         found[name] = (peak / span if span > 0.0 else 0.0, abs(less.rms / more.rms - 1.0) if more.rms > 0.0 else 0.0)
