@@ -68,7 +68,9 @@ class Absolute:
         self.start = self.values[self.mechanism.driver.start_angle.path]
         joint = self.mechanism.joint(self.mechanism.driver.joint)
         self.driven = joint.other(FRAME)
-        self.motor = self.mechanism.driver.torque  # None: constant speed
+        self.motor, self.table = self.mechanism.driver.torque, self.mechanism.driver.table  # neither: constant speed
+        self.free = self.motor is not None or self.table is not None  # the driver's angle is a state
+        self.acceleration = 0.0  # of the driver, where its speed is given
         self._chain = [(self.start, self._closed(self.start, self._guessed(guess)))]
 
     # numbers of the scene
@@ -159,7 +161,7 @@ class Absolute:
         residual.append(driven @ q - angle)
         rows.append(driven)
         rates.append(rate)
-        rest.append(0.0)
+        rest.append(self.acceleration)
         return np.array(residual), np.array(rows), np.array(rates), np.array(rest), where
 
     def play(self, bearing: Bearing, q: Array, v: Array) -> tuple[Place, Place, Place]:
@@ -225,10 +227,19 @@ class Absolute:
         return q
 
     def drive(self, t: float, x: Array) -> tuple[float, float]:
-        """Angle and speed of the driven body: last of the state's positions and velocities where a torque drives."""
-        if self.motor is None:
+        """Angle and speed of the driven body: last of the state's positions and velocities where the speed changes."""
+        if not self.free:
             return self.start + self.speed * t, self.speed
         return float(x[len(x) // 2 - 1]), float(x[-1])
+
+    def slope(self, t: float) -> float:
+        """Acceleration of the driver by the table of its speed."""
+        if self.table is None:
+            return 0.0
+        times = [self.value(q) for q in self.table.time]
+        speeds = [self.value(q) for q in (self.mechanism.driver.speed, *self.table.later_speed)]
+        apart = 1e-3 * min(np.diff(times))
+        return float(np.diff(np.interp([t, t + apart], times, speeds))[0] / apart)
 
     def absolute(self, t: float, x: Array) -> tuple[Array, Array]:
         """Positions and velocities of all bodies and rings, from a state of the scene: positions, then velocities."""

@@ -19,6 +19,7 @@ from ballpass.derive.lower.functions import _Lowering
 from ballpass.derive.mechanism.forces import PointForce
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.records import NamedPoint, Quantity, Scene, Vector
+from ballpass.derive.variables import Input
 
 UNDAMPED = 'law = "none"'
 TANGENT = 'law = "tangent"\nratio = "2.5e-5 s"'
@@ -127,10 +128,17 @@ class Derived:
             if i.kind == "border"
             else self.values[i.offset]
             if i.kind == "phase"
+            else self._slope(i, t)
+            if i.kind == "table_rate"
             else gates[i.name.removeprefix("gate.")]
             for i in self.system.inputs
         ]
         return [part.full()[:, 0] for part in self._function(t, x, inputs, self._p, self._c)]
+
+    def _slope(self, table: Input, t: float) -> float:
+        """Of a table over time, flat before its first row and behind its last."""
+        times, heights = (np.array([self.values[name] for name in column]) for column in (table.times, table.values))
+        return float(np.concatenate([[0.0], np.diff(heights) / np.diff(times), [0.0]])[np.searchsorted(times, t)])
 
     def gates(self, value: float = 0.0) -> dict[str, float]:
         return {i.name.removeprefix("gate."): value for i in self.system.inputs if i.kind == "gate"}

@@ -250,6 +250,7 @@ class Multibody(Absolute):
 
     def evaluate(self, t: float, x: Array) -> Found:
         """Accelerations, reactions and drive torque at a state."""
+        self.acceleration = self.slope(t)
         return self.move(*self.absolute(t, x))
 
     def move(self, q: Array, v: Array) -> Found:
@@ -283,7 +284,7 @@ class Multibody(Absolute):
                 reaction = -push * np.array([-math.sin(alpha), math.cos(alpha)])
                 outputs[f"reaction.{joint.name}.moment"] = -moment
             outputs |= {f"reaction.{joint.name}.{axis}": float(f) for axis, f in zip("xy", reaction, strict=True)}
-        found = {} if held else {"driver.angle": float(self.row(self.driven) @ a)}
+        found = {} if not self.free else {"driver.angle": float(self.row(self.driven) @ a)}
         for bearing in self.bearings:
             prefix = bearing.prefix
             inner, housing, outer = self.play(bearing, q, v)
@@ -307,14 +308,14 @@ class Multibody(Absolute):
         return found[: self.size] / scale, found[self.size :]
 
     def state(self, q: Array, v: Array) -> Array:
-        """State of the scene at absolute coordinates, that of a driver with a torque included."""
+        """State of the scene at absolute coordinates, that of a driver whose speed changes included."""
         positions, velocities = [], []
         for bearing in self.bearings:
             inner, housing, outer = self.play(bearing, q, v)
             for apart in [inner - housing] + ([outer - housing] if bearing.outer is not None else []):
                 positions += [*apart.position]
                 velocities += [*apart.velocity]
-        if self.motor is not None:
+        if self.free:
             positions.append(self.angle(self.driven, q))
             velocities.append(float(self.row(self.driven) @ v))
         return np.array([*positions, *velocities])

@@ -142,6 +142,13 @@ law = "none"
 """
 
 
+#: Up, and down through zero, with what a flywheel takes.
+SPEED = 'speed = "500 rpm"                       # [paper]; positive is counter-clockwise\n'
+RUN_UP = """flywheel.inertia = "0.2 kg*m^2"
+table = { time = ["0.1 s", "0.5 s", "1 s"], speed = ["100 rpm", "600 rpm", "-300 rpm"] }
+"""
+
+
 def driven_by(drive: str) -> tuple[tuple[str, str], ...]:
     return ((FRAME_POINTS, drive + FRAME_POINTS),)
 
@@ -161,6 +168,11 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         "four_bar",
         driven_by(DIRECT_CURRENT),
         (bearing("A"), bearing("B", "crank", elastic=True), bearing("D", "frame", elastic=True)),
+    ),
+    "press, run-up": (
+        "punching_press",
+        (*OFF_CENTRE, (SPEED, RUN_UP)),
+        (bearing("A", elastic=True, count=2), bearing("B", "rod")),
     ),
     "press, A B C elastic": (
         "punching_press",
@@ -221,7 +233,7 @@ def drawn(rng: np.random.Generator, derived: Derived, machine: Multibody) -> tup
     size = len(derived.coordinates)
     t = float(rng.uniform(0, 2)) * 2 * math.pi / abs(machine.speed or 1.0)
     x = np.concatenate([rng.uniform(-3e-5, 3e-5, size), rng.uniform(-0.1, 0.1, size)])
-    if machine.motor is not None:
+    if machine.free:
         x[size - 1], x[-1] = machine.start + rng.uniform(-10, 10), rng.uniform(-60, 60)
     angle, _ = machine.drive(t, x)
     return t, x, {name: machine.gate(name, angle) for name in derived.gates()}
@@ -254,6 +266,23 @@ def test_accelerations_and_reactions_are_those_of_absolute_coordinates_with_mult
     derived, machine = pair(name)
     rng = np.random.default_rng(14)
     assert max(largest_difference(derived, machine, *drawn(rng, derived, machine)) for _ in range(3)) < 1e-10
+
+
+def test_a_run_up_loads_one_way_bearings_with_the_reaction_of_the_accelerated_linkage() -> None:
+    derived = Derived(with_bearings(text("punching_press", (SPEED, RUN_UP))))
+    ideal = replace(derived.scene, bearings=())
+    machine, rng = Multibody(ideal, derived.points()), np.random.default_rng(5)
+    loads = []
+    for t in (0.05, 0.3, 0.7, 1.2):
+        _, x, gates = drawn(rng, derived, machine)
+        found, expected = derived.outputs(t, x, gates), machine.evaluate(t, x[len(x) // 2 - 1 :: len(x) // 2]).outputs
+        largest = max(map(abs, expected.values()))
+        assert {k: found[k] for k in expected} == pytest.approx(expected, rel=1e-10, abs=1e-10 * largest)
+        assert found["load.x"] == pytest.approx(0.5 * expected["reaction.A.x"])
+        assert derived.rhs(t, x, gates)[-1] == pytest.approx(machine.acceleration, rel=1e-9)
+        assert derived.ball_angles(t, x) == pytest.approx([(1 - 7.9375 / 33.5) / 2 * x[len(x) // 2 - 1]])
+        loads.append(found["drive_torque"])
+    assert len(set(loads)) == 4
 
 
 @pytest.mark.parametrize("name", list(CASES))

@@ -42,7 +42,10 @@ def events_of(
     inputs: Iterable[Input], bearings: Iterable[BearingModel], switches: Iterable[StateSwitch]
 ) -> tuple[Event, ...]:
     """Events of a model, in the order of its inputs, bearings and loads that switch where the motion decides."""
-    found = [event for item in inputs for event in _of_input(item)]
+    listed = tuple(inputs)
+    valued = {item.times for item in listed if item.kind == "table"}
+    # the slope of a table whose value is a state stands alone
+    found = [e for item in listed if item.kind != "table_rate" or item.times not in valued for e in _of_input(item)]
     found += [event for bearing in bearings for event in _of_balls(bearing)]
     found += [
         Event(name=one.border.name, kind="state", function=one.function, rate=one.rate, changes=one.changes)
@@ -60,14 +63,15 @@ def _of_input(item: Input) -> Iterator[Event]:
         for edge in (edge for window in item.windows for edge in window):
             function = passed - sp.Symbol(edge, real=True)
             yield Event(name=edge, kind="angle", function=function, rate=rate, changes=f"`{item.name}`")
-    elif item.kind == "table":
+    elif item.kind in ("table", "table_rate"):
+        changes = f"the slope of `{item.name}`" if item.kind == "table" else f"`{item.name}`"
         for knot in item.times[:1]:
             yield Event(
                 name=f"{knot} and the {len(item.times) - 1} rows behind",
                 kind="angle" if turns else "time",
                 function=passed - sp.Symbol(knot, real=True),
                 rate=rate,
-                changes=f"the slope of `{item.name}`",
+                changes=changes,
             )
 
 

@@ -120,7 +120,10 @@ def _features(scene: Scene) -> Iterator[Feature]:
 
 def _of_mechanism(scene: Scene, mechanism: Mechanism) -> Iterator[Feature]:
     count, torque = len(mechanism.bodies), mechanism.driver.torque
+    table = mechanism.driver.table
     driven = " at constant drive speed" if torque is None else f", driven by {torque.words()}"
+    if table is not None:
+        driven = f", driven at a speed by a table of {len(table.time)} times"
     yield Feature(
         name="mechanism",
         path="mechanism",
@@ -235,8 +238,9 @@ def _is_free(scene: Scene) -> bool:
 
 
 def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
-    """The bearings alone on their shaft, unloaded; None where there is none, or they act back on the mechanism."""
-    if not scene.bearings or scene.coupled:
+    """The bearings alone on their shaft, unloaded; None where there is none, they act back on the
+    mechanism, or its speed changes."""
+    if not scene.bearings or scene.coupled or mechanism.driver.table is not None:
         return None
     quantities = list(scene.quantities)
     bearings = []

@@ -87,7 +87,7 @@ def mechanism_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactio
             ("drive_power", torque * angle.velocity, "W", "Power of the drive"),
             (angle.name, angle.position, "rad", "Angle of the driven body from +x, whole turns counted"),
             (angle.velocity.name, angle.velocity, "rad/s", "Speed of the driven body"),
-            ("driver.acceleration", angle.acceleration, "rad/s^2", "Angular acceleration of the driven body"),
+            ("driver.acceleration", drive.acceleration, "rad/s^2", "Angular acceleration of the driven body"),
         )
         out += [Output(name=n, expression=e, unit=u, description=d) for n, e, u, d in rows]
     for body in mechanism.bodies:

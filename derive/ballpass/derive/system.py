@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ballpass.derive.bearing.cage import cage_between, cage_on_shaft
+from ballpass.derive.bearing.cage import Cage, cage_between, cage_on_shaft
 from ballpass.derive.bearing.equations import (
     BearingModel,
     RingMotion,
@@ -25,7 +25,7 @@ from ballpass.derive.bearing.equations import (
 from ballpass.derive.bearing.equivalent_mass import inner_mass
 from ballpass.derive.bearing.ring_load import RingLoad, own_load, reaction_share
 from ballpass.derive.bearing.two_way import couple, play_of
-from ballpass.derive.drive import Drive, constant_speed, drive_of
+from ballpass.derive.drive import Drive, drive_of
 from ballpass.derive.events import Event, events_of
 from ballpass.derive.mechanism.forces import Forces, derive_forces
 from ballpass.derive.mechanism.kinematics import Play
@@ -145,7 +145,10 @@ def _on_shaft(scene: Scene, errors: list[SceneError]) -> System:
     """Bearings on a shaft, under the scene's own load."""
     own = own_load(scene) if scene.bearings else RingLoad(force=(sp.S.Zero, sp.S.Zero))
     speed = sp.S.Zero if scene.shaft is None else symbol_of(scene.shaft.speed)
-    rings = [_rings(bearing, speed, own.force, inner_mass(bearing, None)) for bearing in scene.bearings]
+    rings = [
+        _rings(bearing, cage_on_shaft(bearing, speed), own.force, inner_mass(bearing, None))
+        for bearing in scene.bearings
+    ]
     return _of_rings(scene, rings, errors, inputs=own.inputs, definitions=own.definitions, constants=own.constants)
 
 
@@ -167,46 +170,55 @@ def _linked(
 
 def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> System | None:
     """An ideal linkage, and the bearings that its reactions load."""
-    drive = constant_speed(mechanism.driver)
+    drive = drive_of(mechanism.driver)
     linked, reactions = _linked(scene, mechanism, drive, NO_PLAY, errors), None
     if linked is not None:
         linkage, forces = linked
         with _noted(errors):
-            reactions = derive_reactions(mechanism, linkage, forces.loads, _moments(scene, mechanism))
+            loads = (*forces.loads, *loads_of_drive(linkage))
+            reactions = derive_reactions(mechanism, linkage, loads, _moments(scene, mechanism))
     masses = []
     for bearing in scene.bearings:
         with _noted(errors):
             masses.append(inner_mass(bearing, mechanism))
     if linked is None or reactions is None or len(masses) < len(scene.bearings):
         return None
-    speed = symbol_of(mechanism.driver.speed)
     rings = [
-        _rings(bearing, speed, reaction_share(scene, bearing, reactions).force, mass)
+        _rings(bearing, _cage(bearing, mechanism, linkage), reaction_share(scene, bearing, reactions).force, mass)
         for bearing, mass in zip(scene.bearings, masses, strict=True)
     ]
+    inertias, weights = inertia_of(mechanism, linkage)
     return _of_rings(
         scene,
         rings,
         errors,
+        drive=drive,
+        forces=forces,
         inputs=(*drive.inputs, *forces.inputs),
         definitions=(*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions),
         quantities=(*mechanism_outputs(mechanism, linkage, reactions), *forces.outputs),
-        requested=_requested(mechanism, linkage, reactions, forces, *inertia_of(mechanism, linkage)),
+        requested=_requested(mechanism, linkage, reactions, forces, (*inertias, *work_of_drive(linkage)[1]), weights),
         linkage=linkage,
         reactions=reactions,
-        smoothness=forces.smoothness,
-        switches=forces.switches,
     )
+
+
+def _cage(bearing: Bearing, mechanism: Mechanism, linkage: Linkage) -> Cage:
+    """Balls of a bearing at the driver's joint, whose play does not move the linkage."""
+    drive = linkage.drive
+    if drive.coordinate is None:
+        return cage_on_shaft(bearing, drive.speed)
+    carriers = linkage.pose(linkage.driven), linkage.pose(FRAME)
+    return cage_between(bearing, carriers, (WITH_DRIVER, STILL), mechanism.driver, drive)
 
 
 def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> System | None:
     """A linkage whose joints have the play of its bearings, or that a torque drives: one set of equations of motion."""
     drive = drive_of(mechanism.driver)
     rings = {bearing.name: ring_coordinates(bearing) for bearing in scene.bearings}
-    driven = () if drive.coordinate is None else (drive.coordinate,)
     positions = tuple(c.position for several in rings.values() for c in several)
     # the heaviest last: M is factored in this order, without pivoting
-    coordinates = (*(c for several in rings.values() for c in several), *driven)
+    coordinates = (*(c for several in rings.values() for c in several), *_driven(drive, known=False))
     joints = {bearing.name: mechanism.joint(bearing.joint or "") for bearing in scene.bearings}
     play = {joints[b.name].name: play_of(b, joints[b.name], rings[b.name]) for b in scene.bearings}
     linked = _linked(scene, mechanism, drive, play, errors)
@@ -249,9 +261,8 @@ def _moving(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sys
         models,
         errors,
         inputs=(*drive.inputs, *forces.inputs, *(i for cage in cages for i in cage.inputs)),
-        driven=driven,
-        smoothness=(*(("driver.torque", drive.smoothness) for _ in driven), *forces.smoothness),
-        switches=forces.switches,
+        drive=drive,
+        forces=forces,
         definitions=(*known, *reactions.definitions, *motion.definitions),
         linear_forms=motion.definitions,
         constants=(
@@ -310,20 +321,25 @@ def _moments(scene: Scene, mechanism: Mechanism) -> frozenset[str]:
     return frozenset(name for name in guides if is_asked(scene.outputs, f"reaction.{name}.moment"))
 
 
+def _driven(drive: Drive | None, *, known: bool | None = None) -> tuple[Coordinate, ...]:
+    """The driver's angle where it is a state; with `known` only if its acceleration is known, or is not."""
+    if drive is None or drive.coordinate is None or known not in (None, drive.torque is None):
+        return ()
+    return (drive.coordinate,)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Rings:
-    """A bearing loaded one-way, with the phase of its cage."""
+    """A bearing loaded one-way, and the motion of its balls."""
 
     model: BearingModel
     motion: RingMotion
-    inputs: tuple[Input, ...]
+    cage: Cage
 
 
-def _rings(bearing: Bearing, shaft_speed: sp.Expr, load: tuple[sp.Expr, sp.Expr], mass: sp.Expr) -> _Rings:
-    cage = cage_on_shaft(bearing, shaft_speed)
+def _rings(bearing: Bearing, cage: Cage, load: tuple[sp.Expr, sp.Expr], mass: sp.Expr) -> _Rings:
     model = derive_bearing(bearing, cage)
-    motion = ring_motion(bearing, model, load, mass)
-    return _Rings(model=model, motion=motion, inputs=cage.inputs)
+    return _Rings(model=model, motion=ring_motion(bearing, model, load, mass), cage=cage)
 
 
 def _of_rings(
@@ -338,16 +354,16 @@ def _of_rings(
     requested: tuple[Output, ...] = (),
     linkage: Linkage | None = None,
     reactions: Reactions | None = None,
-    smoothness: tuple[tuple[str, Smoothness], ...] = (),
-    switches: tuple[StateSwitch, ...] = (),
+    drive: Drive | None = None,
+    forces: Forces | None = None,
 ) -> System:
     """The system of bearings that do not act back on what loads them."""
     return _system(
         scene,
         [one.model for one in rings],
         errors,
-        inputs=(*inputs, *(i for one in rings for i in one.inputs)),
-        definitions=definitions,
+        inputs=(*inputs, *(i for one in rings for i in one.cage.inputs)),
+        definitions=(*definitions, *(d for one in rings for d in one.cage.definitions)),
         constants=(*(c for one in rings for c in (*one.model.constants, *one.motion.constants)), *constants),
         quantities=(*(q for one in rings for q in bearing_outputs(one.model, one.motion.load)), *quantities),
         requested=(
@@ -368,8 +384,8 @@ def _of_rings(
         ),
         linkage=linkage,
         reactions=reactions,
-        smoothness=smoothness,
-        switches=switches,
+        drive=drive,
+        forces=forces,
     )
 
 
@@ -388,10 +404,13 @@ def _system(
     linkage: Linkage | None,
     reactions: Reactions | None,
     linear_forms: tuple[Definition, ...] = (),
-    driven: tuple[Coordinate, ...] = (),
-    smoothness: tuple[tuple[str, Smoothness], ...] = (),
-    switches: tuple[StateSwitch, ...] = (),
+    drive: Drive | None = None,
+    forces: Forces | None = None,
 ) -> System:
+    driven, switches = _driven(drive), () if forces is None else forces.switches
+    if drive is not None and _driven(drive, known=True):
+        mass = sp.ImmutableMatrix(sp.diag(mass, 1))
+        forcing = sp.ImmutableMatrix(sp.Matrix.vstack(forcing, sp.Matrix([drive.acceleration])))
     outputs: tuple[Output, ...] = ()
     with _noted(errors):
         outputs = select_outputs(quantities, requested, scene.outputs)
@@ -420,7 +439,8 @@ def _system(
         outputs=outputs,
         smoothness=(
             *((f"{bearing.names.prefix}{name}", law.anywhere) for bearing in bearings for name, law in bearing.laws),
-            *smoothness,
+            *(("driver.torque", drive.smoothness) for _ in _driven(drive, known=False) if drive is not None),
+            *(() if forces is None else forces.smoothness),
         ),
         events=events_of(inputs, bearings, switches),
         switches=switches,

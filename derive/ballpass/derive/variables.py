@@ -47,8 +47,8 @@ class StateSwitch:
     """A place of the motion at which a load switches: what it switches on acts where `function` is above `border`.
 
     `function` is zero there, and `rate` its time derivative; the input `border` is zero, or infinite while a step holds
-    the side on which it started.  That of a window of the driver's angle names the edges, [1]; others are sizes, in [m]
-    or [rad].
+    the side on which it started.  That of a window of the driver's angle names the edges, [rad]; others are sizes, in
+    [m] or [rad].
     """
 
     border: Input

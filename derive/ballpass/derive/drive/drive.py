@@ -40,7 +40,7 @@ class Drive(ABC):
     description : of the acceleration, for people
     definitions : of the symbols in these, ordered
     inputs : that these need
-    coordinate : the angle, where it is a coordinate of the equations of motion
+    coordinate : the angle, where it is a state; without a `torque` its acceleration is known
     torque : on the driven body [N*m]; None where it is what the motion takes
     flywheel : moment of inertia that turns with the driven body [kg*m^2]
     smoothness : of the torque

@@ -28,13 +28,12 @@ def work_of(loads: Iterable[Load], linkage: Linkage) -> tuple[Effort, ...]:
 
 
 def work_of_drive(linkage: Linkage) -> tuple[tuple[Effort, ...], tuple[Inertia, ...]]:
-    """Work of a drive's torque, and its flywheel; nothing where the speed is constant."""
+    """Work of a drive's torque, and its flywheel; nothing where the speed is constant, no work where it is given."""
     drive = linkage.drive
+    wheel = Inertia(amount=drive.flywheel, rate=drive.speed, acceleration=drive.acceleration)
     if drive.torque is None:
-        return (), ()
-    return (Effort(amount=drive.torque, rate=drive.speed),), (
-        Inertia(amount=drive.flywheel, rate=drive.speed, acceleration=drive.acceleration),
-    )
+        return (), (wheel,) if drive.flywheel != 0 else ()
+    return (Effort(amount=drive.torque, rate=drive.speed),), (wheel,)
 
 
 def loads_of_drive(linkage: Linkage) -> tuple[Load, ...]:

@@ -84,8 +84,10 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         support = _read_outer_ring(table)
         inner_body = ""
         if coupling == "two-way":
-            refuse_effects(table)
+            refuse_effects(table, "coupling two-way", "load the bearing one-way")
             inner_body = read_inner_body(table, mechanism, joint)
+        elif mechanism is not None and mechanism.driver.table is not None:
+            refuse_effects(table, "mechanism.driver.table", "write speed instead of the table")
         ball = table.quantity("ball_diameter", "m", "Ball diameter", "D_w", example="7.9375 mm")
         pitch = table.quantity(
             "pitch_diameter", "m", "Diameter of the circle of ball centres", "D_{pw}", example="33.5 mm"

@@ -99,14 +99,14 @@ def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None)
         return body
 
 
-def refuse_effects(table: Table) -> None:
-    """Note a fault for each effect on the balls of a bearing coupled two-way."""
+def refuse_effects(table: Table, what: str, remedy: str) -> None:
+    """Note a fault for each effect on the balls of a bearing whose rings turn unevenly: `what` makes them do so."""
     for kind in EFFECTS:
         if table.has(kind):
             table.fault(
                 kind,
                 "effects on the balls are modelled for rings that turn at constant speed",
-                given=f"{kind}, and coupling two-way",
-                allowed=f'{kind} with coupling = "one-way"',
-                remedy=f"delete {kind}, or load the bearing one-way",
+                given=f"{kind}, and {what}",
+                allowed=f'{kind} with coupling = "one-way" and a driver of constant speed',
+                remedy=f"delete {kind}, or {remedy}",
             )

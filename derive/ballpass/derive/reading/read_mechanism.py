@@ -6,6 +6,7 @@ linkage can be assembled is no question of reading: `derive` answers it.
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from ballpass.derive.drive import LAWS
@@ -13,7 +14,17 @@ from ballpass.derive.drive.laws import TorqueLaw
 from ballpass.derive.mechanism.dyads import BRANCHES
 from ballpass.derive.mechanism.forces import FORCE_TABLES
 from ballpass.derive.scene.body_keys import Points, read_pair, refuse_unknown_body, refuse_unknown_point
-from ballpass.derive.scene.records import FRAME, Body, Driver, Force, Joint, Mechanism, NamedPoint, Quantity
+from ballpass.derive.scene.records import (
+    FRAME,
+    Body,
+    Driver,
+    Force,
+    Joint,
+    Mechanism,
+    NamedPoint,
+    Quantity,
+    SpeedOverTime,
+)
 from ballpass.derive.scene.schema import Table, VectorWords, listing, suggest, upright
 from ballpass.derive.scene.units import show
 
@@ -62,9 +73,12 @@ def _read_driver(table: Table) -> Driver:
     with table.table("driver", "joint and speed") as driver:
         by_torque = driver.has("torque")
         words = "Speed of the driver at the start" if by_torque else "Speed of the driver"
+        joint = driver.text("joint", "A") or ""
+        speed, over_time = _read_table(driver) if driver.has("table") else (None, None)
         return Driver(
-            joint=driver.text("joint", "A") or "",
-            speed=driver.quantity("speed", "rad/s", words, r"\omega_0" if by_torque else r"\omega", example="500 rpm"),
+            joint=joint,
+            speed=speed
+            or driver.quantity("speed", "rad/s", words, r"\omega_0" if by_torque else r"\omega", example="500 rpm"),
             start_angle=driver.quantity(
                 "start_angle",
                 "rad",
@@ -73,9 +87,29 @@ def _read_driver(table: Table) -> Driver:
                 example="0 deg",
                 default="0 deg",
             ),
+            table=over_time,
             torque=_read_torque(driver) if by_torque else None,
-            flywheel=_read_flywheel(driver, by_torque) if driver.has("flywheel") else None,
+            flywheel=_read_flywheel(driver, by_torque or over_time is not None) if driver.has("flywheel") else None,
         )
+
+
+def _read_table(driver: Table) -> tuple[Quantity | None, SpeedOverTime | None]:
+    """The speed at t = 0, and the table it begins; faults where another key gives the speed."""
+    for key in ("speed", "torque"):
+        if driver.has(key):
+            driver.fault(
+                key,
+                "the table gives the driver's speed",
+                given=f"{key} and table",
+                allowed="one of speed, table, and speed with torque",
+                remedy=f"delete {key}, or the table",
+            )
+    with driver.table("table", "time and speed") as data:
+        time = data.column("time", "s", "Time in row ROW of the driver's table", "t_{1,ROW}")
+        speed = data.column("speed", "rad/s", "Speed in row ROW of the driver's table", r"\omega_{1,ROW}")
+    if not speed:  # reported
+        return Quantity(path="", value=math.nan, unit="rad/s", description="", latex=""), None
+    return speed[0], SpeedOverTime(time=time, later_speed=speed[1:])
 
 
 def _read_torque(driver: Table) -> TorqueLaw | None:
@@ -87,13 +121,13 @@ def _read_torque(driver: Table) -> TorqueLaw | None:
         return LAWS[name].read(data)
 
 
-def _read_flywheel(driver: Table, by_torque: bool) -> Quantity:
-    if not by_torque:
+def _read_flywheel(driver: Table, changing: bool) -> Quantity:
+    if not changing:
         driver.fault(
             "flywheel",
             "at constant speed a flywheel is without effect",
-            given="[mechanism.driver.flywheel] without [mechanism.driver.torque]",
-            allowed="a flywheel where a torque drives",
+            given="[mechanism.driver.flywheel] without [mechanism.driver.torque] or [mechanism.driver.table]",
+            allowed="a flywheel where the speed changes",
             remedy="delete the flywheel, or add [mechanism.driver.torque]",
         )
     with driver.table("flywheel", "inertia") as wheel:

@@ -20,6 +20,7 @@ from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.records import (
     Bearing,
     Bounds,
+    Driver,
     EquivalentMass,
     HarmonicLoad,
     HertzContact,
@@ -233,10 +234,23 @@ def _check_mechanism(checker: Checker, mechanism: Mechanism) -> None:
         checker.polar(point.position)
     if mechanism.driver.torque is not None:
         mechanism.driver.torque.check(checker)
+    if mechanism.driver.table is not None:
+        _check_speeds(checker, mechanism.driver)
     checker.not_negative(mechanism.driver.flywheel)
     for force in mechanism.forces:
         force.pathway.check(checker)
         force.law.check(checker)
+
+
+def _check_speeds(checker: Checker, driver: Driver) -> None:
+    """Times from zero on, as many as speeds, two or more."""
+    table = driver.table
+    assert table is not None
+    for time in table.time[:1]:
+        checker.not_negative(time)
+    remedy = "give every row a time and a speed, or write speed instead of the table for one that does not change"
+    path = driver.speed.path.rpartition(".")[0].rpartition(".")[0]
+    checker.rows(path, table.time, (driver.speed, *table.later_speed), "time", remedy)
 
 
 def _check_table(checker: Checker, load: TableLoad) -> None:

@@ -126,20 +126,35 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedOverTime:
+    """Rows of a driver's speed: times [s], increasing, and the speeds behind the first, which is `Driver.speed`."""
+
+    time: tuple[Quantity, ...]
+    later_speed: tuple[Quantity, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Driver:
     """The joint (revolute, frame to a body) turned from `start_angle` [rad] at t = 0.
 
     The driver's angle is that of the driven body's x axis from +x.
 
-    Without a `torque` the `speed` [rad/s] is constant.  With one, a record of `ballpass.derive.drive` that this layer
-    only carries, it is that at t = 0, and a `flywheel` [kg*m^2] (None: none) turns with the driven body.
+    Without `table` and `torque` the `speed` [rad/s] is constant, else it is that at t = 0.  A `table` gives it over
+    time.  A `torque` is a record of `ballpass.derive.drive` that this layer only carries.  With either a `flywheel`
+    [kg*m^2] (None: none) turns with the driven body.
     """
 
     joint: str
     speed: Quantity
     start_angle: Quantity
+    table: SpeedOverTime | None = None
     torque: Any = None
     flywheel: Quantity | None = None
+
+    @property
+    def turns_unevenly(self) -> bool:
+        """Whether its angle is a state."""
+        return self.table is not None or self.torque is not None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -125,8 +125,8 @@ def _drive_work(view: View, quantity: Quantity) -> Estimate:
     assert mechanism is not None  # it has a drive torque
     if mechanism.angle:
         raise RequestError(
-            f"{quantity.name}: a torque drives this scene, and its turns are not alike. Ask for mean:drive_power, "
-            "times the length of the run."
+            f"{quantity.name}: the driver's speed changes in this scene, and its turns are not alike. Ask for "
+            "mean:drive_power, times the length of the run."
         )
     value, slope = view.channel(quantity)
     total, moved = view.integral(value, slope)

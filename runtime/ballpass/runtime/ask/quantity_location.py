@@ -84,9 +84,9 @@ def place_of(manifest: Manifest, numbers: Numbers, window: Window, quantity: Qua
 
 
 def _refuse_driven(manifest: Manifest, quantity: Quantity, words: str) -> None:
-    """Refuse what counts on a constant speed where a torque drives."""
+    """Refuse what counts on a constant speed where the driver's changes."""
     if manifest.mechanism is not None and manifest.mechanism.angle:
-        raise RequestError(f"{quantity.name}: a torque drives this scene, and its driver {words}.")
+        raise RequestError(f"{quantity.name}: the driver's speed changes in this scene: the driver {words}.")
 
 
 def place_slope(

@@ -24,6 +24,7 @@ from ballpass.runtime.contract.folder import (
 )
 from ballpass.runtime.contract.manifest import (
     DIGEST,
+    DRIVER_ACCELERATION,
     FILE_NAME,
     JACOBIANS,
     MODEL,
@@ -49,6 +50,7 @@ from ballpass.runtime.contract.manifest import (
 
 __all__ = [
     "DIGEST",
+    "DRIVER_ACCELERATION",
     "FILE_NAME",
     "JACOBIANS",
     "MODEL",

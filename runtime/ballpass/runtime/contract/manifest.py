@@ -15,6 +15,9 @@ SCHEMA = 5
 FILE_NAME = "manifest.json"
 
 #: Last key of the file: sha256 of its text without this key.
+#: Name of the input that holds the slope of a driver's table of speed over time.
+DRIVER_ACCELERATION = "driver.acceleration"
+
 DIGEST = "digest"
 
 #: Where a generated function lives: ``<library>.c`` and, serialised, ``<library>.casadi``.
@@ -235,7 +238,7 @@ class MechanismInfo:
     ``.magnitude`` and ``.direction`` (see `force_components`).  Where its input is a table, that holds the amount, and
     the parameter ``mechanism.forces.<name>.direction`` the direction.
 
-    Where a torque drives, `angle` and `rate` name the states that hold the driver's angle and speed, and `speed` and
+    Where the speed changes, `angle` and `rate` name the states that hold the driver's angle and speed, and `speed` and
     `start_angle` the parameters they start from; else they are empty.
     """
 

@@ -171,7 +171,7 @@ def make_members(model: LoadedModel, table: Table, *, bounded: bool = True) -> M
 def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused: dict[int, str]) -> None:
     """Note members whose tables have knots that do not increase, or not within a turn."""
     for item in manifest.inputs:
-        if item.kind != "table":
+        if item.kind not in ("table", "table_rate"):
             continue
         knots = np.array([columns[name] for name in item.times])
         wrong = np.any(np.diff(knots, axis=0) <= 0.0, axis=0) | (

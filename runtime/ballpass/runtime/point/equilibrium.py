@@ -173,8 +173,8 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
     mechanism = model.manifest.mechanism
     if mechanism is not None and mechanism.angle:
         raise RequestError(
-            "crank_angle: a torque drives this scene, so that no time belongs to an angle. Give the angle as the "
-            f"parameter {mechanism.start_angle} instead."
+            "crank_angle: the driver's angle is a state of this scene, so that no time belongs to it. Give the "
+            f"angle as the parameter {mechanism.start_angle} instead."
         )
     angle = real(crank_angle)
     if not math.isfinite(angle):
@@ -277,7 +277,7 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
     start, velocity = np.zeros(half), np.zeros(half)
     mechanism = model.manifest.mechanism
     if mechanism is not None and mechanism.angle:
-        start[held], velocity[held] = numbers.values[mechanism.start_angle], numbers.values[mechanism.speed]
+        start[held], velocity[held] = clock.driver_at(model.manifest, numbers.values, t)
 
     def force(q: Array) -> Array:
         there["x"] = np.concatenate([q, velocity])

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import BallpassError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.usual import unusual
@@ -151,6 +152,8 @@ def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float) -
 
 def _knot(slope: str) -> str:
     """Words for a knot of the table whose slope is this input, as ``force.punch_slope`` or ``load.x_rate``."""
+    if slope == DRIVER_ACCELERATION:
+        return "row of the driver's table"
     kind, _, name = slope.rpartition("_")[0].partition(".")
     return f"knot of {'the load' if kind == 'load' else name}"
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.contract import InputInfo, Manifest
+from ballpass.runtime.contract import DRIVER_ACCELERATION, InputInfo, Manifest
 from ballpass.runtime.contract.errors import RequestError
 
 TURN = 2.0 * math.pi
@@ -33,7 +33,7 @@ Values = Mapping[str, float]
 def period(manifest: Manifest, values: Values) -> float:
     """Time of one turn of driver or shaft [s]; infinite when it stands or none exists.
 
-    Where a torque drives, at the initial speed.
+    Where the driver's speed changes, at the initial one.
     """
     speed = shaft_speed(manifest, values)
     return TURN / abs(speed) if speed != 0.0 else math.inf
@@ -55,17 +55,30 @@ def speed_name(manifest: Manifest) -> str | None:
 def crank_angle(manifest: Manifest, values: Values, t: float, state: np.ndarray | None = None) -> float:
     """Angle of the driver (of the shaft: from its position at t = 0) in [0, 2 pi) [rad].
 
-    Where a torque drives it is in the `state`, shape (states,); None is the one at t = 0.
+    Where its speed changes it is in the `state`, shape (states,); None is the one of `driver_at`.
     """
     if manifest.mechanism is not None and manifest.mechanism.angle:
         at = [info.name for info in manifest.states].index(manifest.mechanism.angle)
-        return float(values[manifest.mechanism.start_angle] if state is None else state[at]) % TURN
+        return float(driver_at(manifest, values, t)[0] if state is None else state[at]) % TURN
     start = values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
     return (start + shaft_speed(manifest, values) * t) % TURN
 
 
+def driver_at(manifest: Manifest, values: Values, t: float) -> tuple[float, float]:
+    """Angle [rad] and speed [rad/s] of a driver whose speed changes: by its table at a time, else the initial ones."""
+    assert manifest.mechanism is not None  # it has the driver
+    angle, speed = values[manifest.mechanism.start_angle], values[manifest.mechanism.speed]
+    for item in manifest.inputs:
+        if item.name == DRIVER_ACCELERATION:
+            times, speeds = _knots(item, values)
+            edges = np.concatenate([[0.0], times[(times > 0.0) & (times < t)], [t]])
+            rates = np.interp(edges, times, speeds)
+            return angle + float(np.trapezoid(rates, edges)), float(rates[-1])
+    return angle, speed
+
+
 def turned_states(manifest: Manifest, values: Values, angles: np.ndarray) -> np.ndarray:
-    """States in which a driver that a torque drives is so far past its start [rad], all else zero, (angles, states)."""
+    """States with the driver so far past its start [rad], all else zero, shape (angles, states)."""
     assert manifest.mechanism is not None  # it has the driver
     found = np.zeros((len(angles), len(manifest.states)))
     at = [info.name for info in manifest.states].index(manifest.mechanism.angle)
@@ -207,7 +220,7 @@ def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float)
             for name, edge in zip(item.times, _knots(item, values)[0].tolist(), strict=True):
                 if rate != 0.0 and _passes(values[item.offset] + rate * t, edge):
                     found[((name, 1.0 / rate), (item.offset, -1.0 / rate), (item.rate, -t / rate))] = None
-        elif item.kind == "table":
+        elif item.kind in ("table", "table_rate") and not item.rate:
             times = _knots(item, values)[0]
             near = np.flatnonzero(np.abs(times - t) <= TIME_RESOLUTION * max(abs(t), float(np.max(np.abs(times)))))
             for k in near:

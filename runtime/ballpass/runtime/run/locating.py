@@ -125,15 +125,16 @@ def refuse_jumps(manifest: Manifest, what: str) -> None:
     Raises
     ------
     RequestError
-        Names the laws, or the loads that act within windows of an angle that a torque drives.
+        Names the laws, or the loads that act within windows of an angle that is a state.
     """
     jumping = [law for law, smoothness in manifest.smoothness if smoothness == "discontinuous"]
     loads = [law.removeprefix("gate.") for law in jumping if law.startswith("gate.")]
     if loads:
         raise RequestError(
-            f"{what}: a torque drives this scene, and the load {' and '.join(loads)} acts within windows of its angle: "
-            "the force jumps when the motion gets there, and the derivative of the steps is not that of the motion. "
-            "Allowed: continuous loads. Give the load as a table over the angle, with flanks as steep as they are."
+            f"{what}: the driver's angle is a state, and the load {' and '.join(loads)} acts within windows of its "
+            "angle: the force jumps when the motion gets there, and the derivative of the steps is not that of the "
+            "motion. Allowed: continuous loads. Give the load as a table over the angle, with flanks as steep as they "
+            "are."
         )
     if jumping:
         raise RequestError(

@@ -87,7 +87,7 @@ class Solution:
     x : states, shape (samples, states), in the order of the manifest
     outputs : output name to samples; at a breakpoint, the value behind it
     parameters, constants : numbers of the run by name
-    cycle_length : time of one turn [s], where a torque drives at the initial speed; None where nothing turns
+    cycle_length : time of one turn [s], where its speed changes at the initial one; None where nothing turns
     transient_cycles : turns from t = 0 on that `steady` leaves out
     manifest : names, units and descriptions
     statistics : how the solution came about
@@ -194,7 +194,7 @@ class Solution:
 
     @property
     def period(self) -> float | None:
-        """Time after which the machine is where it was [s]; None where nothing turns, or a torque drives."""
+        """Time after which the machine is where it was [s]; None where nothing turns, or the speed changes."""
         mechanism = self.manifest.mechanism
         return None if mechanism is not None and mechanism.angle else self.cycle_length
 

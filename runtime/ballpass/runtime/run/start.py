@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -66,6 +67,7 @@ def start_state(model: LoadedModel, numbers: Numbers, given: Start) -> np.ndarra
                 f"are {', '.join(names)}. Give the end of a run of this scene."
             )
         _refuse_jump(model, numbers, given)
+        _check_driver(model, numbers, given.time, given.x)
         return given.x
     initial = vector(given)
     if initial.shape != (len(names),) or not np.all(np.isfinite(initial)):
@@ -73,7 +75,22 @@ def start_state(model: LoadedModel, numbers: Numbers, given: Start) -> np.ndarra
             f"initial: {len(names)} finite numbers are expected ({', '.join(names)}), "
             f"not an array of shape {initial.shape}{'' if np.all(np.isfinite(initial)) else ' with NaN or inf'}."
         )
+    _check_driver(model, numbers, 0.0, initial)
     return initial
+
+
+def _check_driver(model: LoadedModel, numbers: Numbers, time: float, x: np.ndarray) -> None:
+    """Refuse a start at which the driver has not the speed of its table."""
+    if all(item.name != DRIVER_ACCELERATION for item in model.manifest.inputs):
+        return
+    assert model.manifest.mechanism is not None  # it has the driver
+    given = float(x[[state.name for state in model.manifest.states].index(model.manifest.mechanism.rate)])
+    speed = clock.driver_at(model.manifest, numbers.values, time)[1]
+    if abs(given - speed) > SAME_ANGLE * max(abs(speed), 1.0):
+        raise RequestError(
+            f"initial: the driver's speed {given:.9g} rad/s was given, and its table has {speed:.9g} rad/s at "
+            f"t = {time:g} s. Give that speed; to go on with a run give its end, initial=solution.end."
+        )
 
 
 def _refuse_jump(model: LoadedModel, numbers: Numbers, end: RunEnd) -> None:

@@ -61,7 +61,7 @@ def drawn_forces(mechanism: Mechanism) -> tuple[tuple[str, str, str, str], ...]:
     return tuple(
         (force.name, force.pathway.body, force.pathway.point, _input(force))
         for force in mechanism.forces
-        if isinstance(force.pathway, PointForce) and not (mechanism.driver.torque is not None and _input(force))
+        if isinstance(force.pathway, PointForce) and not (mechanism.driver.turns_unevenly and _input(force))
     )
 
 

@@ -133,8 +133,8 @@ def _step(kernels: dict[str, int], bearings: Sequence[Bearing]) -> dict[str, int
 
 def _of_drive(scene: Scene) -> list[str]:
     """What a drive at constant speed leaves out."""
-    driven = scene.mechanism is not None and scene.mechanism.driver.torque is not None
-    return [] if driven else ["variation of the drive's speed"]
+    uneven = scene.mechanism is not None and scene.mechanism.driver.turns_unevenly
+    return [] if uneven else ["variation of the drive's speed"]
 
 
 def _absent(scene: Scene) -> list[str]:

@@ -1,0 +1,111 @@
+"""A drive whose angle is a coordinate: what changes with the angle is a function of the state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+from ballpass.derive.drive.drive import Drive, OverAngle
+from ballpass.derive.drive.piecewise_linear import piecewise_linear
+from ballpass.derive.terms import Definition, Smoothness
+from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, StateSwitch
+
+#: Of a window without width, or without a gap [1].
+LEAST_SLOPE = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AngleState(Drive):
+    """A drive whose angle and speed are states."""
+
+    def gate(self, name: str, windows: Sequence[tuple[str, str]]) -> OverAngle:
+        """1 where the switching function of a window is positive."""
+        edges = [self._edges(name, number, *window) for number, window in enumerate(windows, start=1)]
+        inside = [sp.Piecewise((1, edge.function > edge.border.symbol), (0, True)) for edge in edges]
+        gate = Definition(
+            symbol=sp.Symbol(f"gate.{name}", real=True),
+            expression=sp.Max(*inside, evaluate=False) if len(inside) > 1 else inside[0],
+            unit="1",
+            description=f"1 while {name} acts, else 0",
+            latex=rf"g_{{\mathrm{{{name}}}}}",
+        )
+        jumps = ((gate.symbol.name, Smoothness.DISCONTINUOUS),)
+        return OverAngle(
+            value=gate.symbol,
+            inputs=tuple(edge.border for edge in edges),
+            definitions=(gate,),
+            smoothness=jumps,
+            switches=tuple(edges),
+        )
+
+    def _edges(self, name: str, number: int, start: str, end: str) -> StateSwitch:
+        function, path = inside_window(start, end), f"border.{name}.{number}"
+        return StateSwitch(
+            border=Input(
+                name=path,
+                symbol=sp.Symbol(path, real=True),
+                kind="border",
+                unit="rad",
+                description=f"Border of the switching function of window {number} of {name}",
+                latex=rf"b_{{\mathrm{{{name}}},{number}}}",
+                windows=((start, end),),
+            ),
+            function=function,
+            rate=sp.diff(function, DRIVER_ANGLE) * self.speed,
+            changes=f"`gate.{name}`",
+        )
+
+    def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str]) -> OverAngle:
+        """Value over the angle behind the first knot, whole turns taken off."""
+        knots, heights = ([sp.Symbol(path, real=True) for path in column] for column in (angles, values))
+        turn, past = 2 * sp.pi, DRIVER_ANGLE - knots[0]
+        behind = Definition(
+            symbol=sp.Symbol(f"{name}.angle", real=True),
+            expression=past - turn * sp.floor(past / turn, evaluate=False),
+            unit="rad",
+            description=f"Driver's angle behind the first row of the table of {name}, within a turn",
+            latex=rf"\theta_{{\mathrm{{{name}}}}}",
+        )
+        places = [knot - knots[0] for knot in knots]
+        value = Definition(
+            symbol=sp.Symbol(f"{name}.value", real=True),
+            expression=piecewise_linear(behind.symbol, [*places, turn], [*heights, heights[0]]),
+            unit=unit,
+            description=f"Value of the table of {name}",
+            latex=rf"T_{{\mathrm{{{name}}}}}",
+        )
+        kinks = ((f"{name}.table", Smoothness.KINKED),)
+        return OverAngle(value=value.symbol, definitions=(behind, value), smoothness=kinks)
+
+
+def inside_window(start: str, end: str) -> sp.Expr:
+    """Switching function of a window from one driver angle to another: positive inside, modulo a turn [rad].
+
+    Its zeros are the edges: (cos(angle - middle) - cos(half)) / sin(half), half of the width; its slope there is one.
+    An end before the start lies in the next turn: middle and half width are then half a turn more, which changes both
+    signs of the difference.
+    """
+    first, last = (sp.Symbol(path, real=True) for path in (start, end))
+    span = last - first
+    half = sp.Min(sp.Abs(span) / 2, sp.pi, evaluate=False)
+    middle = (first + last) / 2
+    # cosine and sine of the angle are there already: the driven body's
+    along = sp.cos(DRIVER_ANGLE) * sp.cos(middle) + sp.sin(DRIVER_ANGLE) * sp.sin(middle)
+    slope = sp.Max(sp.sin(half), LEAST_SLOPE, evaluate=False)
+    return sp.sign(span, evaluate=False) * (along - sp.cos(half)) / slope
+
+
+def driver_coordinate() -> Coordinate:
+    """The driver's angle as a coordinate."""
+    return Coordinate(
+        name=DRIVER_ANGLE.name,
+        kind="angle",
+        unit="rad",
+        position=DRIVER_ANGLE,
+        velocity=sp.Symbol("driver.speed", real=True),
+        latex=r"\theta_1",
+        description="of the driven body, counter-clockwise",
+        group="driver",
+    )

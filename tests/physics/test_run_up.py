@@ -1,0 +1,134 @@
+"""A driver with a table of its speed over time, against closed forms: the angle is a quadratic between rows."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import simpson
+from scipy.optimize import brentq
+
+from ballpass.derive import generate
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.derive.scene.errors import SceneError
+from ballpass.runtime import Model, load
+from ballpass.runtime.contract.errors import RequestError
+
+PRESS = (Path(__file__).parents[2] / "scenes/punching_press.toml").read_text()
+SPEED = 'speed = "500 rpm"                       # [paper]; positive is counter-clockwise\n'
+TABLE = """flywheel.inertia = "0.3 kg*m^2"
+table.time = { file = "run.csv", column = "time", unit = "s" }
+table.speed = { file = "run.csv", column = "n", unit = "rpm" }
+"""
+ROWS = "time, n\n0.02, 60\n0.3, 600\n0.5, 450\n0.8, -300\n"
+TIMES, SPEEDS = np.array([0.02, 0.3, 0.5, 0.8]), np.array([60.0, 600.0, 450.0, -300.0]) * math.pi / 30.0
+END, START_ANGLE, PUNCH = 0.9, 0.4, "mechanism.forces.punch.force.y"
+NAMES = [f"mechanism.driver.table.{column}.{row}" for column in ("time", "speed") for row in (1, 2, 3, 4)]
+
+
+def angle(time: float, times: np.ndarray = TIMES, speeds: np.ndarray = SPEEDS) -> float:
+    """The exact integral: trapezoids between knots."""
+    edges = np.array([0.0, *times[times < time], time])
+    return START_ANGLE + float(np.trapezoid(np.interp(edges, times, speeds), edges))
+
+
+def _model(folder: Path, *changes: tuple[str, str]) -> Model:
+    """The press of the paper without its bearing."""
+    head = PRESS[: PRESS.index("[bearing]")]
+    for old, new in ((SPEED, TABLE), ('start_angle = "0 deg"', 'start_angle = "0.4 rad"'), *changes):
+        assert old in head
+        head = head.replace(old, new)
+    (folder / "run.csv").write_text(ROWS)
+    outputs = '"driver.*", "drive_*", "reaction.*"'
+    (folder / "press.toml").write_text(f'{head}\n[run]\nduration = "{END} s"\noutputs = [{outputs}]\n')
+    return load(generate(folder / "press.toml", folder / "model"))
+
+
+@pytest.fixture(scope="module")
+def press(tmp_path_factory: pytest.TempPathFactory) -> Model:
+    return _model(tmp_path_factory.mktemp("run_up"))
+
+
+def test_angle_and_acceleration_are_the_integral_and_the_slope_of_the_table(press: Model) -> None:
+    times = np.array([0.01, 0.1, 0.31, 0.5, 0.7, 0.85])
+    run = press.simulate(times=times, duration=END, rtol=1e-6)
+    assert run["driver.angle"] == pytest.approx([angle(t) for t in times], rel=1e-12)
+    assert run["driver.speed"] == pytest.approx(np.interp(times, TIMES, SPEEDS), rel=1e-12)
+    slopes = np.diff(SPEEDS) / np.diff(TIMES)
+    assert run["driver.acceleration"] == pytest.approx([0.0, slopes[0], slopes[1], slopes[2], slopes[2], 0.0])
+
+
+def test_steps_end_where_the_exact_angle_passes_the_edges_of_windows(press: Model) -> None:
+    """Also behind the standstill at 0.68 s, from where the driver turns back."""
+    edges = math.radians(237.0), math.radians(267.0)
+    passed = []
+    for left, right in pairwise([0.0, *TIMES[:3], 0.68, TIMES[3], END]):
+        low, high = sorted((angle(left), angle(right)))
+        for edge in edges:
+            turn = edge + 2.0 * math.pi * math.ceil((low - edge) / (2.0 * math.pi))
+            while turn < high:
+                passed.append(brentq(lambda t, goal=turn: angle(t) - goal, left, right, xtol=1e-15))
+                turn += 2.0 * math.pi
+    assert press.simulate(duration=END, rtol=1e-9).statistics.located == len(passed) == 10
+    beside = np.ravel([[t - 1e-9, t + 1e-9] for t in sorted(passed)])
+    force = press.simulate(times=beside, duration=END, rtol=1e-6)["reaction.D.x"].reshape(-1, 2)
+    free = press.simulate(times=beside, duration=END, rtol=1e-6, parameters={PUNCH: 0.0})["reaction.D.x"].reshape(-1, 2)
+    acts = np.abs(force - free) > 1.0
+    assert np.all(acts[:, 0] != acts[:, 1])
+
+
+def test_work_of_the_drive_is_what_bodies_flywheel_and_weight_take(press: Model) -> None:
+    """Piece by piece of the table; energies by closed forms of the slider-crank that are written here."""
+    for left, right in pairwise([*TIMES, END]):
+        times = np.linspace(left, right, 4001)
+        times[[0, -1]] += [1e-9, -1e-9]  # the torque jumps at a row
+        run = press.simulate(times=times, duration=END, rtol=1e-10, parameters={PUNCH: 0.0})
+        theta, omega = run["driver.angle"], run["driver.speed"]
+        sine, cosine = 0.06 * np.cos(theta), np.sqrt(1.0 - (0.06 * np.cos(theta)) ** 2)
+        swing = 0.06 * np.sin(theta) / cosine * omega  # of the rod
+        pin = 0.006 * np.array([-np.sin(theta), np.cos(theta)]) * omega
+        # the rod hangs at the angle asin(sine) from the vertical
+        height = 0.006 * np.sin(theta) - 0.1 * cosine
+        slider = 0.006 * np.cos(theta) * omega - 0.1 * (sine / cosine) * 0.06 * np.sin(theta) * omega
+        middle = 0.5 * np.array([pin[0], pin[1] + slider])
+        kinetic = 0.5 * (0.3 + 611.7e-6) * omega**2 + 0.5 * 7517.545e-6 * swing**2
+        kinetic += 0.5 * 2.55 * np.sum(middle**2, axis=0) + 0.5 * 16.7965 * slider**2
+        potential = 9.81 * (2.55 * 0.5 * (0.006 * np.sin(theta) + height) + 16.7965 * height)
+        energy = kinetic + potential
+        work = simpson(run["drive_power"], x=times)
+        assert energy[-1] - energy[0] == pytest.approx(work, rel=1e-8, abs=1e-8)
+
+
+def test_derivatives_by_rows_of_the_table_are_those_of_the_integral(tmp_path: Path) -> None:
+    """Times and speeds; the ends of segments move with the times."""
+    model = _model(tmp_path, ('window = { start = "237 deg", end = "267 deg" }', ""))
+    found = model.sensitivities(NAMES, duration=END, rtol=1e-9).x[-1]
+    rows, h = np.concatenate([TIMES, SPEEDS]), 1e-5
+    for k in range(8):
+        up, down = (np.split(rows + sign * h * np.eye(8)[k], 2) for sign in (1.0, -1.0))
+        assert found[0, k] == pytest.approx((angle(END, *up) - angle(END, *down)) / (2.0 * h), rel=1e-8, abs=1e-8)
+        assert found[1, k] == pytest.approx(float(k == 7), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ('speed = "5 rad/s"\ntable = { time = ["0 s", "1 s"], speed = ["0 rpm", "9 rpm"] }', "the table gives the"),
+        ('table = { time = ["0 s", "0 s"], speed = ["0 rpm", "9 rpm"] }', "the time does not increase"),
+        ('table = { time = ["0 s"], speed = ["0 rpm"] }', "the table has too few rows"),
+        ('table = { time = ["-1 s", "1 s"], speed = ["0 rpm", "9 rpm"] }', "the value is negative"),
+        ('table = { time = ["0 s", "1 s"] }', "this key is missing"),
+        ('table = { time = ["0 s", "1 s"], speed = ["0 rpm", "9 rpm"] }', "nothing turns, so there are no cycles"),
+    ],
+)
+def test_tables_of_speed_that_say_nothing_are_refused(keys: str, words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        scene_from_text(PRESS.replace(SPEED, keys + "\n"), "press")
+
+
+def test_a_run_begins_at_the_start_of_its_table(press: Model) -> None:
+    with pytest.raises(RequestError, match="its table has"):
+        press.simulate(duration=0.1, initial=[0.0, 10.0])
