@@ -29,7 +29,7 @@ from scipy.optimize import root
 
 from ballpass.derive import generate
 from ballpass.derive.scene.records import Scene
-from ballpass.runtime import load
+from ballpass.runtime import Model, load, read_manifest
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
@@ -406,6 +406,44 @@ def test_energy_changes_by_the_work_of_the_drive_alone_in_long_runs(name: str) -
         ),
     }[name]
     assert energy_drift(scene, turns) < 1e-9
+
+
+SMOOTH = ('law = "one-sided"', 'law = "tangent"'), ('ratio = "0.25e-5 s*mm^0.5"', 'ratio = "2.5e-5 s"')
+
+#: Central differences of sixth order: neighbours and weights.
+SIXTH_ORDER = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes"),
+    [
+        ("punching_press_two_way", SMOOTH),
+        pytest.param("punching_press_hinges", SMOOTH, marks=pytest.mark.long),
+        pytest.param("punching_press_hinges", (*SMOOTH, *driven_by(MOTOR)), marks=pytest.mark.long),
+    ],
+)
+def test_modes_are_those_of_absolute_coordinates_with_multipliers(
+    scene: str, changes: tuple[tuple[str, str], ...], tmp_path: Path
+) -> None:
+    """Of the whole machine about its equilibrium, the accelerations of the second implementation differentiated."""
+    derived = Derived(with_bearings(text(scene, *changes)))
+    machine, size = Multibody(derived.scene, derived.points()), len(derived.coordinates)
+    folder = generate(derived.scene, tmp_path / "model")
+    found = Model(folder, read_manifest(folder), None).linearize()
+    step = np.where([name == "driver.angle" for name in derived.coordinates], 1e-4, 2e-8)
+
+    def accelerations(x: np.ndarray) -> np.ndarray:
+        known = machine.evaluate(0.0, x).accelerations
+        return np.array([known[name] for name in derived.coordinates])
+
+    columns = [
+        sum(w * (accelerations(found.x + k * h) - accelerations(found.x - k * h)) for k, w in SIXTH_ORDER) / np.sum(h)
+        for h in np.diag(np.concatenate([step, np.full(size, 1e-2)]))
+    ]
+    values = np.linalg.eigvals(np.block([[np.zeros((size, size)), np.eye(size)], [np.array(columns).T]]))
+    assert len(found.eigenvalues) == 2 * size
+    for value in found.eigenvalues:
+        assert np.min(np.abs(values - value)) < 1e-8 * abs(value)
 
 
 FOUR_BAR_JOINTS = (("A", ""), ("B", "coupler"), ("C", "rocker"), ("D", ""))
