@@ -141,7 +141,8 @@ free_distance = "-103 mm"
 hysteresis = "0.5 s/m"
 
 """
-    model = make_model(name, ("[mechanism.bodies.crank]", stop + "[mechanism.bodies.crank]"))
+    asked = ("outputs = [", 'outputs = ["stop.*", ')
+    model = make_model(name, ("[mechanism.bodies.crank]", stop + "[mechanism.bodies.crank]"), asked)
     exact = model.simulate(rtol=1e-12, cycles=1.0, method="stepper-dop853").x
     errors = {}
     for kinks in ("located", "stepped-over"):
@@ -149,6 +150,11 @@ hysteresis = "0.5 s/m"
         errors[kinks] = np.max(np.max(np.abs(run.x - exact), axis=0) / np.max(np.abs(exact), axis=0))
     assert errors["located"] < 1e-5
     assert errors["located"] < 0.1 * errors["stepped-over"]
+    of_stop = [f"mechanism.stops.bottom.{key}" for key in ("stiffness", "free_distance", "hysteresis")]
+    for quantity in ("mean:stop.bottom.force", "max:ball.force"):
+        found = model.sensitivity(quantity, of_stop, cycles=1.0, transient=0.0)
+        assert {pair.check.verdict.value for pair in found.pairs} == {"verified"}
+        assert len(found.grazing) < 20
 
 
 def test_equations_and_events_name_stops(scene_text: Callable[..., str]) -> None:

@@ -383,7 +383,8 @@ def _difference_scales(
 def _grazing(model: LoadedModel, numbers: Numbers, course: Course, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:
     """Where the run grazes a kink, whether or not the scene's outputs name the balls' deflections."""
     manifest, track = model.manifest, course.track
-    if track is None or not manifest.bearings:
+    # without a step the quantities need no motion
+    if track is None or track.steps == 0 or not manifest.bearings:
         return ()
     names = [bearing.prefix + DEFLECTION for bearing in manifest.bearings]
     state = manifest.mechanism.angle if manifest.mechanism is not None else ""

@@ -148,6 +148,7 @@ def _absent(scene: Scene) -> list[str]:
             out.append("weight of the mechanism's bodies (mechanism.gravity)")
         if not mechanism.forces:
             out.append("forces, torques and springs ([mechanism.forces.NAME], torques, springs, torsion_springs)")
+            out.append("stops and friction of joints ([mechanism.stops.NAME], torsion_stops, friction, guide_friction)")
     if not scene.bearings:
         out.append("a bearing: forces of the mechanism only ([bearing])")
     for bearing in scene.bearings:
