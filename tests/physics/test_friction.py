@@ -14,6 +14,7 @@ from test_springs import TURN, lever
 
 from ballpass.derive import derive, equations, generate
 from ballpass.derive.reading.read import scene_from_text
+from ballpass.derive.reading.usual import usual_ranges
 from ballpass.derive.scene.errors import SceneError
 from ballpass.runtime import load
 
@@ -115,6 +116,13 @@ def test_equations_name_friction(scene_text: Callable[..., str]) -> None:
     assert "Friction torque of pin, against the rate [N·m]" in text
     assert "Friction force of slot, against the rate [N]" in text
     assert r"\tanh" in text
+
+
+def test_coulomb_friction_that_turns_round_over_much_of_the_speed_is_unusual(scene_text: Callable[..., str]) -> None:
+    scene = scene_from_text(scene_text("crank_shaper", *changes(PIN, SLOT)), "shaper")
+    (found,) = (info for info in usual_ranges(scene) if "friction" in info.names[0])
+    assert (found.names, found.of) == (("mechanism.friction.pin.smoothing",), "mechanism.driver.speed")
+    assert found.most == 0.1
 
 
 @pytest.mark.parametrize(
