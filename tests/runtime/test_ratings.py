@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -12,8 +13,10 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
+from ballpass.runtime.contract import BearingInfo, CatalogueInfo, DampingInfo
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.ratings import ellipse, groove_slip, life, load_ratings, mounted_clearance
+from ballpass.runtime.ratings.of_bearing import ratings_of
 
 BALL, PITCH, BALLS, GROOVES = 7.9375e-3, 33.5e-3, 8, (0.52, 0.53)  # 6204
 MILLION = 1e6
@@ -121,6 +124,62 @@ def test_ratings_of_balls_are_the_printed_formulas(gamma: float) -> None:
     assert found == pytest.approx(expected, rel=1e-12)
 
 
+def test_load_of_sectors_is_both_means_of_the_standard_in_their_limits() -> None:
+    """Where the ring turns against the load all places bear the same, where it stands each bears one load; and both
+    rings change places where the load turns with the shaft."""
+    places = 2.0 * math.pi * (np.arange(360) + 0.5) / 360
+    loads = np.maximum(np.cos(places), 0.0) ** 1.5 * 900.0
+    turning = np.full(360, np.mean(loads**3))
+    assert life.sector_ball_load(turning) == pytest.approx(life.equivalent_ball_load(loads, turning=True), rel=1e-10)
+    assert life.sector_ball_load(loads**3) == pytest.approx(life.equivalent_ball_load(loads, turning=False), rel=1e-10)
+    # the load at 2π k/360 in space is met by the place at k - j of a ring that has turned by j
+    passes = np.array([[loads[(k - j) % 360] ** 3 for j in range(360)] for k in range(360)])
+    in_ring = np.array([np.mean([passes[(k + j) % 360, j] for j in range(360)]) for k in range(360)])
+    assert life.sector_ball_load(passes.mean(axis=1)) == pytest.approx(life.sector_ball_load(turning), rel=1e-10)
+    assert life.sector_ball_load(in_ring) == pytest.approx(life.sector_ball_load(loads**3), rel=1e-10)
+
+
+def press_load(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Force of the crank on the frame of the ideal press over equal steps of a turn, by Newton and Euler [N]."""
+    speed, crank, rod, m1, m2, m3, inertia, g = 500 * RPM, 6e-3, 0.1, 0.3567, 2.55, 16.7965, 7517.545e-6, 9.81
+    wave = np.fft.fftfreq(len(angles), 1.0 / len(angles))
+
+    def acceleration(x: np.ndarray) -> np.ndarray:
+        return np.asarray(-(speed**2) * np.fft.ifft(wave**2 * np.fft.fft(x)).real)
+
+    pin, high = crank * np.cos(angles), crank * np.sin(angles)
+    low = high - np.sqrt(rod**2 - pin**2)
+    punch = np.where((np.degrees(angles) >= 237.0) & (np.degrees(angles) < 267.0), 8964.8, 0.0)
+    slider = m3 * (acceleration(low) + g) - punch
+    vertical = m2 * (acceleration((high + low) / 2) + g) + slider
+    swing = inertia * acceleration(np.arctan2(low - high, -pin))
+    across = m2 * acceleration(pin / 2)  # without the guide's force, which the moments about the rod's middle give:
+    guide = (swing - pin / 2 * (vertical + slider) + (high - low) / 2 * across) / (low - high)
+    return -(across + guide), -vertical - m1 * g
+
+
+def test_ideal_press_lasts_389_or_348_million_turns() -> None:
+    """Quasi-static, no clearance, share 1/2, C = 13.5 kN: inner ring taken as turning, and by sectors."""
+    angles = 2.0 * math.pi * (np.arange(720) + 0.5) / 720
+    x, y = press_load(angles)
+    at_240 = np.interp(np.radians(240.0), angles, x), np.interp(np.radians(240.0), angles, y)
+    assert at_240 == pytest.approx((-267.174, 8486.976), rel=1e-3)
+    force, direction = 0.5 * np.hypot(x, y), np.arctan2(y, x)
+
+    def cubes(offset: np.ndarray) -> np.ndarray:
+        """Q³ of a ball at an angle from a load of 1 N: Q = cos^1.5/Σcos^2.5 over all balls."""
+        others = offset[..., None] + 2.0 * math.pi * np.arange(BALLS) / BALLS
+        return np.maximum(np.cos(offset), 0.0) ** 4.5 / np.sum(np.maximum(np.cos(others), 0.0) ** 2.5, axis=-1) ** 3
+
+    places = angles[::4, None]
+    outer = life.sector_ball_load(np.mean(force**3 * cubes(places - direction), axis=1))
+    inner = life.sector_ball_load(np.mean(force**3 * cubes(places + angles - direction), axis=1))
+    turning = (np.mean(force**3) * np.mean(cubes(angles))) ** (1 / 3)
+    ratings = life.ball_ratings(13.5e3, BALLS, BALL / PITCH, GROOVES)
+    assert life.reference_life(ratings, (turning, outer)) == pytest.approx(389.1 * MILLION, rel=3e-3)
+    assert life.reference_life(ratings, (inner, outer)) == pytest.approx(348.4 * MILLION, rel=3e-3)
+
+
 @pytest.mark.parametrize(
     ("load", "mean", "printed"),
     [
@@ -199,6 +258,26 @@ def test_equal_warming_of_all_parts_keeps_the_clearance() -> None:
     assert mounted_clearance.thermal_reduction(20.0, 20.0, 20.0, BALL, PITCH) == pytest.approx(0.0, abs=1e-18)
     lost = mounted_clearance.thermal_reduction(10.0, 5.0, 0.0, BALL, PITCH)  # α 10 K D_pw
     assert lost == pytest.approx(11.5e-6 * 10 * PITCH, rel=1e-12)
+
+
+def test_ratings_that_a_scene_gives_stand_before_formulas() -> None:
+    taken = CatalogueInfo(
+        designation="6204", clearance_group="", clearance_least=None, clearance_most=None,
+        dynamic_rating=13.5e3, static_rating=6.55e3, fatigue_limit=None,
+    )  # fmt: skip
+    bearing = BearingInfo(
+        name="", prefix="", path="bearing", balls=BALLS, joint="", inner_body="", ring_speed="", outer_ring=False,
+        damping=DampingInfo(law="none"), catalogue=taken,
+    )  # fmt: skip
+    values = {"bearing.ball_diameter": BALL, "bearing.pitch_diameter": PITCH}
+    found = ratings_of(bearing, values)
+    assert (found.dynamic, found.static, found.given) == (13.5e3, 6.55e3, ("dynamic_rating", "static_rating"))
+    assert found.fatigue_limit == pytest.approx(6.55e3 / 22)
+    assert (found.inner_ball, found.outer_ball) == pytest.approx(life.ball_ratings(13.5e3, BALLS, BALL / PITCH))
+    grooves = {f"bearing.contact.{ring}_groove_radius": 0.54 * BALL for ring in ("inner", "outer")}
+    wide = ratings_of(replace(bearing, catalogue=None), values | grooves)
+    assert wide.dynamic < load_ratings.dynamic_rating(BALLS, BALL, PITCH)
+    assert wide.static < load_ratings.static_rating(BALLS, BALL, PITCH)
 
 
 def test_lives_are_differentiated_by_casadi() -> None:

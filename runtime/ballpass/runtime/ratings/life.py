@@ -154,6 +154,20 @@ def equivalent_ball_load(loads: Sequence[Any], *, turning: bool) -> Any:
     return mean_load(loads, TURNING if turning else STANDING)
 
 
+def sector_ball_load(cubes: Sequence[Any]) -> Any:
+    """Q_e of a ring whose places bear different loads [N].
+
+    A place of the raceway adds up damage by the cube of the loads that pass it, the places together fail by Weibull's
+    law: {mean over places of ⟨Q³⟩^(10/9)}^(3/10).  It is the cubic mean where all places bear the same, and the mean of
+    exponent 10/3 where each place bears one load: `equivalent_ball_load`.
+
+    Parameters
+    ----------
+    cubes : ⟨Q³⟩, mean over the passes at each of equal sectors, in the ring's own coordinates [N³]
+    """
+    return mean_load([cube ** (1.0 / 3.0) for cube in cubes], STANDING)
+
+
 def reference_life(ratings: tuple[Any, Any], equivalent_loads: tuple[Any, Any]) -> Any:
     """L_10r of both rings [turns], from Q_ci, Q_ce and Q_ei, Q_ee [N]; ISO 16281:2008."""
     rings = zip(ratings, equivalent_loads, strict=True)
