@@ -158,6 +158,8 @@ CASES: dict[str, tuple[str, tuple[tuple[str, str], ...], tuple[str, ...]]] = {
     "press, A": ("punching_press", OFF_CENTRE, (bearing("A", law=ONE_SIDED, count=2),)),
     "two-way press": ("punching_press_two_way", (), ()),
     "press, bearings in all hinges": ("punching_press_hinges", (), ()),
+    "press, motor on the crank": ("punching_press_motor", (), ()),
+    "toggle press": ("toggle_press", (), ()),
     "Andrews' squeezer": ("andrews", (), ()),
     "press, motor and flywheel": (
         "punching_press",
