@@ -28,6 +28,7 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 from scipy.optimize import root
 
 from ballpass.derive import generate
+from ballpass.derive.reading.read import with_values
 from ballpass.derive.scene.records import Scene
 from ballpass.runtime import Model, load, read_manifest
 
@@ -585,6 +586,21 @@ def test_random_linkages_move_as_in_absolute_coordinates(topology: int) -> None:
         rng = np.random.default_rng(seed)
         worst = max(largest_difference(derived, machine, *drawn(rng, derived, machine)) for _ in range(2))
         assert worst < 1e-9, seed
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(4))
+def test_random_linkages_rest_at_their_static_equilibrium(seed: int, tmp_path: Path) -> None:
+    """All rings of all bearings, wherever they are: with the crank held, nothing moves in absolute coordinates."""
+    scene = with_values(random_scene(seed), {"mechanism.driver.speed": 1e-9})  # a crawl, which damps nothing
+    folder = generate(scene, tmp_path / "model")
+    rest = Model(folder, read_manifest(folder), None).static_equilibrium()
+    assert not len(rest.free_directions)
+    machine = Multibody(scene, Derived(scene).points())
+    there, concentric = (
+        max(map(abs, machine.evaluate(0.0, x).accelerations.values())) for x in (rest.x, np.zeros_like(rest.x))
+    )
+    assert there < 1e-9 * concentric
 
 
 @pytest.mark.long
