@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class RunEnd:
     time: float
     x: np.ndarray
     states: tuple[str, ...]
-    parameters: Mapping[str, float]
+    parameters: Mapping[str, float] = field(repr=False)
 
 
 #: What may be given as start; None is the scene's.
