@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from ballpass.runtime import Model, load_solution
+from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.point.evaluate import point
 
@@ -57,6 +59,29 @@ def test_a_run_goes_on_as_one_run_through(
         assert reduced[name].maximum == pytest.approx(of_all[name].maximum, rel=1e-6)
         assert reduced[name].rms == pytest.approx(of_all[name].rms, rel=1e-5)
     assert second.steady().t[0] == pytest.approx(reduced.start, rel=1e-2)
+
+
+@pytest.mark.long
+def test_the_command_goes_on_from_the_file_of_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scene_text: Callable[..., str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("alone.toml").write_text(scene_text("varying_compliance"), encoding="utf-8")
+    how = ["--no-figures", "--transient", "0.2", "--cycles"]
+    runs = {
+        "first": ["0.3"],
+        "second": ["0.1", "--initial", "first/solution.nc"],
+        "rest": ["0.3", "--initial", "equilibrium"],
+    }
+    for name, words in runs.items():
+        done = CliRunner().invoke(app, ["run", "alone.toml", "--out", name, *how, *words])
+        assert done.exit_code == 0, done.output
+    first, second, rest = (load_solution(f"{name}/solution.nc") for name in runs)
+    assert (second.t[0], second.x[0].tolist()) == (first.t[-1], first.x[-1].tolist())
+    assert abs(np.diff(rest["inner.x"][:2])[0]) < 0.05 * abs(np.diff(first["inner.x"][:2])[0])
+    done = CliRunner().invoke(app, ["run", "alone.toml", "--initial", "nowhere.nc"])
+    assert done.exit_code == 2
+    assert "nowhere.nc: there is no such file" in done.output
 
 
 def test_what_would_jump_does_not_go_on(make_model: Callable[..., Model]) -> None:
