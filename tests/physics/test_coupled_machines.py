@@ -27,8 +27,9 @@ from multibody import Multibody
 from scipy.integrate import cumulative_simpson, solve_ivp
 from scipy.optimize import root
 
-from ballpass.derive import generate
+from ballpass.derive import derive, generate
 from ballpass.derive.reading.read import with_values
+from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.scene.records import Scene
 from ballpass.runtime import Model, load, read_manifest
 
@@ -286,6 +287,26 @@ def test_a_run_up_loads_one_way_bearings_with_the_reaction_of_the_accelerated_li
         assert derived.ball_angles(t, x) == pytest.approx([(1 - 7.9375 / 33.5) / 2 * x[len(x) // 2 - 1]])
         loads.append(found["drive_torque"])
     assert len(set(loads)) == 4
+
+
+@pytest.mark.parametrize("ground", [150.0, 50.0])
+@pytest.mark.parametrize(("left", "refused"), [(0.009, True), (0.011, False)])
+def test_play_that_lets_a_linkage_reach_a_dead_centre_is_refused(ground: float, left: float, refused: bool) -> None:
+    """Coupler 100 mm and rocker 80 mm in one line with the crank of 30 mm, but for what is left.
+
+    In two joints the rings have 5 um each.
+    """
+    short = ground - math.copysign(left, ground - 100.0)
+    scene = with_bearings(
+        text("four_bar", ('D = ["120 mm", "0 mm"]', f'D = ["{short} mm", "0 mm"]')),
+        bearing("B", "crank"),
+        bearing("C", "rocker"),
+    )
+    if not refused:
+        derive(scene)
+        return
+    with pytest.raises(SceneError, match=r"(?s)bearings at B, C lets the linkage reach a dead centre.*less clear"):
+        derive(scene)
 
 
 @pytest.mark.parametrize("name", list(CASES))

@@ -162,7 +162,8 @@ def _linked(
         with _noted(errors):
             forces = derive_forces(mechanism, linkage, drive)
         with _noted(errors):
-            check_assembly(linkage, {q.path: q.value for q in scene.quantities})
+            reach = {b.joint: max(b.clearance.value, 0.0) / 2.0 for b in scene.bearings if b.joint is not None}
+            check_assembly(linkage, {q.path: q.value for q in scene.quantities}, reach)
         if forces is None:
             derive_reactions(mechanism, linkage, (), _moments(scene, mechanism))  # for its faults
     return None if linkage is None or forces is None else (linkage, forces)

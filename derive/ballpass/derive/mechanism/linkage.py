@@ -132,13 +132,16 @@ def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY) -> 
     )
 
 
-def check_assembly(linkage: Linkage, values: Mapping[str, float]) -> None:
-    """Refuse numbers with which the linkage locks somewhere in a turn of the driver.
+def check_assembly(
+    linkage: Linkage, values: Mapping[str, float], reach: Mapping[str, float] = MappingProxyType({})
+) -> None:
+    """Refuse numbers with which the linkage locks somewhere in a turn of the driver, or where its play lets it lock.
 
     Parameters
     ----------
     linkage : from `derive_linkage`
     values : SI value of every parameter, by its path
+    reach : of joints with play, how far the two points of each come apart without load [m]
 
     Raises
     ------
@@ -150,7 +153,14 @@ def check_assembly(linkage: Linkage, values: Mapping[str, float]) -> None:
     driven = linkage.poses[linkage.driven]
     apart = (entry for motion in linkage.play.values() for entry in motion.position)
     closed = {symbol.name: 0.0 for entry in apart for symbol in entry.free_symbols}
-    faults = locked_positions(linkage.definitions, linkage.placements, driven, {**values, **closed})
+    numbers = {**values, **closed}
+    faults = locked_positions(linkage.definitions, linkage.placements, driven, numbers)
+    if not faults and linkage.play:
+        plays = {
+            joint: (tuple(sorted((s for e in motion.position for s in e.free_symbols), key=str)), reach[joint])
+            for joint, motion in linkage.play.items()
+        }
+        faults = locked_positions(linkage.definitions, linkage.placements, driven, numbers, plays)
     if faults:
         raise LinkageError(faults)
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ def locked_positions(
     placements: Sequence[Placement],
     driven: Pose,
     values: Mapping[str, float],
+    plays: Mapping[str, tuple[tuple[sp.Symbol, ...], float]] = MappingProxyType({}),
 ) -> list[Fault]:
     """One fault for each dyad that cannot be assembled somewhere in a turn.
 
@@ -38,6 +40,8 @@ def locked_positions(
     definitions, placements : of a `Linkage`
     driven : pose of the driven body, whose cosine and sine are swept
     values : SI value of every parameter, by its path
+    plays : by joint, the displacements of its play, and how far they reach together [m].  A margin is then what is left
+        of it where all plays lie as they are worst for it, to first order
 
     Raises
     ------
@@ -51,8 +55,17 @@ def locked_positions(
         radians = np.deg2rad(degrees)
         # Beyond the limit of one dyad the next one has no numbers: not a warning, but what is looked for.
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            rows = evaluator({**parameters, driven.cos: np.cos(radians), driven.sin: np.sin(radians)})
-        return np.array([np.broadcast_to(row, degrees.shape) for row in rows], dtype=float)
+            turned = {**parameters, driven.cos: np.cos(radians), driven.sin: np.sin(radians)}
+
+            def margins(moved: Mapping[sp.Symbol, float]) -> Array:
+                rows = evaluator({**turned, **moved})
+                return np.array([np.broadcast_to(row, degrees.shape) for row in rows], dtype=float)
+
+            left = margins({})
+            for along, far in plays.values():
+                ways = [(margins({s: np.float64(far)}) - margins({s: np.float64(-far)})) / 2.0 for s in along]
+                left = left - np.sqrt(sum(way**2 for way in ways))
+        return left
 
     grid = np.arange(0.0, 360.0, STEP)
     swept = sweep(grid)
@@ -64,7 +77,7 @@ def locked_positions(
         here = np.where(reachable, here, np.inf)
         angle, least = _least(sweep, row, grid, here)
         if least <= DEAD_CENTER:
-            faults.append(_fault(placement, angle, least, grid[here <= DEAD_CENTER]))
+            faults.append(_fault(placement, angle, least, grid[here <= DEAD_CENTER], plays))
     return faults
 
 
@@ -87,7 +100,7 @@ def _least(sweep: Callable[[Array], Array], row: int, grid: Array, here: Array) 
     return best
 
 
-def _fault(placement: Placement, angle: float, least: float, closed: Array) -> Fault:
+def _fault(placement: Placement, angle: float, least: float, closed: Array, plays: Iterable[str]) -> Fault:
     margin, dyad = placement.margin, placement.dyad
     joints = ", ".join(dyad.joints)
     if np.isneginf(least):
@@ -99,10 +112,17 @@ def _fault(placement: Placement, angle: float, least: float, closed: Array) -> F
         given = f"{margin.description}: {least:.6g} there"
         if closed.size > 1:
             given += f", not positive at {closed.size * STEP:.4g} of the 360 deg of a turn"
+    remedy = f"change the lengths between joints {joints}, or shorten the crank"
+    if played := ", ".join(plays):
+        problem = (
+            f"the clearance of the bearings at {played} lets the linkage reach a dead centre at joint {margin.joint} "
+            f"at a crank angle of {angle:.4f} deg"
+        )
+        remedy += ", or give the bearings less clearance"
     return Fault(
         key=f"mechanism.joints.{margin.joint}",
         problem=problem,
         given=given,
         allowed=f"above {DEAD_CENTER:g} at every crank angle",
-        remedy=f"change the lengths between joints {joints}, or shorten the crank",
+        remedy=remedy,
     )
