@@ -7,7 +7,7 @@
 
 #include "trig.h"
 
-enum { BP_NQ = 4, BP_NX = 8, BP_NU = 3, BP_NP = 41, BP_NC = 39, BP_NW = 4, BP_NA = 2, BP_NJ = 57, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_RELATIVE = 7, BP_NR = 7, BP_NG = 6, BP_LANES = 8 };
+enum { BP_NQ = 4, BP_NX = 8, BP_NU = 4, BP_NP = 41, BP_NC = 40, BP_NW = 4, BP_NA = 2, BP_NJ = 57, BP_BEARINGS = 1, BP_NB = 8, BP_NS = 2, BP_RELATIVE = 7, BP_NR = 7, BP_NG = 6, BP_LANES = 8 };
 
 /* Coordinates of one group share a magnitude; where a coordinate has a partner, their difference counts. */
 static const int bp_group[4] = {0, 0, 0, 0};
@@ -29,9 +29,9 @@ static inline void bp_0_numbers(const double *restrict p, const double *restrict
     (void)w;
     double w0 = c[10];
     k[0] = w0;
-    w0 = c[13];
+    w0 = c[14];
     k[1] = w0;
-    w0 = c[38];
+    w0 = c[39];
     k[2] = w0;
 }
 
@@ -192,11 +192,11 @@ static inline void bp_stage(double t, const double *restrict u, const double *re
     w3 = bp_cos1(w1);
     w2 = p[7];
     double w4 = w3 * w2;
-    double w5 = c[17];
+    double w5 = c[18];
     w4 = w4 * w5;
     w1 = bp_sin1(w1);
     w2 = w1 * w2;
-    double w6 = c[18];
+    double w6 = c[19];
     w2 = w2 * w6;
     w4 = w4 - w2;
     w2 = p[11];
@@ -210,10 +210,10 @@ static inline void bp_stage(double t, const double *restrict u, const double *re
     w8 = u[1];
     double w9 = p[14];
     w9 = w8 * w9;
-    double w10 = c[23];
+    double w10 = c[24];
     w10 = w10 * w1;
     w10 = w10 * w5;
-    double w11 = c[22];
+    double w11 = c[23];
     w11 = w11 * w3;
     w11 = w11 * w6;
     w10 = w10 - w11;
@@ -221,9 +221,9 @@ static inline void bp_stage(double t, const double *restrict u, const double *re
     w10 = w10 * i0;
     w10 = w10 * w10;
     w11 = w2 * w10;
-    double w12 = c[20];
+    double w12 = c[21];
     double w13 = w12 * w1;
-    double w14 = c[21];
+    double w14 = c[22];
     double w15 = w14 * w3;
     w13 = w13 + w15;
     w11 = w11 + w13;
@@ -249,12 +249,12 @@ static inline void bp_stage(double t, const double *restrict u, const double *re
     w15 = w15 * w5;
     w15 = w15 * w17;
     w8 = w8 + w15;
-    w15 = c[26];
+    w15 = c[27];
     w8 = w8 - w15;
     w8 = w5 * w8;
     w9 = w9 + w8;
     w8 = w2 * w9;
-    w15 = c[19];
+    w15 = c[20];
     w2 = w2 * w15;
     w17 = p[10];
     w14 = w2 * w17;
@@ -271,10 +271,10 @@ static inline void bp_stage(double t, const double *restrict u, const double *re
     w12 = w12 - w2;
     w2 = p[8];
     w12 = w12 * w2;
-    w11 = c[24];
+    w11 = c[25];
     double w18 = w12 + w11;
     w18 = w14 * w18;
-    double w19 = c[25];
+    double w19 = c[26];
     double w20 = w4 * w15;
     w20 = w20 * w17;
     w13 = w13 + w20;
@@ -291,10 +291,10 @@ static inline void bp_stage(double t, const double *restrict u, const double *re
     w8 = w8 * i0;
     w13 = w13 * w2;
     w8 = w8 + w13;
-    w13 = c[29];
-    w2 = c[28];
+    w13 = c[30];
+    w2 = c[29];
     w5 = w2 * w3;
-    w4 = c[27];
+    w4 = c[28];
     w19 = w4 * w1;
     w5 = w5 - w19;
     w5 = w13 * w5;
@@ -315,7 +315,7 @@ static inline void bp_stage(double t, const double *restrict u, const double *re
     w13 = w13 * w4;
     w13 = w13 * w19;
     w16 = w16 + w13;
-    w13 = c[30];
+    w13 = c[31];
     w16 = w16 - w13;
     w0 = w0 * w16;
     w[3] = w0;
@@ -341,11 +341,11 @@ static inline void bp_stage_rate(double t, const double *restrict u, const doubl
     w2 = bp_cos1(w5);
     double w7 = p[7];
     double w8 = w2 * w7;
-    double w9 = c[17];
+    double w9 = c[18];
     w8 = w8 * w9;
     w5 = bp_sin1(w5);
     double w10 = w5 * w7;
-    double w11 = c[18];
+    double w11 = c[19];
     w10 = w10 * w11;
     w8 = w8 - w10;
     w10 = p[11];
@@ -359,10 +359,10 @@ static inline void bp_stage_rate(double t, const double *restrict u, const doubl
     w15 = u[1];
     double w16 = p[14];
     w16 = w15 * w16;
-    double w17 = c[23];
+    double w17 = c[24];
     double w18 = w17 * w5;
     w18 = w18 * w9;
-    double w19 = c[22];
+    double w19 = c[23];
     double w20 = w19 * w2;
     w20 = w20 * w11;
     w18 = w18 - w20;
@@ -370,9 +370,9 @@ static inline void bp_stage_rate(double t, const double *restrict u, const doubl
     w18 = w18 * i0;
     w20 = w18 * w18;
     double w21 = w14 * w20;
-    double w22 = c[20];
+    double w22 = c[21];
     double w23 = w22 * w5;
-    double w24 = c[21];
+    double w24 = c[22];
     double w25 = w24 * w2;
     w23 = w23 + w25;
     w21 = w21 + w23;
@@ -398,12 +398,12 @@ static inline void bp_stage_rate(double t, const double *restrict u, const doubl
     w28 = w25 * w9;
     w28 = w28 * w29;
     w15 = w15 + w28;
-    w28 = c[26];
+    w28 = c[27];
     w15 = w15 - w28;
     w15 = w9 * w15;
     w16 = w16 + w15;
     w15 = w14 * w16;
-    w28 = c[19];
+    w28 = c[20];
     double w30 = w14 * w28;
     double w31 = p[10];
     double w32 = w30 * w31;
@@ -420,10 +420,10 @@ static inline void bp_stage_rate(double t, const double *restrict u, const doubl
     w27 = w27 - w36;
     w36 = p[8];
     w27 = w27 * w36;
-    double w37 = c[24];
+    double w37 = c[25];
     double w38 = w27 + w37;
     double w39 = w32 * w38;
-    double w40 = c[25];
+    double w40 = c[26];
     double w41 = w33 * w34;
     w41 = w41 * w31;
     w23 = w23 + w41;
@@ -440,10 +440,10 @@ static inline void bp_stage_rate(double t, const double *restrict u, const doubl
     w15 = w15 * i0;
     w23 = w23 * w36;
     w23 = w15 + w23;
-    w43 = c[29];
-    double w44 = c[28];
+    w43 = c[30];
+    double w44 = c[29];
     double w45 = w44 * w2;
-    double w46 = c[27];
+    double w46 = c[28];
     double w47 = w46 * w5;
     w45 = w45 - w47;
     w45 = w43 * w45;
@@ -464,7 +464,7 @@ static inline void bp_stage_rate(double t, const double *restrict u, const doubl
     w37 = w43 * w37;
     w37 = w37 * w47;
     w27 = w27 + w37;
-    w37 = c[30];
+    w37 = c[31];
     w27 = w27 - w37;
     w27 = w4 * w27;
     w[3] = w27;
@@ -618,7 +618,7 @@ static inline void bp_relative(const double *restrict x, const double *restrict 
 {
     (void)u;
     (void)p;
-    double w0 = c[37];
+    double w0 = c[38];
     r[0] = w0;
     w0 = x[0];
     double w1 = x[2];
@@ -656,7 +656,7 @@ static inline void bp_acceleration(const double *restrict x, const double *restr
 {
     (void)r;
     (void)u;
-    double w0 = c[16];
+    double w0 = c[17];
     double w1 = w[2];
     double w2 = S[0];
     w1 = w1 - w2;
@@ -667,7 +667,7 @@ static inline void bp_acceleration(const double *restrict x, const double *restr
     w1 = w1 - w3;
     w0 = w0 * w1;
     a[1] = w0;
-    w0 = c[31];
+    w0 = c[32];
     w1 = p[32];
     double w4 = x[6];
     w4 = w1 * w4;
@@ -696,7 +696,7 @@ static inline void bp_acceleration_jacobian(const double *restrict x, const doub
     (void)r;
     (void)u;
     (void)w;
-    double w0 = c[16];
+    double w0 = c[17];
     double w1 = G[4];
     double w2 = w0 * w1;
     double w3 = c[12];
@@ -729,7 +729,7 @@ static inline void bp_acceleration_jacobian(const double *restrict x, const doub
     w8 = w8 - w12;
     A[6] = w8;
     A[7] = w0;
-    w0 = c[31];
+    w0 = c[32];
     w5 = w0 * w5;
     w1 = w0 * w1;
     w8 = w1 * w3;
@@ -794,7 +794,7 @@ static inline void bp_acceleration_rate(const double *restrict x, const double *
     (void)u;
     (void)p;
     (void)w;
-    double w0 = c[16];
+    double w0 = c[17];
     double w1 = wt[2];
     w1 = w0 * w1;
     double w2 = r[6];
@@ -849,7 +849,7 @@ static inline void bp_acceleration_rate(const double *restrict x, const double *
     w9 = w9 - w0;
     w1 = w1 + w9;
     at[1] = w1;
-    w1 = c[31];
+    w1 = c[32];
     w4 = w1 * w4;
     w4 = w4 * w15;
     w10 = w1 * w10;
@@ -862,6 +862,24 @@ static inline void bp_acceleration_rate(const double *restrict x, const double *
     w1 = w1 * w12;
     w13 = w13 - w1;
     at[3] = w13;
+}
+
+/* Of each bearing: angle of ball 1 as the outer and the inner ring see it. 4 operations. */
+static inline void bp_passes(double t, const double *restrict x, const double *restrict u, const double *restrict p, const double *restrict c, double *restrict a)
+{
+    (void)x;
+    (void)p;
+    double w0 = u[2];
+    double w1 = c[12];
+    double w2 = t;
+    w1 = w1 * w2;
+    w0 = w0 + w1;
+    a[0] = w0;
+    w0 = u[3];
+    w1 = c[13];
+    w1 = w1 * w2;
+    w0 = w0 + w1;
+    a[1] = w0;
 }
 
 /* Angles of a stage and their rates. 4 operations. */
@@ -914,11 +932,11 @@ static inline void bp_stage_turned_lanes(const double *restrict C, const double 
         double w1 = C[1 * BP_LANES + lane];
         double w2 = p[7];
         double w3 = w1 * w2;
-        double w4 = c[17];
+        double w4 = c[18];
         w3 = w3 * w4;
         double w5 = S[1 * BP_LANES + lane];
         w2 = w5 * w2;
-        double w6 = c[18];
+        double w6 = c[19];
         w2 = w2 * w6;
         w3 = w3 - w2;
         w2 = p[11];
@@ -932,10 +950,10 @@ static inline void bp_stage_turned_lanes(const double *restrict C, const double 
         w8 = u[1];
         double w9 = p[14];
         w9 = w8 * w9;
-        double w10 = c[23];
+        double w10 = c[24];
         w10 = w10 * w5;
         w10 = w10 * w4;
-        double w11 = c[22];
+        double w11 = c[23];
         w11 = w11 * w1;
         w11 = w11 * w6;
         w10 = w10 - w11;
@@ -943,9 +961,9 @@ static inline void bp_stage_turned_lanes(const double *restrict C, const double 
         w10 = w10 * i0;
         w10 = w10 * w10;
         w11 = w2 * w10;
-        double w12 = c[20];
+        double w12 = c[21];
         double w13 = w12 * w5;
-        double w14 = c[21];
+        double w14 = c[22];
         double w15 = w14 * w1;
         w13 = w13 + w15;
         w11 = w11 + w13;
@@ -971,12 +989,12 @@ static inline void bp_stage_turned_lanes(const double *restrict C, const double 
         w15 = w15 * w4;
         w15 = w15 * w17;
         w8 = w8 + w15;
-        w15 = c[26];
+        w15 = c[27];
         w8 = w8 - w15;
         w8 = w4 * w8;
         w9 = w9 + w8;
         w8 = w2 * w9;
-        w15 = c[19];
+        w15 = c[20];
         w2 = w2 * w15;
         w17 = p[10];
         w14 = w2 * w17;
@@ -993,10 +1011,10 @@ static inline void bp_stage_turned_lanes(const double *restrict C, const double 
         w12 = w12 - w2;
         w2 = p[8];
         w12 = w12 * w2;
-        w11 = c[24];
+        w11 = c[25];
         double w18 = w12 + w11;
         w18 = w14 * w18;
-        double w19 = c[25];
+        double w19 = c[26];
         double w20 = w3 * w15;
         w20 = w20 * w17;
         w13 = w13 + w20;
@@ -1013,10 +1031,10 @@ static inline void bp_stage_turned_lanes(const double *restrict C, const double 
         w8 = w8 * i0;
         w13 = w13 * w2;
         w8 = w8 + w13;
-        w13 = c[29];
-        w2 = c[28];
+        w13 = c[30];
+        w2 = c[29];
         w4 = w2 * w1;
-        w3 = c[27];
+        w3 = c[28];
         w19 = w3 * w5;
         w4 = w4 - w19;
         w4 = w13 * w4;
@@ -1037,7 +1055,7 @@ static inline void bp_stage_turned_lanes(const double *restrict C, const double 
         w13 = w13 * w3;
         w13 = w13 * w19;
         w16 = w16 + w13;
-        w13 = c[30];
+        w13 = c[31];
         w16 = w16 - w13;
         w0 = w0 * w16;
         w[3 * BP_LANES + lane] = w0;
@@ -1058,11 +1076,11 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
         double w3 = C[1 * BP_LANES + lane];
         double w4 = p[7];
         double w5 = w3 * w4;
-        double w6 = c[17];
+        double w6 = c[18];
         w5 = w5 * w6;
         double w7 = S[1 * BP_LANES + lane];
         double w8 = w7 * w4;
-        double w9 = c[18];
+        double w9 = c[19];
         w8 = w8 * w9;
         w5 = w5 - w8;
         w8 = p[11];
@@ -1076,10 +1094,10 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
         w13 = u[1];
         double w14 = p[14];
         w14 = w13 * w14;
-        double w15 = c[23];
+        double w15 = c[24];
         double w16 = w15 * w7;
         w16 = w16 * w6;
-        double w17 = c[22];
+        double w17 = c[23];
         double w18 = w17 * w3;
         w18 = w18 * w9;
         w16 = w16 - w18;
@@ -1087,9 +1105,9 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
         w16 = w16 * i0;
         w18 = w16 * w16;
         double w19 = w12 * w18;
-        double w20 = c[20];
+        double w20 = c[21];
         double w21 = w20 * w7;
-        double w22 = c[21];
+        double w22 = c[22];
         double w23 = w22 * w3;
         w21 = w21 + w23;
         w19 = w19 + w21;
@@ -1115,12 +1133,12 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
         w26 = w23 * w6;
         w26 = w26 * w27;
         w13 = w13 + w26;
-        w26 = c[26];
+        w26 = c[27];
         w13 = w13 - w26;
         w13 = w6 * w13;
         w14 = w14 + w13;
         w13 = w12 * w14;
-        w26 = c[19];
+        w26 = c[20];
         double w28 = w12 * w26;
         double w29 = p[10];
         double w30 = w28 * w29;
@@ -1137,10 +1155,10 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
         w25 = w25 - w34;
         w34 = p[8];
         w25 = w25 * w34;
-        double w35 = c[24];
+        double w35 = c[25];
         double w36 = w25 + w35;
         double w37 = w30 * w36;
-        double w38 = c[25];
+        double w38 = c[26];
         double w39 = w31 * w32;
         w39 = w39 * w29;
         w21 = w21 + w39;
@@ -1157,10 +1175,10 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
         w13 = w13 * i0;
         w21 = w21 * w34;
         w21 = w13 + w21;
-        w41 = c[29];
-        double w42 = c[28];
+        w41 = c[30];
+        double w42 = c[29];
         double w43 = w42 * w3;
-        double w44 = c[27];
+        double w44 = c[28];
         double w45 = w44 * w7;
         w43 = w43 - w45;
         w43 = w41 * w43;
@@ -1181,7 +1199,7 @@ static inline void bp_stage_rate_turned_lanes(const double *restrict C, const do
         w35 = w41 * w35;
         w35 = w35 * w45;
         w25 = w25 + w35;
-        w35 = c[30];
+        w35 = c[31];
         w25 = w25 - w35;
         w25 = w2 * w25;
         w[3 * BP_LANES + lane] = w25;

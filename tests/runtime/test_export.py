@@ -505,7 +505,7 @@ def test_wrong_requests_name_what_was_given_and_what_is_allowed(exported: Callab
         ),
         (
             ("--duration=1e9", "--samples=1", "shaft.speed=0.6"),
-            "up to 95493195.77 segments, cut where a load switches and at every whole turn, were asked for. Allowed: "
+            "up to 95493337.94 segments, cut where a load switches and at every whole turn, were asked for. Allowed: "
             "89478485.",
         ),
     ],

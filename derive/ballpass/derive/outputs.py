@@ -42,6 +42,9 @@ def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None)
         Output(name=s.name, expression=s, unit=u, description=d + of, balls_of=prefix, per_ball=True)
         for s, u, d in per_ball
     ]
+    for ring, angle in (("outer", ball.in_outer), ("inner", ball.in_inner)):
+        words = f"Angle of ball 1{of} as the {ring} ring sees it, from where that ring's x axis was at the start"
+        out.append(Output(name=f"{prefix}cage.in_{ring}", expression=angle, unit="rad", description=words))
     for axis, total in zip("xy", ball.sums, strict=True):
         words = f"Force of the inner ring on the balls{of} along {axis}, Eqs. (8) and (9)"
         out.append(Output(name=f"{prefix}ring_force.{axis}", expression=total.symbol, unit="N", description=words))

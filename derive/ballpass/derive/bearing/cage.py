@@ -11,7 +11,7 @@ import sympy as sp
 
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.kinematics import Ledger, Pose
-from ballpass.derive.mechanism.swing import Swing
+from ballpass.derive.mechanism.swing import STILL, Swing
 from ballpass.derive.scene.records import Bearing, Driver
 from ballpass.derive.terms import TIME, Definition, Names, symbol_of
 from ballpass.derive.variables import Input, phase
@@ -24,13 +24,16 @@ class Cage:
     Attributes
     ----------
     angle, rate : of ball 1 [rad], [rad/s]
-    inputs : the one that holds the part of the angle that grows evenly, at the reference time; none where the driver's
-        angle is a coordinate
+    in_outer, in_inner : angle of ball 1 as the outer and the inner ring see it, which stood along x at the start [rad]
+    inputs : the parts of these angles that grow evenly, at the reference time; none where the driver's angle is a
+        coordinate
     constants, definitions : of the symbols in these
     """
 
     angle: sp.Expr
     rate: sp.Symbol
+    in_outer: sp.Expr
+    in_inner: sp.Expr
     inputs: tuple[Input, ...]
     constants: tuple[Definition, ...]
     definitions: tuple[Definition, ...] = ()
@@ -45,11 +48,21 @@ def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr) -> Cage:
     """Inner ring at constant speed [rad/s], outer ring at rest, Eq. (7)."""
     names = Names(prefix=bearing.prefix, path=bearing.path)
     speed, even = names.constant("cage_speed"), _phase(bearing, names)
+    pass_speed, passing = names.constant("inner_pass_speed"), _phase(bearing, names, "inner")
     constants = (
         _ratio(bearing, names),
         names.define(speed, cage_ratio(names) * shaft_speed, "rad/s", "Speed of the cage", r"\omega_c"),
+        _pass(names, "inner", speed - shaft_speed),
     )
-    return Cage(angle=even.symbol + speed * TIME, rate=speed, inputs=(even,), constants=constants)
+    angle = even.symbol + speed * TIME
+    return Cage(
+        angle=angle,
+        rate=speed,
+        in_outer=angle,
+        in_inner=passing.symbol + pass_speed * TIME,
+        inputs=(even, passing),
+        constants=constants,
+    )
 
 
 def cage_between(
@@ -78,7 +91,7 @@ def cage_between(
     )
     words = "Mean speed of the balls about the bearing's axis"
     between = (swings[0].turns - swings[1].turns) * driver_speed
-    constants = (
+    constants: tuple[Definition, ...] = (
         _ratio(bearing, names),
         names.define(
             names.constant("ring_speed"),
@@ -89,16 +102,39 @@ def cage_between(
         ),
         names.define(speed, turns * driver_speed, "rad/s", words, r"\omega_c"),
     )
-    even = _phase(bearing, names)
+    inner, outer = swings
+    apart = inner.swing - inner.at_start - outer.swing + outer.at_start
     free = drive.coordinate is not None
-    angle = symbol_of(bearing.ball_angle) + turns * (drive.angle - start) if free else even.symbol + speed * TIME
+    inputs: list[Input] = []
+
+    def ball(part: str, turns: sp.Expr, swung: sp.Expr) -> sp.Expr:
+        """Angle of ball 1, of which so many turns go with the driver's."""
+        if free:
+            return symbol_of(bearing.ball_angle) + turns * (drive.angle - start) + swung
+        inputs.append(_phase(bearing, names, part))
+        return inputs[-1].symbol + names.constant(f"{part}_pass_speed" if part else "cage_speed") * TIME + swung
+
+    angle, in_outer = ball("", turns, swung), None
+    if outer is not STILL:
+        constants += (_pass(names, "outer", ratio * names.constant("ring_speed")),)
+        in_outer = ball("outer", ratio * (inner.turns - outer.turns), ratio * apart)
+    constants += (_pass(names, "inner", (ratio - 1) * names.constant("ring_speed")),)
+    in_inner = ball("inner", (ratio - 1) * (inner.turns - outer.turns), (ratio - 1) * apart)
     return Cage(
-        angle=angle + swung,
+        angle=angle,
         rate=rate,
-        inputs=() if free else (even,),
+        in_outer=angle if in_outer is None else in_outer,
+        in_inner=in_inner,
+        inputs=tuple(inputs),
         constants=constants,
         definitions=ledger.definitions,
     )
+
+
+def _pass(names: Names, ring: str, speed: sp.Expr) -> Definition:
+    """Mean speed of the balls over a ring."""
+    words = f"Mean speed of the balls over the {ring} ring"
+    return names.define(names.constant(f"{ring}_pass_speed"), speed, "rad/s", words, rf"\omega_{{c,{ring[0]}}}")
 
 
 def _ratio(bearing: Bearing, names: Names) -> Definition:
@@ -112,11 +148,13 @@ def _ratio(bearing: Bearing, names: Names) -> Definition:
     )
 
 
-def _phase(bearing: Bearing, names: Names) -> Input:
+def _phase(bearing: Bearing, names: Names, ring: str = "") -> Input:
+    """Angle of ball 1 at the reference time, as a ring sees it; "" in axes that stand still."""
+    seen = f", as the {ring} ring sees it" if ring else ""
     return phase(
-        f"{bearing.prefix}cage",
-        f"Angle of ball 1{f' of {bearing.name}' if bearing.name else ''} at the reference time",
-        names.latex(r"\psi_0"),
+        f"{bearing.prefix}{f'{ring}_pass' if ring else 'cage'}",
+        f"Angle of ball 1{f' of {bearing.name}' if bearing.name else ''} at the reference time{seen}",
+        names.latex(rf"\psi_{{0,{ring[0]}}}" if ring else r"\psi_0"),
         offset=bearing.ball_angle.path,
-        rate=f"{bearing.path}.cage_speed",
+        rate=f"{bearing.path}.{f'{ring}_pass' if ring else 'cage'}_speed",
     )

@@ -35,6 +35,7 @@ class Ball:
     Attributes
     ----------
     cage_angle, cage_speed : angle of ball 1 [rad] and its rate [rad/s], constant where the coupling is one-way
+    in_outer, in_inner : angle of ball 1 as the rings see it, see `cage.Cage` [rad]
     cos, sin : of the angle of ball j
     deflection, deflection_rate, elastic_force, damping_force, force : symbols; no damping force is None
     own : what effects take from the deflection, None without effects
@@ -46,6 +47,8 @@ class Ball:
     count: int
     cage_angle: sp.Expr
     cage_speed: sp.Symbol
+    in_outer: sp.Expr
+    in_inner: sp.Expr
     cos: sp.Symbol
     sin: sp.Symbol
     deflection: sp.Symbol
@@ -194,6 +197,8 @@ def _ball(
         count=bearing.balls,
         cage_angle=cage.angle,
         cage_speed=speed,
+        in_outer=cage.in_outer,
+        in_inner=cage.in_inner,
         cos=cos,
         sin=sin,
         deflection=delta,

@@ -13,6 +13,7 @@ stage_moved    (J, u_d, p_d, c_d) -> w_d       w along a direction of u, p, c
 acceleration   (x, S, r, u, p, c, w) -> a      from the sums S over the balls of every bearing
 acceleration_jacobian  (x, S, G, r, u, p, c, w) -> A, B     da/dq, da/dv (row-major); G: sums of the slopes' rows
 acceleration_rate      (x, S, G, r, u, p, c, w, wt) -> at    partial time derivative at fixed state
+passes         (t, x, u, p, c) -> a         of each bearing: angle of ball 1 as the outer and the inner ring see it
 
 The balls enter by the kernels of `ball_kernels`, one set for each bearing: the driver loops over them, and the compiler
 makes SIMD lanes of the loop.  Text and compile time do not depend on their number.
@@ -172,6 +173,7 @@ class KernelBuilder:
         stage = ca.vertcat(*(self._visit(e) for e in self._stage))
         state = {k: self._arguments[k] for k in "up"} | {"c": ca.SX(0, 1)}
         tail = {**state, "w": w}
+        seen = [self._visit(angle) for b in bearings for angle in (b.ball.in_outer, b.ball.in_inner)]
         return [
             (
                 "stage",
@@ -209,6 +211,12 @@ class KernelBuilder:
                 {"x": x, "S": sums, "G": g, "r": held, **tail, "wt": wt},
                 {"at": by_time},
                 "Partial time derivative of the accelerations at fixed state",
+            ),
+            (
+                "passes",
+                {"t": t, "x": x, **state},
+                {"a": ca.vertcat(*seen)},
+                "Of each bearing: angle of ball 1 as the outer and the inner ring see it",
             ),
         ]
 

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ballpass.runtime.ask.life import PLACES, life
 from ballpass.runtime.ask.quantity_location import frequency
 from ballpass.runtime.ask.quantity_records import Estimate, Quantity, View
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.ratings.readings import KINDS as LIFE
 from ballpass.runtime.run import inputs as clock
 
 
@@ -31,6 +33,8 @@ class Kind:
     unit : of the value; "" for that of the channel
     over_time : whether the unit is that of the channel times a second
     static : whether it is one of the rings at rest, for which nothing is run (`ballpass.runtime.ask.study`)
+    of_loads : whether it is of the loads of a bearing's balls, which its channel has to be
+    beside : channels that it looks at as well, behind the bearing's prefix
     """
 
     summary: str
@@ -41,6 +45,8 @@ class Kind:
     unit: str = ""
     static: bool = False
     over_time: bool = False
+    of_loads: bool = False
+    beside: tuple[str, ...] = ()
 
 
 def _mean(view: View, quantity: Quantity) -> Estimate:
@@ -137,6 +143,18 @@ def _drive_work(view: View, quantity: Quantity) -> Estimate:
     return Estimate(value=angle * mean, slope=angle * (moved.real - mean * longer) / length)
 
 
+def _of_life(name: str) -> Kind:
+    readings = LIFE[name]
+    which = f"reading {readings[0]}" if len(readings) == 1 else "by the reading that gives the shortest"
+    return Kind(
+        summary=f"rating life of the bearing in turns, ISO 16281, {which}",
+        evaluate=lambda view, quantity: life(view, quantity, readings),
+        unit="turns",
+        of_loads=True,
+        beside=PLACES if "sectors" in readings else (),
+    )
+
+
 #: What is expected behind ``@`` of quantities at rest.
 _FIRST_TURN = "a crank angle of the first turn (240deg, 4.19rad) or a time (0.41s)"
 
@@ -174,4 +192,5 @@ KINDS: Mapping[str, Kind] = {
         unit="N",
         static=True,
     ),
+    **{name: _of_life(name) for name in LIFE},
 }

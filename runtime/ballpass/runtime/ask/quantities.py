@@ -57,7 +57,7 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
         No such kind, output, ball or place; the nearest known names are told.
     """
     channels = channels_of(manifest)
-    aliases = _aliases(channels)
+    aliases = _aliases(channels) | _lives(manifest)
     form = _FORM.fullmatch(aliases.get(text, text))
     bare, _, instant = text.partition("@")
     statics = _statics(manifest)
@@ -84,8 +84,14 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
     name = _SYNONYMS.get(form["kind"], form["kind"])
     if name in _COUNTED:
         raise RequestError(f"{text}: {name} is found in ensembles, and has no derivative here. Ask for max: instead.")
-    if name not in KINDS or KINDS[name].unit:
+    if name not in KINDS or KINDS[name].static or KINDS[name].channel:
         raise RequestError(f"{text}: {unknown_name('kind of quantity', form['kind'], [*KINDS, *_SYNONYMS])}")
+    if KINDS[name].of_loads:
+        bearings = {meant: written for written, meant in _lives(manifest).items()}
+        if aliases.get(text, text) not in bearings:
+            words = " or ".join(written for meant, written in bearings.items() if meant.startswith(f"{name}:"))
+            raise RequestError(f"{text}: {name} is of a bearing. Write {words or 'it for a scene with one'}.")
+        return Quantity(name=text, kind=name, channel=form["channel"], ball=None, place="", unit=KINDS[name].unit)
     if form["channel"] not in channels:
         raise RequestError(f"{text}: {no_output(manifest, form['channel'], list(channels))}")
     columns, unit = channels[form["channel"]]
@@ -138,6 +144,16 @@ def _aliases(channels: Mapping[str, tuple[int, str]]) -> dict[str, str]:
     }
 
 
+def _lives(manifest: Manifest) -> dict[str, str]:
+    """Names of the kinds that are of a bearing's loads, with its prefix: ``life``, ``big_end.life_sectors``."""
+    return {
+        f"{bearing.prefix}{name}": f"{name}:{bearing.prefix}ball.force"
+        for name, kind in KINDS.items()
+        if kind.of_loads
+        for bearing in manifest.bearings
+    }
+
+
 def _statics(manifest: Manifest) -> dict[str, tuple[str, str]]:
     """Names of the static quantities, ``static_left_deflection`` of one bearing of several; -> (kind, prefix)."""
     return {
@@ -152,10 +168,11 @@ def _usable(manifest: Manifest, channels: Mapping[str, tuple[int, str]]) -> list
     """Names that can be asked for as they stand, for suggestions."""
     open_ = [name for name, kind in KINDS.items() if not kind.place and not kind.unit]
     counted = tuple(f"{name}:" for name in _COUNTED)
-    alone = {name: kind for name, kind in KINDS.items() if kind.unit}
+    alone = {name: kind for name, kind in KINDS.items() if kind.unit and not kind.of_loads}
     return [
         *(alias for alias, meant in _aliases(channels).items() if not meant.startswith(counted)),
         *(f"{name}:{channel}" for name in open_ for channel in channels),
         *(name for name, kind in alone.items() if not kind.static and kind.channel in channels),
         *_statics(manifest),
+        *_lives(manifest),
     ]

@@ -116,7 +116,13 @@ class Study:
         self._panels: Panels | None = None
         self._moving = [quantity for quantity in quantities if not KINDS[quantity.kind].static]
         channels = [quantity.channel for quantity in self._moving]
+        channels += [
+            quantity.channel.removesuffix("ball.force") + name
+            for quantity in self._moving
+            for name in KINDS[quantity.kind].beside
+        ]
         self._summed = list(dict.fromkeys(item.channel for item in self._moving if item.kind not in AT_A_MOMENT))
+        self._loads = list(dict.fromkeys(item.channel for item in self._moving if KINDS[item.kind].of_loads))
         self._outlook = Outlook(model, channels)
         # outputs that follow from time alone need no integration
         self._still = all(name in model.outputs and not depends(model, name, "x") for name in channels)
@@ -221,7 +227,10 @@ class Study:
                 break
             within = np.flatnonzero(nodes.weight)
             signals = self._outlook.look(track, numbers)
-            parts = parts_needed([signals[name].value[within] for name in self._summed], self.rough)
+            each = [signals[name].value[within] for name in self._summed]
+            # what is integrated of loads is steeper than they are
+            each += [np.maximum(signals[name].value[within], 0.0) ** 3 for name in self._loads]
+            parts = parts_needed(each, self.rough)
             if np.all(parts == 1) or len(GAUSS) * np.sum(parts) > most:
                 break
             panels = split(panels, parts)
@@ -280,16 +289,26 @@ class Study:
     def _kinked(self) -> bool:
         """Whether an integral over an output with kinks is asked for: of the balls, or any where a stop is."""
         stops = self.model.manifest.stops
-        broken = tuple(bearing.prefix + name for bearing in self.model.manifest.bearings for name in BROKEN)
+        bearings = self.model.manifest.bearings
+        broken = tuple(bearing.prefix + name for bearing in bearings for name in BROKEN)
+        # powers of loads are smooth where contacts begin, but not where a law has a corner or jumps
+        rough = any(b.damping.corner_at_rest or b.damping.in_deflection == "discontinuous" for b in bearings)
         return any(
-            not KINDS[item.kind].extremes and item.kind != "value" and (stops or item.channel.startswith(broken))
+            not KINDS[item.kind].extremes
+            and (rough or not KINDS[item.kind].of_loads)
+            and item.kind != "value"
+            and (stops or item.channel.startswith(broken))
             for item in self._moving
         )
 
     def _kinks(self, numbers: Numbers, track: Track) -> list[float]:
         """Times of kinks of the outputs of the balls, and of those that a stop changes."""
         nodes, edges, bearings = track.nodes, track.edges, self.model.manifest.bearings
-        ranked = {item.channel for item in self._moving if ".ball." in f".{item.channel}" and item.ball is None}
+        ranked = {
+            item.channel
+            for item in self._moving
+            if ".ball." in f".{item.channel}" and item.ball is None and not KINDS[item.kind].of_loads
+        }
         # among the quantities of every bearing, whether or not the scene's outputs name it
         deflections = [bearing.prefix + DEFLECTION for bearing in bearings] + [*self.model.manifest.stops]
         signals = Outlook(self.model, [*sorted(ranked), *deflections]).look(track, numbers)

@@ -9,6 +9,7 @@ not: it is one number for both sides of the edge.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -203,7 +204,7 @@ class Outlook:
         self._more = [rows for name in self.channels if name not in own for rows in rows_of(model, name)]
         self._columns = [(info.name, info.size) for info in self._outputs]
         self._columns += [(name.partition("[")[0], len(rows.labels)) for rows in self._more for name in rows.labels[:1]]
-        self._values_of_more: Loop | None = None
+        self._own = threading.local()  # a loop is not for several threads, and differences run in several
         self._derivatives: Loop | None = None
 
     def look(self, track: Track, numbers: Numbers, chain: Chain | None = None) -> Mapping[str, Signal]:
@@ -224,9 +225,9 @@ class Outlook:
     def _values(self, track: Track, numbers: Numbers) -> dict[str, Signal]:
         found: dict[str, Signal] = {}
         if self._more:
-            if self._values_of_more is None:
-                self._values_of_more = Loop(self._function(self._more_rows), ("t", "x", "u"))
-            every = self._values_of_more(len(track.nodes), self._given(track, numbers))["g"]
+            if not hasattr(self._own, "more"):
+                self._own.more = Loop(self._function(self._more_rows), ("t", "x", "u"))
+            every = self._own.more(len(track.nodes), self._given(track, numbers))["g"]
             column = 0
             for name, size in self._columns[len(self._outputs) :]:
                 found[name] = Signal(value=every[:, column : column + size], slope=np.zeros((len(every), size, 0)))

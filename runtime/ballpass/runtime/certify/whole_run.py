@@ -18,14 +18,15 @@ from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.ratings.readings import KINDS as LIFE
 from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, Kinks, stepper_for
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
 from ballpass.runtime.run.reduced_run import SCALED_TURNS, Begun, check_span, choose_family, integrate_reduced
-from ballpass.runtime.run.reductions import channel_names, observable_aliases, observe
+from ballpass.runtime.run.reductions import channel_names, channels_needed, observable_aliases, observe
 from ballpass.runtime.run.request import Request, make_plan
 
 #: Kinds of observables whose relative error means something.
-KINDS = ("max", "min", "mean", "rms", "range")
+KINDS = ("max", "min", "mean", "rms", "range", *LIFE)
 
 #: An observable: kind and channel.
 Observable = tuple[str, str]
@@ -113,7 +114,8 @@ class WholeRun:
         """
         layout = reduction_rows(self.model.manifest)
         states = self.model.states
-        row = layout.empty(1, self.start, {*states, *(channel for _, channel in observables)})
+        needed = {name for observable in observables for name in channels_needed(*observable)}
+        row = layout.empty(1, self.start, {*states, *needed})
         state = self.initial.copy()
         state[: len(state) // 2] += moved
         stepper = stepper_for(self.model, way.kinks)  # compiled before it is timed
@@ -133,7 +135,7 @@ class WholeRun:
         seconds = _now() - begin
 
         def found(kind: str, channel: str) -> float:
-            return float(observe(layout, kind, channel, row, state[None])[0])
+            return float(observe(self.model.manifest, kind, channel, row, state[None], self.numbers.values)[0])
 
         return Integrated(
             values=np.array([found(*observable) for observable in observables]),

@@ -47,6 +47,14 @@ static void begin_segment(const bp_job *job, long m)
 }
 
 /* Put a member whose segment has begun into a lane, all that depends on the segment included. */
+/* The balls' forces, out of all quantities of the balls. */
+static void put_forces(bp_lane_block *b, int lane, const double *balls)
+{
+#define BP_PUT(b_) put(b->forces[0] + BP_##b_##_FIRST_BALL * BP_L, lane, balls + BP_BALL_CHANNELS * BP_##b_##_FIRST_BALL, BP_##b_##_BALLS);
+    BP_EACH_BEARING(BP_PUT)
+#undef BP_PUT
+}
+
 static void enter_segment(const bp_job *job, bp_lane_block *b, int lane)
 {
     const long m = b->who[lane];
@@ -75,8 +83,9 @@ static void enter_segment(const bp_job *job, bp_lane_block *b, int lane)
     b->reducing[lane] = 0.0;
     if (job->reductions != NULL && b->start[lane] >= job->reductions[m * BP_REDUCTION + BP_FROM]) {
         double value[BP_CHANNELS], balls[BP_BALL_QUANTITIES];
-        bp_channels(&n, at->t, x, b->balls, value, balls);
+        bp_channels(&n, at->t, x, b->balls, b->powers, value, balls);
         put(b->sampled[0], lane, value, BP_CHANNELS);
+        if (b->powers) put_forces(b, lane, balls);
         b->reducing[lane] = 1.0;
     }
 }
@@ -277,6 +286,7 @@ static int pass(const bp_job *job, bp_lane_block *b, int linearly)
     b->linearly = linearly;
     b->wanted = job->reductions != NULL ? bp_wanted(job->reductions) : 0;
     b->balls = job->reductions != NULL && bp_balls_wanted(job->reductions);
+    b->powers = job->reductions != NULL && bp_powers_wanted(job->reductions);
     b->numbers.u = b->u;
     b->numbers.p = b->p;
     b->numbers.c = b->c;

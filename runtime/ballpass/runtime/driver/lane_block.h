@@ -52,12 +52,13 @@ typedef struct {
     /* reductions */
     double dense[BP_DENSE_ROWS][BP_NX * BP_L] BP_ALIGNED;
     double sampled[BP_POINTS][BP_CHANNELS * BP_L] BP_ALIGNED;
+    double forces[BP_POINTS][(BP_NB > 0 ? BP_NB : 1) * BP_L] BP_ALIGNED; /* of the balls, where powers of their loads are wanted */
     double maximum[BP_CHANNELS * BP_L] BP_ALIGNED, minimum[BP_CHANNELS * BP_L] BP_ALIGNED;
     double integral[BP_CHANNELS * BP_L] BP_ALIGNED, square[BP_CHANNELS * BP_L] BP_ALIGNED;
     long who[BP_L];
     double start[BP_L] BP_ALIGNED, resolution[BP_L] BP_ALIGNED; /* of the segment, and of time within it [s] */
     int linearly;       /* which family this pass advances */
-    int balls;          /* whether channels of the balls are reduced */
+    int balls, powers;  /* whether channels of the balls, and powers of their loads, are reduced */
     unsigned long wanted; /* channels reduced, a bit each; all members have the same */
     bp_lane_numbers numbers;
     bp_lane_angles angles; /* of the step tried */

@@ -7,6 +7,7 @@
 
 #include "ensemble_kernels.h"
 #include "model.h"
+#include "powers.h"
 
 enum { BP_L = BP_MEMBERS };
 
@@ -141,16 +142,30 @@ static inline void bp_lane_linearize(const bp_lane_numbers *n, const double *res
     bp_member_acceleration_rate_lanes(x, S, G, r, n->u, n->p, n->c, w, wt, at);
 }
 
-/* Channels of the balls (see reductions.h) in lanes: for each bearing four quantities of the most loaded ball. */
+/* Add the share of a ball to powers of the loads; to the last of them from its sum, with the last ball. */
+BP_INLINE void bp_lane_powers(const double *restrict force, double share, double *restrict power, int last)
+{
+    BP_EACH_LANE {
+        const double load = force[lane] > 0.0 ? 1e-3 * force[lane] : 0.0, cube = load * load * load;
+        power[lane] += share * cube;
+        power[BP_L + lane] += share * (cube * bp_cube_root(load));
+        power[2 * BP_L + lane] = last ? bp_nine_tenths(power[BP_L + lane]) : 0.0;
+    }
+}
+
+/* Channels of the balls (see reductions.h) in lanes: for each bearing four quantities of the most loaded ball, then, where they are wanted,
+   three powers of the loads; and then the forces of all balls. */
 static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane_angles *restrict angles, double theta,
-                                         const double *restrict t, const double *restrict h, const double *restrict x,
-                                         double *restrict value)
+                                         const double *restrict t, const double *restrict h, const double *restrict x, int powers,
+                                         double *restrict value, double *restrict forces)
 {
     double w[BP_NW * BP_L] BP_ALIGNED, r[BP_NR * BP_L] BP_ALIGNED;
     double C[BP_NA * BP_L] BP_ALIGNED, S[BP_NA * BP_L] BP_ALIGNED, time[BP_L] BP_ALIGNED;
     bp_lane_turn(angles, theta, t, h, C, S, time);
     bp_member_cage_turned_lanes(C, S, time, n->u, n->p, n->c, w);
     bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
+    double *power = value + 4 * BP_BEARINGS * BP_L;
+    for (int i = 0; i < 3 * BP_BEARINGS * BP_L; i++) power[i] = 0.0;
 #define BP_CHANNEL(b)                                                                                                            \
     for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                                   \
         double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[4 * BP_L] BP_ALIGNED, *to = value + 4 * (b) * BP_L;                \
@@ -158,6 +173,10 @@ static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane
         bp_member_##b##_contact_lanes(co, si, r + BP_RELATIVE * (b) * BP_L, n->p, n->c, w, rows);                                          \
         _Pragma("omp simd")                                                                                                      \
         for (int i = 0; i < 4 * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];                                  \
+        if (powers) {                                                                                                            \
+            bp_lane_powers(rows, 1.0 / BP_##b##_BALLS, power + 3 * (b) * BP_L, j + 1 == BP_##b##_BALLS);                         \
+            memcpy(forces + (BP_##b##_FIRST_BALL + j) * BP_L, rows, BP_L * sizeof *rows);                                        \
+        }                                                                                                                        \
     }
     BP_EACH_BEARING(BP_CHANNEL)
 #undef BP_CHANNEL

@@ -50,7 +50,7 @@ static void reduce_start(bp_run *run, double start)
 {
     run->reduction = run->options->reduction;
     if (run->reduction != NULL && start < run->reduction[BP_FROM]) run->reduction = run->options->before;
-    if (run->reduction != NULL) bp_channels(&run->numbers, 0.0, run->x, bp_balls_wanted(run->reduction), run->sampled[0], run->balls[0]);
+    if (run->reduction != NULL) bp_channels(&run->numbers, 0.0, run->x, bp_balls_wanted(run->reduction), bp_powers_wanted(run->reduction), run->sampled[0], run->balls[0]);
 }
 
 static void reduce_step(bp_run *run, double start, double t, double h)
@@ -64,7 +64,7 @@ static void reduce_step(bp_run *run, double start, double t, double h)
         for (int i = 1; i < BP_POINTS; i++) {
             double y[BP_NX];
             const double time = state_of_step(&step, (double)i / (BP_POINTS - 1), y);
-            bp_channels(&run->numbers, time, y, bp_balls_wanted(run->reduction), run->sampled[i], run->balls[i]);
+            bp_channels(&run->numbers, time, y, bp_balls_wanted(run->reduction), bp_powers_wanted(run->reduction), run->sampled[i], run->balls[i]);
         }
         const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])run->balls;
         const bp_within within = {start + t + step.from * h, step.span * h, &run->numbers, state_of_step, &step, balls};

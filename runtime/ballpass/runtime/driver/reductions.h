@@ -12,6 +12,11 @@
    DOP853 the polynomial is the dense output itself, and no extreme is missed.  An extreme is always a value that the solution takes, never
    an extrapolation across a kink.
 
+   What fatigue needs of a bearing's balls follows behind: the mean over them of the third power of their load, of its power 10/3, and the
+   latter to the power 9/10, loads in kN and nothing where they pull.  Only their integrals mean something.  Where they are wanted, the third
+   power is added up over the places of both raceways as well: each raceway's places are hat functions, BP_SECTORS of them, in the ring's own
+   coordinates, and what a ball gives in a step acts at its centroid, so that amount and first moment are right.
+
    The most loaded ball has kinks where two balls change rank.  Its largest value is the largest of any ball, whose tops are looked for
    one ball after the other; its smallest is looked for where the ranks change as well.  Where a law jumps at contact, the force has its
    extreme beside the jump: a contact that begins or ends between two quarters is located, and both of its sides are looked at.
@@ -23,8 +28,16 @@
 #include <string.h>
 
 #include "model.h"
+#include "powers.h"
 
-enum { BP_POINTS = 5, BP_BALL_CHANNELS = 4, BP_CHANNELS = BP_NX + BP_BALL_CHANNELS * BP_BEARINGS };
+enum {
+    BP_POINTS = 5,
+    BP_BALL_CHANNELS = 4,
+    BP_POWERS = 3,   /* of the loads of a bearing */
+    BP_SECTORS = 72, /* of a raceway */
+    BP_LOOKED_AT = BP_NX + BP_BALL_CHANNELS * BP_BEARINGS, /* channels with extremes */
+    BP_CHANNELS = BP_LOOKED_AT + BP_POWERS * BP_BEARINGS
+};
 
 /* Places in a reduction: the head, then BP_CHANNELS entries of each kind. */
 enum {
@@ -40,7 +53,8 @@ enum {
     BP_MIN_BALL = BP_MIN_TIME + BP_CHANNELS,
     BP_INTEGRAL = BP_MIN_BALL + BP_CHANNELS, /* of the channel over time */
     BP_SQUARE = BP_INTEGRAL + BP_CHANNELS,   /* of its square */
-    BP_REDUCTION = BP_SQUARE + BP_CHANNELS
+    BP_RACEWAYS = BP_SQUARE + BP_CHANNELS, /* integrals of the third power over time [kN^3 s]: of each bearing outer, then inner raceway */
+    BP_REDUCTION = BP_RACEWAYS + 2 * BP_SECTORS * BP_BEARINGS
 };
 
 enum {
@@ -56,6 +70,7 @@ enum {
 /* Channels wanted, a bit each; whether those of the balls are among them. */
 static inline unsigned long bp_wanted(const double *reduction) { return (unsigned long)reduction[BP_WANTED]; }
 static inline int bp_balls_wanted(const double *reduction) { return bp_wanted(reduction) >> BP_NX != 0; }
+static inline int bp_powers_wanted(const double *reduction) { return bp_wanted(reduction) >> BP_LOOKED_AT != 0; }
 
 /* How far a channel may reach beyond its values at the quarters of a step, as a part of their range. */
 static const double BP_BEYOND = 0.5;
@@ -97,8 +112,24 @@ static inline const double *bp_ball_row(const double *q, int channel, int *balls
     return q + BP_BALL_CHANNELS * first[bearing] + channel % BP_BALL_CHANNELS * *balls;
 }
 
+/* Means over so many balls of powers of their forces `of` [N]: third, 10/3, and that to the power 9/10; in kN. */
+static inline void bp_powers(const double *restrict of, int balls, double *restrict power)
+{
+    double cubes = 0.0, more = 0.0;
+#pragma omp simd reduction(+ : cubes, more)
+    for (int j = 0; j < balls; j++) {
+        const double load = of[j] > 0.0 ? 1e-3 * of[j] : 0.0, cube = load * load * load;
+        cubes += cube;
+        more += cube * bp_cube_root(load);
+    }
+    power[0] = cubes / balls;
+    power[1] = more / balls;
+    power[2] = bp_nine_tenths(more / balls);
+}
+
 /* All channels at a state and time, and all quantities of the balls; those of the balls are zero where not wanted. */
-static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, int balls, double *restrict value, double *restrict q)
+static inline void bp_channels(const bp_numbers *n, double t, const double *restrict x, int balls, int powers, double *restrict value,
+                               double *restrict q)
 {
     for (int k = 0; k < BP_NX; k++) value[k] = x[k];
     for (int k = BP_NX; k < BP_CHANNELS; k++) value[k] = 0.0;
@@ -111,9 +142,36 @@ static inline void bp_channels(const bp_numbers *n, double t, const double *rest
         _Pragma("omp simd reduction(max : most)")                                                      \
         for (int j = 0; j < BP_##b##_BALLS; j++) most = of[j] > most ? of[j] : most;                   \
         value[BP_NX + BP_BALL_CHANNELS * (b) + k] = most;                                              \
-    }
+    }                                                                                                  \
+    if (powers) bp_powers(q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, BP_##b##_BALLS, value + BP_LOOKED_AT + BP_POWERS * (b));
     BP_EACH_BEARING(BP_MOST)
 #undef BP_MOST
+}
+
+/* Add a step to the places of both raceways of a bearing.
+
+   sectors   of the outer, then of the inner raceway
+   force     of ball j at quarter i of the step: force[i * point + j * ball] [N]
+   from, to  angle of ball 1 as outer and inner ring see it at both ends of the step [rad] */
+static inline void bp_add_sectors(double *restrict sectors, int balls, double h, const double *restrict force, int point, int ball,
+                                  const double *restrict from, const double *restrict to)
+{
+    for (int j = 0; j < balls; j++) {
+        double sum = 0.0, moment = 0.0;
+        for (int i = 0; i < BP_POINTS; i++) {
+            const double at = force[i * point + j * ball], load = at > 0.0 ? 1e-3 * at : 0.0, part = bp_boole[i] * (load * load * load);
+            sum += part;
+            moment += 0.25 * i * part;
+        }
+        if (!(sum > 0.0)) continue;
+        for (int ring = 0; ring < 2; ring++) {
+            const double turns = (from[ring] + (to[ring] - from[ring]) * (moment / sum)) * 0.15915494309189533577 + (double)j / balls;
+            const double place = BP_SECTORS * (turns - floor(turns)), below = floor(place);
+            const int k = (int)below % BP_SECTORS;
+            sectors[BP_SECTORS * ring + k] += h * sum * (1.0 - (place - below));
+            sectors[BP_SECTORS * ring + (k + 1) % BP_SECTORS] += h * sum * (place - below);
+        }
+    }
 }
 
 /* The most loaded ball, counted from 1, of these entries. */
@@ -487,10 +545,24 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
         if (!(wanted >> k & 1)) continue;
         reduction[BP_INTEGRAL + k] += h * sum[k];
         reduction[BP_SQUARE + k] += h * square[k];
+        if (k >= BP_LOOKED_AT) continue;
         if (first || top[k] > reduction[BP_MAX + k])
             bp_extreme(reduction, BP_MAX, k, 1.0, v[0] + k, BP_CHANNELS, step);
         if (first || bottom[k] < reduction[BP_MIN + k])
             bp_extreme(reduction, BP_MIN, k, -1.0, v[0] + k, BP_CHANNELS, step);
+    }
+    if (bp_powers_wanted(reduction)) {
+        double x[BP_NX], from[2 * BP_BEARINGS + 1], to[2 * BP_BEARINGS + 1];
+        const double *of = step->balls[0];
+        for (int end = 0; end < 2; end++) {
+            const double t = step->state(step->source, end, x);
+            bp_passes(t, x, step->n->u, step->n->p, step->n->c, end ? to : from);
+        }
+#define BP_ADD(b)                                                                                                                        \
+    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, h, of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL,        \
+                   BP_BALL_QUANTITIES, 1, from + 2 * (b), to + 2 * (b));
+        BP_EACH_BEARING(BP_ADD)
+#undef BP_ADD
     }
     reduction[BP_DURATION] += h;
 }

@@ -26,11 +26,12 @@ from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size
 from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
 from ballpass.runtime.native.ensemble_driver import LANE_FAMILIES
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.ratings.readings import KINDS as LIFE
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
 from ballpass.runtime.run.printed import printed
 from ballpass.runtime.run.reduced_run import check_span, choose_family
-from ballpass.runtime.run.reductions import channel_names, observable_aliases, observe
+from ballpass.runtime.run.reductions import channel_names, channels_needed, observable_aliases, observe
 from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, check_memory, on_request
 from ballpass.runtime.run.request import tolerance as relative_tolerance
 
@@ -182,7 +183,7 @@ def simulate_many(
     skipped = manifest.run.transient_cycles if transient is None else real(transient)
     span = _span(model, members, cycles, duration, skipped)
     in_lanes = lanes and at_kinks != LOCATED and family in LANE_FAMILIES
-    reduced = {channel for kind, channel in chosen.values() if kind != "end"}
+    reduced = {name for observable in chosen.values() for name in channels_needed(*observable)}
     work = Work(
         model=model,
         driver=driver,
@@ -208,7 +209,7 @@ def simulate_many(
     failed = sorted(work.results)
     found = {}
     for name, (kind, channel) in chosen.items():
-        values = observe(driver.rows, kind, channel, work.rows, work.end)
+        values = observe(manifest, kind, channel, work.rows, work.end, members.columns)
         values[failed] = np.nan
         found[name] = values
     return EnsembleResult(
@@ -341,5 +342,7 @@ def observable_unit(manifest: Manifest, kind: str, channel: str) -> str:
         return "s"
     if kind == "peak_ball":
         return "1"
+    if kind in LIFE:
+        return "turns"
     units = {state.name: state.unit for state in manifest.states}
     return units.get(channel, "m" if channel.endswith("ball.deflection") else "N")

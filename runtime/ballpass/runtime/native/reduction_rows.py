@@ -1,7 +1,9 @@
 """Rows of on-line reductions as the driver writes them (`driver/reductions.h`).
 
 A row is a head and, for every channel, one number of each kind in `ROWS`.  Channels are the states, then four
-quantities of the balls of each bearing, each with its value of the most loaded ball at the moment.
+quantities of the balls of each bearing, each with its value of the most loaded ball at the moment, then the powers of
+each bearing's ball loads that fatigue needs, of which the integrals alone mean something.  Behind all stand the places
+of the raceways.
 """
 
 from __future__ import annotations
@@ -21,6 +23,12 @@ ROWS = ("max", "max_time", "max_ball", "min", "min_time", "min_ball", "integral"
 #: Channels of a bearing behind those of the states, without its prefix: values of the most loaded ball.
 BALL_CHANNELS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
 
+#: Behind these for each bearing: means over its balls of powers of their loads [kN^3, kN^(10/3), kN^3].
+LOAD_POWERS = ("load.cubes", "load.ten_thirds", "load.outer_damage")
+
+#: Places of a raceway.
+SECTORS = 72
+
 
 @dataclass(frozen=True, slots=True)
 class ReductionRows:
@@ -28,21 +36,40 @@ class ReductionRows:
 
     Attributes
     ----------
-    states, balls : names of the channels: states, and quantities of the balls
+    states, balls, powers : names of the channels: states, quantities of the balls, powers of their loads
     """
 
     states: tuple[str, ...]
     balls: tuple[str, ...]
+    powers: tuple[str, ...]
 
     @property
     def channels(self) -> tuple[str, ...]:
         """All channels in the driver's order."""
-        return (*self.states, *self.balls)
+        return (*self.states, *self.balls, *self.powers)
 
     @property
     def size(self) -> int:
         """Numbers of a row."""
+        return self._sectors + 2 * SECTORS * (len(self.powers) // len(LOAD_POWERS))
+
+    @property
+    def _sectors(self) -> int:
         return len(HEAD) + len(ROWS) * len(self.channels)
+
+    def raceways(self, rows: np.ndarray, prefix: str) -> np.ndarray:
+        """Integrals over time of the third power of the ball loads at the places of both raceways of a bearing.
+
+        Places are hat functions at equal distances, in the ring's own coordinates, from where its x axis was at the
+        start.
+
+        Returns
+        -------
+        numpy.ndarray
+            Outer, then inner raceway [kN^3 s], shape (members, 2, SECTORS).
+        """
+        first = self._sectors + 2 * SECTORS * (self.powers.index(prefix + LOAD_POWERS[0]) // len(LOAD_POWERS))
+        return rows[:, first : first + 2 * SECTORS].reshape(len(rows), 2, SECTORS)
 
     def column(self, kind: str, channel: str) -> int:
         """Place of an entry of `ROWS` in a row."""
@@ -62,4 +89,5 @@ def reduction_rows(manifest: Manifest) -> ReductionRows:
     return ReductionRows(
         states=tuple(state.name for state in manifest.states),
         balls=tuple(prefix + name for prefix in prefixes for name in BALL_CHANNELS),
+        powers=tuple(prefix + name for prefix in prefixes for name in LOAD_POWERS),
     )

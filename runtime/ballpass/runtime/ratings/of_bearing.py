@@ -38,7 +38,9 @@ def ratings_of(bearing: BearingInfo, values: Mapping[str, Any]) -> Ratings:
     """
     ball, pitch = values[f"{bearing.path}.ball_diameter"], values[f"{bearing.path}.pitch_diameter"]
     radii = [values.get(f"{bearing.path}.contact.{ring}_groove_radius") for ring in ("inner", "outer")]
-    inner, outer = load_ratings.REFERENCE_GROOVES if None in radii else (radius / ball for radius in radii)
+    inner, outer = (
+        load_ratings.REFERENCE_GROOVES if any(r is None for r in radii) else (radius / ball for radius in radii)
+    )
     taken = bearing.catalogue
     dynamic = None if taken is None else taken.dynamic_rating
     static = None if taken is None else taken.static_rating

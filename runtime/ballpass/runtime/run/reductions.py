@@ -16,7 +16,18 @@ import numpy as np
 
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.parameters import unknown_name
-from ballpass.runtime.native.reduction_rows import BALL_CHANNELS, HEAD, ROWS, ReductionRows, reduction_rows
+from ballpass.runtime.native.reduction_rows import (
+    BALL_CHANNELS,
+    HEAD,
+    LOAD_POWERS,
+    ROWS,
+    SECTORS,
+    ReductionRows,
+    reduction_rows,
+)
+from ballpass.runtime.ratings.of_bearing import ratings_of
+from ballpass.runtime.ratings.readings import KINDS as LIFE
+from ballpass.runtime.ratings.readings import LoadPowers, lives
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,7 +198,8 @@ def _joined(first: Reduction, second: Reduction, share: float, rest: float) -> R
 
 
 def observable_aliases(channels: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Every name of an observable: ``max:ball.force``, and ``peak_ball_force`` for people; -> (kind, channel)."""
+    """Every name of an observable: ``max:ball.force``, and ``peak_ball_force`` or ``life`` for people; -> (kind,
+    channel)."""
     found: dict[str, tuple[str, str]] = {}
     for channel in channels:
         plain = channel.replace(".", "_")
@@ -197,9 +209,11 @@ def observable_aliases(channels: Sequence[str]) -> dict[str, tuple[str, str]]:
             found[f"{kind}:{channel}"] = (kind, channel)
             found[f"{kind}_{plain}"] = (kind, channel)
         found[f"peak:{channel}"] = found[f"peak_{plain}"] = ("max", channel)
-        if channel.endswith(".ball.force"):
+        if channel.endswith("ball.force"):
+            prefix = channel.removesuffix("ball.force")
             # as the summary names it, with the bearing first
-            found[f"{channel.removesuffix('ball.force')}peak_ball_force"] = ("max", channel)
+            found[f"{prefix}peak_ball_force"] = ("max", channel)
+            found |= {name: (kind, channel) for kind in LIFE for name in (f"{kind}:{channel}", f"{prefix}{kind}")}
     return found
 
 
@@ -207,28 +221,49 @@ def observable_aliases(channels: Sequence[str]) -> dict[str, tuple[str, str]]:
 KINDS = ("max", "min", "mean", "rms", "range", "peak_time", "peak_ball", "min_time", "end")
 
 
-def observe(layout: ReductionRows, kind: str, channel: str, rows: np.ndarray, end: np.ndarray) -> np.ndarray:
+def channels_needed(kind: str, channel: str) -> tuple[str, ...]:
+    """Channels that are reduced for an observable."""
+    if kind in LIFE:
+        return tuple(channel.removesuffix("ball.force") + name for name in LOAD_POWERS)
+    return () if kind == "end" else (channel,)
+
+
+def observe(
+    manifest: Manifest, kind: str, channel: str, rows: np.ndarray, end: np.ndarray, values: Mapping[str, Any]
+) -> np.ndarray:
     """Values of an observable from reductions.
 
     Parameters
     ----------
     rows : reductions, shape (members, .)
     end : states at the end, shape (members, states)
+    values : parameters by name, numbers or of shape (members,)
     """
+    layout = reduction_rows(manifest)
     if kind == "end":
         return end[:, layout.states.index(channel)].copy()
 
-    def of(row: str) -> np.ndarray:
-        values: np.ndarray = rows[:, layout.column(row, channel)]
+    def of(row: str, name: str = channel) -> np.ndarray:
+        values: np.ndarray = rows[:, layout.column(row, name)]
         return values
 
     duration = rows[:, HEAD.index("duration")]
     found: np.ndarray
+    with np.errstate(invalid="ignore", divide="ignore"):  # a member that never started has no duration
+        if kind in LIFE:
+            prefix = channel.removesuffix("ball.force")
+            bearing = next(item for item in manifest.bearings if item.prefix == prefix)
+            length = duration[:, None, None] * bearing.balls / SECTORS
+            cubes, more, damage = (of("integral", prefix + name) / duration for name in LOAD_POWERS)
+            powers = LoadPowers(
+                cubes=cubes, ten_thirds=more, outer_damage=damage, raceways=layout.raceways(rows, prefix) / length
+            )
+            by_reading = lives(ratings_of(bearing, values), powers)
+            return np.asarray(np.min([by_reading[reading] for reading in LIFE[kind]], axis=0))
+        if kind in ("mean", "rms"):
+            return np.asarray(of("integral") / duration if kind == "mean" else np.sqrt(of("square") / duration))
     if kind == "range":
         found = of("max") - of("min")
-    elif kind in ("mean", "rms"):
-        with np.errstate(invalid="ignore", divide="ignore"):  # a member that never started has no duration
-            found = of("integral") / duration if kind == "mean" else np.sqrt(of("square") / duration)
     else:
         found = of({"peak_time": "max_time", "peak_ball": "max_ball"}.get(kind, kind)).copy()
     return found

@@ -1,0 +1,72 @@
+"""Readings of a history of ball loads as rating life: mean over time, Miner's rule, sectors of the raceways.
+
+In: mean powers of the loads over time.  Out: equivalent loads of both rings [N], lives [turns].
+
+A history has more than one reading.  `mean` takes ISO 16281's means over the balls, one ring turning against the load
+and the other standing, over time as well.  `miner` takes the damage of the standing ring at every instant and adds it
+up.  `sectors` asks no ring to stand or to turn: it adds up what every place of each raceway has met, in the ring's own
+coordinates, and reduces to either mean where the load stands or turns.  Where a load turns with the shaft, as a
+punch's, one place of the inner raceway meets it in every turn, and `mean` is on the unsafe side.
+
+Means are over time, which is over turns where the speed is constant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ballpass.runtime.ratings.life import reference_life, sector_ball_load
+from ballpass.runtime.ratings.of_bearing import Ratings
+
+KILO = 1e3
+
+#: Readings, and what each is.
+READINGS = {
+    "mean": "ISO 16281, inner ring turning against the load, outer ring standing, means over time",
+    "miner": "the same, the damage of the outer ring added up instant by instant",
+    "sectors": "damage of every place of both raceways, the ring as it turns",
+}
+
+#: Quantities: the readings that each takes the shortest life of.
+KINDS = {"life": tuple(READINGS), **{f"life_{reading}": (reading,) for reading in READINGS}}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadPowers:
+    """Means over time, loads in kN; each of shape (members,) or a number, `raceways` with two axes more.
+
+    Attributes
+    ----------
+    cubes : of the third power of the balls' loads, over the balls as well [kN^3]
+    ten_thirds : of the power 10/3 [kN^(10/3)]
+    outer_damage : of the mean over the balls of the power 10/3, to the power 9/10 [kN^3]
+    raceways : of the third power at each place of the outer, then of the inner raceway, over the balls that pass,
+        shape (..., 2, places) [kN^3]
+    """
+
+    cubes: Any
+    ten_thirds: Any
+    outer_damage: Any
+    raceways: Any
+
+
+def equivalent_loads(powers: LoadPowers) -> Mapping[str, tuple[Any, Any]]:
+    """Q_ei and Q_ee of every reading [N]."""
+    cubic = KILO * powers.cubes ** (1.0 / 3.0)
+    outer, inner = (KILO * sector_ball_load(np.moveaxis(powers.raceways[..., k, :], -1, 0)) for k in (0, 1))
+    return {
+        "mean": (cubic, KILO * powers.ten_thirds**0.3),
+        "miner": (cubic, KILO * powers.outer_damage ** (1.0 / 3.0)),
+        "sectors": (inner, outer),
+    }
+
+
+def lives(ratings: Ratings, powers: LoadPowers) -> dict[str, Any]:
+    """Life by every reading [turns], infinite where nothing is carried."""
+    balls = ratings.inner_ball, ratings.outer_ball
+    with np.errstate(divide="ignore"):
+        return {name: reference_life(balls, loads) for name, loads in equivalent_loads(powers).items()}

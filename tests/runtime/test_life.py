@@ -1,0 +1,107 @@
+"""Rating life of a run: readings against samples of the ball forces, lanes against single runs, derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ballpass.runtime import Model
+from ballpass.runtime.certify.certificate import Verdict
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.ratings.life import reference_life
+from ballpass.runtime.ratings.of_bearing import ratings_of
+
+READINGS = ("life_mean", "life_miner", "life_sectors")
+
+
+def by_samples(model: Model, cycles: int, prefix: str = "") -> dict[str, float]:
+    """Readings from fine samples of the ball forces, sectors counted as bins."""
+    bearing = next(b for b in model.manifest.bearings if b.prefix == prefix)
+    run = model.simulate(cycles=cycles, transient=1, samples_per_cycle=20000, rtol=1e-8)
+    steady = np.asarray(run.t) > model.period()
+    loads = np.maximum(np.asarray(run[f"{prefix}ball.force"]), 0.0)[steady]
+    cubes, more = loads**3, loads ** (10 / 3)
+    numbers = model.numbers({}).values
+    mean = float(cubes.mean()) ** (1 / 3)
+    by_ring = {
+        "life_mean": (mean, float(more.mean()) ** 0.3),
+        "life_miner": (mean, float((more.mean(axis=1) ** 0.9).mean()) ** (1 / 3)),
+    }
+    rated = ratings_of(bearing, numbers)
+    balls = (rated.inner_ball, rated.outer_ball)
+    found = {name: reference_life(balls, pair) for name, pair in by_ring.items()}
+    # a shaft at constant speed in a ring at rest
+    speed, cage = numbers[bearing.ring_speed], numbers[f"{bearing.path}.cage_speed"]
+    first = numbers[f"{bearing.path}.ball_angle"] + 2 * np.pi * np.arange(bearing.balls) / bearing.balls
+    rings = []
+    for rate in (cage - speed, cage):
+        place = (first + rate * np.asarray(run.t)[steady, None]) / (2 * np.pi) % 1.0
+        field = np.histogram(place, bins=90, range=(0, 1), weights=cubes)[0] * 90 / cubes.size
+        rings.append(float(np.mean(field ** (10 / 9))) ** 0.3)
+    found["life_sectors"] = reference_life(balls, tuple(rings))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("scene", "cycles"), [("punching_press", 12), pytest.param("varying_compliance", 12, marks=pytest.mark.long)]
+)
+def test_readings_are_those_of_fine_samples(make_model: Callable[..., Model], scene: str, cycles: int) -> None:
+    model = make_model(scene)
+    table = {"bearing.clearance": [model.parameters["bearing.clearance"]]}
+    found = model.simulate_many(table, READINGS, cycles=cycles, transient=1, rtol=1e-8, growth=False)
+    for name, expected in by_samples(model, cycles).items():
+        # bins and hat functions smear a field alike only in the limit
+        allowed = 5e-3 if name == "life_sectors" else 2e-5
+        assert float(found[name][0]) == pytest.approx(expected, rel=allowed), name
+
+
+def test_lanes_single_runs_and_quadrature_give_one_life(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press")
+    clearances = [8e-6, 10e-6, 12e-6]
+    run = {"cycles": 4, "transient": 2, "rtol": 1e-8, "growth": False}
+    lanes, single = (
+        model.simulate_many({"bearing.clearance": clearances}, READINGS, lanes=lanes, **run) for lanes in (True, False)
+    )
+    for name in READINGS:
+        np.testing.assert_allclose(lanes[name], single[name], rtol=2e-5)
+    report = model.sensitivity(of=[*READINGS, "life"], wrt=["mechanism.forces.punch.force.y"], cycles=4, transient=2)
+    values = {quantity.name: quantity.value for quantity in report.quantities}
+    for name in READINGS:
+        assert values[name] == pytest.approx(float(single[name][1]), rel=1e-4)
+    assert values["life"] == min(values[name] for name in READINGS)
+
+
+@pytest.mark.long
+def test_the_bearing_of_several_is_named(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press_hinges")
+    names = [f"{bearing.prefix}life_sectors" for bearing in model.manifest.bearings]
+    found = model.simulate_many({"mechanism.gravity": [9.81]}, names, cycles=2, transient=1, growth=False)
+    assert all(1e4 < float(found[name][0]) < 1e12 for name in names)
+    with pytest.raises(RequestError, match=r"life_sectors is of a bearing. Write main.life_sectors or"):
+        model.sensitivity(of=["life_sectors:inner.x"], wrt=["mechanism.gravity"])
+
+
+@pytest.mark.long
+def test_derivatives_of_life_are_verified_and_those_of_differences(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press_tangent")
+    names = [
+        *("bearing.clearance", "bearing.contact.inner_groove_radius"),
+        *("mechanism.forces.punch.force.y", "mechanism.driver.speed"),
+    ]
+    report = model.sensitivity(of=["life", *READINGS], wrt=names, cycles=6, transient=2)
+    assert report.verdicts[Verdict.VERIFIED] == len(report.pairs)
+    for name in names:
+        at = model.parameters[name]
+        steps = at * np.array([-6e-4, -3e-4, 3e-4, 6e-4])
+        run = {"cycles": 6, "transient": 2, "rtol": 1e-10, "kinks": "located", "growth": False}
+        found = model.simulate_many({name: at + steps}, READINGS, **run)
+        for reading in READINGS:
+            far, near = (float(found[reading][k] - found[reading][3 - k]) / (steps[k] - steps[3 - k]) for k in (0, 1))
+            slope = (4 * near - far) / 3
+            value = float(np.mean(found[reading]))
+            assert report[reading, name].derivative == pytest.approx(slope, rel=2e-3, abs=2e-4 * value / at), (
+                reading,
+                name,
+            )
