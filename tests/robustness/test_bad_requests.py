@@ -104,7 +104,7 @@ WRONG_REQUESTS = [
     ("samples_per_cycle", 10**30, r"^1e[+]29 samples of .* numbers would not fit into memory"),
     ("transient", "x", "transient: a number of cycles from 0 on is expected, not 'x'"),
     ("transient", math.nan, "transient: a number of cycles from 0 on is expected, not nan"),
-    ("initial", "abc", "initial: 8 finite numbers are expected"),
+    ("initial", "abc", r"initial: 'abc' was given\. Allowed: a state, \"equilibrium\", or the end of a run"),
     ("initial", [0.0] * 3, r"initial: 8 finite numbers are expected .*not an array of shape \(3,\)"),
     ("initial", [math.nan] * 8, "initial: 8 finite numbers are expected .*NaN or inf"),
     ("initial", [[0.0] * 8], r"initial: 8 finite numbers are expected .*shape \(1, 8\)"),
