@@ -62,7 +62,7 @@ def test_every_shipped_scene_can_be_read(name: str) -> None:
 @pytest.mark.parametrize("name", FILES)
 def test_every_number_of_a_record_is_listed_once_and_is_the_same_object(name: str) -> None:
     scene = read_scene(SCENES / f"{name}.toml")
-    found = quantities_in((scene.mechanism, scene.shaft, scene.load, scene.bearing))
+    found = quantities_in((scene.mechanism, scene.shaft, scene.loads, scene.bearing))
     assert [id(quantity) for quantity in found] == [id(quantity) for quantity in scene.quantities]
     assert len({quantity.path for quantity in found}) == len(found)
     assert len({quantity.latex for quantity in found}) == len(found), "two quantities share a symbol"
@@ -177,19 +177,20 @@ frequency = "50 Hz"
 phase = "0 deg"
 """
     scene = scene_from_text(edited(ROTOR, constant, harmonic), "rotor")
-    assert isinstance(scene.load, HarmonicLoad)
-    assert scene.load.frequency.value == 50.0
+    assert isinstance(scene.loads[0].law, HarmonicLoad)
+    assert scene.loads[0].law.frequency.value == 50.0
     table = """type = "table"
 time = { values = [0, 1.5, 4], unit = "ms" }
 x = ["0 N", "1 kN", "0 N"]
 y = { values = [0, 0.5, 0], unit = "kN" }
 """
     scene = scene_from_text(edited(ROTOR, constant, table), "rotor")
-    assert isinstance(scene.load, TableLoad)
-    assert [quantity.value for quantity in scene.load.time] == [0.0, 0.0015, 0.004]
-    assert [quantity.value for quantity in scene.load.x] == [0.0, 1000.0, 0.0]
-    assert [quantity.value for quantity in scene.load.y] == [0.0, 500.0, 0.0]
-    assert scene.load.time[1].path == "load.time.2"
+    held = scene.loads[0].law
+    assert isinstance(held, TableLoad)
+    assert [quantity.value for quantity in held.rows] == [0.0, 0.0015, 0.004]
+    assert [quantity.value for quantity in held.x] == [0.0, 1000.0, 0.0]
+    assert [quantity.value for quantity in held.y] == [0.0, 500.0, 0.0]
+    assert held.rows[1].path == "load.time.2"
 
 
 def test_clearance_may_be_zero_or_preload() -> None:

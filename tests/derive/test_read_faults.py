@@ -274,7 +274,7 @@ REFUSED = [
         "run.outputs",
         "add outputs",
     ),
-    ("load beside a mechanism", "[run]", '[load]\ntype = "constant"\n[run]', "load", "delete [load]"),
+    ("shaft beside a mechanism", "[run]", '[shaft]\nspeed = "1 rpm"\n[run]', "shaft", "delete [shaft]"),
     ("shaft beside a mechanism", "[run]", '[shaft]\nspeed = "1 rpm"\n[run]', "shaft", "delete [shaft]"),
     ("title of two lines", 'title = "P', 'title = "a\\nP', "title", "shorten"),
     ("gravity in g", 'gravity = "9.81 m/s^2"', 'gravity = "9.81"', "mechanism.gravity", "9.81 m/s^2"),

@@ -20,11 +20,11 @@ from ballpass.derive.scene.records import (
     EquivalentMass,
     InitialState,
     InnerRing,
+    Load,
     Mechanism,
     Quantity,
     Scene,
     Shaft,
-    Vector,
 )
 from ballpass.derive.system import derive
 
@@ -107,12 +107,13 @@ def _features(scene: Scene) -> Iterator[Feature]:
     mechanism = scene.mechanism
     if mechanism is not None:
         yield from _of_mechanism(scene, mechanism)
-    if scene.load is not None:
+    for load in scene.loads:
+        rest = tuple(other for other in scene.loads if other is not load)
         yield Feature(
-            name="load",
-            path="load",
-            modelled=f"{type(scene.load).__name__.removesuffix('Load').lower()} force on the inner ring",
-            without=replace(scene, load=_no_load()) if not _is_free(scene) else None,
+            name=f"load {load.name}".rstrip(),
+            path=load.path,
+            modelled=f"{type(load.law).__name__.removesuffix('Load').lower()} force on the inner ring",
+            without=replace(scene, loads=rest) if not _is_free(load) else None,
         )
     for bearing in scene.bearings:
         yield from _of_bearing(scene, bearing)
@@ -229,12 +230,8 @@ def _without_smoothing(scene: Scene, bearing: Bearing, path: str) -> Scene:
     return replace(_with(scene, bearing), quantities=tuple(q for q in scene.quantities if q.path != path))
 
 
-def _no_load() -> ConstantLoad:
-    return ConstantLoad(force=Vector(kind="zero"))
-
-
-def _is_free(scene: Scene) -> bool:
-    return isinstance(scene.load, ConstantLoad) and scene.load.force.kind == "zero"
+def _is_free(load: Load) -> bool:
+    return isinstance(load.law, ConstantLoad) and load.law.force.kind == "zero"
 
 
 def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
@@ -257,7 +254,6 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
         scene,
         mechanism=None,
         shaft=Shaft(speed=mechanism.driver.speed),
-        load=_no_load(),
         bearings=tuple(bearings),
         quantities=tuple(quantities),
         outputs=_patterns(scene, "reaction", "drive", "body", *(f"{f.word}." for f in mechanism.forces)),

@@ -23,7 +23,7 @@ from ballpass.derive.bearing.equations import (
     ring_motion,
 )
 from ballpass.derive.bearing.equivalent_mass import inner_mass
-from ballpass.derive.bearing.ring_load import RingLoad, own_load, reaction_share
+from ballpass.derive.bearing.ring_load import own_loads, reaction_share
 from ballpass.derive.bearing.two_way import couple, play_of
 from ballpass.derive.drive import Drive, drive_of
 from ballpass.derive.events import Event, events_of
@@ -143,7 +143,7 @@ def _noted(errors: list[SceneError]) -> Iterator[None]:
 
 def _on_shaft(scene: Scene, errors: list[SceneError]) -> System:
     """Bearings on a shaft, under the scene's own load."""
-    own = own_load(scene) if scene.bearings else RingLoad(force=(sp.S.Zero, sp.S.Zero))
+    own = own_loads(scene)
     speed = sp.S.Zero if scene.shaft is None else symbol_of(scene.shaft.speed)
     rings = [
         _rings(bearing, cage_on_shaft(bearing, speed), own.force, inner_mass(bearing, None))
@@ -184,10 +184,11 @@ def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sy
             masses.append(inner_mass(bearing, mechanism))
     if linked is None or reactions is None or len(masses) < len(scene.bearings):
         return None
-    rings = [
-        _rings(bearing, _cage(bearing, mechanism, linkage), reaction_share(scene, bearing, reactions).force, mass)
-        for bearing, mass in zip(scene.bearings, masses, strict=True)
-    ]
+    own, rings = own_loads(scene), []
+    for bearing, mass in zip(scene.bearings, masses, strict=True):
+        share = reaction_share(scene, bearing, reactions).force
+        load = (share[0] + own.force[0], share[1] + own.force[1])
+        rings.append(_rings(bearing, _cage(bearing, mechanism, linkage), load, mass))
     inertias, weights = inertia_of(mechanism, linkage)
     return _of_rings(
         scene,
@@ -195,8 +196,11 @@ def _one_way(scene: Scene, mechanism: Mechanism, errors: list[SceneError]) -> Sy
         errors,
         drive=drive,
         forces=forces,
-        inputs=(*drive.inputs, *forces.inputs),
-        definitions=(*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions),
+        inputs=(*drive.inputs, *forces.inputs, *own.inputs),
+        definitions=(
+            *(*drive.definitions, *linkage.definitions, *forces.definitions, *reactions.definitions, *own.definitions),
+        ),
+        constants=own.constants,
         quantities=(*mechanism_outputs(mechanism, linkage, reactions), *forces.outputs),
         requested=_requested(mechanism, linkage, reactions, forces, (*inertias, *work_of_drive(linkage)[1]), weights),
         linkage=linkage,

@@ -1,4 +1,4 @@
-"""Force on an inner ring: share of a joint's reaction, or the scene's own load.
+"""Force on an inner ring: share of a joint's reaction, and the scene's own loads.
 
 In: a scene, one of its bearings and the reactions of its mechanism.  Out: a `RingLoad`, the force and the inputs,
 constants and definitions it is made of.
@@ -6,14 +6,31 @@ constants and definitions it is made of.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from ballpass.derive.drive.constant_speed import ConstantSpeed
 from ballpass.derive.mechanism.reactions import Reactions
-from ballpass.derive.scene.records import FRAME, Bearing, ConstantLoad, HarmonicLoad, Quantity, Scene, TableLoad
+from ballpass.derive.scene.records import (
+    FRAME,
+    Bearing,
+    ConstantLoad,
+    HarmonicLoad,
+    Load,
+    LoadWindow,
+    Quantity,
+    Scene,
+    Shaft,
+    TableLoad,
+    UnbalanceLoad,
+)
 from ballpass.derive.terms import TIME, Definition, components, symbol_of
 from ballpass.derive.variables import Input, phase
+
+#: How long a load without an end acts, longer than any run [s].
+FOR_EVER = 10**9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,52 +54,198 @@ def reaction_share(scene: Scene, bearing: Bearing, reactions: Reactions) -> Ring
     return RingLoad(force=(sign * share * fx, sign * share * fy))
 
 
-def own_load(scene: Scene) -> RingLoad:
-    """The load of a scene without mechanism; every bearing of the scene carries it."""
-    load = scene.load
-    assert load is not None  # the reader requires a load where there is no mechanism
-    if isinstance(load, ConstantLoad):
-        return RingLoad(force=components(load.force))
-    if isinstance(load, HarmonicLoad):
-        return _harmonic(load)
-    return _table(load)
+def own_loads(scene: Scene) -> RingLoad:
+    """Sum of the loads that a scene gives itself; every bearing of the scene carries it."""
+    shaft = _shaft(scene.shaft) if scene.shaft is not None and any(load.turns for load in scene.loads) else None
+    parts = [] if shaft is None else [_turning(shaft)]
+    for load in scene.loads:
+        assert shaft is not None or not load.turns  # the reader refuses these beside a mechanism
+        parts.append(_windowed(load, _unwindowed(load, shaft), shaft))
+    return _sum(parts)
 
 
-def _harmonic(load: HarmonicLoad) -> RingLoad:
+def _sum(parts: Iterable[RingLoad]) -> RingLoad:
+    total = RingLoad(force=(sp.S.Zero, sp.S.Zero))
+    for part in parts:
+        total = RingLoad(
+            force=(total.force[0] + part.force[0], total.force[1] + part.force[1]),
+            inputs=(*total.inputs, *part.inputs),
+            constants=(*total.constants, *part.constants),
+            definitions=(*total.definitions, *part.definitions),
+        )
+    return total
+
+
+def _shaft(shaft: Shaft) -> ConstantSpeed:
+    """The shaft's angle, zero at t = 0."""
+    start = phase(
+        "shaft",
+        "Angle of the shaft at the reference time",
+        r"\theta_0",
+        offset="shaft.start_angle",
+        rate=shaft.speed.path,
+    )
+    return ConstantSpeed(
+        angle=sp.Symbol("shaft.angle", real=True),
+        speed=symbol_of(shaft.speed),
+        acceleration=sp.S.Zero,
+        description="the shaft's speed is constant",
+        inputs=(start,),
+        phase=start,
+    )
+
+
+def _turning(shaft: ConstantSpeed) -> RingLoad:
+    """What the loads that follow the shaft's angle share: no force."""
+    zero = Definition(
+        symbol=sp.Symbol(shaft.phase.offset, real=True),
+        expression=sp.S.Zero,
+        unit="rad",
+        description="Angle of the shaft at t = 0",
+        latex=r"\theta_s",
+    )
+    angle = Definition(
+        symbol=shaft.angle,
+        expression=shaft.phase.symbol + shaft.speed * TIME,
+        unit="rad",
+        description="Angle of the shaft",
+        latex=r"\theta",
+    )
+    return RingLoad(force=(sp.S.Zero, sp.S.Zero), inputs=shaft.inputs, constants=(zero,), definitions=(angle,))
+
+
+def _unwindowed(load: Load, shaft: ConstantSpeed | None) -> RingLoad:
+    law = load.law
+    if isinstance(law, ConstantLoad):
+        return RingLoad(force=components(law.force))
+    if isinstance(law, HarmonicLoad):
+        return _harmonic(load, law)
+    if isinstance(law, UnbalanceLoad):
+        assert shaft is not None
+        return _unbalance(load, law, shaft)
+    return _over_time(load, law) if law.over == "time" else _over_angle(load, law, shaft)
+
+
+def _windowed(load: Load, full: RingLoad, shaft: ConstantSpeed | None) -> RingLoad:
+    """The load times 1 within its windows and 0 outside."""
+    if load.angle_window is not None and load.angle_window.end is not None:
+        assert shaft is not None
+        gate = shaft.gate(load.label, [(load.angle_window.start.path, load.angle_window.end.path)])
+        full = _times(gate.value, full, gate.inputs)
+    if load.time_window is not None:
+        full = _within_times(load, load.time_window, full)
+    return full
+
+
+def _times(
+    gate: sp.Expr, full: RingLoad, inputs: tuple[Input, ...], constants: tuple[Definition, ...] = ()
+) -> RingLoad:
+    force = (gate * full.force[0], gate * full.force[1])
+    return replace(full, force=force, inputs=(*full.inputs, *inputs), constants=(*full.constants, *constants))
+
+
+def _within_times(load: Load, window: LoadWindow, full: RingLoad) -> RingLoad:
+    """The gate is the slope of the table with the rows (start, start) and (end, end): one between, zero outside."""
+    constants: tuple[Definition, ...] = ()
+    if window.end is None:
+        end = Definition(
+            symbol=sp.Symbol(f"{load.path}.time_window.end", real=True),
+            expression=symbol_of(window.start) + FOR_EVER,
+            unit="s",
+            description="Time at which the load ends: never",
+            latex="t_{off}",
+        )
+        constants, edges = (end,), (window.start.path, end.symbol.name)
+    else:
+        edges = (window.start.path, window.end.path)
+    name = f"{load.label}.time_window"
+    gate = Input(
+        name=name,
+        symbol=sp.Symbol(f"input.{name}", real=True),
+        kind="table_rate",
+        unit="1",
+        description="1 while the load acts, else 0",
+        latex=r"g_t",
+        times=edges,
+        values=edges,
+    )
+    return _times(gate.symbol, full, (gate,), constants)
+
+
+def _unbalance(load: Load, law: UnbalanceLoad, shaft: ConstantSpeed) -> RingLoad:
+    """Centrifugal force m_u e_u omega^2 of a mass that turns with the shaft."""
+    amount = Definition(
+        symbol=sp.Symbol(f"{load.path}.centrifugal_force", real=True),
+        expression=symbol_of(law.mass) * symbol_of(law.eccentricity) * shaft.speed**2,
+        unit="N",
+        description="Centrifugal force of the unbalance",
+        latex="F_u",
+    )
+    towards = shaft.angle + symbol_of(law.angle)
+    return RingLoad(force=(amount.symbol * sp.cos(towards), amount.symbol * sp.sin(towards)), constants=(amount,))
+
+
+def _harmonic(load: Load, law: HarmonicLoad) -> RingLoad:
     words = "Angle of the harmonic load at the reference time"
-    turning = phase("load", words, r"\varphi_0", offset=load.phase.path, rate="load.angular_frequency")
     angular = Definition(
-        symbol=sp.Symbol("load.angular_frequency", real=True),
-        expression=2 * sp.pi * symbol_of(load.frequency),
+        symbol=sp.Symbol(f"{load.path}.angular_frequency", real=True),
+        expression=2 * sp.pi * symbol_of(law.frequency),
         unit="rad/s",
         description="Angular frequency of the load",
         latex=r"\Omega",
     )
-    wave = Definition(
-        symbol=sp.Symbol("load.wave", real=True),
-        expression=sp.cos(turning.symbol + angular.symbol * TIME),
-        unit="1",
-        description="Harmonic of the load",
-        latex="w",
-    )
-    mean, amplitude = components(load.mean), components(load.amplitude)
+
+    def wave(ending: str, at_start: Quantity, words: str) -> tuple[Input, Definition]:
+        axis = ending.removeprefix(".")
+        turning = phase(
+            f"{load.label}{ending}",
+            words,
+            rf"\varphi_{{0,{axis}}}" if axis else r"\varphi_0",
+            offset=at_start.path,
+            rate=angular.symbol.name,
+        )
+        harmonic = Definition(
+            symbol=sp.Symbol(f"{load.label}.wave{ending}", real=True),
+            expression=sp.cos(turning.symbol + angular.symbol * TIME),
+            unit="1",
+            description=f"Harmonic of the load{f' along {axis}' if axis else ''}",
+            latex=f"w_{axis}" if axis else "w",
+        )
+        return turning, harmonic
+
+    if isinstance(law.phase, tuple):
+        both = [wave(f".{a}", at, f"{words} along {a}") for a, at in zip("xy", law.phase, strict=True)]
+    else:
+        both = [wave("", law.phase, words)]
+    mean, amplitude = components(law.mean), components(law.amplitude)
+    waves = (both[0][1].symbol, both[-1][1].symbol)
     return RingLoad(
-        force=(mean[0] + amplitude[0] * wave.symbol, mean[1] + amplitude[1] * wave.symbol),
-        inputs=(turning,),
+        force=(mean[0] + amplitude[0] * waves[0], mean[1] + amplitude[1] * waves[1]),
+        inputs=tuple(turning for turning, _ in both),
         constants=(angular,),
-        definitions=(wave,),
+        definitions=tuple(harmonic for _, harmonic in both),
     )
 
 
-def _table(load: TableLoad) -> RingLoad:
+def _over_angle(load: Load, law: TableLoad, shaft: ConstantSpeed | None) -> RingLoad:
+    assert shaft is not None
+    angles = [q.path for q in law.rows]
+    x, y = (
+        shaft.table(f"{load.label}.{axis}", "N", angles, [q.path for q in values])
+        for axis, values in (("x", law.x), ("y", law.y))
+    )
+    return RingLoad(force=(x.value, y.value), inputs=(*x.inputs, *y.inputs))
+
+
+def _over_time(load: Load, law: TableLoad) -> RingLoad:
     inputs: list[Input] = []
-    times = tuple(q.path for q in load.time)
+    times = tuple(q.path for q in law.rows)
 
     def column(axis: str, values: tuple[Quantity, ...]) -> sp.Expr:
         names = tuple(q.path for q in values)
         value = Input(
-            name=f"load.{axis}",
-            symbol=sp.Symbol(f"input.load.{axis}", real=True),
+            name=f"{load.label}.{axis}",
+            symbol=sp.Symbol(f"input.{load.label}.{axis}", real=True),
             kind="table",
             unit="N",
             description=f"Value of the load table along {axis} at the reference time",
@@ -91,8 +254,8 @@ def _table(load: TableLoad) -> RingLoad:
             values=names,
         )
         slope = Input(
-            name=f"load.{axis}_rate",
-            symbol=sp.Symbol(f"input.load.{axis}_rate", real=True),
+            name=f"{load.label}.{axis}_rate",
+            symbol=sp.Symbol(f"input.{load.label}.{axis}_rate", real=True),
             kind="table_rate",
             unit="N/s",
             description=f"Slope of the load table along {axis} at the reference time",
@@ -103,5 +266,5 @@ def _table(load: TableLoad) -> RingLoad:
         inputs.extend((value, slope))
         return value.symbol + slope.symbol * TIME
 
-    force = (column("x", load.x), column("y", load.y))
+    force = (column("x", law.x), column("y", law.y))
     return RingLoad(force=force, inputs=tuple(inputs))

@@ -13,7 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballpass.derive.scene.csv_columns import named_files
+from ballpass.derive.scene.file_columns import named_files
 from ballpass.runtime import contract as mf
 from ballpass.runtime.contract.errors import ArtefactError
 
@@ -28,7 +28,7 @@ def signature(scene: Scene) -> str:
 
 
 def source_key(path: Path) -> str:
-    """Digest of a scene file and the CSV files it names, whatever ends of lines; of deriving sources and versions.
+    """Digest of a scene file and the files it names, whatever ends of lines; of deriving sources and versions.
 
     Raises
     ------

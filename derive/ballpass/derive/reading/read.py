@@ -16,13 +16,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ballpass.derive.reading.read_bearing import read_bearing, read_load, read_shaft
+from ballpass.derive.reading.read_bearing import read_bearing, read_shaft
+from ballpass.derive.reading.read_load import read_load
 from ballpass.derive.reading.read_mechanism import read_mechanism
 from ballpass.derive.reading.recouple import Coupling, recoupled
 from ballpass.derive.reading.values import parse_override, quantities_of, replaced, value_faults, with_values
-from ballpass.derive.scene.csv_columns import with_columns
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.records import Bearing, Mechanism, Run, Scene
+from ballpass.derive.scene.file_columns import with_columns
+from ballpass.derive.scene.records import Bearing, Load, Mechanism, Run, Scene
 from ballpass.derive.scene.schema import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
@@ -48,7 +49,7 @@ RESERVED = (
     *("body", "driver", "force", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "point"),
     *("reaction", "spring", "stop", "torque", "torsion_spring", "torsion_stop", "weight"),
 )
-_TABLES = ("mechanism", "shaft", "load", "bearing", "bearings", "run")
+_TABLES = ("mechanism", "shaft", "load", "loads", "bearing", "bearings", "run")
 
 
 def read_scene(path: str | Path, coupling: Coupling | None = None) -> Scene:
@@ -181,21 +182,23 @@ def _read(root: Table, name: str) -> Scene:
                 allowed="[mechanism], [bearing] (or [bearings.<name>]) or both",
                 remedy="add one of the two tables",
             )
-        shaft = load = None
+        shaft = None
         if mechanism is not None or not has_bearing:
             _refuse_loads(root, "mechanism" if mechanism is not None else "")
         else:
             shaft = read_shaft(root.table("shaft", "speed"))
-            load = read_load(root.table("load", "type"))
+        loads = _read_loads(root, required=shaft is not None) if has_bearing else ()
         bearings = _read_bearings(root, mechanism, driven) if has_bearing else ()
+        if mechanism is not None:
+            _check_loads_beside(root, loads, bearings)
         run, outputs = _read_run(root.table("run", "cycles or duration, and outputs"))
-        quantities = tuple(quantities_of((mechanism, shaft, load, bearings)))
+        quantities = tuple(quantities_of((mechanism, shaft, loads, bearings)))
     return Scene(
         name=name,
         title=title,
         mechanism=mechanism,
         shaft=shaft,
-        load=load,
+        loads=loads,
         bearings=bearings,
         outputs=outputs,
         run=run,
@@ -274,14 +277,62 @@ def _read_title(root: Table, name: str) -> str:
     return title
 
 
+def _read_loads(root: Table, *, required: bool) -> tuple[Load, ...]:
+    """``[load]``, or ``[loads.<name>]`` for several."""
+    if root.has("load") and root.has("loads"):
+        root.fault(
+            "loads",
+            "loads are given in two places",
+            given="[load] and [loads]",
+            allowed="[load] for one, or [loads.<name>] for several",
+            remedy="move [load] to [loads.<name>], with a name of its own",
+        )
+        return ()
+    if not root.has("loads"):
+        load = read_load(root.table("load", "type")) if required or root.has("load") else None
+        return () if load is None else (load,)
+    loads = []
+    with root.table("loads") as several:
+        for name in several.names("load"):
+            load = read_load(several.table(name, "type"), name)
+            if load is not None:
+                names = Names(prefix=f"{name}.", path=load.path)
+                # several loads have the same symbols: their name tells them apart
+                marked = {q.path: replace(q, latex=names.latex(q.latex)) for q in quantities_of(load)}
+                loads.append(replaced(load, marked))
+    return tuple(loads)
+
+
+def _check_loads_beside(root: Table, loads: Sequence[Load], bearings: Sequence[Bearing]) -> None:
+    """Beside a mechanism loads follow the time, and bearings are loaded one-way."""
+    for load in loads:
+        allowed = "loads over time on bearings that are coupled one-way"
+        if any(bearing.coupling == "two-way" for bearing in bearings):
+            root.collector.fault(
+                tuple(load.path.split(".")),
+                "a bearing coupled two-way has no ring of its own that a load could act on",
+                given=f"[{load.path}]",
+                allowed=allowed,
+                remedy="write it as a force on a body, [mechanism.forces.<name>]",
+            )
+        elif load.turns:
+            root.collector.fault(
+                tuple(load.path.split(".")),
+                "this load follows the angle of a shaft, and a mechanism has none",
+                given=f"[{load.path}]",
+                allowed=allowed,
+                remedy="write it as a force on a body, [mechanism.forces.<name>], an unbalance as its center_of_mass",
+            )
+
+
 def _refuse_loads(root: Table, because: str) -> None:
-    for key in ("shaft", "load"):
+    for key in ("shaft",) if because and (root.has("bearing") or root.has("bearings")) else ("shaft", "load", "loads"):
         if root.has(key):
             root.fault(
                 key,
-                "the mechanism turns and loads the bearing" if because else "there is no bearing to turn and load",
+                "the mechanism turns the bearing" if because else "there is no bearing to turn and load",
                 given=f"[{key}]",
-                allowed=f"[{key}] only in a scene with [bearing] and without [mechanism]",
+                allowed=f"[{key}] only in a scene with [bearing]" + (" and without [mechanism]" if because else ""),
                 remedy=f"delete [{key}]" + (", or delete [mechanism]" if because else ", or add [bearing]"),
             )
 

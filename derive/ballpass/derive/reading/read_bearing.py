@@ -1,4 +1,4 @@
-"""The tables [shaft], [load] and [bearing] of a scene file to their records.
+"""The tables [shaft] and [bearing] of a scene file to their records.
 
 In: the tables.  Out: records, possibly with placeholders where faults were noted (see `schema.py`).
 """
@@ -14,23 +14,19 @@ from ballpass.derive.scene.records import (
     FRAME,
     BallEffect,
     Bearing,
-    ConstantLoad,
     Damping,
     EquivalentMass,
     GivenContact,
-    HarmonicLoad,
     HertzContact,
     InitialState,
     InnerRing,
-    Load,
     Material,
     Mechanism,
     OuterRing,
     Quantity,
     Shaft,
-    TableLoad,
 )
-from ballpass.derive.scene.schema import Table, listing, suggest, words_of_force
+from ballpass.derive.scene.schema import Table, listing, suggest
 from ballpass.derive.scene.units import show
 
 _HERTZ_KEYS = ("inner_groove_radius", "outer_groove_radius", "young_modulus", "poisson_ratio")
@@ -43,31 +39,6 @@ def read_shaft(table: Table) -> Shaft:
         return Shaft(
             speed=table.quantity("speed", "rad/s", "Speed of the shaft", r"\omega", example="1200 rpm"),
         )
-
-
-def read_load(table: Table) -> Load | None:
-    """Load on the inner ring where no mechanism makes it; None, with a fault, where its type is unknown."""
-    with table:
-        kind = table.choice("type", ("constant", "harmonic", "table"))
-        if kind == "constant":
-            return ConstantLoad(force=table.vector("force", "N", words_of_force("the load on the inner ring", "F")))
-        if kind == "harmonic":
-            return HarmonicLoad(
-                mean=table.vector("mean", "N", words_of_force("the mean load on the inner ring", r"\bar F")),
-                amplitude=table.vector(
-                    "amplitude", "N", words_of_force("the amplitude of the load on the inner ring", r"\hat F")
-                ),
-                frequency=table.quantity("frequency", "Hz", "Frequency of the load", "f", example="50 Hz"),
-                phase=table.quantity("phase", "rad", "Phase of the load at the start", r"\varphi", example="0 deg"),
-            )
-        if kind == "table":
-            return TableLoad(
-                time=table.column("time", "s", "Time of row ROW of the load's table", "t_{ROW}"),
-                x=table.column("x", "N", "x component of the load in row ROW of its table", "F_{x,ROW}"),
-                y=table.column("y", "N", "y component of the load in row ROW of its table", "F_{y,ROW}"),
-            )
-        table.know(*table.data)
-    return None
 
 
 def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, name: str = "") -> Bearing:

@@ -14,6 +14,7 @@ from typing import Any, cast
 
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.laws import LAWS
+from ballpass.derive.reading.check_load import check_load
 from ballpass.derive.reading.clearance_groups import clearance_of_group
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.errors import Fault, SceneError
@@ -22,12 +23,10 @@ from ballpass.derive.scene.records import (
     Bounds,
     Driver,
     EquivalentMass,
-    HarmonicLoad,
     HertzContact,
     Mechanism,
     Quantity,
     Scene,
-    TableLoad,
 )
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 
@@ -65,10 +64,8 @@ def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
     checker = Checker(given)
     if scene.mechanism is not None:
         _check_mechanism(checker, scene.mechanism)
-    if isinstance(scene.load, HarmonicLoad):
-        checker.positive(scene.load.frequency)
-    if isinstance(scene.load, TableLoad):
-        _check_table(checker, scene.load)
+    for load in scene.loads:
+        check_load(checker, load)
     for bearing in scene.bearings:
         _check_bearing(checker, bearing)
     _check_run(checker, scene)
@@ -80,8 +77,8 @@ def value_bounds(scene: Scene) -> dict[str, Bounds]:
     checker = Checker({})
     if scene.mechanism is not None:
         _check_mechanism(checker, scene.mechanism)
-    if isinstance(scene.load, HarmonicLoad):
-        checker.positive(scene.load.frequency)
+    for load in scene.loads:
+        check_load(checker, load)
     for bearing in scene.bearings:
         _check_bearing(checker, bearing)
     return checker.bounds
@@ -251,37 +248,6 @@ def _check_speeds(checker: Checker, driver: Driver) -> None:
     remedy = "give every row a time and a speed, or write speed instead of the table for one that does not change"
     path = driver.speed.path.rpartition(".")[0].rpartition(".")[0]
     checker.rows(path, table.time, (driver.speed, *table.later_speed), "time", remedy)
-
-
-def _check_table(checker: Checker, load: TableLoad) -> None:
-    rows = {"time": len(load.time), "x": len(load.x), "y": len(load.y)}
-    if min(rows.values()) == 0:  # reported when it was read
-        return
-    if min(rows.values()) != max(rows.values()):
-        checker.fault(
-            "load",
-            "the columns of the table differ in length",
-            ", ".join(f"{name}: {count}" for name, count in rows.items()),
-            "three columns of one length",
-            "give every row a time, x and y",
-        )
-    elif len(load.time) < 2:
-        checker.fault(
-            "load.time",
-            "the table has too few rows",
-            str(len(load.time)),
-            "two rows or more",
-            'add rows, or write type = "constant"',
-        )
-    for before, behind in zip(load.time, load.time[1:], strict=False):
-        if behind.value <= before.value:
-            checker.fault(
-                behind.path,
-                "the time does not increase",
-                f"{checker.show(behind)} after {checker.show(before)}",
-                "strictly increasing times",
-                "sort the rows by time; write a jump as two rows with a short time between them",
-            )
 
 
 def _check_bearing(checker: Checker, bearing: Bearing) -> None:

@@ -217,27 +217,78 @@ class ConstantLoad:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HarmonicLoad:
-    """``mean + amplitude * cos(2 pi frequency t + phase)`` on the inner ring [N], [Hz], [rad]."""
+    """``mean + amplitude * cos(2 pi frequency t + phase)`` on the inner ring [N], [Hz], [rad].
+
+    `phase` is one for both components, or that of x and that of y.
+    """
 
     mean: Vector
     amplitude: Vector
     frequency: Quantity
-    phase: Quantity
+    phase: Quantity | tuple[Quantity, Quantity]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableLoad:
-    """Force on the inner ring, linear between rows, constant before the first and behind the last.
+    """Force on the inner ring, linear between rows.
 
-    `time` [s] strictly increasing, `x` and `y` [N]; all of one length of at least two.
+    `over` says what the rows are over: the time [s], constant before the first and behind the last, or the angle of the
+    shaft [rad], periodic over a turn.  Rows strictly increasing, `x` and `y` [N]; all of one length of at least two.
     """
 
-    time: tuple[Quantity, ...]
+    over: Literal["time", "angle"]
+    rows: tuple[Quantity, ...]
     x: tuple[Quantity, ...]
     y: tuple[Quantity, ...]
 
 
-Load = ConstantLoad | HarmonicLoad | TableLoad
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnbalanceLoad:
+    """Unbalance of the shaft: a mass [kg] at an eccentricity [m], at an angle of the shaft [rad]."""
+
+    mass: Quantity
+    eccentricity: Quantity
+    angle: Quantity
+
+
+LoadLaw = ConstantLoad | HarmonicLoad | TableLoad | UnbalanceLoad
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadWindow:
+    """From `start` (inclusive) to `end` (exclusive; None: for ever): times [s], or angles of the shaft [rad]."""
+
+    start: Quantity
+    end: Quantity | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Load:
+    """A force on the inner ring of every bearing, acting within its windows where it has some.
+
+    `name` is empty for the scene's only ``[load]``; ``[loads.<name>]`` have one.
+    """
+
+    name: str
+    law: LoadLaw
+    angle_window: LoadWindow | None = None
+    time_window: LoadWindow | None = None
+
+    @property
+    def path(self) -> str:
+        """Its place in the scene file, which the names of its constants begin with."""
+        return f"loads.{self.name}" if self.name else "load"
+
+    @property
+    def label(self) -> str:
+        """What the names of its inputs and variables begin with."""
+        return f"load.{self.name}" if self.name else "load"
+
+    @property
+    def turns(self) -> bool:
+        """Whether it follows the angle of the shaft."""
+        over_angle = isinstance(self.law, TableLoad) and self.law.over == "angle"
+        return over_angle or isinstance(self.law, UnbalanceLoad) or self.angle_window is not None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -410,7 +461,7 @@ class Scene:
     title: str
     mechanism: Mechanism | None
     shaft: Shaft | None
-    load: Load | None
+    loads: tuple[Load, ...]
     bearings: tuple[Bearing, ...]
     outputs: tuple[str, ...]
     run: Run
@@ -433,7 +484,7 @@ class Scene:
             self.name,
             _structure(self.mechanism),
             _structure(self.shaft),
-            _structure(self.load),
+            _structure(self.loads),
             _structure(self.bearings),
             self.outputs,
         )

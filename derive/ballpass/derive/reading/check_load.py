@@ -1,0 +1,86 @@
+"""Values of a load: signs, and what they must be to each other."""
+
+from __future__ import annotations
+
+import math
+
+from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.records import HarmonicLoad, Load, TableLoad, UnbalanceLoad
+
+_TURN = 2.0 * math.pi
+
+
+def check_load(checker: Checker, load: Load) -> None:
+    """Note faults of the numbers of a load."""
+    law = load.law
+    if isinstance(law, HarmonicLoad):
+        checker.positive(law.frequency)
+    elif isinstance(law, UnbalanceLoad):
+        checker.not_negative(law.mass)
+        checker.not_negative(law.eccentricity, "give the amount, and turn the angle by 180 deg")
+    elif isinstance(law, TableLoad):
+        _check_table(checker, load.path, law)
+    _check_windows(checker, load)
+
+
+def _check_windows(checker: Checker, load: Load) -> None:
+    window = load.angle_window
+    if window is not None and window.end is not None:
+        span = window.end.value - window.start.value
+        if span == 0.0 or abs(span) >= _TURN * (1.0 - 1e-12):
+            checker.fault(
+                window.end.path,
+                "the window is empty or as long as a whole turn",
+                f"start {checker.show(window.start)}, end {checker.show(window.end)}",
+                "two angles that differ, by less than a turn; from start counter-clockwise to end",
+                "give another end, or delete the window for a load that always acts",
+            )
+    window = load.time_window
+    if window is not None and window.end is not None and window.end.value <= window.start.value:
+        checker.fault(
+            window.end.path,
+            "the load ends before it begins",
+            f"start {checker.show(window.start)}, end {checker.show(window.end)}",
+            "an end behind the start",
+            "give a later end, or none for a load that does not end",
+        )
+
+
+def _check_table(checker: Checker, path: str, table: TableLoad) -> None:
+    rows = {table.over: len(table.rows), "x": len(table.x), "y": len(table.y)}
+    if min(rows.values()) == 0:  # reported when it was read
+        return
+    if min(rows.values()) != max(rows.values()):
+        checker.fault(
+            path,
+            "the columns of the table differ in length",
+            ", ".join(f"{name}: {count}" for name, count in rows.items()),
+            "three columns of one length",
+            f"give every row a {table.over}, x and y",
+        )
+    elif len(table.rows) < 2:
+        checker.fault(
+            f"{path}.{table.over}",
+            "the table has too few rows",
+            str(len(table.rows)),
+            "two rows or more",
+            'add rows, or write type = "constant"',
+        )
+    for before, behind in zip(table.rows, table.rows[1:], strict=False):
+        if behind.value <= before.value:
+            checker.fault(
+                behind.path,
+                f"the {table.over} does not increase",
+                f"{checker.show(behind)} after {checker.show(before)}",
+                f"strictly increasing {table.over}s",
+                f"sort the rows by {table.over}; write a jump as two rows with a short {table.over} between them, or "
+                "as a load with a window",
+            )
+    if table.over == "angle" and table.rows[-1].value - table.rows[0].value >= _TURN * (1.0 - 1e-12):
+        checker.fault(
+            table.rows[-1].path,
+            "the angles of the table cover a whole turn",
+            f"{checker.show(table.rows[0])} to {checker.show(table.rows[-1])}",
+            "angles within less than a turn: the last row joins the first, one turn later",
+            "leave the last row out",
+        )
