@@ -1,4 +1,4 @@
-"""Claims about waviness of the outer raceway: which orders push the ring, how strongly and how fast; exact rates."""
+"""Claims about waviness of raceways and balls: which orders push the ring, how strongly and how fast; exact rates."""
 
 from __future__ import annotations
 
@@ -15,7 +15,21 @@ from ballpass.runtime import Model
 BALLS, PRELOAD, AMPLITUDE = 8, 4e-6, 1e-11
 ORDERS = tuple(range(2, 21))
 WAVES = "\n".join(f'{n} = {{ amplitude = "0 um", phase = "20 deg" }}' for n in ORDERS)
-WAVY = ("[bearing.inner_ring]", f"[bearing.outer_waviness]\n{WAVES}\n[bearing.inner_ring]")
+BALL_ORDERS = tuple(range(1, 7))
+BALL_WAVES = "\n".join(f'{n} = {{ amplitude = "0 um", phase = "20 deg" }}' for n in BALL_ORDERS)
+TABLES = f"""
+[bearing.outer_waviness]
+{WAVES}
+[bearing.inner_waviness]
+{WAVES}
+[bearing.ball_waviness.each]
+{BALL_WAVES}
+[bearing.ball_waviness.3]
+2 = {{ amplitude = "0 um", phase = "50 deg" }}
+[bearing.ball_deviation]
+5 = "0 um"
+"""
+WAVY = ("[bearing.inner_ring]", f"{TABLES}[bearing.inner_ring]")
 #: Rings held concentric with preload: every ball is pressed alike.
 TIGHT = ('clearance = "0 um"  ', f'clearance = "{-2e6 * PRELOAD} um"  ')
 START = ('["3.9937 um", "0.1 um"]', '["0 um", "0 um"]')
@@ -28,70 +42,120 @@ def held(make_model: Callable[..., Model]) -> Model:
     return make_model("varying_compliance", WAVY, TIGHT, DAMPED, START, FORCES)
 
 
-def samples(model: Model, order: int, output: str) -> np.ndarray:
-    """An output over one pass of the cage, the rings held at the centre."""
-    wave = {f"bearing.outer_waviness.{order}.amplitude": AMPLITUDE}
-    turn = 2 * np.pi / model.constants()["bearing.cage_speed"]
-    rest = np.zeros(4)
-    return np.array([model.evaluate(t, rest, [output], wave)[output] for t in np.linspace(0, turn, 65)[:-1]])
+@pytest.fixture(scope="module")
+def moving(make_model: Callable[..., Model]) -> Model:
+    """With some waves only: derivatives compile in no time."""
+    table = """
+[bearing.outer_waviness]
+7 = { amplitude = "0.5 um", phase = "0.4 rad" }
+[bearing.inner_waviness]
+9 = { amplitude = "0.2 um", phase = "0.3 rad" }
+[bearing.ball_waviness.3]
+2 = { amplitude = "0.2 um", phase = "0.6 rad" }
+[bearing.ball_deviation]
+5 = "-0.2 um"
+[bearing.inner_ring]"""
+    return make_model("varying_compliance", (WAVY[0], table), TIGHT, DAMPED, START)
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_only_orders_beside_multiples_of_the_balls_push_the_ring(held: Model, order: int) -> None:
-    """n = qZ + 1 and qZ - 1, at qZ times the cage's speed, with 0.75 Z k_b sqrt(preload) B."""
-    lines = np.abs(np.fft.rfft(samples(held, order, "ring_force.x"))) * 2 / 64
-    linear = 0.75 * BALLS * held.constants()["bearing.k_b"] * np.sqrt(PRELOAD) * AMPLITUDE
-    expected = np.zeros(33)
-    if (order + 1) % BALLS == 0 or (order - 1) % BALLS == 0:
-        expected[BALLS * round(order / BALLS)] = linear
-    # what damping adds to the force of a ball: beta times its rate, which is n times the cage's speed
-    faster = np.hypot(1.0, 2e-5 * order * held.constants()["bearing.cage_speed"])
+@pytest.mark.parametrize("ring", ["outer", "inner"])
+def test_only_orders_beside_multiples_of_the_balls_push_the_ring(held: Model, ring: str, order: int) -> None:
+    """n = qZ + 1 and qZ - 1, with 0.75 Z k_b sqrt(preload) B, at qZ times the speed of the balls over the raceway.
+
+    In the raceway's own axes: in those at rest the lines of the inner one are at qZ (w - w_c) + w and - w.
+    """
+    constants = held.constants()
+    passing = constants[f"bearing.{ring}_pass_speed" if ring == "inner" else "bearing.cage_speed"]
+    turning = held.parameters["shaft.speed"] if ring == "inner" else 0.0
+    wave, rest = {f"bearing.{ring}_waviness.{order}.amplitude": AMPLITUDE}, np.zeros(4)
+    forces = np.zeros(64, dtype=complex)
+    for k, t in enumerate(np.linspace(0.0, 2 * np.pi / abs(passing), 65)[:-1]):
+        seen = held.evaluate(t, rest, ["ring_force.x", "ring_force.y"], wave)
+        forces[k] = (seen["ring_force.x"] + 1j * seen["ring_force.y"]) * np.exp(-1j * turning * t)
+    lines = np.abs(np.fft.fft(forces)) / 64
+    linear = 0.75 * BALLS * constants["bearing.k_b"] * np.sqrt(PRELOAD) * AMPLITUDE
+    expected = np.zeros(64)
+    for beside in (-1, 1):
+        if (order - beside) % BALLS == 0:
+            expected[round(-beside * np.sign(passing)) * (order - beside)] = linear
+    # what damping adds to the force of a ball: beta times its rate, which is n times the speed of passing
+    faster = np.hypot(1.0, 2e-5 * order * passing)
     assert lines[1:] == pytest.approx(expected[1:] * faster, abs=2e-5 * linear)
 
 
-@pytest.mark.parametrize("order", [7, 16])
-def test_the_rate_is_that_of_the_deflection(held: Model, order: int) -> None:
+@pytest.mark.parametrize("order", BALL_ORDERS)
+def test_only_even_orders_of_a_ball_press_it(held: Model, order: int) -> None:
+    """Both raceways meet the wave: 2 C cos(n psi), psi at 1.991766 turns of the ball in one of the shaft."""
+    names = ("bearing.ball_waviness.each.{}.amplitude", "bearing.ball_waviness.each.{}.phase")
+    wave = {names[0].format(order): 1e-7, names[1].format(order): 0.3}
+    times = np.linspace(0.0, 0.4, 23)
+    found = np.array([held.evaluate(t, np.zeros(4), ["ball.deflection"], wave)["ball.deflection"] for t in times])
+    spin = 1.991766 * held.parameters["shaft.speed"]
+    thicker = 2e-7 * np.cos(order * spin * times + 0.3) if order % 2 == 0 else np.zeros(len(times))
+    assert found - PRELOAD == pytest.approx(np.tile(thicker[:, None], BALLS), abs=1e-11)
+
+
+def test_waves_and_deviations_of_single_balls_are_those_of_no_other(held: Model) -> None:
+    numbers = {"bearing.ball_waviness.3.2.amplitude": 1e-7, "bearing.ball_deviation.5": -3e-7}
+    for t in (0.0, 0.123, 7.7):
+        found = held.evaluate(t, np.zeros(4), ["ball.deflection"], numbers)["ball.deflection"] - PRELOAD
+        spin = held.constants()["bearing.spin_speed"] * t
+        expected = np.zeros(BALLS)
+        expected[2], expected[4] = 2e-7 * np.cos(2 * spin + np.deg2rad(50.0)), -3e-7
+        assert found == pytest.approx(expected, abs=1e-16)
+
+
+@pytest.mark.parametrize(
+    "wave", ["outer_waviness.7", "outer_waviness.16", "inner_waviness.9", "ball_waviness.each.4", "ball_waviness.3.2"]
+)
+def test_the_rate_is_that_of_the_deflection(held: Model, wave: str) -> None:
     """Damping force over the tangent stiffness and beta is the rate; differences of the deflection are another way."""
-    wave = {f"bearing.outer_waviness.{order}.amplitude": 1e-6}
+    numbers = {f"bearing.{wave}.amplitude": 1e-6}
     rest, t, h = np.zeros(4), 0.013, 1e-6
 
     def at(time: float, output: str) -> np.ndarray:
-        return np.asarray(held.evaluate(time, rest, [output], wave)[output])
+        return np.asarray(held.evaluate(time, rest, [output], numbers)[output])
 
     slope = 1.5 * held.constants()["bearing.k_b"] * np.sqrt(at(t, "ball.deflection"))
     rate = at(t, "ball.damping_force") / (2e-5 * slope)
     difference = (at(t + h, "ball.deflection") - at(t - h, "ball.deflection")) / (2 * h)
+    assert np.max(np.abs(rate)) > 0.0
     assert rate == pytest.approx(difference, rel=1e-7, abs=1e-9 * np.max(np.abs(rate)))
 
 
 @pytest.mark.long
-def test_stepper_lanes_and_virtual_machine_agree(held: Model) -> None:
-    waves = {"bearing.outer_waviness.7.amplitude": 0.5e-6, "bearing.outer_waviness.9.amplitude": 0.2e-6}
-    runs = [held.simulate(cycles=0.5, transient=0, parameters=waves, method=m, rtol=1e-9).x for m in METHODS]
+def test_stepper_lanes_and_virtual_machine_agree(moving: Model) -> None:
+    runs = [moving.simulate(cycles=0.5, transient=0, method=m, rtol=1e-9).x for m in METHODS]
     scale = np.max(np.abs(runs[0]), axis=0)
     for other in runs[1:]:
         assert np.max(np.abs(other - runs[0]) / scale) < 1e-6
-    many = held.simulate_many({k: [v] for k, v in waves.items()}, ["max:inner.y"], cycles=0.5, transient=0, rtol=1e-9)
-    assert many["max:inner.y"][0] == pytest.approx(
-        held.reduce(cycles=0.5, transient=0, parameters=waves, rtol=1e-9)["inner.y"].maximum, rel=1e-6
+    amplitudes = {"bearing.inner_waviness.9.amplitude": [0.1e-6, 0.2e-6], "bearing.ball_deviation.5": [0.0, -0.2e-6]}
+    many = moving.simulate_many(amplitudes, ["max:inner.y"], cycles=0.5, transient=0, rtol=1e-9)
+    assert many["max:inner.y"][1] == pytest.approx(
+        moving.reduce(cycles=0.5, transient=0, rtol=1e-9)["inner.y"].maximum, rel=1e-6
     )
 
 
 METHODS = ("stepper-dp54", "stepper-rodas5p", "cvodes")
 
 
-def test_derivatives_by_amplitude_and_phase_are_those_of_differences(held: Model) -> None:
-    names = ["bearing.outer_waviness.7.amplitude", "bearing.outer_waviness.7.phase"]
-    waves = {names[0]: 0.5e-6, names[1]: 0.4}
+def test_derivatives_by_amplitude_and_phase_are_those_of_differences(moving: Model) -> None:
+    names = [name for name in moving.parameters if "waviness" in name or "deviation" in name]
+    assert len(names) == 7
+    slopes = []
+    for name in names:
+        step = 1e-4 if name.endswith("phase") else 1e-9
+        value = moving.parameters[name]
+        ends = [
+            moving.simulate(cycles=0.2, transient=0, parameters={name: value + s}, rtol=1e-11).x[-1]
+            for s in (step, -step)
+        ]
+        slopes.append((ends[0] - ends[1]) / (2 * step))
     for method in ("stepper-dp54", "stepper-rodas5p"):
-        found = held.sensitivities(names, cycles=0.3, parameters=waves, method=method, rtol=1e-9).x[-1]
-        for k, (name, step) in enumerate(zip(names, (1e-9, 1e-4), strict=True)):
-            ends = [
-                held.simulate(cycles=0.3, transient=0, parameters={**waves, name: waves[name] + s}, rtol=1e-11).x[-1]
-                for s in (step, -step)
-            ]
-            slope = (ends[0] - ends[1]) / (2 * step)
-            assert found[:, k] == pytest.approx(slope, rel=1e-4, abs=1e-4 * np.max(np.abs(slope)))
+        found = moving.sensitivities(names, cycles=0.2, method=method, rtol=1e-9).x[-1]
+        for column, slope in zip(found.T, slopes, strict=True):
+            assert column == pytest.approx(slope, rel=1e-4, abs=1e-4 * np.max(np.abs(slope)))
 
 
 def test_orders_are_structure_and_amplitudes_numbers(held: Model, scene_text: Callable[..., str]) -> None:
@@ -107,6 +171,32 @@ def test_an_order_that_is_none_is_refused(scene_text: Callable[..., str], tmp_pa
     text = scene_text("varying_compliance", (WAVY[0], f"[bearing.outer_waviness]\n{key} = {{}}\n{WAVY[0]}"))
     with pytest.raises(SceneError, match="no order of waviness"):
         generate(scene_from_text(text, "wavy"), tmp_path)
+
+
+def test_a_roughness_is_its_waves(scene_text: Callable[..., str]) -> None:
+    """Amplitudes fall with a power of the order, a seed draws the phases, of each ball its own; they stay numbers."""
+    rough = '{{ amplitude = "0.2 um", exponent = 1.5, lowest = 4, highest = 9, seed = {} }}'
+
+    def read(table: str, seed: int) -> dict[str, float]:
+        text = f"[bearing.{table}]\nroughness = {rough.format(seed)}\n[bearing.inner_ring]"
+        scene = scene_from_text(scene_text("varying_compliance", ("[bearing.inner_ring]", text)), "rough")
+        return {q.path.removeprefix(f"bearing.{table}."): q.value for q in scene.quantities if table in q.path}
+
+    first, again, other = read("inner_waviness", 1), read("inner_waviness", 1), read("inner_waviness", 2)
+    assert first == again
+    assert [first[f"{n}.amplitude"] for n in range(4, 10)] == pytest.approx(
+        [0.2e-6 * (4 / n) ** 1.5 for n in range(4, 10)]
+    )
+    phases = [first[f"{n}.phase"] for n in range(4, 10)]
+    assert len(set(phases)) == 6
+    assert all(0.0 <= phase < 2 * np.pi for phase in phases)
+    assert not set(phases) & {other[f"{n}.phase"] for n in range(4, 10)}
+    table = "bearing.ball_waviness.each]\nroughness = " + rough.format(1)
+    scene = scene_from_text(
+        scene_text("varying_compliance", ("[bearing.inner_ring]", f"[{table}\n[bearing.inner_ring]")), "rough"
+    )
+    drawn = [q.value for q in scene.quantities if "ball_waviness" in q.path and q.path.endswith("phase")]
+    assert len(set(drawn)) == BALLS * 6
 
 
 def test_a_negative_amplitude_is_refused(scene_text: Callable[..., str]) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.kinematics import Ledger, Pose
 from ballpass.derive.mechanism.swing import STILL, Swing
@@ -28,6 +29,7 @@ class Cage:
     inputs : the parts of these angles that grow evenly, at the reference time; none where the driver's angle is a
         coordinate
     constants, definitions : of the symbols in these
+    spin : angle of a ball's own material that meets the outer raceway, None where no effect asks for it [rad]
     """
 
     angle: sp.Expr
@@ -37,6 +39,7 @@ class Cage:
     inputs: tuple[Input, ...]
     constants: tuple[Definition, ...]
     definitions: tuple[Definition, ...] = ()
+    spin: sp.Expr | None = None
 
 
 def cage_ratio(names: Names) -> sp.Symbol:
@@ -55,13 +58,50 @@ def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr) -> Cage:
         _pass(names, "inner", speed - shaft_speed),
     )
     angle = even.symbol + speed * TIME
+    turning = _spin(bearing, names, speed) if any(EFFECTS[e.kind].spins(e) for e in bearing.effects) else None
     return Cage(
         angle=angle,
         rate=speed,
         in_outer=angle,
         in_inner=passing.symbol + pass_speed * TIME,
-        inputs=(even, passing),
-        constants=constants,
+        inputs=(even, passing, *(() if turning is None else (turning.input,))),
+        constants=(*constants, *(() if turning is None else turning.constants)),
+        spin=None if turning is None else turning.angle,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Spin:
+    angle: sp.Expr
+    input: Input
+    constants: tuple[Definition, ...]
+
+
+def _spin(bearing: Bearing, names: Names, cage_speed: sp.Symbol) -> _Spin:
+    """Balls that roll on the outer raceway, which stands: as much of their surface passes as of the raceway."""
+    start, speed = names.constant("spin_start"), names.constant("spin_speed")
+    rolls = 1 + symbol_of(bearing.pitch_diameter) / symbol_of(bearing.ball_diameter)
+    words = "Angle of a ball's material that meets the outer raceway"
+    turned = phase(
+        f"{bearing.prefix}spin",
+        f"{words}{f' of {bearing.name}' if bearing.name else ''}, at the reference time",
+        names.latex(r"\chi_0"),
+        offset=start.name,
+        rate=speed.name,
+    )
+    return _Spin(
+        angle=turned.symbol + speed * TIME,
+        input=turned,
+        constants=(
+            names.define(start, sp.S.Zero, "rad", f"{words} at the start, from which it is counted", r"\chi_{00}"),
+            names.define(
+                speed,
+                rolls * cage_speed,
+                "rad/s",
+                "Speed of the balls about their own axes, seen from the cage",
+                r"\omega_w",
+            ),
+        ),
     )
 
 

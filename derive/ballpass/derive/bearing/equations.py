@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.bearing.cage import Cage
-from ballpass.derive.bearing.effects import EFFECTS
+from ballpass.derive.bearing.effects import EFFECTS, GenericBall
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.bearing.laws.contact import Contact, Rest
-from ballpass.derive.bearing.own_terms import OwnTerms, own_terms
+from ballpass.derive.bearing.own_terms import Axes, OwnTerms, own_terms
 from ballpass.derive.bearing.stiffness import stiffness_constants
 from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
 from ballpass.derive.scene.records import Bearing
@@ -152,8 +152,7 @@ def _ball(
     direction = {sp.cos(angle): cos, sp.sin(angle): sin}
     geometry, rate = geometry.subs(direction), rate.subs(direction)
     gradient = [sp.diff(geometry, c.position) for c in coordinates]
-    taken = sum((EFFECTS[e.kind].term(e, angle) for e in bearing.effects), start=sp.S.Zero)
-    own = own_terms(taken, angle, cos, sin, speed, names) if taken != 0 else None
+    own = _own_terms(bearing, names, cage, cos, sin)
     if own is not None:
         geometry, rate = geometry - own.deflection, rate - own.rate
 
@@ -213,6 +212,22 @@ def _ball(
         switching=find_switching(parts, delta, delta_rate, pairs=bearing.balls % 2 == 0 and own is None),
     )
     return ball, gradient, parts
+
+
+def _own_terms(bearing: Bearing, names: Names, cage: Cage, cos: sp.Symbol, sin: sp.Symbol) -> OwnTerms | None:
+    """What effects take from the deflection of the generic ball; None where they take nothing."""
+    if not bearing.effects:
+        return None
+    still, on_inner, from_first = (sp.Function(n)(TIME) for n in ("theta", "theta_inner", "theta_first"))
+    axes = [
+        Axes(angle=still),
+        Axes(angle=on_inner, turned=cage.angle - cage.in_inner, name="inner", words=" as the inner ring sees it"),
+        Axes(angle=from_first, turned=cage.angle, name="first", words=" from ball 1"),
+    ]
+    assert cage.in_outer == cage.angle  # effects are refused where the outer ring turns
+    ball = GenericBall(balls=bearing.balls, on_outer=still, on_inner=on_inner, from_first=from_first, spin=cage.spin)
+    taken = sum((EFFECTS[e.kind].term(e, ball) for e in bearing.effects), start=sp.S.Zero)
+    return own_terms(taken, axes, cos, sin, cage.rate, names) if taken != 0 else None
 
 
 def ring_motion(bearing: Bearing, model: BearingModel, load: Pair, inner_mass: sp.Expr) -> RingMotion:

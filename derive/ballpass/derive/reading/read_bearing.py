@@ -65,6 +65,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         )
         clearance = table.quantity("clearance", "m", "Diametral clearance of the bearing", "P_d", example="10 um")
         clearance, catalogue = mounted(table, catalogue, clearance, ball.value, pitch.value)
+        balls = table.integer("balls", FEWEST_BALLS, MOST_BALLS, example="8")
         return Bearing(
             name=name,
             joint=joint,
@@ -72,7 +73,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             coupling=coupling,
             inner_body=inner_body,
             count=read_count(table, coupling),
-            balls=table.integer("balls", FEWEST_BALLS, MOST_BALLS, example="8"),
+            balls=balls,
             ball_diameter=ball,
             pitch_diameter=pitch,
             clearance=clearance,
@@ -86,7 +87,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             ),
             contact=_read_contact(table),
             damping=_read_damping(table),
-            effects=_read_effects(table),
+            effects=_read_effects(table, balls),
             inner=_read_inner_ring(table, mechanism is not None) if coupling == "one-way" else None,
             outer=support,
             initial=_read_initial(table, moving_outer=support is not None),
@@ -248,8 +249,8 @@ def _read_damping(table: Table) -> Damping:
         return Damping(law=name, numbers=law.read(damping), smoothing=smoothing)
 
 
-def _read_effects(table: Table) -> tuple[BallEffect, ...]:
-    return tuple(effect.read(table.table(kind)) for kind, effect in EFFECTS.items() if table.has(kind))
+def _read_effects(table: Table, balls: int) -> tuple[BallEffect, ...]:
+    return tuple(effect.read(table.table(kind), balls) for kind, effect in EFFECTS.items() if table.has(kind))
 
 
 def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 from itertools import groupby
 
+from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.mechanism.forces.friction import Friction
 from ballpass.derive.mechanism.forces.windows import Windows
 from ballpass.derive.scene.records import Bearing, HertzContact, Mechanism, Quantity, Scene
@@ -17,9 +18,8 @@ from ballpass.runtime.contract.manifest import UsualInfo
 
 #: Groove radius over ball diameter: ISO 16281 takes 0.52 and 0.53; the bounds are those of made bearings, wide.
 GROOVE = (0.505, 0.56)
-#: Clearance or preload, and amplitude of a wave of the raceway, over ball diameter.
+#: Clearance or preload over ball diameter.
 CLEARANCE = (-0.01, 0.01)
-WAVINESS = (None, 0.001)
 #: Young's modulus from magnesium to silicon carbide [Pa].
 MODULUS = (50e9, 400e9)
 #: Half width of the smoothed contact onset over clearance.
@@ -93,6 +93,5 @@ def _of_bearing(bearing: Bearing) -> Iterator[UsualInfo]:
         hint = "The contact then acts where ball and raceway are apart: give a smaller width."
         yield _range(contact.smoothing, SMOOTHING, hint, bearing.clearance)
     for effect in bearing.effects:
-        for number in effect.numbers:
-            if number.unit == "m":
-                yield _range(number, WAVINESS, "Waves are some tenths of a micrometre: check the unit.", ball)
+        for number, bounds, hint in EFFECTS[effect.kind].usual(effect):
+            yield _range(number, bounds, hint, ball)

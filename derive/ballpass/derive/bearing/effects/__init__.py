@@ -1,9 +1,13 @@
 """Effects on the balls, one file each.  A new effect is a file and a line here."""
 
-from ballpass.derive.bearing.effects.effect import Effect
-from ballpass.derive.bearing.effects.waviness import OuterWaviness
+from ballpass.derive.bearing.effects.ball_deviation import BallDeviation
+from ballpass.derive.bearing.effects.ball_waviness import BallWaviness
+from ballpass.derive.bearing.effects.effect import Effect, GenericBall
+from ballpass.derive.bearing.effects.waviness import InnerWaviness, OuterWaviness
 
 #: Effects by the name of their table.
-EFFECTS: dict[str, Effect] = {effect.name: effect for effect in (OuterWaviness(),)}
+EFFECTS: dict[str, Effect] = {
+    effect.name: effect for effect in (OuterWaviness(), InnerWaviness(), BallWaviness(), BallDeviation())
+}
 
-__all__ = ["EFFECTS", "Effect"]
+__all__ = ["EFFECTS", "Effect", "GenericBall"]

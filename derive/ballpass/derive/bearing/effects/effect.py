@@ -1,4 +1,4 @@
-"""What an effect on a ball is: its name, its numbers in the scene file, what it takes from the deflection.
+"""What an effect on a ball is: its name, its numbers in the scene file, what it adds to the deflection.
 
 An effect is one object in one file of this folder; `EFFECTS` in ``__init__.py`` lists them.
 """
@@ -6,31 +6,74 @@ An effect is one object in one file of this folder; `EFFECTS` in ``__init__.py``
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import BallEffect
+from ballpass.derive.scene.records import BallEffect, Quantity
 from ballpass.derive.scene.schema import Table
 
 if TYPE_CHECKING:
     import sympy as sp
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GenericBall:
+    """Where the generic ball is and how it is turned, functions of `TIME` [rad].
+
+    Attributes
+    ----------
+    balls : their number
+    on_outer, on_inner : its angle as the rings see it, which stood along x at the start
+    from_first : its angle from ball 1
+    spin : angle of its own material that meets the outer raceway, counter-clockwise from what did so at the start; the
+        inner raceway meets the opposite place.  None where no effect asks for it
+    """
+
+    balls: int
+    on_outer: sp.Expr
+    on_inner: sp.Expr
+    from_first: sp.Expr
+    spin: sp.Expr | None
+
+    def only(self, number: int, value: sp.Expr) -> sp.Expr:
+        """A value for one ball, counted from 1, and zero for the others."""
+        import sympy as sp
+
+        near = sp.cos(self.from_first - 2 * sp.pi * sp.Rational(number - 1, self.balls))
+        return sp.Piecewise((value, near > sp.cos(sp.pi / self.balls)), (sp.S.Zero, True))
+
+
+#: A number, bounds over the ball diameter, and what to look at where it lies beyond.
+Usual = tuple[Quantity, tuple[float | None, float | None], str]
+
+
 class Effect(ABC):
     """An effect on the balls of a bearing; `name` is its table within the bearing's."""
 
     name: ClassVar[str]
+    #: For people: what a scene without it leaves out.
+    words: ClassVar[str]
 
     @abstractmethod
-    def read(self, table: Table) -> BallEffect:
+    def read(self, table: Table, balls: int) -> BallEffect:
         """The effect out of its table; faults are noted."""
 
     def check(self, effect: BallEffect, checker: Checker) -> None:  # noqa: B027  an effect may take any number
         """Note faults of its numbers."""
 
+    def usual(self, effect: BallEffect) -> Iterable[Usual]:
+        """Ranges in which its numbers usually lie, over the ball diameter, with a hint for one beyond."""
+        return ()
+
+    def spins(self, effect: BallEffect) -> bool:
+        """Whether it depends on how the balls are turned."""
+        return False
+
     @abstractmethod
-    def term(self, effect: BallEffect, angle: sp.Expr) -> sp.Expr:
-        """What it takes from the deflection of the ball at `angle`, a function of `TIME` [m]."""
+    def term(self, effect: BallEffect, ball: GenericBall) -> sp.Expr:
+        """What it takes from the deflection of the generic ball [m]."""
 
     @abstractmethod
     def describe(self, effect: BallEffect) -> str:

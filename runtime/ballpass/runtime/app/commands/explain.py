@@ -139,6 +139,8 @@ def _of_drive(scene: Scene) -> list[str]:
 
 def _absent(scene: Scene) -> list[str]:
     """What this scene could name and does not, and how it would."""
+    from ballpass.derive.bearing.effects import EFFECTS
+
     out = []
     mechanism = scene.mechanism
     if mechanism is None:
@@ -161,8 +163,8 @@ def _absent(scene: Scene) -> list[str]:
             out.append(f"viscous damping of the inner ring to the frame ({path}.inner_ring.damping)")
         if bearing.outer is None:
             out.append(f'motion of the outer ring ({path}.outer_ring, support = "elastic")')
-        if all(effect.kind != "outer_waviness" for effect in bearing.effects):
-            out.append(f"waviness of the outer raceway ({path}.outer_waviness)")
+        present = {effect.kind for effect in bearing.effects}
+        out += [f"{effect.words} ({path}.{kind})" for kind, effect in EFFECTS.items() if kind not in present]
     return out
 
 

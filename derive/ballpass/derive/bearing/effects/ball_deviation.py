@@ -1,0 +1,59 @@
+"""Balls whose diameter differs from that of the others: a thicker one is pressed more by as much."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
+from ballpass.derive.scene.records import BallEffect
+from ballpass.derive.scene.schema import Table
+from ballpass.derive.terms import symbol_of
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+#: Deviation over ball diameter.
+DEVIATION = (-0.001, 0.001)
+
+
+class BallDeviation(Effect):
+    """Deviation of the diameter of single balls."""
+
+    name = "ball_deviation"
+    words = "balls of different diameters"
+
+    def read(self, table: Table, balls: int) -> BallEffect:
+        with table:
+            names = [str(number) for number in range(1, balls + 1)]
+            table.know(*names)
+            which = [name for name in names if name in table.data]
+            numbers = [
+                table.quantity(
+                    name,
+                    "m",
+                    f"Deviation of the diameter of ball {name}",
+                    rf"\Delta D_{{w,{name}}}",
+                    example="0.5 um",
+                )
+                for name in which
+            ]
+        return BallEffect(kind=self.name, structure=tuple(map(int, which)), numbers=tuple(numbers))
+
+    def usual(self, effect: BallEffect) -> Iterable[Usual]:
+        hint = "Balls of one bearing differ by tenths of a micrometre: check the unit."
+        return [(deviation, DEVIATION, hint) for deviation in effect.numbers]
+
+    def term(self, effect: BallEffect, ball: GenericBall) -> sp.Expr:
+        import sympy as sp
+
+        return -sum(
+            (
+                ball.only(int(number), symbol_of(deviation))
+                for number, deviation in zip(effect.structure, effect.numbers, strict=True)
+            ),
+            start=sp.S.Zero,
+        )
+
+    def describe(self, effect: BallEffect) -> str:
+        return f"diameters of their own of the balls {', '.join(map(str, effect.structure))}"

@@ -1,0 +1,98 @@
+"""Waviness of the balls: harmonics of a ball's own angle, which it meets both raceways with.
+
+A ball whose material at the angle psi meets the outer raceway, and at psi + pi the inner one, is thicker there by
+C_n cos(n psi + gamma_n) and C_n cos(n (psi + pi) + gamma_n).  Both are added to its deflection: of even orders twice
+the amplitude, and nothing of odd ones, which only move the ball.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
+from ballpass.derive.bearing.effects.read_waves import ORDERS, read_waves, usual_amplitudes, with_roughness
+from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.records import BallEffect, Quantity
+from ballpass.derive.scene.schema import Table
+from ballpass.derive.terms import symbol_of
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+#: Table of waves that all balls have alike.
+EACH = "each"
+
+
+class BallWaviness(Effect):
+    """Waves around the balls."""
+
+    name = "ball_waviness"
+    words = "waviness of the balls"
+
+    def read(self, table: Table, balls: int) -> BallEffect:
+        structure, numbers = list[str](), list[Quantity]()
+        with table:
+            table.data = _for_every_ball(table, balls)
+            names = (EACH, *ORDERS[:balls])
+            table.know(*names)
+            for whose in (name for name in names if name in table.data):
+                where = "around each ball" if whose == EACH else f"around ball {whose}"
+                label = "" if whose == EACH else f"{whose},"
+                orders, read = read_waves(table.table(whose), where, ("C", r"\gamma"), label)
+                structure += [f"{whose}.{n}" for n in orders]
+                numbers += read
+        return BallEffect(kind=self.name, structure=tuple(structure), numbers=tuple(numbers))
+
+    def check(self, effect: BallEffect, checker: Checker) -> None:
+        for amplitude in effect.numbers[::2]:
+            checker.not_negative(amplitude, "give the amount, and turn the phase by 180 deg")
+
+    def spins(self, effect: BallEffect) -> bool:
+        return True
+
+    def usual(self, effect: BallEffect) -> Iterable[Usual]:
+        return usual_amplitudes(effect.numbers[::2])
+
+    def term(self, effect: BallEffect, ball: GenericBall) -> sp.Expr:
+        import sympy as sp
+
+        assert ball.spin is not None  # `spins`
+        thicker: dict[str, sp.Expr] = {}
+        for entry, amplitude, phase in zip(effect.structure, effect.numbers[::2], effect.numbers[1::2], strict=True):
+            whose, _, order = str(entry).partition(".")
+            n = int(order)
+            both = sum(
+                symbol_of(amplitude) * sp.cos(n * ball.spin + n * side + symbol_of(phase))
+                for side in (sp.S.Zero, sp.pi)
+            )
+            thicker[whose] = thicker.get(whose, sp.S.Zero) + both
+        return -sum(
+            (value if whose == EACH else ball.only(int(whose), value) for whose, value in thicker.items()),
+            start=sp.S.Zero,
+        )
+
+    def describe(self, effect: BallEffect) -> str:
+        entries = [str(entry).partition(".") for entry in effect.structure]
+        names = dict.fromkeys(whose for whose, _, _ in entries)
+        told = (
+            f"{'each ball' if whose == EACH else f'ball {whose}'}: orders "
+            + ", ".join(n for other, _, n in entries if other == whose)
+            for whose in names
+        )
+        return "waves around the balls, of which only even orders act; " + "; ".join(told)
+
+
+def _for_every_ball(table: Table, balls: int) -> dict[str, object]:
+    """What the table holds; the roughness of each ball has phases of its own."""
+    each = table.data.get(EACH)
+    if not isinstance(each, dict) or "roughness" not in each:
+        return table.data
+    found = dict(table.data)
+    for whose in ORDERS[:balls]:
+        own = found.get(whose, {})
+        if isinstance(own, dict):
+            rough = Table(table.collector, (*table.path, EACH), {"roughness": each["roughness"]})
+            found[whose] = {**with_roughness(rough, whose), **own}
+    rest = {key: value for key, value in each.items() if key != "roughness"}
+    return {**found, EACH: rest}
