@@ -22,7 +22,8 @@ import numpy as np
 from rich.table import Table
 
 from ballpass.runtime.app.tables import simple_table
-from ballpass.runtime.ask.observables import drive_work, kinematic_frequencies, statistics, turns
+from ballpass.runtime.ask.characteristic import frequencies_of
+from ballpass.runtime.ask.observables import drive_work, statistics, turns
 from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks
 from ballpass.runtime.certify.whole_run import check_observables
 from ballpass.runtime.contract import Manifest
@@ -327,8 +328,7 @@ def _constants(sol: Solution) -> dict[str, Any]:
         mechanism = sol.manifest.mechanism
         even = mechanism is None or not mechanism.angle
         if even and speed != 0.0:  # rings that only swing against each other pass no ball
-            ball, pitch = (sol.parameters[f"{bearing.path}.{name}"] for name in ("ball_diameter", "pitch_diameter"))
-            frequencies = kinematic_frequencies(bearing.balls, ball, pitch, speed)
+            frequencies = frequencies_of(bearing, {**sol.parameters, **sol.constants})
             found[f"{bearing.prefix}frequencies"] = asdict(frequencies) | {"unit": "Hz"}
         found[f"{bearing.prefix}damping_law"] = bearing.damping.law
     return found

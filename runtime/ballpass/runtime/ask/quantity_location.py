@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ballpass.runtime.ask.characteristic import frequencies_of
 from ballpass.runtime.ask.nodes import Window
-from ballpass.runtime.ask.observables import KinematicFrequencies, kinematic_frequencies
 from ballpass.runtime.ask.quantity_records import Array, Quantity, View
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
@@ -131,24 +131,20 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     # the bearing that the channel is one of, else the first
     bearings = sorted(manifest.bearings, key=lambda one: not (one.prefix and quantity.channel.startswith(one.prefix)))
     bearing = bearings[0]
-    speed, faster = values[bearing.ring_speed], view.slopes(bearing.ring_speed)
-    ball_name, pitch_name = f"{bearing.path}.ball_diameter", f"{bearing.path}.pitch_diameter"
-    ball, pitch = values[ball_name], values[pitch_name]
-
-    def of(ratio: complex, shaft: complex) -> complex:
-        """The same closed forms for complex numbers: their derivative is exact to rounding (complex step)."""
-        cage = shaft * (1.0 - ratio) / 2.0
-        spin = shaft * (1.0 - ratio**2) / (2.0 * ratio)
-        passing = {"ball_pass_outer": bearing.balls * cage, "ball_pass_inner": bearing.balls * (shaft - cage)}
-        return {"shaft": shaft, "cage": cage, "ball_spin": spin, **passing}[_FREQUENCIES[place]]
-
-    known: KinematicFrequencies = kinematic_frequencies(bearing.balls, ball, pitch, speed)
-    ratio, shaft, tiny = ball / pitch, abs(speed) / clock.TURN, 1e-30
-    by_ratio = of(complex(ratio, tiny), shaft).imag / tiny
-    by_shaft = of(ratio, complex(shaft, tiny)).imag / tiny
-    ratio_slope = (view.slopes(ball_name) - ratio * view.slopes(pitch_name)) / pitch
-    shaft_slope = math.copysign(1.0, speed) * faster / clock.TURN
-    return float(getattr(known, _FREQUENCIES[place])), by_ratio * ratio_slope + by_shaft * shaft_slope
+    at, what = bearing.path, _FREQUENCIES[place]
+    frequency = float(getattr(frequencies_of(bearing, values), what))
+    if what == "shaft":
+        of = bearing.ring_speed
+    elif what == "ball_pass_inner":
+        of = f"{at}.inner_pass_speed"
+    else:
+        of = f"{at}.outer_pass_speed" if f"{at}.outer_pass_speed" in values else f"{at}.cage_speed"
+    slope = frequency / values[of] * view.slopes(of) if values[of] else 0.0 * view.slopes(of)
+    if what == "ball_spin":  # in proportion to 1 + pitch/ball
+        ball, pitch = f"{at}.ball_diameter", f"{at}.pitch_diameter"
+        ratio = values[pitch] / values[ball]
+        slope = slope + frequency / (1.0 + ratio) * (view.slopes(pitch) - ratio * view.slopes(ball)) / values[ball]
+    return frequency, slope
 
 
 def is_frequency(manifest: Manifest, place: str) -> bool:

@@ -1,9 +1,9 @@
 """How much of a signal is at which frequency.
 
-In: samples at equal steps.  Out: an `AmplitudeSpectrum`, single-sided, in the unit of the signal.
+In: samples at equal steps.  Out: an `AmplitudeSpectrum`, single-sided, in the unit of the signal; or a `PowerSpectrum`.
 
-The record is cut to a whole number of cycles of the machine, its mean taken off, and weighted with a window whose
-coherent gain is divided out: a sine of amplitude a that falls on a line of the spectrum reads a.
+For amplitudes the record is cut to a whole number of cycles of the machine, its mean taken off, and weighted with a
+window whose coherent gain is divided out: a sine of amplitude a that falls on a line of the spectrum reads a.
 
 Choice of window
 ----------------
@@ -12,19 +12,24 @@ the lines are as narrow as the record allows.  Frequencies that are no harmonics
 neighbours and may read up to 36 % low (scalloping).
 ``hann``: leaks far less, at lines twice as wide; may read up to 15 % low.
 ``flattop``: reads any amplitude within 0.1 %, at lines about five times as wide: for long records.
+
+Any other window that `scipy.signal.get_window` knows by name alone may be given.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ballpass.runtime.contract.errors import RequestError
 
-Window = Literal["boxcar", "hann", "flattop"]
+#: Name of a window.
+Window = str
+#: Powers of lines [unit^2], or per bandwidth [unit^2/Hz], as in `scipy.signal`.
+Scaling = Literal["spectrum", "density"]
 
 #: Largest difference between steps that still counts as equal, relative to the step; rounding of t is far below.
 _STEP_TOLERANCE = 1e-6
@@ -48,6 +53,66 @@ class AmplitudeSpectrum:
     resolution: float
     cycles: int | None
     window: Window
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PowerSpectrum:
+    """Single-sided power spectrum, by Welch's method.
+
+    Attributes
+    ----------
+    frequency : (m,) line frequencies from 0 to half the sampling rate [Hz]
+    power : (m,) of the lines [unit of the signal squared], or their density [the same per Hz]
+    resolution : distance of the lines [Hz]
+    window, scaling : as asked for
+    """
+
+    frequency: NDArray[np.float64]
+    power: NDArray[np.float64]
+    resolution: float
+    window: Window
+    scaling: Scaling
+
+
+def power_spectrum(
+    t: ArrayLike,
+    signal: ArrayLike,
+    *,
+    window: Window = "hann",
+    scaling: Scaling = "density",
+    segment: float | None = None,
+) -> PowerSpectrum:
+    """Power spectrum of a signal, the mean of each segment removed (`scipy.signal.welch`).
+
+    Parameters
+    ----------
+    t : (n,) times at equal steps [s]
+    signal : (n,) samples [any unit]
+    window : any name that `scipy.signal.get_window` takes
+    scaling : ``"spectrum"``: a sine of amplitude a has the power a^2/2; ``"density"``: the integral over the frequency
+        is the mean square
+    segment : length of the segments that are averaged, half overlapping [s]; None: the whole record at once
+
+    Raises
+    ------
+    RequestError
+        Steps are not equal, the window or the scaling is unknown, or a segment is longer than the record.
+    """
+    time, values = even_samples(t, signal)
+    if scaling not in ("spectrum", "density"):
+        raise RequestError(f"scaling is {scaling!r}; allowed: spectrum, density")
+    rate = (time.size - 1) / (time[-1] - time[0])
+    count = time.size if segment is None else round(segment * rate)
+    if not 4 <= count <= time.size:
+        raise RequestError(
+            f"segment is {segment!r} s, {count} samples; allowed: 4 samples up to the record's length of "
+            f"{time.size / rate:.6g} s"
+        )
+    from scipy.signal import welch  # here: the import takes longer than a run
+
+    weight = window_weights(window, count)
+    frequency, power = welch(values, rate, window=weight, nperseg=count, scaling=scaling, detrend="constant")
+    return PowerSpectrum(frequency=frequency, power=power, resolution=rate / count, window=window, scaling=scaling)
 
 
 def whole_cycles(
@@ -74,7 +139,7 @@ def whole_cycles(
     RequestError
         Steps are not equal, or the record is shorter than a cycle.
     """
-    time, values = _samples(t, signal)
+    time, values = even_samples(t, signal)
     if not (np.isfinite(cycle_length) and cycle_length > 0.0):
         raise RequestError(f"cycle_length is {cycle_length!r} s; allowed: positive and finite")
     step = (time[-1] - time[0]) / (time.size - 1)
@@ -118,16 +183,14 @@ def amplitude_spectrum(
     Amplitude of line k: ``2 |X_k| / sum(w)``, at half the sampling rate ``|X_k| / sum(w)``; X the discrete Fourier
     transform of w (signal - mean), the mean being weighted with w so that nothing of it is left at zero frequency.
     """
-    if window not in get_args(Window):
-        raise RequestError(f"window is {window!r}; allowed: {', '.join(get_args(Window))}")
     cycles: int | None = None
     if cycle_length is None:
-        time, values = _samples(t, signal)
+        time, values = even_samples(t, signal)
     else:
         time, values, cycles = whole_cycles(t, signal, cycle_length)
     count = values.size
     length = count * (time[-1] - time[0]) / (count - 1)
-    weight = _weight(window, count)
+    weight = window_weights(window, count)
     centred = values - np.sum(weight * values) / np.sum(weight)
     amplitude = np.abs(np.fft.rfft(weight * centred)) * (2.0 / np.sum(weight))
     if count % 2 == 0:
@@ -141,16 +204,23 @@ def amplitude_spectrum(
     )
 
 
-def _weight(window: Window, count: int) -> NDArray[np.float64]:
+def window_weights(window: Window, count: int) -> NDArray[np.float64]:
     """Weights of a window in its periodic form, the one for spectra."""
     if window == "boxcar":
         return np.ones(count)
     from scipy.signal import get_window  # here: the import takes longer than a run
 
-    return np.asarray(get_window(window, count), dtype=float)
+    try:
+        return np.asarray(get_window(window, count), dtype=float)
+    except (TypeError, ValueError):
+        raise RequestError(
+            f"window is {window!r}; allowed: boxcar, hann, flattop, or another one that scipy.signal.get_window knows "
+            "by its name alone"
+        ) from None
 
 
-def _samples(t: ArrayLike, signal: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def even_samples(t: ArrayLike, signal: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times and signal as arrays; RequestError where their shapes differ or the steps are not equal."""
     time, values = np.asarray(t, dtype=float), np.asarray(signal, dtype=float)
     if time.ndim != 1 or values.shape != time.shape or time.size < 4:
         raise RequestError(

@@ -93,7 +93,7 @@ def _plain_overrides(manifest: Manifest, settings: list[str]) -> dict[str, float
         for text in settings:
             path, _, value = (part.strip() for part in text.partition("="))
             # ends of windows and knots of tables are checked against each other when a scene is read
-            if path not in units or path in found or ".window" in path or path.startswith("load."):
+            if path not in units or path in found or "window" in path or path.startswith(("load.", "loads.")):
                 return None
             found[path] = parse_quantity(value, units[path])
         resolve_parameters(manifest, found)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.ask.observables import KinematicFrequencies, kinematic_frequencies, turns
+from ballpass.runtime.ask.characteristic import frequencies_of
+from ballpass.runtime.ask.observables import KinematicFrequencies, turns
 from ballpass.runtime.contract import force_components, table_direction
 from ballpass.runtime.run.ball_angles import ball_angles
 
@@ -119,12 +120,7 @@ class Record:
         bearing, mechanism = self.bearing, self.manifest.mechanism
         if bearing is None or (mechanism is not None and mechanism.angle):
             return None
-        return kinematic_frequencies(
-            bearing.balls,
-            self.parameter("bearing.ball_diameter"),
-            self.parameter("bearing.pitch_diameter"),
-            self.parameter(bearing.ring_speed),
-        )
+        return frequencies_of(bearing, {**self.solution.parameters, **self.solution.constants})
 
     def ball_angles(self, sample: int) -> Array:
         """Angles of the balls at a sample, (balls,) [rad]."""
