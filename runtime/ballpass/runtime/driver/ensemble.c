@@ -47,10 +47,15 @@ static void begin_segment(const bp_job *job, long m)
 }
 
 /* Put a member whose segment has begun into a lane, all that depends on the segment included. */
-/* The balls' forces, out of all quantities of the balls. */
-static void put_forces(bp_lane_block *b, int lane, const double *balls)
+/* Third powers of the balls' loads, out of all quantities of the balls. */
+static void put_cubes(bp_lane_block *b, int lane, const double *balls)
 {
-#define BP_PUT(b_) put(b->forces[0] + BP_##b_##_FIRST_BALL * BP_L, lane, balls + BP_BALL_CHANNELS * BP_##b_##_FIRST_BALL, BP_##b_##_BALLS);
+#define BP_PUT(b_)                                                                                       \
+    for (int j = 0; j < BP_##b_##_BALLS; j++) {                                                          \
+        const double force = balls[BP_BALL_CHANNELS * BP_##b_##_FIRST_BALL + j];                         \
+        const double load = force > 0.0 ? 1e-3 * force : 0.0;                                            \
+        b->cubes[0][(BP_##b_##_FIRST_BALL + j) * BP_L + lane] = load * load * load;                      \
+    }
     BP_EACH_BEARING(BP_PUT)
 #undef BP_PUT
 }
@@ -85,7 +90,7 @@ static void enter_segment(const bp_job *job, bp_lane_block *b, int lane)
         double value[BP_CHANNELS], balls[BP_BALL_QUANTITIES];
         bp_channels(&n, at->t, x, b->balls, b->powers, value, balls);
         put(b->sampled[0], lane, value, BP_CHANNELS);
-        if (b->powers) put_forces(b, lane, balls);
+        if (b->powers) put_cubes(b, lane, balls);
         b->reducing[lane] = 1.0;
     }
 }

@@ -39,20 +39,40 @@ static void lane_source(const bp_job *job, const bp_lane_block *b, int lane, int
     }
 }
 
-/* Add the step of a lane to the places of the raceways; see bp_add_sectors. */
-static void add_sectors(const bp_job *job, const bp_lane_block *b, int lane, double *sectors)
+/* Add the steps of lanes to the places of the raceways; see bp_add_sectors. */
+static void add_sectors(const bp_job *job, bp_lane_block *b, const double *add)
 {
-    const bp_numbers n = member_numbers(job, b->who[lane]);
-    double x[BP_NX], from[2 * BP_BEARINGS + 1], to[2 * BP_BEARINGS + 1];
-    get(b->x, lane, x, BP_NX);
-    bp_passes(b->t[lane], x, n.u, n.p, n.c, from);
-    get(b->next, lane, x, BP_NX);
-    bp_passes(b->t[lane] + b->h[lane], x, n.u, n.p, n.c, to);
-#define BP_ADD(b_)                                                                                                                       \
-    bp_add_sectors(sectors + 2 * BP_SECTORS * (b_), BP_##b_##_BALLS, b->h[lane], b->forces[0] + BP_##b_##_FIRST_BALL * BP_L + lane,       \
-                   (BP_NB > 0 ? BP_NB : 1) * BP_L, BP_L, from + 2 * (b_), to + 2 * (b_));
-    BP_EACH_BEARING(BP_ADD)
+    double sum[BP_NB + 1][BP_L] BP_ALIGNED, moment[BP_NB + 1][BP_L] BP_ALIGNED;
+    for (int j = 0; j < BP_NB; j++) {
+        const int i = j * BP_L;
+        BP_EACH_LANE {
+            const double c0 = bp_boole[0] * b->cubes[0][i + lane], c1 = bp_boole[1] * b->cubes[1][i + lane];
+            const double c2 = bp_boole[2] * b->cubes[2][i + lane], c3 = bp_boole[3] * b->cubes[3][i + lane];
+            const double c4 = bp_boole[4] * b->cubes[4][i + lane];
+            sum[j][lane] = c0 + c1 + c2 + c3 + c4;
+            moment[j][lane] = 0.25 * c1 + 0.5 * c2 + 0.75 * c3 + c4;
+            b->cubes[0][i + lane] = add[lane] != 0.0 ? b->cubes[BP_POINTS - 1][i + lane] : b->cubes[0][i + lane];
+        }
+    }
+    for (int lane = 0; lane < BP_L; lane++) {
+        if (add[lane] == 0.0) continue;
+        const bp_numbers n = member_numbers(job, b->who[lane]);
+        double x[BP_NX], from[2 * BP_BEARINGS + 1], to[2 * BP_BEARINGS + 1];
+        double *sectors = job->reductions + b->who[lane] * BP_REDUCTION + BP_RACEWAYS;
+        get(b->x, lane, x, BP_NX);
+        bp_passes(b->t[lane], x, n.u, n.p, n.c, from);
+        get(b->next, lane, x, BP_NX);
+        bp_passes(b->t[lane] + b->h[lane], x, n.u, n.p, n.c, to);
+#define BP_ADD(b_)                                                                                                                      \
+        for (int j = 0; j < BP_##b_##_BALLS; j++) {                                                                                     \
+            const double total = sum[BP_##b_##_FIRST_BALL + j][lane];                                                                   \
+            if (total > 0.0)                                                                                                            \
+                bp_add_places(sectors + 2 * BP_SECTORS * (b_), (double)j / BP_##b_##_BALLS, b->h[lane] * total,                         \
+                              moment[BP_##b_##_FIRST_BALL + j][lane] / total, from + 2 * (b_), to + 2 * (b_));                          \
+        }
+        BP_EACH_BEARING(BP_ADD)
 #undef BP_ADD
+    }
 }
 
 /* Reductions of the lanes whose step was accepted; the same rules as bp_reduce. */
@@ -70,7 +90,7 @@ static void reduce(const bp_job *job, bp_lane_block *b)
         else if (b->linearly) bp_lane_rosenbrock_at(&bp_rodas5p, dense, b->x, b->next, theta, y);
         else bp_lane_explicit_at(&bp_dp54, dense, b->x, b->next, theta, y);
         if (!b->balls) continue;
-        bp_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, b->powers, y + BP_NX * BP_L, b->forces[q]);
+        bp_lane_ball_channels(&b->numbers, &b->angles, theta, b->t, b->h, y, b->powers, y + BP_NX * BP_L, b->cubes[q]);
     }
     double news[BP_CHANNELS][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
     for (int k = 0; k < BP_CHANNELS; k++) {
@@ -111,18 +131,9 @@ static void reduce(const bp_job *job, bp_lane_block *b)
             b->minimum[k * BP_L + lane] = reduction[BP_MIN + k];
         }
     }
-    for (int lane = 0; lane < BP_L; lane++) {
-        if (add[lane] == 0.0) continue;
-        double *reduction = job->reductions + b->who[lane] * BP_REDUCTION;
-        if (b->powers) add_sectors(job, b, lane, reduction + BP_RACEWAYS);
-        reduction[BP_DURATION] += b->h[lane];
-    }
-    if (b->powers)
-        for (int k = 0; k < BP_NB; k++)
-            BP_EACH_LANE {
-                const int i = k * BP_L + lane;
-                b->forces[0][i] = add[lane] != 0.0 ? b->forces[BP_POINTS - 1][i] : b->forces[0][i];
-            }
+    if (b->powers) add_sectors(job, b, add);
+    for (int lane = 0; lane < BP_L; lane++)
+        if (add[lane] != 0.0) job->reductions[b->who[lane] * BP_REDUCTION + BP_DURATION] += b->h[lane];
     for (int k = 0; k < BP_CHANNELS; k++)
         BP_EACH_LANE {
             const int i = k * BP_L + lane;

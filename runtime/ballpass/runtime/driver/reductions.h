@@ -70,7 +70,14 @@ enum {
 /* Channels wanted, a bit each; whether those of the balls are among them. */
 static inline unsigned long bp_wanted(const double *reduction) { return (unsigned long)reduction[BP_WANTED]; }
 static inline int bp_balls_wanted(const double *reduction) { return bp_wanted(reduction) >> BP_NX != 0; }
-static inline int bp_powers_wanted(const double *reduction) { return bp_wanted(reduction) >> BP_LOOKED_AT != 0; }
+/* 1 where third powers are, 2 where powers that need roots are wanted as well. */
+static inline int bp_powers_wanted(const double *reduction)
+{
+    const unsigned long powers = bp_wanted(reduction) >> BP_LOOKED_AT;
+    int rooted = 0;
+    for (int b = 0; b < BP_BEARINGS; b++) rooted |= (powers >> BP_POWERS * b & 6) != 0;
+    return powers != 0 ? 1 + rooted : 0;
+}
 
 /* How far a channel may reach beyond its values at the quarters of a step, as a part of their range. */
 static const double BP_BEYOND = 0.5;
@@ -113,18 +120,18 @@ static inline const double *bp_ball_row(const double *q, int channel, int *balls
 }
 
 /* Means over so many balls of powers of their forces `of` [N]: third, 10/3, and that to the power 9/10; in kN. */
-static inline void bp_powers(const double *restrict of, int balls, double *restrict power)
+static inline void bp_powers(const double *restrict of, int balls, int rooted, double *restrict power)
 {
     double cubes = 0.0, more = 0.0;
 #pragma omp simd reduction(+ : cubes, more)
     for (int j = 0; j < balls; j++) {
         const double load = of[j] > 0.0 ? 1e-3 * of[j] : 0.0, cube = load * load * load;
         cubes += cube;
-        more += cube * bp_cube_root(load);
+        more += rooted ? cube * bp_cube_root(load) : 0.0;
     }
     power[0] = cubes / balls;
     power[1] = more / balls;
-    power[2] = bp_nine_tenths(more / balls);
+    power[2] = rooted ? bp_nine_tenths(more / balls) : 0.0;
 }
 
 /* All channels at a state and time, and all quantities of the balls; those of the balls are zero where not wanted. */
@@ -143,34 +150,42 @@ static inline void bp_channels(const bp_numbers *n, double t, const double *rest
         for (int j = 0; j < BP_##b##_BALLS; j++) most = of[j] > most ? of[j] : most;                   \
         value[BP_NX + BP_BALL_CHANNELS * (b) + k] = most;                                              \
     }                                                                                                  \
-    if (powers) bp_powers(q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, BP_##b##_BALLS, value + BP_LOOKED_AT + BP_POWERS * (b));
+    if (powers) bp_powers(q + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL, BP_##b##_BALLS, powers > 1, value + BP_LOOKED_AT + BP_POWERS * (b));
     BP_EACH_BEARING(BP_MOST)
 #undef BP_MOST
 }
 
-/* Add a step to the places of both raceways of a bearing.
+/* Add to the places of both raceways what one ball of a bearing gave in a step.
 
    sectors   of the outer, then of the inner raceway
-   force     of ball j at quarter i of the step: force[i * point + j * ball] [N]
+   ball      as a part of a turn behind ball 1
+   amount    integral of the third power over the step [kN^3 s]
+   centroid  of it, as a part of the step
    from, to  angle of ball 1 as outer and inner ring see it at both ends of the step [rad] */
-static inline void bp_add_sectors(double *restrict sectors, int balls, double h, const double *restrict force, int point, int ball,
-                                  const double *restrict from, const double *restrict to)
+static inline void bp_add_places(double *restrict sectors, double ball, double amount, double centroid, const double *restrict from,
+                                 const double *restrict to)
+{
+    for (int ring = 0; ring < 2; ring++) {
+        const double turns = (from[ring] + (to[ring] - from[ring]) * centroid) * 0.15915494309189533577 + ball;
+        const double place = BP_SECTORS * (turns - floor(turns)), below = floor(place);
+        const int k = (int)below % BP_SECTORS;
+        sectors[BP_SECTORS * ring + k] += amount * (1.0 - (place - below));
+        sectors[BP_SECTORS * ring + (k + 1) % BP_SECTORS] += amount * (place - below);
+    }
+}
+
+/* The same for all balls of a bearing, whose forces at the quarters of the step are `of` [N], BP_BALL_QUANTITIES apart. */
+static inline void bp_add_sectors(double *restrict sectors, int balls, double h, const double *restrict of, const double *restrict from,
+                                  const double *restrict to)
 {
     for (int j = 0; j < balls; j++) {
         double sum = 0.0, moment = 0.0;
         for (int i = 0; i < BP_POINTS; i++) {
-            const double at = force[i * point + j * ball], load = at > 0.0 ? 1e-3 * at : 0.0, part = bp_boole[i] * (load * load * load);
-            sum += part;
-            moment += 0.25 * i * part;
+            const double force = of[i * BP_BALL_QUANTITIES + j], load = force > 0.0 ? 1e-3 * force : 0.0;
+            sum += bp_boole[i] * (load * load * load);
+            moment += 0.25 * i * bp_boole[i] * (load * load * load);
         }
-        if (!(sum > 0.0)) continue;
-        for (int ring = 0; ring < 2; ring++) {
-            const double turns = (from[ring] + (to[ring] - from[ring]) * (moment / sum)) * 0.15915494309189533577 + (double)j / balls;
-            const double place = BP_SECTORS * (turns - floor(turns)), below = floor(place);
-            const int k = (int)below % BP_SECTORS;
-            sectors[BP_SECTORS * ring + k] += h * sum * (1.0 - (place - below));
-            sectors[BP_SECTORS * ring + (k + 1) % BP_SECTORS] += h * sum * (place - below);
-        }
+        if (sum > 0.0) bp_add_places(sectors, (double)j / balls, h * sum, moment / sum, from, to);
     }
 }
 
@@ -558,9 +573,9 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
             const double t = step->state(step->source, end, x);
             bp_passes(t, x, step->n->u, step->n->p, step->n->c, end ? to : from);
         }
-#define BP_ADD(b)                                                                                                                        \
-    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, h, of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL,        \
-                   BP_BALL_QUANTITIES, 1, from + 2 * (b), to + 2 * (b));
+#define BP_ADD(b)                                                                                                                       \
+    bp_add_sectors(reduction + BP_RACEWAYS + 2 * BP_SECTORS * (b), BP_##b##_BALLS, h, of + BP_BALL_CHANNELS * BP_##b##_FIRST_BALL,       \
+                   from + 2 * (b), to + 2 * (b));
         BP_EACH_BEARING(BP_ADD)
 #undef BP_ADD
     }

@@ -224,7 +224,9 @@ KINDS = ("max", "min", "mean", "rms", "range", "peak_time", "peak_ball", "min_ti
 def channels_needed(kind: str, channel: str) -> tuple[str, ...]:
     """Channels that are reduced for an observable."""
     if kind in LIFE:
-        return tuple(channel.removesuffix("ball.force") + name for name in LOAD_POWERS)
+        # what every place of the raceways has met needs no root of a load
+        powers = LOAD_POWERS[:1] if LIFE[kind] == ("sectors",) else LOAD_POWERS
+        return tuple(channel.removesuffix("ball.force") + name for name in powers)
     return () if kind == "end" else (channel,)
 
 

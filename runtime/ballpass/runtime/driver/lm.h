@@ -1,0 +1,185 @@
+/* The model for a member of an ensemble in each SIMD lane; see model.h for one member.
+
+   Every array holds BP_MEMBERS values an entry, next to each other.  Lanes never look at each other: a member's arithmetic is the same
+   whichever members are its neighbours. */
+#ifndef BALLPASS_LANE_MODEL_H
+#define BALLPASS_LANE_MODEL_H
+
+#include "ensemble_kernels.h"
+#include "model.h"
+#include "powers.h"
+
+enum { BP_L = BP_MEMBERS };
+
+#define BP_EACH_LANE _Pragma("omp simd") for (int lane = 0; lane < BP_L; lane++)
+#define BP_ALIGNED __attribute__((aligned(64)))
+#define BP_INLINE static inline __attribute__((always_inline))
+
+typedef struct {
+    const double *u;
+    const double *p;
+    const double *c;
+} bp_lane_numbers;
+
+/* Where the angles of the stages are when a step begins, and how fast they turn. */
+typedef struct {
+    double angle[BP_NA * BP_L] BP_ALIGNED, rate[BP_NA * BP_L] BP_ALIGNED;
+    double cosine[BP_NA * BP_L] BP_ALIGNED, sine[BP_NA * BP_L] BP_ALIGNED;
+    double far[BP_L] BP_ALIGNED; /* whether an angle turns by more within the step than bp_turn takes */
+    double any;                  /* whether one does so in any lane */
+} bp_lane_angles;
+
+BP_INLINE void bp_lane_angles_start(bp_lane_angles *restrict at, const bp_lane_numbers *n, const double *restrict t, const double *restrict h)
+{
+    double largest[BP_L] BP_ALIGNED;
+    bp_member_angles_lanes(t, n->u, n->p, n->c, at->angle, at->rate);
+    BP_EACH_LANE largest[lane] = 0.0;
+    for (int k = 0; k < BP_NA; k++)
+        BP_EACH_LANE {
+            const int i = k * BP_L + lane;
+            const double turning = fabs(at->rate[i]);
+            largest[lane] = turning > largest[lane] ? turning : largest[lane];
+            bp_sincos(at->angle[i], &at->sine[i], &at->cosine[i]);
+        }
+    BP_EACH_LANE at->far[lane] = largest[lane] * h[lane] <= BP_SMALL_ANGLE ? 0.0 : 1.0;
+    double any = 0.0;
+    for (int lane = 0; lane < BP_L; lane++) any += at->far[lane];
+    at->any = any;
+}
+
+/* Cosines and sines of the angles at the times t + node h, which are returned; as bp_directions for one member. */
+BP_INLINE void bp_lane_turn(const bp_lane_angles *restrict at, double node, const double *restrict t, const double *restrict h,
+                            double *restrict C, double *restrict S, double *restrict time)
+{
+    BP_EACH_LANE time[lane] = t[lane] + node * h[lane];
+    for (int k = 0; k < BP_NA; k++)
+        BP_EACH_LANE {
+            const int i = k * BP_L + lane;
+            bp_turn(at->cosine[i], at->sine[i], at->rate[i] * h[lane] * node, &C[i], &S[i]);
+        }
+    if (at->any == 0.0) return;
+    for (int k = 0; k < BP_NA; k++)
+        BP_EACH_LANE {
+            const int i = k * BP_L + lane;
+            double sine, cosine;
+            bp_sincos(at->angle[i] + at->rate[i] * h[lane] * node, &sine, &cosine);
+            C[i] = at->far[lane] != 0.0 ? cosine : C[i];
+            S[i] = at->far[lane] != 0.0 ? sine : S[i];
+        }
+}
+
+/* Stage variables at the times t + node h. */
+BP_INLINE void bp_lane_stage(const bp_lane_numbers *n, const bp_lane_angles *restrict at, double node, const double *restrict t,
+                             const double *restrict h, double *restrict w)
+{
+    double C[BP_NA * BP_L] BP_ALIGNED, S[BP_NA * BP_L] BP_ALIGNED, time[BP_L] BP_ALIGNED;
+    bp_lane_turn(at, node, t, h, C, S, time);
+    bp_member_stage_turned_lanes(C, S, time, n->u, n->p, n->c, w);
+}
+
+/* Direction of ball j of a bearing, whose cage has the angle with the cosine and sine at `cage`. */
+BP_INLINE void bp_lane_direction(double cage_cos, double cage_sin, const double *restrict cage, double *restrict co, double *restrict si)
+{
+    BP_EACH_LANE {
+        co[lane] = cage_cos * cage[lane] - cage_sin * cage[BP_L + lane];
+        si[lane] = cage_sin * cage[lane] + cage_cos * cage[BP_L + lane];
+    }
+}
+
+/* A kernel of bearing b for `directions` balls (of opposite pairs one), its first rows added to S and the others to G. */
+#define BP_LANE_SUM(b, kernel, slopes)                                                                                           \
+    for (int j = 0; j < BP_##b##_DIRECTIONS; j++) {                                                                              \
+        double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[(2 + (slopes)) * BP_L] BP_ALIGNED;                                 \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + (BP_RELATIVE * (b) + 5) * BP_L, co, si);                                         \
+        bp_member_##b##_##kernel##_lanes(co, si, r + BP_RELATIVE * (b) * BP_L, n->p, n->c, w, rows);                                       \
+        for (int m = 0; m < 2; m++) BP_EACH_LANE S[(2 * (b) + m) * BP_L + lane] += rows[m * BP_L + lane];                        \
+        for (int m = 0; m < (slopes); m++)                                                                                       \
+            BP_EACH_LANE G[(BP_##b##_FIRST_SLOPE + m) * BP_L + lane] += rows[(2 + m) * BP_L + lane];                             \
+    }
+
+/* Sums over the balls of each bearing: F cos, F sin. */
+BP_INLINE void bp_lane_sums(const bp_lane_numbers *n, const double *restrict w, const double *restrict r, double *restrict S)
+{
+    double *G = NULL;
+    (void)G;
+    for (int i = 0; i < BP_NS * BP_L; i++) S[i] = 0.0;
+#define BP_SUM(b) BP_LANE_SUM(b, forces, 0)
+    BP_EACH_BEARING(BP_SUM)
+#undef BP_SUM
+}
+
+/* The same, and the sums G of the slopes. */
+BP_INLINE void bp_lane_sums_and_slopes(const bp_lane_numbers *n, const double *restrict w, const double *restrict r, double *restrict S,
+                                       double *restrict G)
+{
+    for (int i = 0; i < BP_NS * BP_L; i++) S[i] = 0.0;
+    for (int i = 0; i < BP_NG * BP_L; i++) G[i] = 0.0;
+#define BP_SUM(b) BP_LANE_SUM(b, slopes, BP_##b##_SLOPES)
+    BP_EACH_BEARING(BP_SUM)
+#undef BP_SUM
+}
+
+/* dx/dt at a state, for stage variables w that hold for its time. */
+static inline void bp_lane_rate(const bp_lane_numbers *n, const double *restrict w, const double *restrict x, double *restrict dx)
+{
+    double r[BP_NR * BP_L] BP_ALIGNED, S[BP_NS * BP_L] BP_ALIGNED;
+    bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
+    bp_lane_sums(n, w, r, S);
+    for (int k = 0; k < BP_NQ; k++) BP_EACH_LANE dx[k * BP_L + lane] = x[(BP_NQ + k) * BP_L + lane];
+    bp_member_acceleration_lanes(x, S, r, n->u, n->p, n->c, w, dx + BP_NQ * BP_L);
+}
+
+/* dx/dt, the blocks A = da/dq and B = da/dv of its Jacobian, and the partial time derivative of a. */
+static inline void bp_lane_linearize(const bp_lane_numbers *n, const double *restrict w, const double *restrict wt, const double *restrict x,
+                                     double *restrict dx, double *restrict A, double *restrict B, double *restrict at)
+{
+    double r[BP_NR * BP_L] BP_ALIGNED, S[BP_NS * BP_L] BP_ALIGNED, G[BP_NG * BP_L] BP_ALIGNED;
+    bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
+    bp_lane_sums_and_slopes(n, w, r, S, G);
+    for (int k = 0; k < BP_NQ; k++) BP_EACH_LANE dx[k * BP_L + lane] = x[(BP_NQ + k) * BP_L + lane];
+    bp_member_acceleration_lanes(x, S, r, n->u, n->p, n->c, w, dx + BP_NQ * BP_L);
+    bp_member_acceleration_jacobian_lanes(x, S, G, r, n->u, n->p, n->c, w, A, B);
+    bp_member_acceleration_rate_lanes(x, S, G, r, n->u, n->p, n->c, w, wt, at);
+}
+
+/* Third power of a ball's load, and its share in the means over the balls. */
+BP_INLINE void bp_lane_powers(const double *restrict force, double share, double *restrict cubes, double *restrict power)
+{
+    BP_EACH_LANE {
+        const double load = force[lane] > 0.0 ? 1e-3 * force[lane] : 0.0, cube = load * load * load;
+        cubes[lane] = cube;
+        power[lane] += share * cube;
+        power[BP_L + lane] += share * (cube * bp_cube_root(load));
+    }
+}
+
+/* Channels of the balls (see reductions.h) in lanes: for each bearing four quantities of the most loaded ball, then, where they are wanted,
+   three powers of the loads; and then the third powers of all balls. */
+static inline void bp_lane_ball_channels(const bp_lane_numbers *n, const bp_lane_angles *restrict angles, double theta,
+                                         const double *restrict t, const double *restrict h, const double *restrict x, int powers,
+                                         double *restrict value, double *restrict cubes)
+{
+    double w[BP_NW * BP_L] BP_ALIGNED, r[BP_NR * BP_L] BP_ALIGNED;
+    double C[BP_NA * BP_L] BP_ALIGNED, S[BP_NA * BP_L] BP_ALIGNED, time[BP_L] BP_ALIGNED;
+    bp_lane_turn(angles, theta, t, h, C, S, time);
+    bp_member_cage_turned_lanes(C, S, time, n->u, n->p, n->c, w);
+    bp_member_relative_lanes(x, n->u, n->p, n->c, w, r);
+    double *power = value + 4 * BP_BEARINGS * BP_L;
+    for (int i = 0; i < 3 * BP_BEARINGS * BP_L; i++) power[i] = 0.0;
+#define BP_CHANNEL(b)                                                                                                            \
+    for (int j = 0; j < BP_##b##_BALLS; j++) {                                                                                   \
+        double co[BP_L] BP_ALIGNED, si[BP_L] BP_ALIGNED, rows[4 * BP_L] BP_ALIGNED, *to = value + 4 * (b) * BP_L;                \
+        bp_lane_direction(bp_##b##_cos[j], bp_##b##_sin[j], r + (BP_RELATIVE * (b) + 5) * BP_L, co, si);                                         \
+        bp_member_##b##_contact_lanes(co, si, r + BP_RELATIVE * (b) * BP_L, n->p, n->c, w, rows);                                          \
+        _Pragma("omp simd")                                                                                                      \
+        for (int i = 0; i < 4 * BP_L; i++) to[i] = j == 0 || rows[i] > to[i] ? rows[i] : to[i];                                  \
+        if (powers)                                                                                                              \
+            bp_lane_powers(rows, 1.0 / BP_##b##_BALLS, cubes + (BP_##b##_FIRST_BALL + j) * BP_L, power + 3 * (b) * BP_L);        \
+    }
+    BP_EACH_BEARING(BP_CHANNEL)
+#undef BP_CHANNEL
+    for (int b = 0; b < BP_BEARINGS && powers; b++)
+        BP_EACH_LANE power[(3 * b + 2) * BP_L + lane] = bp_nine_tenths(power[(3 * b + 1) * BP_L + lane]);
+}
+
+#endif
