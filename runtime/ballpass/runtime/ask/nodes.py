@@ -59,7 +59,7 @@ class Edges:
     slopes : their derivatives along the directions, shape (edges, directions) [s/unit]
     first : index of the edge at which the time that counts begins
     window : the time that counts
-    kinks : indices of edges that are kinks of outputs, where no load switches
+    kinks : indices of edges that are kinks of outputs, or passages of windows' edges, within a segment of the driver
     """
 
     times: Array
@@ -142,18 +142,23 @@ def make_edges(
     return Edges(times=times, slopes=columns, first=first, window=window)
 
 
-def with_kinks(edges: Edges, times: Sequence[float]) -> Edges:
-    """Edges with further ones at `times`, in order, that keep their place between the neighbouring ones.
+def with_kinks(edges: Edges, kinks: Sequence[float], times: Array, own: Array) -> Edges:
+    """Edges with further ones, in order: kinks, that keep their place between the edges, and `times`, that move.
 
     Nothing jumps at a kink, so that any motion of it is right; this one spares turns that get longer from being cut.
+
+    Parameters
+    ----------
+    own : derivatives of `times` along the directions, shape (times, directions) [s/unit]
     """
-    if not times:
+    if not len(kinks) + len(times):
         return edges
+    times = np.concatenate([kinks, times])
     every = np.concatenate([edges.times, times])
     segment = np.searchsorted(edges.times, times) - 1
     part = ((times - edges.times[segment]) / np.diff(edges.times)[segment])[:, None]
     between = edges.slopes[segment] + part * (edges.slopes[segment + 1] - edges.slopes[segment])
-    slopes = np.concatenate([edges.slopes, between])
+    slopes = np.concatenate([edges.slopes, between[: len(kinks)], own])
     order = np.argsort(every, kind="stable")
     places = np.flatnonzero(order >= len(edges.times))
     return Edges(

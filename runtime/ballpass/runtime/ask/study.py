@@ -38,10 +38,11 @@ from ballpass.runtime.ask.panels import (
     split,
     uniform_panels,
 )
+from ballpass.runtime.ask.passages import Passages, find_passages
 from ballpass.runtime.ask.quantity_location import Place, place_of, place_slope
 from ballpass.runtime.ask.quantity_records import Estimate, Mark, Quantity, View
 from ballpass.runtime.ask.static import at_rest
-from ballpass.runtime.ask.track import Outlook, Signal, Stepping, Track, depends, follow
+from ballpass.runtime.ask.track import Outlook, Signal, Stepping, Track, depends, follow, jumps
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -161,10 +162,19 @@ class Study:
         Raises
         ------
         RequestError
-            An unknown parameter, or several loads that switch at one time.
+            An unknown parameter, several loads that switch at one time, or an extreme of an output that jumps at the
+            edge of a window whose time the motion decides.
         SimulationError
             The computation failed.
         """
+        for item in self._moving:
+            if KINDS[item.kind].extremes and jumps(self.model, item.channel):
+                raise RequestError(
+                    f"{item.name}: the driver's angle is a state, and {item.channel} jumps where a load within a "
+                    "window of that angle begins or ends; on which side of the jump the extreme is, is not followed. "
+                    "Allowed: extremes of states, forces of balls and all else that does not jump; means and integrals "
+                    "of all. Or give the load as a table over the angle, with flanks as steep as they are."
+                )
         return self._course(numbers, Chain(self.model, numbers, names), stepping)
 
     def _course(self, numbers: Numbers, chain: Chain | None, stepping: Stepping) -> Course:
@@ -182,9 +192,11 @@ class Study:
             track, row, panels = self._resolve(numbers, edges, panels, stepping)
             asked = [(item, kind) for item in self._moving for kind in KINDS[item.kind].extremes]
             extremes = self._extremes(numbers, asked, track, row, stepping)
-            if self._kinked:
-                broken = with_kinks(edges, self._kinks(numbers, track))
-                extremes = {key: _moved(item, edges, broken) for key, item in extremes.items()}
+            if self._kinked or self.model.manifest.edges:
+                passages = find_passages(self.model, numbers, track, stepping, chain)
+                kinks = self._kinks(numbers, track, passages.times) if self._kinked else []
+                broken = with_kinks(edges, kinks, passages.times, passages.slopes)
+                extremes = {key: _moved(item, edges, broken, passages) for key, item in extremes.items()}
                 edges, panels = broken, between_kinks(panels, edges, broken)
         points = list(dict.fromkeys((item.segment, item.fraction) for item in extremes.values()))
         plan = with_points(plan_of(panels, edges), points)
@@ -241,7 +253,7 @@ class Study:
 
         Not where outputs have kinks: panels that are fine where the kinks were would err by how far those have moved.
         """
-        if self._summed and not self._kinked:
+        if self._summed and not self._kinked and not self.model.manifest.edges:
             edges = make_edges(self.model, numbers, self.window(numbers))
             _, _, self._panels = self._resolve(numbers, edges, uniform_panels(edges, self.per_turn), stepping)
 
@@ -301,7 +313,7 @@ class Study:
             for item in self._moving
         )
 
-    def _kinks(self, numbers: Numbers, track: Track) -> list[float]:
+    def _kinks(self, numbers: Numbers, track: Track, passages: Array) -> list[float]:
         """Times of kinks of the outputs of the balls, and of those that a stop changes."""
         nodes, edges, bearings = track.nodes, track.edges, self.model.manifest.bearings
         ranked = {
@@ -319,7 +331,7 @@ class Study:
             [signals[name].value for name in sorted(ranked)],
             one_sided=any(bearing.damping.corner_at_rest for bearing in bearings),
             length=edges.window.duration,
-            edges=edges.times,
+            edges=np.concatenate([edges.times, passages]),
         )
 
     def _extremes(
@@ -364,10 +376,17 @@ def _appended(nodes: Nodes, edges: Edges, time: float, slope: Array, kind: Place
     )
 
 
-def _moved(extreme: Extreme, edges: Edges, broken: Edges) -> Extreme:
-    """An extreme found between edges, told in those with kinks: on the same side where it lies at an edge."""
+def _moved(extreme: Extreme, edges: Edges, broken: Edges, passages: Passages) -> Extreme:
+    """An extreme found between edges, told in those with kinks: on the same side where it lies at an edge.
+
+    One where a load begins or ends is at the corner of what the load drives, and moves with it.
+    """
     if not broken.kinks:
         return extreme
+    beside = np.flatnonzero(np.abs(passages.times - extreme.time) < passages.near)
+    if len(beside):
+        edge = int(np.searchsorted(broken.times, passages.times[beside[0]]))
+        return replace(extreme, segment=edge - 1, fraction=1.0)
     if extreme.fraction in (0.0, 1.0):
         edge = edges.times[extreme.segment + int(extreme.fraction)]
         segment = int(np.searchsorted(broken.times, edge)) - int(extreme.fraction)

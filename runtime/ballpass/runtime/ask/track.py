@@ -319,3 +319,12 @@ class Outlook:
             (every,) = group.call([inputs[name] for name in group.name_in()])
             found.append(every[rows.indices.tolist()])
         return found
+
+
+def jumps(model: LoadedModel, channel: str) -> bool:
+    """Whether a channel depends on which side of a window's edge an angle is that is a state."""
+    windows = {k for k in model.manifest.borders if model.manifest.inputs[k].windows}
+    if not windows or channel in model.states:
+        return False
+    outlook = Outlook(model, [channel])
+    return bool(windows & set(outlook._function(outlook._all_rows).jac_sparsity(0, 2).get_col()))

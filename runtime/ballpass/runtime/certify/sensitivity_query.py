@@ -50,7 +50,7 @@ from ballpass.runtime.native.stepper import METHODS, Family
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.direction_scales import ANGLE
-from ballpass.runtime.run.locating import refuse_jumps
+from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, refuse_jumps
 from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.request import TOLERANCES, Request, asked_length
@@ -203,7 +203,13 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
             Request(cycles=query.span.cycles, duration=query.span.duration, transient_cycles=0.0),
             moving,
         )
-    stepping = Stepping(family=family, rtol=query.rtol, magnitude=magnitude, sensitivity_rtol=query.sensitivity_rtol)
+    stepping = Stepping(
+        family=family,
+        rtol=query.rtol,
+        magnitude=magnitude,
+        kinks=LOCATED if manifest.borders else STEPPED_OVER,  # as the steps with derivatives
+        sensitivity_rtol=query.sensitivity_rtol,
+    )
 
     tell("differentiating", 0.0)
     course, tolerance = _differentiate(study, numbers, names, stepping)

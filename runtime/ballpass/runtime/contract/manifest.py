@@ -286,10 +286,20 @@ class Manifest:
         return self.bearings[0] if self.bearings else None
 
     @property
+    def borders(self) -> tuple[int, ...]:
+        """Inputs that are borders: of windows of an angle that is a state, and of stops."""
+        return tuple(k for k, item in enumerate(self.inputs) if item.kind == "border")
+
+    @property
     def stops(self) -> tuple[str, ...]:
         """Compressions of all stops, among the quantities."""
-        borders = (item.name for item in self.inputs if item.kind == "border" and not item.windows)
-        return tuple(f"{name.removeprefix('border.')}.compression" for name in borders)
+        names = (self.inputs[k].name for k in self.borders if not self.inputs[k].windows)
+        return tuple(f"{name.removeprefix('border.')}.compression" for name in names)
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """Parameters that are edges of windows of an angle that is a state."""
+        return tuple(edge for k in self.borders for window in self.inputs[k].windows for edge in window)
 
     def function(self, name: str) -> FunctionInfo:
         """Signature of a generated function; KeyError where there is none of that name."""

@@ -31,7 +31,9 @@ static const double BP_FAR = 2.0, BP_LEAST_PACE = 0.25, BP_NEAREST = 0.1, BP_AST
 
 /* Events before this one are let go for good.  The derivative of a force of a ball does not jump at its kinks, and the clock of sqrt_time.h is
    not differentiated: a run with derivatives locates the events of loads alone. */
-#if defined BALLPASS_SENSITIVITIES && defined BP_HAS_STOPS
+#if defined BALLPASS_SENSITIVITIES && defined BP_HAS_WINDOWS
+enum { BP_FIRST_LOCATED = BP_FIRST_WINDOW }; /* stops come behind them */
+#elif defined BALLPASS_SENSITIVITIES && defined BP_HAS_STOPS
 enum { BP_FIRST_LOCATED = BP_FIRST_STOP };
 #else
 enum { BP_FIRST_LOCATED = 0 };

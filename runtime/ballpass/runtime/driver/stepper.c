@@ -127,6 +127,7 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
                             ? locate(run, start, t, &h, &error, resolution, aimed, longest)
                             : NO_KINK;
         if (met == AT_ONCE) {
+            tangent_switch(run, t);
             turn_sides(run, start + t, tried);
             if (is_explicit(run->method)) first_slope(run, t);
             else linearize(run, t, 1);
@@ -156,7 +157,10 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
             }
             if (met == NO_KINK) remember_touch(run, h, factor);
             t = last ? length : t + h;
-            if (met == CUT) turn_sides(run, start + t, tried);
+            if (met == CUT) {
+                tangent_switch(run, t);
+                turn_sides(run, start + t, tried);
+            }
             sides_move_on(run);
             if (has_stalled(run)) {
                 result->time = start + t;

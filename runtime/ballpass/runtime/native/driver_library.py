@@ -56,8 +56,8 @@ _REDUCTIONS = (*_DERIVATIVES, "ensemble_kernels.h")
 #: with derivatives; with steps that end on the kinks of the laws.
 PLAIN = DriverSources(kind="stepper", headers=_REDUCTIONS, flags=("-DBALLPASS_REDUCTIONS",))
 DIFFERENTIATING = DriverSources(kind="stepper", headers=_DERIVATIVES, flags=("-DBALLPASS_SENSITIVITIES",))
-#: With derivatives, where stops are, whose derivatives jump: steps end on their kinks.
-DIFFERENTIATING_STOPS = DriverSources(
+#: With derivatives, where stops or windows of an angle that is a state are, at which derivatives jump: steps end there.
+DIFFERENTIATING_LOCATED = DriverSources(
     kind="differentiating",
     headers=(*_DERIVATIVES, SWITCHES),
     flags=("-DBALLPASS_SENSITIVITIES", "-DBALLPASS_LOCATED"),

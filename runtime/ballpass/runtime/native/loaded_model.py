@@ -17,7 +17,7 @@ from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.compilers import find_compiler
 from ballpass.runtime.native.driver_library import (
     DIFFERENTIATING,
-    DIFFERENTIATING_STOPS,
+    DIFFERENTIATING_LOCATED,
     ENSEMBLE,
     LOCATING,
     PLAIN,
@@ -98,7 +98,7 @@ class LoadedModel(Functions):
     @property
     def differentiating_stepper(self) -> Stepper:
         """The stepper with the derivatives of its steps, compiled when first asked for; errors as for `stepper`."""
-        return self._driver(Stepper, DIFFERENTIATING_STOPS if self.manifest.stops else DIFFERENTIATING)
+        return self._driver(Stepper, DIFFERENTIATING_LOCATED if self.manifest.borders else DIFFERENTIATING)
 
     @property
     def locating_stepper(self) -> Stepper:

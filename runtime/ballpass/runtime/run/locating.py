@@ -69,8 +69,8 @@ def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float
     Returns
     -------
     Kinks
-        By default ``located`` at tight tolerances of ``stepper``, and at all where loads act within windows of an
-        angle that is a state; else ``stepped-over``.
+        By default ``located`` at tight tolerances of ``stepper``, and at all of every method of the stepper where
+        loads act within windows of an angle that is a state, or at stops; else ``stepped-over``.
 
     Raises
     ------
@@ -78,14 +78,14 @@ def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float
         Another word, or kinks are to be located by a method that cannot.
     """
     if asked is None:
-        tight = rtol <= tight_below(manifest)
-        return LOCATED if method == "stepper" and tight and has_kinks(manifest) else STEPPED_OVER
+        tight = rtol <= tight_below(manifest) and has_kinks(manifest)
+        return LOCATED if tight and (method == "stepper" or (manifest.borders and method in STEPPERS)) else STEPPED_OVER
     return check_located(asked, method)
 
 
 def tight_below(manifest: Manifest) -> float:
     """Tolerance from which on `stepper` locates kinks by itself [1]."""
-    if any(item.kind == "border" for item in manifest.inputs):
+    if manifest.borders:
         return ALWAYS
     return TIGHT_JUMPS if any(word == "discontinuous" for _, word in manifest.smoothness) else TIGHT
 
@@ -116,7 +116,9 @@ def stepper_for(model: LoadedModel, kinks: Kinks) -> Stepper:
 
 
 def refuse_jumps(manifest: Manifest, what: str) -> None:
-    """Refuse derivatives of a motion whose forces jump at places that the state decides.
+    """Refuse derivatives of a motion with laws whose force jumps at contact.
+
+    Loads that jump at the edges of windows are no reason: steps end there, and the derivative's jump is known.
 
     Parameters
     ----------
@@ -125,17 +127,9 @@ def refuse_jumps(manifest: Manifest, what: str) -> None:
     Raises
     ------
     RequestError
-        Names the laws, or the loads that act within windows of an angle that is a state.
+        Names the laws.
     """
-    jumping = [law for law, smoothness in manifest.smoothness if smoothness == "discontinuous"]
-    loads = [law.removeprefix("gate.") for law in jumping if law.startswith("gate.")]
-    if loads:
-        raise RequestError(
-            f"{what}: the driver's angle is a state, and the load {' and '.join(loads)} acts within windows of its "
-            "angle: the force jumps when the motion gets there, and the derivative of the steps is not that of the "
-            "motion. Allowed: continuous loads. Give the load as a table over the angle, with flanks as steep as they "
-            "are."
-        )
+    jumping = [law for law, word in manifest.smoothness if word == "discontinuous" and not law.startswith("gate.")]
     if jumping:
         raise RequestError(
             f"{what}: the {' and '.join(jumping)} law of this scene is discontinuous (its force jumps at "
