@@ -5,6 +5,8 @@ Each case is an edit of a shipped scene.
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -622,3 +624,45 @@ def test_a_one_way_bearing_has_no_place_in_a_linkage_with_play(scene_text: Calla
     twice = text.replace('joint = "B"', 'joint = "C"', 1).replace('body = "crank"', 'body = "rod"')
     with pytest.raises(SceneError, match="another bearing gives this joint its play"):
         scene_from_text(twice, "press")
+
+
+DUTY = '\n[duty.work]\nshare = 0.7\n[duty.idle]\nshare = 0.3\nset.mechanism.driver.speed = "300 rpm"\n'
+
+
+def test_states_of_a_duty_cycle_take_numbers_like_any_other_and_compile_nothing() -> None:
+    scene, plain = (scene_from_text(PRESS + more, "press") for more in (DUTY, ""))
+    assert [state.share for state in scene.duty] == [0.7, 0.3]
+    assert dict(scene.duty[1].parameters) == {"mechanism.driver.speed": pytest.approx(10.0 * math.pi)}
+    film = '\n[bearing.lubrication]\nviscosity = "30 mm^2/s"\ncontamination = 0.5\n'
+    assert scene.structure() == plain.structure() == scene_from_text(PRESS + film, "press").structure()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "words"),
+    [
+        ("share = 0.3", "share = 0.2", "duty", "add a state for the rest"),
+        ("share = 0.3", "share = -0.3", "duty.idle.share", "delete the state"),
+        ("driver.speed", "driver.sped", "duty.idle.set.mechanism.driver.sped", "did you mean"),
+        ('speed = "300 rpm"', 'speed = "300 mm"', "duty.idle.set.mechanism.driver.speed", "rpm"),
+        ("set.mechanism.driver.speed", "set.bearing.balls", "duty.idle.set.bearing.balls", ""),
+        ('speed = "300 rpm"', "speed = true", "duty.idle.set.mechanism.driver.speed", "one number"),
+        ("set.mechanism.driver.speed", "set.bearing.ball_diameter", "duty.idle.set.bearing.ball_diameter", "rpm|unit"),
+        ("[duty.work]", "[bearing.lubrication]\ncontamination = 0.5\n[duty.work]", "bearing.lubrication", "add visc"),
+        (
+            "[duty.work]",
+            "[bearing.lubrication]\nviscosity_ratio = 0.05\ncontamination = 0.5\n[duty.work]",
+            "bearing.lubrication.viscosity_ratio",
+            "thicker",
+        ),
+        (
+            "[duty.work]",
+            "[bearing.lubrication]\nviscosity_ratio = 1\ncontamination = 1.5\n[duty.work]",
+            "bearing.lubrication.contamination",
+            "cleanliness",
+        ),
+    ],
+)
+def test_faults_of_duty_and_film_name_their_place(old: str, new: str, key: str, words: str) -> None:
+    found = {fault.key: fault.remedy for fault in faults(PRESS + edited(DUTY, old, new)).faults}
+    assert key in found
+    assert re.search(words, found[key])

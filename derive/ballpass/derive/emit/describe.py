@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from ballpass.derive.emit.signature import catalogue_info, run_info, signature, versions
+from ballpass.derive.emit.signature import catalogue_info, duty_info, lubrication_info, run_info, signature, versions
 from ballpass.derive.lower.functions import Functions, operations
 from ballpass.derive.mechanism.forces import drawn_forces
 from ballpass.derive.reading.usual import usual_ranges
@@ -97,6 +97,7 @@ def describe(system: System, functions: Functions, source: str, files: tuple[tup
         bearings=_bearings(system),
         run=run_info(scene),
         unfit=functions.unfit,
+        duty=duty_info(scene),
         files=files,
     )
 
@@ -148,6 +149,7 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
                 law=bearing.damping.law, in_deflection=law.in_deflection.value, in_rate=law.in_rate.value
             ),
             catalogue=catalogue_info(bearing),
+            lubrication=lubrication_info(bearing),
         )
         for bearing, law in zip(scene.bearings, laws, strict=True)
     )

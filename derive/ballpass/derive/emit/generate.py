@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING
 
 from ballpass.derive.emit.signature import (
     catalogue_info,
+    duty_info,
     folder_of,
     fresh_manifest,
     intact_manifest,
+    lubrication_info,
     run_info,
     signature,
     source_key,
@@ -162,8 +164,9 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> N
         title=scene.title,
         parameters=tuple(replace(p, default=values[p.name]) for p in present.parameters),
         run=run_info(scene),
+        duty=duty_info(scene),
         bearings=tuple(
-            replace(info, catalogue=catalogue_info(bearing))
+            replace(info, catalogue=catalogue_info(bearing), lubrication=lubrication_info(bearing))
             for info, bearing in zip(present.bearings, scene.bearings, strict=True)
         ),
     )

@@ -109,6 +109,21 @@ def catalogue_info(bearing: Bearing) -> mf.CatalogueInfo | None:
     )
 
 
+def lubrication_info(bearing: Bearing) -> mf.LubricationInfo | None:
+    """Film and dirt of a bearing."""
+    film = bearing.lubrication
+    if film is None:
+        return None
+    return mf.LubricationInfo(
+        viscosity_ratio=film.viscosity_ratio, viscosity=film.viscosity, contamination=film.contamination
+    )
+
+
+def duty_info(scene: Scene) -> tuple[mf.DutyInfo, ...]:
+    """The states of a scene's duty cycle."""
+    return tuple(mf.DutyInfo(name=s.name, share=s.share, parameters=s.parameters) for s in scene.duty)
+
+
 def _sources() -> str:
     """Digest of the deriving modules and the table of bearings: a changed derivation makes every artefact stale."""
     digest = hashlib.sha256()

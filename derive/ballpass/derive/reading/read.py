@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ballpass.derive.reading.read_bearing import read_bearing, read_shaft
+from ballpass.derive.reading.read_duty import duty_faults, read_duty
 from ballpass.derive.reading.read_load import read_load
 from ballpass.derive.reading.read_mechanism import read_mechanism
 from ballpass.derive.reading.recouple import Coupling, recoupled
@@ -49,7 +50,7 @@ RESERVED = (
     *("body", "driver", "force", "friction", "gate", "guide_friction", "input", "joint", "load", "phase", "point"),
     *("reaction", "spring", "stop", "torque", "torsion_spring", "torsion_stop", "weight"),
 )
-_TABLES = ("mechanism", "shaft", "load", "loads", "bearing", "bearings", "run")
+_TABLES = ("mechanism", "shaft", "load", "loads", "bearing", "bearings", "run", "duty")
 
 
 def read_scene(path: str | Path, coupling: Coupling | None = None) -> Scene:
@@ -124,6 +125,7 @@ def _scene(text: str, name: str, source: str | None, coupling: Coupling | None =
     data = with_columns(data, None if source is None else Path(source).parent, collector.faults)
     scene = _read(Table(collector, (), data), name)
     faults = [*collector.faults, *value_faults(scene, collector.given)]
+    faults = faults or duty_faults(scene)
     if not faults:
         return replace(scene, lines=collector.lines)
     topology = ("mechanism.joints", "mechanism.driver")
@@ -193,17 +195,18 @@ def _read(root: Table, name: str) -> Scene:
             _check_loads_beside(root, loads, bearings)
         run, outputs = _read_run(root.table("run", "cycles or duration, and outputs"))
         quantities = tuple(quantities_of((mechanism, shaft, loads, bearings)))
-    return Scene(
-        name=name,
-        title=title,
-        mechanism=mechanism,
-        shaft=shaft,
-        loads=loads,
-        bearings=bearings,
-        outputs=outputs,
-        run=run,
-        quantities=quantities,
-    )
+        scene = Scene(
+            name=name,
+            title=title,
+            mechanism=mechanism,
+            shaft=shaft,
+            loads=loads,
+            bearings=bearings,
+            outputs=outputs,
+            run=run,
+            quantities=quantities,
+        )
+        return replace(scene, duty=read_duty(root.table("duty"), scene)) if root.has("duty") else scene
 
 
 def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None) -> tuple[Bearing, ...]:

@@ -9,6 +9,7 @@ from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.reading.read_coupling import read_count, read_coupling, read_inner_body, refuse_effects
 from ballpass.derive.reading.read_designation import fill_by_designation
+from ballpass.derive.reading.read_duty import read_lubrication
 from ballpass.derive.reading.read_fit import mounted
 from ballpass.derive.scene.records import (
     FRAME,
@@ -92,6 +93,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             outer=support,
             initial=_read_initial(table, moving_outer=support is not None),
             catalogue=catalogue,
+            lubrication=read_lubrication(table),
         )
 
 

@@ -49,7 +49,7 @@ def recoupled(data: dict[str, Any], coupling: Coupling) -> dict[str, Any]:
     if not kept:
         _refuse(f"no bearing is at the driver's joint {driver}", "a bearing there, which the paper's model can load")
     run = {**data.get("run", {}), "outputs": ["drive_torque"]}
-    rest = {key: value for key, value in data.items() if key not in ("bearing", "bearings")}
+    rest = {key: value for key, value in data.items() if key not in ("bearing", "bearings", "duty")}
     title = f"{data.get('title', 'The scene')}, {coupling}"
     return {**rest, "title": title, "run": run, **({"bearings": kept} if several else {"bearing": kept[""]})}
 

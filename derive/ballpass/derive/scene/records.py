@@ -395,6 +395,19 @@ class Catalogue:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Lubrication:
+    """Film and dirt, for the life factor of ISO 281; nothing that is derived depends on it.
+
+    Of `viscosity_ratio` [1] and kinematic `viscosity` at the bearing's temperature [m^2/s] one is given;
+    `contamination` is e_C [1].
+    """
+
+    viscosity_ratio: float | None
+    viscosity: float | None
+    contamination: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Bearing:
     """A deep groove ball bearing.
 
@@ -404,7 +417,8 @@ class Bearing:
     `coupling` two-way: its play moves the bodies of the joint; `inner_body` carries the inner ring, `count` bearings
     stand side by side (None: one).
     `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
-    `outer` is None for a fixed outer ring.  `catalogue` is None where the scene says nothing of that kind.
+    `outer` is None for a fixed outer ring.  `catalogue` and `lubrication` are None where the scene says nothing of
+    that kind.
     """
 
     name: str
@@ -425,6 +439,7 @@ class Bearing:
     outer: OuterRing | None
     initial: InitialState
     catalogue: Catalogue | None = None
+    lubrication: Lubrication | None = None
 
     @property
     def prefix(self) -> str:
@@ -450,11 +465,21 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DutyState:
+    """A state of a duty cycle: its share of the time [1], and the numbers that differ then, by path [SI]."""
+
+    name: str
+    share: float
+    parameters: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """A checked scene.
 
     `outputs` are the patterns of the file (``"inner.*"``); `derive` resolves them.  `quantities` lists every number
-    in the order of the file's schema: the model's parameters.  `lines` says where its keys stand, for messages.
+    in the order of the file's schema: the model's parameters.  `duty` is for lives alone.  `lines` says where its keys
+    stand, for messages.
     """
 
     name: str
@@ -466,6 +491,7 @@ class Scene:
     outputs: tuple[str, ...]
     run: Run
     quantities: tuple[Quantity, ...]
+    duty: tuple[DutyState, ...] = ()
     lines: LineIndex = field(default=LineIndex(lines={}), repr=False, compare=False)
 
     @property
@@ -493,7 +519,7 @@ class Scene:
 def _structure(value: Any) -> object:
     if isinstance(value, Quantity):
         return (value.path, value.unit, value.description, value.latex)
-    if isinstance(value, Catalogue):
+    if isinstance(value, Catalogue | Lubrication):
         return None
     if is_dataclass(value) and not isinstance(value, type):
         return (type(value).__name__, *((f.name, _structure(getattr(value, f.name))) for f in fields(value)))

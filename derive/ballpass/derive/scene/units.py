@@ -75,6 +75,7 @@ KINDS: dict[str, tuple[str, str]] = {
     "Pa": ("an elastic modulus", "207 GPa"),
     "Hz": ("a frequency", "50 Hz"),
     "K": ("a difference of temperatures", "10 K"),
+    "m^2/s": ("a kinematic viscosity", "32 mm^2/s"),
 }
 
 

@@ -210,6 +210,24 @@ class CatalogueInfo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LubricationInfo:
+    """Film and dirt: see `ballpass.derive.scene.records.Lubrication`; viscosity in m^2/s."""
+
+    viscosity_ratio: float | None
+    viscosity: float | None
+    contamination: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DutyInfo:
+    """A state of a duty cycle: its share of the time [1], and the parameters that differ then, (name, value) [SI]."""
+
+    name: str
+    share: float
+    parameters: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BearingInfo:
     """What observables need of a bearing: balls, and the names of its kinematic parameters and constants.
 
@@ -228,6 +246,7 @@ class BearingInfo:
     outer_ring: bool
     damping: DampingInfo
     catalogue: CatalogueInfo | None = None
+    lubrication: LubricationInfo | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -278,6 +297,7 @@ class Manifest:
     unfit: str = ""  # why the stepper's kernels do not take the model; empty where they do
     relations: tuple[tuple[str, float, str], ...] = ()  # (name, factor, other): value > factor * value of the other
     usual: tuple[UsualInfo, ...] = ()
+    duty: tuple[DutyInfo, ...] = ()
     files: tuple[tuple[str, str], ...] = field(default=())  # file name -> sha256
 
     @property
