@@ -33,6 +33,7 @@ from ballpass.runtime.run.start import RunEnd, Start
 Initial = Sequence[float] | np.ndarray | RunEnd | Literal["equilibrium"] | None
 
 if TYPE_CHECKING:
+    from ballpass.runtime.ask.life_records import LifeReport
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport
     from ballpass.runtime.run.solution import Solution
 
@@ -373,6 +374,45 @@ class Model(PointModel):
             progress=progress,
         )
         return settle(self, numbers, request, most)
+
+    def life(
+        self,
+        cycles: float | None = None,
+        *,
+        transient: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        rtol: float | None = None,
+        method: str | None = None,
+        initial: Initial = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> LifeReport:
+        """Strength, rating life and wear of every bearing, over the scene's duty cycle where it has one.
+
+        Parameters
+        ----------
+        cycles : turns.  Default: as many as the lives take to settle (see `ballpass.runtime.run.load_history`); the
+            report says how many that were, and `unsettled` whether more would change a life
+        others : as for `reduce`; overrides of a state of the duty cycle come behind those given here
+
+        Raises
+        ------
+        RequestError
+            A wrong request, a linkage that cannot be assembled, or a scene without bearing.
+        SimulationError
+            The computation failed.
+        """
+        from ballpass.runtime.ask.life_report import life_report
+
+        numbers = self._runnable(parameters)
+        request = Request(
+            cycles=cycles,
+            transient_cycles=transient,
+            rtol=rtol,
+            method=method,
+            initial=self._start(numbers, initial),
+            progress=progress,
+        )
+        return life_report(self, dict(parameters or {}), request)
 
     def simulate_many(
         self,

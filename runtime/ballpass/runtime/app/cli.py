@@ -18,6 +18,7 @@ from ballpass.runtime.app.commands.asked import Asked, faults_of_numbers, read_a
 from ballpass.runtime.app.commands.bearings import bearings
 from ballpass.runtime.app.commands.explain import explain
 from ballpass.runtime.app.commands.jacobian import jacobian, linearize
+from ballpass.runtime.app.commands.life import life
 from ballpass.runtime.app.commands.sensitivity import sensitivity
 from ballpass.runtime.app.commands.shared import (
     Stages,
@@ -286,7 +287,7 @@ def export(
     typer.echo(str(folder))
 
 
-for _command in (bearings, explain, jacobian, linearize, sensitivity, sweep, trade):
+for _command in (bearings, explain, jacobian, life, linearize, sensitivity, sweep, trade):
     app.command()(_command)
 
 

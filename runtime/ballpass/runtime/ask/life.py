@@ -15,9 +15,9 @@ from ballpass.runtime.ask.quantity_records import Estimate, Quantity, View
 from ballpass.runtime.contract import BearingInfo
 from ballpass.runtime.native.reduction_rows import SECTORS
 from ballpass.runtime.ratings.life import MILLION
-from ballpass.runtime.ratings.of_bearing import ratings_of
+from ballpass.runtime.ratings.of_bearing import ratings_of, refuse_swinging
 from ballpass.runtime.ratings.readings import KILO
-from ballpass.runtime.run.inputs import TURN
+from ballpass.runtime.run.inputs import TURN, shaft_speed
 
 Array = NDArray[np.float64]
 
@@ -35,8 +35,15 @@ def bearing_of(view: View, quantity: Quantity) -> BearingInfo:
 
 
 def life(view: View, quantity: Quantity, readings: Sequence[str]) -> Estimate:
-    """Life by the reading that gives the shortest one [turns], see `ballpass.runtime.ratings.readings`."""
+    """Life by the reading that gives the shortest one [turns], see `ballpass.runtime.ratings.readings`.
+
+    Raises
+    ------
+    RequestError
+        The bearing does not turn.
+    """
     bearing = bearing_of(view, quantity)
+    refuse_swinging(bearing, view.numbers.values, shaft_speed(view.manifest, view.numbers.values))
     balls = _ball_ratings(view, bearing)
     loads = _equivalent_loads(view, quantity, bearing, readings)
     found = {reading: _reference_life(balls, loads[reading]) for reading in readings}

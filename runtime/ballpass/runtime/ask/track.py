@@ -223,25 +223,31 @@ class Outlook:
         return {"t": track.local, "x": track.x, "u": track.u, "p": numbers.p, "c": numbers.c}
 
     def _values(self, track: Track, numbers: Numbers) -> dict[str, Signal]:
-        found: dict[str, Signal] = {}
+        found = self.outputs_at(len(track.nodes), self._given(track, numbers))
+        return {name: Signal(value=value, slope=np.zeros((*value.shape, 0))) for name, value in found.items()}
+
+    def outputs_at(self, count: int, given: Mapping[str, Array]) -> dict[str, Array]:
+        """Channels that are no states, at points, each of shape (points, columns).
+
+        Parameters
+        ----------
+        given : t, x and u of every point, and p, c
+        """
+        found: dict[str, Array] = {}
         if self._more:
             if not hasattr(self._own, "more"):
                 self._own.more = Loop(self._function(self._more_rows), ("t", "x", "u"))
-            every = self._own.more(len(track.nodes), self._given(track, numbers))["g"]
+            every = self._own.more(count, given)["g"]
             column = 0
             for name, size in self._columns[len(self._outputs) :]:
-                found[name] = Signal(value=every[:, column : column + size], slope=np.zeros((len(every), size, 0)))
+                found[name] = every[:, column : column + size]
                 column += size
         if not self._outputs:
             return found
         infos = self._model.manifest.outputs
-        loop = self._model.loop("outputs", ("t", "x", "u"))
-        results = loop(len(track.nodes), self._given(track, numbers))
+        results = self._model.loop("outputs", ("t", "x", "u"))(count, given)
         columns = dict(zip((info.name for info in infos), results.values(), strict=True))
-        return found | {
-            info.name: Signal(value=columns[info.name], slope=np.zeros((*columns[info.name].shape, 0)))
-            for info in self._outputs
-        }
+        return found | {info.name: columns[info.name] for info in self._outputs}
 
     def _differentiated(self, track: Track, numbers: Numbers, chain: Chain) -> dict[str, Signal]:
         if self._derivatives is None:

@@ -26,6 +26,7 @@ from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size
 from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
 from ballpass.runtime.native.ensemble_driver import LANE_FAMILIES
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.ratings.of_bearing import refuse_swinging
 from ballpass.runtime.ratings.readings import KINDS as LIFE
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
@@ -180,6 +181,7 @@ def simulate_many(
     if at_kinks == LOCATED and has_kinks(manifest):
         driver = driver.with_stepper(model.locating_stepper)
     members = make_members(model, columns, bounded=bounded)
+    _refuse_lives(model, chosen)
     skipped = manifest.run.transient_cycles if transient is None else real(transient)
     span = _span(model, members, cycles, duration, skipped)
     in_lanes = lanes and at_kinks != LOCATED and family in LANE_FAMILIES
@@ -242,6 +244,15 @@ def _observables(
     if faults:
         raise RequestError("\n".join(faults))
     return {name: aliases[name] for name in names}
+
+
+def _refuse_lives(model: LoadedModel, chosen: Mapping[str, tuple[str, str]]) -> None:
+    """RequestError for the life of a bearing that does not turn, whatever the numbers of a member are."""
+    asked = {channel.removesuffix("ball.force") for kind, channel in chosen.values() if kind in LIFE}
+    values = model.numbers({}).values if asked else {}
+    for bearing in model.manifest.bearings:
+        if bearing.prefix in asked:
+            refuse_swinging(bearing, values, clock.shaft_speed(model.manifest, values))
 
 
 def _fault(manifest: Manifest, name: str, aliases: Mapping[str, tuple[str, str]]) -> str:

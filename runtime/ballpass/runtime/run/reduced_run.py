@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,6 +90,18 @@ def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reduct
     SimulationError
         The computation failed.
     """
+    names = channel_names(model.manifest)
+    run = start_reducing(model, numbers, request, names)
+    run.on_to(run.end)
+    found = reductions_of(
+        model.manifest, run.row, names, end=run.state, steps=run.steps, rejected=run.rejected, turn=run.turn
+    )
+    assert found is not None  # `check_span` leaves some time
+    return found
+
+
+def start_reducing(model: LoadedModel, numbers: Numbers, request: Request, channels: Sequence[str]) -> ReducedRun:
+    """A run that reduces these channels, before its first step; see `reduce_run`."""
     run = model.manifest.run
     method = request.method or run.method
     rtol = tolerance("rtol", run.rtol if request.rtol is None else request.rtol)
@@ -103,18 +115,63 @@ def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reduct
     named = "stepper" if method == "auto" else method
     chosen = choose_kinks(request.kinks, named, model.manifest, rtol)
     looked_at = min(duration, SCALED_TURNS * turn)
-    allowed = rtol * stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn, begin)
-    names = channel_names(model.manifest)
-    row = reduction_rows(model.manifest).empty(1, start, names)[0]
-    state = initial.copy()
-    steps, rejected = integrate_reduced(
-        *(model, stepper_for(model, chosen), numbers, family, allowed, state, row, (begin + duration, turn, start)),
+    return ReducedRun(
+        model=model,
+        stepper=stepper_for(model, chosen),
+        numbers=numbers,
+        family=family,
+        tolerance=rtol * stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn, begin),
+        state=initial.copy(),
+        row=reduction_rows(model.manifest).empty(1, start, channels)[0],
+        turn=turn,
+        start=start,
+        time=begin,
+        end=begin + duration,
         progress=request.progress,
-        begun=Begun(time=begin),
     )
-    found = reductions_of(model.manifest, row, names, end=state, steps=steps, rejected=rejected, turn=turn)
-    assert found is not None  # `check_span` leaves some time
-    return found
+
+
+@dataclass(slots=True, kw_only=True)
+class ReducedRun:
+    """A run that keeps reductions, as far as it has come.
+
+    Attributes
+    ----------
+    state : at `time`, shape (states,)
+    row : the reductions so far
+    turn : time of a turn, infinite where nothing turns [s]
+    start : from when on is reduced [s]
+    time : how far it has come [s]
+    end : how far it was asked to go [s]
+    steps, rejected : so far
+    """
+
+    model: LoadedModel
+    stepper: Stepper
+    numbers: Numbers
+    family: Family
+    tolerance: np.ndarray
+    state: np.ndarray
+    row: np.ndarray
+    turn: float
+    start: float
+    time: float
+    end: float
+    progress: Callable[[float], None] | None
+    steps: int = 0
+    rejected: int = 0
+
+    def on_to(self, time: float) -> None:
+        """Integrate to a later time [s]; SimulationError where that fails."""
+        steps, rejected = integrate_reduced(
+            *(self.model, self.stepper, self.numbers, self.family, self.tolerance, self.state, self.row),
+            (time, self.turn, self.start),
+            progress=self.progress,
+            begun=Begun(time=self.time, steps=self.steps + self.rejected),
+        )
+        self.time = time
+        self.steps += steps
+        self.rejected += rejected
 
 
 def integrate_reduced(

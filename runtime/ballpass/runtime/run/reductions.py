@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.reduction_rows import (
     BALL_CHANNELS,
@@ -143,7 +143,7 @@ def reductions_of(
     if not duration > 0.0:
         return None
     return Reductions(
-        channels={name: _reduction(rows, row, name, duration) for name in names},
+        channels={name: reduction_of(rows, row, name, duration) for name in names},
         start=float(row[HEAD.index("from")]),
         duration=duration,
         end=dict(zip(rows.states, end.tolist(), strict=True)),
@@ -153,7 +153,8 @@ def reductions_of(
     )
 
 
-def _reduction(rows: ReductionRows, row: np.ndarray, channel: str, duration: float) -> Reduction:
+def reduction_of(rows: ReductionRows, row: np.ndarray, channel: str, duration: float) -> Reduction:
+    """What a row holds of a channel over its duration [s]."""
     entry = {kind: float(row[rows.column(kind, channel)]) for kind in ROWS}
     of_ball = channel in rows.balls
     return Reduction(
@@ -230,6 +231,16 @@ def channels_needed(kind: str, channel: str) -> tuple[str, ...]:
     return () if kind == "end" else (channel,)
 
 
+def load_powers(manifest: Manifest, bearing: BearingInfo, rows: np.ndarray) -> LoadPowers:
+    """Mean powers of a bearing's ball loads from reductions, shape (members, .)."""
+    layout = reduction_rows(manifest)
+    duration = rows[:, HEAD.index("duration")]
+    cubes, more, damage = (rows[:, layout.column("integral", bearing.prefix + name)] / duration for name in LOAD_POWERS)
+    length = duration[:, None, None] * bearing.balls / SECTORS
+    places = layout.raceways(rows, bearing.prefix) / length
+    return LoadPowers(cubes=cubes, ten_thirds=more, outer_damage=damage, raceways=places)
+
+
 def observe(
     manifest: Manifest, kind: str, channel: str, rows: np.ndarray, end: np.ndarray, values: Mapping[str, Any]
 ) -> np.ndarray:
@@ -255,12 +266,7 @@ def observe(
         if kind in LIFE:
             prefix = channel.removesuffix("ball.force")
             bearing = next(item for item in manifest.bearings if item.prefix == prefix)
-            length = duration[:, None, None] * bearing.balls / SECTORS
-            cubes, more, damage = (of("integral", prefix + name) / duration for name in LOAD_POWERS)
-            powers = LoadPowers(
-                cubes=cubes, ten_thirds=more, outer_damage=damage, raceways=layout.raceways(rows, prefix) / length
-            )
-            by_reading = lives(ratings_of(bearing, values), powers)
+            by_reading = lives(ratings_of(bearing, values), load_powers(manifest, bearing, rows))
             return np.asarray(np.min([by_reading[reading] for reading in LIFE[kind]], axis=0))
         if kind in ("mean", "rms"):
             return np.asarray(of("integral") / duration if kind == "mean" else np.sqrt(of("square") / duration))

@@ -1,0 +1,121 @@
+"""Figures of a life report: damage around both raceways, pressure over a turn, life against clearance.
+
+In: records of `ballpass.runtime.ask`, arrays.  Out: figures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from ballpass.runtime.app.figures.canvas import FIRST, INK, PALE, SAND, SECOND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.app.figures.sweep import LUMINANCE
+from ballpass.runtime.ask.life_records import BearingStrength
+from ballpass.runtime.ratings.life import MILLION
+
+Array = NDArray[np.float64]
+
+#: Lines of the readings.
+_LOOKS = {
+    "mean": FIRST,
+    "miner": SECOND,
+    "sectors": {"color": SAND, "linestyle": "-", "linewidth": 2.4},
+}
+
+
+@styled
+def damage(title: str, bearing: BearingStrength) -> Figure:
+    """Share of every place of both raceways in the damage of the bearing."""
+    figure = new_figure(5.2)
+    rings = (("inner raceway", bearing.inner, INK), ("outer raceway", bearing.outer, SIGNAL))
+    for k, (name, ring, colour) in enumerate(rings):
+        panel = figure.add_subplot(1, 2, k + 1, projection="polar")
+        share = 100.0 * np.asarray(ring.damage)
+        width = 2.0 * math.pi / len(share)
+        panel.bar(width * np.arange(len(share)), share, width=width, color=colour, edgecolor="white", linewidth=0.3)
+        panel.set_title(f"{name}: {share.sum():.0f} % of the damage", loc="center", pad=12)
+        panel.yaxis.set_major_locator(MaxNLocator(4))
+        panel.tick_params(labelsize=8)
+    words = (
+        f"Share of each of {len(bearing.inner.damage)} places in the damage of both raceways [%], by the third power "
+        "of the ball loads that pass it, with the exponent 10/9 of Weibull's law. Angles are in each ring's own "
+        "coordinates, from where its x axis was at the start. Life by sectors: "
+        f"{bearing.lives['sectors'] / MILLION:.4g} million turns; governing reading: {bearing.governing}."
+    )
+    caption(figure, f"{_titled(title, bearing)}: where the raceways tire", words)
+    return figure
+
+
+@styled
+def pressure(title: str, bearing: BearingStrength, crank: Array, found: Array, ring: str) -> Figure:
+    """Peak pressure of every ball's contact over a turn.
+
+    Parameters
+    ----------
+    crank : angles of driver or shaft, increasing over a turn, shape (samples,) [rad]
+    found : shape (samples, balls) [Pa]
+    """
+    figure = new_figure(4.4)
+    panel = figure.add_subplot()
+    balls = found.shape[1]
+    edges = np.degrees(np.append(crank, 2.0 * crank[-1] - crank[-2]))
+    mesh = panel.pcolormesh(
+        edges, np.arange(balls + 1) + 0.5, found.T / 1e6, cmap=LUMINANCE.reversed(), rasterized=True
+    )
+    figure.colorbar(mesh, ax=panel, label="peak pressure [MPa]")
+    panel.set(xlabel="angle of driver or shaft [deg]", ylabel="ball", yticks=range(1, balls + 1))
+    panel.grid(visible=False)
+    words = (
+        f"Peak pressure between each ball and the {ring} ring in the first turn behind the transient; dark is high. "
+        "The static limit of ISO 76 is 4200 MPa; the highest pressure of all turns is "
+        f"{bearing.inner.peak_pressure / 1e6:.0f} MPa at the inner and {bearing.outer.peak_pressure / 1e6:.0f} MPa at "
+        "the outer ring."
+    )
+    caption(figure, f"{_titled(title, bearing)}: pressure over a turn", words)
+    return figure
+
+
+@styled
+def life_of_clearance(
+    title: str,
+    bearing: BearingStrength,
+    clearances: Array,
+    lives: Mapping[str, Array],
+    present: float,
+    group: tuple[str, float, float] | None,
+    turns: float,
+) -> Figure:
+    """Life by every reading against the clearance.
+
+    Parameters
+    ----------
+    clearances : shape (points,) [m]
+    lives : by reading, shape (points,) [turns]
+    present : clearance of the scene [m]
+    group : name and range of the bearing's group of clearance [m]; None where the scene names none
+    turns : steady turns of each point
+    """
+    figure = new_figure(4.4)
+    panel = figure.add_subplot()
+    if group is not None:
+        name, least, most = group
+        panel.axvspan(1e6 * least, 1e6 * most, color=PALE, linewidth=0, zorder=0, label=f"clearance {name}")
+    for name, values in lives.items():
+        panel.plot(1e6 * clearances, values / MILLION, label=name, **_LOOKS[name])
+    panel.axvline(1e6 * present, color="#6c757d", linewidth=1.0, linestyle=":")
+    panel.set(xlabel="diametral clearance in operation [µm]", ylabel="L_10r [million turns]")
+    panel.set_ylim(bottom=0.0)
+    panel.legend(loc="best")
+    shaded = f" Shaded: group {group[0]} in operation." if group is not None else ""
+    words = f"{len(clearances)} runs of {turns:.4g} steady turns. Dotted: the scene's clearance.{shaded}"
+    caption(figure, f"{_titled(title, bearing)}: life against clearance", words)
+    return figure
+
+
+def _titled(title: str, bearing: BearingStrength) -> str:
+    return f"{title}, {bearing.name}" if bearing.name else title

@@ -1,0 +1,338 @@
+"""Strength and life of bearings: what a report holds, and its text.
+
+Numbers are SI, lives in turns of the inner ring against the outer one, angles in rad.  Places of a raceway are angles
+in the ring's own coordinates, from where its x axis was at the start.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ballpass.runtime.ratings.life import MILLION, hours
+from ballpass.runtime.ratings.wear import COEFFICIENTS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RingStrength:
+    """One ring of a bearing.
+
+    Attributes
+    ----------
+    peak_pressure : under the highest ball force [Pa]
+    major_axis, minor_axis : half axes of the ellipse then, across the groove and along it [m]
+    equivalent_loads : Q_e by reading; empty where there is no life [N]
+    damage : share of each place of the raceway in the damage of both, first at angle 0; empty likewise [1]
+    worst_angle : place of the most damage [rad]
+    wear : depth a second at the deepest place, for the least and the most of `COEFFICIENTS` [m/s]
+    wear_angle, wear_across : that place, around the ring [rad] and from the middle of the groove [m]
+    """
+
+    peak_pressure: float
+    major_axis: float
+    minor_axis: float
+    equivalent_loads: Mapping[str, float]
+    damage: tuple[float, ...]
+    worst_angle: float
+    wear: tuple[float, float]
+    wear_angle: float
+    wear_across: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BearingStrength:
+    """One bearing under the load of a run.
+
+    Attributes
+    ----------
+    name : empty for the scene's only one
+    dynamic_rating, static_rating, fatigue_limit : C_r, C_0r, C_u [N]
+    given : which of these the scene gives; the others follow from the geometry
+    assumed : whether grooves and steel are the reference ones, for the scene gives a stiffness
+    peak_force : highest force of any ball [N], at `peak_time` [s], of ball `peak_ball`, counted from 1, at the angle
+        `peak_angle` of driver or shaft, None where its speed changes [rad]
+    static_safety : s_0, of the load P_0 whose heaviest ball bears the peak force (Z/5 of it) [1]
+    inner, outer : the rings
+    speed : of the inner ring against the outer one [rad/s]
+    why_no_life : reason why no standard gives a life; empty where one does
+    equivalent_load : P, cubic mean of the force on the bearing [N]
+    basic_life : L_10 of ISO 281 under P [turns]
+    lives : L_10r of ISO 16281 by reading [turns]; empty where there is none
+    viscosity_ratio, contamination : κ and e_C [1], None where the scene does not give them
+    factor, modified_life : a_ISO [1] and L_nmr [turns] of the governing reading, likewise
+    """
+
+    name: str
+    dynamic_rating: float
+    static_rating: float
+    fatigue_limit: float
+    given: tuple[str, ...]
+    assumed: bool
+    peak_force: float
+    peak_time: float
+    peak_ball: int
+    peak_angle: float | None
+    static_safety: float
+    inner: RingStrength
+    outer: RingStrength
+    speed: float
+    why_no_life: str
+    equivalent_load: float
+    basic_life: float | None
+    lives: Mapping[str, float]
+    viscosity_ratio: float | None
+    contamination: float | None
+    factor: float | None
+    modified_life: float | None
+
+    @property
+    def governing(self) -> str:
+        """The reading that gives the shortest life; empty where there is none."""
+        return min(self.lives, key=lambda name: self.lives[name]) if self.lives else ""
+
+    @property
+    def life(self) -> float | None:
+        """Life by the governing reading [turns]."""
+        return self.lives[self.governing] if self.lives else None
+
+    def hours(self, turns: float) -> float:
+        """Hours that so many turns take."""
+        return float(hours(turns, abs(self.speed)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateStrength:
+    """The bearings of a scene in one state of its duty cycle, or as the scene stands.
+
+    Attributes
+    ----------
+    name, share : of the state [1]; empty and 1 without a duty cycle
+    bearings : none where the state stands still
+    turns : steady turns that were run, None where nothing turns
+    change : of the life or peak that the second half of them moved most, relative to itself [1]
+    settled : whether that counts as none
+    samples : steady samples that wear and the equivalent load of ISO 281 are means of
+    """
+
+    name: str
+    share: float
+    bearings: tuple[BearingStrength, ...]
+    turns: float | None
+    change: float
+    settled: bool
+    samples: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DutyLife:
+    """Life of one bearing over a duty cycle, by Miner's rule.
+
+    Attributes
+    ----------
+    name : of the bearing
+    hours, turns : life by reading
+    modified_hours, modified_turns : of L_nmr; None where a state has none
+    damage : share of each state, by the governing reading [1]
+    why_no_life : reason why there is none; empty where there is one
+    """
+
+    name: str
+    hours: Mapping[str, float]
+    turns: Mapping[str, float]
+    modified_hours: float | None
+    modified_turns: float | None
+    damage: Mapping[str, float]
+    why_no_life: str
+
+    @property
+    def governing(self) -> str:
+        """The reading that gives the shortest life; empty where there is none."""
+        return min(self.hours, key=lambda name: self.hours[name]) if self.hours else ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LifeReport:
+    """Strength and life of all bearings of a scene; see `ballpass.runtime.Model.life`.
+
+    Attributes
+    ----------
+    scene, title : of the model
+    states : of the duty cycle, one for a scene without
+    duty : life of each bearing over the cycle; empty for a scene without
+    """
+
+    scene: str
+    title: str
+    states: tuple[StateStrength, ...]
+    duty: tuple[DutyLife, ...]
+
+    @property
+    def bearings(self) -> tuple[BearingStrength, ...]:
+        """The bearings in the first state."""
+        return self.states[0].bearings
+
+    @property
+    def unsettled(self) -> tuple[str, ...]:
+        """Sentences about lives that more turns would change."""
+        return tuple(
+            f"{f'State {state.name}: ' if state.name else ''}{_turns_words(state)} Take more: --cycles."
+            for state in self.states
+            if not state.settled
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data, SI; what is infinite becomes None."""
+        found: dict[str, Any] = _finite(asdict(self))
+        for state, plain in zip(self.states, found["states"], strict=True):
+            for bearing, entry in zip(state.bearings, plain["bearings"], strict=True):
+                entry["governing"] = bearing.governing
+                entry["hours"] = {name: _finite(bearing.hours(life)) for name, life in bearing.lives.items()}
+        for life, plain in zip(self.duty, found["duty"], strict=True):
+            plain["governing"] = life.governing
+        found["wear_coefficients"] = list(COEFFICIENTS)
+        return found
+
+    def __str__(self) -> str:
+        lines = textwrap.wrap(f"{self.title}: strength and life of its bearings", 80)
+        for state in self.states:
+            if state.name:
+                lines += ["", f"State {state.name}, {100.0 * state.share:.3g} % of the time"]
+            if not state.bearings:
+                lines.append("  nothing turns: no damage")
+                continue
+            lines += _wrapped(_turns_words(state))
+            for bearing in state.bearings:
+                lines += ["", *_bearing_lines(bearing)]
+            lines += [
+                "",
+                f"  Wear and P: means of {state.samples} samples; angles from each ring's x axis.",
+            ]
+        for life in self.duty:
+            lines += ["", *_duty_lines(life)]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        parts = []
+        for found in self.duty or self.bearings:
+            name = f"{found.name}: " if found.name else ""
+            if found.why_no_life:
+                parts.append(f"{name}no life")
+            elif isinstance(found, DutyLife):
+                parts.append(f"{name}{_hours(found.hours[found.governing])} by {found.governing}")
+            else:
+                parts.append(f"{name}{_million(found.life)} by {found.governing}, s_0 {found.static_safety:.3g}")
+        return f"LifeReport({self.scene}: {'; '.join(parts)})"
+
+
+def _turns_words(state: StateStrength) -> str:
+    run = "The run" if state.turns is None else f"{state.turns:.4g} steady turns"
+    if state.settled:
+        return f"{run}, settled: the second half moved lives and peaks by at most {100.0 * state.change:.2g} %."
+    return f"{run}, not settled: the second half moved a life or a peak by {100.0 * state.change:.2g} %."
+
+
+def _bearing_lines(bearing: BearingStrength) -> list[str]:
+    rings = (bearing.inner, bearing.outer)
+    at = f"{bearing.peak_time:.5g} s"
+    if bearing.peak_angle is not None:
+        at += f", {math.degrees(bearing.peak_angle):.1f} deg of crank or shaft"
+    lines = [
+        f"Bearing {bearing.name}".rstrip() + (" (grooves 0.52 and 0.53, steel: assumed)" if bearing.assumed else ""),
+        f"  C_r {_force(bearing.dynamic_rating)} ({_source(bearing, 'dynamic_rating', 'ISO 281')}), "
+        f"C_0r {_force(bearing.static_rating)} ({_source(bearing, 'static_rating', 'ISO 76')}), "
+        f"C_u {_force(bearing.fatigue_limit)} ({_source(bearing, 'fatigue_limit', 'C_0r/22')})",
+        f"  highest ball force {_force(bearing.peak_force)}: ball {bearing.peak_ball}, {at}",
+        f"  static safety s_0 {bearing.static_safety:.3g}",
+        "",
+        _row("", "inner ring", "outer ring"),
+        _row("  peak pressure", *(f"{ring.peak_pressure / 1e6:.0f} MPa" for ring in rings)),
+        _row("  ellipse, a x b", *(f"{1e3 * ring.major_axis:.3f} x {1e3 * ring.minor_axis:.3f} mm" for ring in rings)),
+    ]
+    for reading in bearing.lives:
+        lines.append(_row(f"  Q_e, {reading}", *(_force(ring.equivalent_loads[reading]) for ring in rings)))
+    if bearing.lives:
+        lines.append(
+            _row("  place of the most damage", *(f"{math.degrees(ring.worst_angle):.0f} deg" for ring in rings))
+        )
+        shares = (100.0 * sum(ring.damage) for ring in rings)
+        lines.append(_row("  share of the damage", *(f"{share:.0f} %" for share in shares)))
+    lines.append(_row("  wear, deepest, least k", *(_wear(ring.wear[0]) for ring in rings)))
+    lines.append(_row("                 most k", *(_wear(ring.wear[1]) for ring in rings)))
+    places = (f"{math.degrees(ring.wear_angle):.0f} deg, {1e3 * ring.wear_across:.2f} mm" for ring in rings)
+    lines += [_row("  there: angle, off the middle", *places), ""]
+    if bearing.why_no_life:
+        return lines + _wrapped(f"No rating life. {bearing.why_no_life}")
+    lines.append(_row("", "million turns", "hours"))
+    lines.append(_life_row(bearing, f"  L_10, P = {_force(bearing.equivalent_load)}", bearing.basic_life))
+    for reading, life in bearing.lives.items():
+        mark = "  <- governs" if reading == bearing.governing else ""
+        lines.append(_life_row(bearing, f"  L_10r, {reading}", life) + mark)
+    if bearing.factor is not None:
+        words = f"  L_nmr, a_ISO {bearing.factor:.3g}, kappa {bearing.viscosity_ratio:.3g}"
+        lines.append(_life_row(bearing, words, bearing.modified_life))
+    return lines
+
+
+def _duty_lines(life: DutyLife) -> list[str]:
+    lines = [f"Duty cycle, bearing {life.name}".rstrip() + ", Miner's rule over the states"]
+    if life.why_no_life:
+        return lines + _wrapped(f"No rating life. {life.why_no_life}")
+    lines.append(_row("", "million turns", "hours"))
+    for reading in life.hours:
+        mark = "  <- governs" if reading == life.governing else ""
+        lines.append(_row(f"  L_10r, {reading}", *_life(life.turns[reading], life.hours[reading])) + mark)
+    if life.modified_hours is not None and life.modified_turns is not None:
+        lines.append(_row("  L_nmr", *_life(life.modified_turns, life.modified_hours)))
+    shares = ", ".join(f"{name} {100.0 * share:.3g} %" for name, share in life.damage.items())
+    return lines + _wrapped(f"Damage: {shares}.")
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, 78, initial_indent="  ", subsequent_indent="  ")
+
+
+def _row(head: str, first: str, second: str) -> str:
+    return f"{head:<32}{first:>18}{second:>18}".rstrip()
+
+
+def _life_row(bearing: BearingStrength, head: str, life: float | None) -> str:
+    assert life is not None  # the bearing turns
+    return _row(head, *_life(life, bearing.hours(life)))
+
+
+def _life(turns: float, spent: float) -> tuple[str, str]:
+    if math.isinf(turns):
+        return "unlimited", "unlimited"
+    return f"{turns / MILLION:.4g}", f"{spent:.4g}" if spent < 1e4 else f"{spent:.0f}"
+
+
+def _million(turns: float | None) -> str:
+    return "" if turns is None else f"{turns / MILLION:.4g} million turns"
+
+
+def _hours(spent: float) -> str:
+    return f"{spent:.4g} h"
+
+
+def _force(value: float) -> str:
+    return f"{value:.0f} N" if value < 9999.5 else f"{value / 1e3:.4g} kN"
+
+
+def _source(bearing: BearingStrength, rating: str, otherwise: str) -> str:
+    return "given" if rating in bearing.given else otherwise
+
+
+def _wear(rate: float) -> str:
+    """Depth a second as depth an hour."""
+    return f"{1e6 * 3600.0 * rate:.2g} um/h"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _finite(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

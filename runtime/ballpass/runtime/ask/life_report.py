@@ -1,0 +1,247 @@
+"""Strength and life of the bearings of a scene, over its duty cycle where it has one.
+
+In: a model, overrides, a request.  Out: a `LifeReport`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.ask.life_records import BearingStrength, DutyLife, LifeReport, RingStrength, StateStrength
+from ballpass.runtime.ask.wear import LoadSamples, load_samples, wear_field
+from ballpass.runtime.contract import BearingInfo, DutyInfo
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import SECTORS
+from ballpass.runtime.ratings import life
+from ballpass.runtime.ratings.of_bearing import (
+    Contact,
+    Ratings,
+    contacts_of,
+    geometry_is_assumed,
+    ratings_of,
+    why_no_life,
+)
+from ballpass.runtime.ratings.readings import KILO, LoadPowers, equivalent_loads, lives
+from ballpass.runtime.ratings.wear import COEFFICIENTS
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.load_history import LoadHistory, load_history
+from ballpass.runtime.run.request import Request
+
+#: Steady turns whose samples wear and the equivalent load of ISO 281 are taken from, at most.
+SAMPLED_TURNS = 64
+
+
+def life_report(model: LoadedModel, parameters: Mapping[str, float], request: Request) -> LifeReport:
+    """Run the scene, in every state of its duty cycle, and judge its bearings.
+
+    Raises
+    ------
+    RequestError
+        The scene has no bearing, or a wrong request.
+    SimulationError
+        The computation failed.
+    """
+    manifest = model.manifest
+    if not manifest.bearings:
+        raise RequestError(
+            "life: this scene has no bearing. Allowed: a scene with [bearing] or [bearings.<name>]. Its joints' "
+            "reactions, which a bearing would carry, are outputs of `ballpass run`."
+        )
+    states = manifest.duty or (DutyInfo(name="", share=1.0, parameters=()),)
+    judged = [_state(model, {**parameters, **dict(state.parameters)}, state, request) for state in states]
+    return LifeReport(
+        scene=manifest.scene,
+        title=manifest.title,
+        states=tuple(judged),
+        duty=tuple(_over_duty(info, judged) for info in manifest.bearings) if manifest.duty else (),
+    )
+
+
+def _state(model: LoadedModel, parameters: Mapping[str, float], state: DutyInfo, request: Request) -> StateStrength:
+    numbers = model.numbers(parameters)
+    if state.name and clock.shaft_speed(model.manifest, numbers.values) == 0.0:
+        return StateStrength(
+            name=state.name, share=state.share, bearings=(), turns=None, change=0.0, settled=True, samples=0
+        )
+    history = load_history(model, numbers, request)
+    samples = load_samples(model, numbers, _sampled(model, history, request))
+    return StateStrength(
+        name=state.name,
+        share=state.share,
+        bearings=tuple(
+            _bearing(model, numbers, info, history, samples[info.prefix]) for info in model.manifest.bearings
+        ),
+        turns=history.turns,
+        change=history.change,
+        settled=history.settled,
+        samples=len(next(iter(samples.values())).time),
+    )
+
+
+def _sampled(model: LoadedModel, history: LoadHistory, request: Request) -> Request:
+    """The part of a run that is sampled."""
+    turn = clock.period(model.manifest, model.numbers({}).values)
+    if request.duration is not None or not math.isfinite(turn):
+        return request
+    run = model.manifest.run
+    transient = run.transient_cycles if request.transient_cycles is None else request.transient_cycles
+    steady = min(SAMPLED_TURNS, request.cycles - transient if request.cycles is not None else SAMPLED_TURNS)
+    return replace(request, cycles=transient + steady)
+
+
+def _bearing(
+    model: LoadedModel, numbers: Numbers, info: BearingInfo, history: LoadHistory, samples: LoadSamples
+) -> BearingStrength:
+    manifest, values = model.manifest, numbers.values
+    ratings = ratings_of(info, values)
+    speed = values[info.ring_speed]
+    initial = clock.shaft_speed(manifest, values)
+    speed *= history.shaft_speed / initial if initial else 1.0
+    peak = history.peaks[info.prefix]
+    force = max(peak.maximum, 0.0)
+    uneven = manifest.mechanism is not None and manifest.mechanism.angle
+    why = why_no_life(info, values, initial)
+    powers = history.powers[info.prefix]
+    found = {} if why else {name: float(turns) for name, turns in lives(ratings, powers).items()}
+    load = float(np.mean(samples.resultant**3)) ** (1.0 / 3.0)
+    ratio, contamination, factor, modified = _modified(info, values, ratings, speed, found)
+    inner, outer = _rings(info, values, ratings, samples, powers, force, turns=not why)
+    return BearingStrength(
+        name=info.name,
+        dynamic_rating=float(ratings.dynamic),
+        static_rating=float(ratings.static),
+        fatigue_limit=float(ratings.fatigue_limit),
+        given=ratings.given,
+        assumed=geometry_is_assumed(info, values),
+        peak_force=force,
+        peak_time=peak.maximum_time,
+        peak_ball=int(peak.maximum_ball or 0),
+        peak_angle=None if uneven else clock.crank_angle(manifest, values, peak.maximum_time),
+        static_safety=static_safety(info.balls, float(ratings.static), force),
+        inner=inner,
+        outer=outer,
+        speed=speed,
+        why_no_life=why,
+        equivalent_load=load,
+        basic_life=None if why else _basic(float(ratings.dynamic), load),
+        lives=found,
+        viscosity_ratio=ratio,
+        contamination=contamination,
+        factor=factor,
+        modified_life=modified,
+    )
+
+
+def static_safety(balls: int, static_rating: float, force: float) -> float:
+    """s_0 of the load whose heaviest ball bears `force` [N]: Z/5 of it, as in ISO 76."""
+    return float(life.static_safety(static_rating, balls * force / 5.0)) if force > 0.0 else math.inf
+
+
+def _basic(dynamic_rating: float, load: float) -> float:
+    return float(life.basic_life(dynamic_rating, load)) if load > 0.0 else math.inf
+
+
+def _rings(
+    info: BearingInfo,
+    values: Mapping[str, float],
+    ratings: Ratings,
+    samples: LoadSamples,
+    powers: LoadPowers,
+    force: float,
+    *,
+    turns: bool,
+) -> tuple[RingStrength, RingStrength]:
+    """Inner and outer ring."""
+    loads = equivalent_loads(powers)
+    fields = (powers.raceways[1], powers.raceways[0])
+    # (Q_e/Q_c)^(10/3) of a ring is the mean of this over its places
+    damage = [
+        (KILO * field ** (1.0 / 3.0) / float(rating)) ** (10.0 / 3.0)
+        for field, rating in zip(fields, (ratings.inner_ball, ratings.outer_ball), strict=True)
+    ]
+    total = float(sum(np.sum(part) for part in damage))
+
+    def ring(k: int, contact: Contact, place: NDArray[np.float64]) -> RingStrength:
+        across, along = contact.semi_axes(force)
+        worn, angle, off = wear_field(samples, place, contact).deepest
+        return RingStrength(
+            peak_pressure=float(contact.peak_pressure(force)),
+            major_axis=float(across),
+            minor_axis=float(along),
+            equivalent_loads={reading: float(pair[k]) for reading, pair in loads.items()} if turns else {},
+            damage=tuple((damage[k] / total).tolist()) if turns and total > 0.0 else (),
+            worst_angle=clock.TURN * int(np.argmax(fields[k])) / SECTORS,
+            wear=(COEFFICIENTS[0] * worn, COEFFICIENTS[1] * worn),
+            wear_angle=angle,
+            wear_across=off,
+        )
+
+    inner, outer = contacts_of(info, values)
+    return ring(0, inner, samples.in_inner), ring(1, outer, samples.in_outer)
+
+
+def _modified(
+    info: BearingInfo, values: Mapping[str, float], ratings: Ratings, speed: float, found: Mapping[str, float]
+) -> tuple[float | None, float | None, float | None, float | None]:
+    """κ, e_C, a_ISO and L_nmr of the governing life; None where the scene gives no film."""
+    film = info.lubrication
+    if film is None or not found:
+        return None, None, None, None
+    ratio = film.viscosity_ratio
+    if ratio is None:
+        assert film.viscosity is not None  # the scene gives one of them
+        ratio = life.viscosity_ratio(film.viscosity, speed, values[f"{info.path}.pitch_diameter"])
+    shortest = min(found.values())
+    load = life.equivalent_load(ratings.dynamic, shortest)
+    limit = film.contamination * ratings.fatigue_limit / load if load > 0.0 else math.inf
+    factor = life.MOST_MODIFIED if math.isinf(limit) else float(life.life_factor(ratio, limit))
+    return ratio, film.contamination, factor, float(life.modified_life(shortest, factor))
+
+
+def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
+    """Miner's rule over the states of a duty cycle, by shares of time: damage an hour adds up."""
+    turning = [(state, _of(state, info.name)) for state in states if state.bearings]
+    lasting = [(state, bearing) for state, bearing in turning if not bearing.why_no_life]
+    if not lasting:
+        why = turning[0][1].why_no_life if turning else "Nothing turns in any state."
+        return DutyLife(
+            name=info.name, hours={}, turns={}, modified_hours=None, modified_turns=None, damage={}, why_no_life=why
+        )
+    shares = [state.share for state, _ in lasting]
+
+    def together(of: list[float]) -> tuple[float, float]:
+        """Life in hours and in turns, from that of each state in turns."""
+        spent = [bearing.hours(turns) for (_, bearing), turns in zip(lasting, of, strict=True)]
+        damage = sum(share / each for share, each in zip(shares, spent, strict=True))
+        total = 1.0 / damage if damage > 0.0 else math.inf
+        speed = sum(share * abs(bearing.speed) for share, (_, bearing) in zip(shares, lasting, strict=True))
+        return total, total * 3600.0 * speed / clock.TURN
+
+    readings = lasting[0][1].lives
+    by = {name: together([bearing.lives[name] for _, bearing in lasting]) for name in readings}
+    governing = min(by, key=lambda name: by[name][0])
+    films = [bearing.modified_life for _, bearing in lasting]
+    modified = None if None in films else together([each for each in films if each is not None])
+    damage = {state.name: 0.0 for state in states}
+    for state, bearing in lasting:
+        damage[state.name] = state.share * by[governing][0] / bearing.hours(bearing.lives[governing])
+    return DutyLife(
+        name=info.name,
+        hours={name: pair[0] for name, pair in by.items()},
+        turns={name: pair[1] for name, pair in by.items()},
+        modified_hours=None if modified is None else modified[0],
+        modified_turns=None if modified is None else modified[1],
+        damage=damage,
+        why_no_life="",
+    )
+
+
+def _of(state: StateStrength, name: str) -> BearingStrength:
+    return next(bearing for bearing in state.bearings if bearing.name == name)

@@ -1,0 +1,131 @@
+"""Ball loads at samples of a run, and the wear of both raceways that follows from them.
+
+In: a model, numbers, a request.  Out: `LoadSamples`; fields of wear over the places of a raceway and across its groove.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.ask.track import Outlook
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import SECTORS
+from ballpass.runtime.ratings.of_bearing import Contact
+from ballpass.runtime.ratings.wear import depth_of_pass
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.simulate import simulate
+
+Array = NDArray[np.float64]
+
+#: Places across the groove where wear is computed, from its middle to the edge of the widest contact.
+ACROSS = 41
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LoadSamples:
+    """Loads of a bearing's balls at equally spaced times.
+
+    Attributes
+    ----------
+    time : shape (samples,) [s]
+    crank : angle of driver or shaft since t = 0, with that at the start, shape (samples,) [rad]
+    force : of each ball, nothing where it pulls, shape (samples, balls) [N]
+    resultant : force on the inner ring, shape (samples,) [N]
+    in_outer, in_inner : angle of ball 1 as the rings see it, shape (samples,) [rad]
+    """
+
+    time: Array
+    crank: Array
+    force: Array
+    resultant: Array
+    in_outer: Array
+    in_inner: Array
+
+
+def load_samples(model: LoadedModel, numbers: Numbers, request: Request) -> Mapping[str, LoadSamples]:
+    """Samples of the steady part of a run, by the prefix of each bearing.
+
+    Raises
+    ------
+    RequestError
+        A wrong request.
+    SimulationError
+        The computation failed.
+    """
+    manifest = model.manifest
+    run = simulate(model, numbers, replace(request, outputs=[]))
+    dropped = run.transient_cycles * run.cycle_length if run.cycle_length is not None else 0.0
+    counted = run.t >= dropped * (1.0 - 1e-12)
+    time, states = run.t[counted], run.x[counted]
+    names = ("ball.force", "ring_force.x", "ring_force.y", "cage.in_outer", "cage.in_inner")
+    outlook = Outlook(model, [b.prefix + name for b in manifest.bearings for name in names])
+    inputs = clock.inputs_over(manifest.inputs, numbers.values, time, time)
+    given = {"t": np.zeros(len(time)), "x": states, "u": inputs, "p": numbers.p, "c": numbers.c}
+    signals = outlook.outputs_at(len(time), given)
+    crank = np.array([clock.crank_angle(manifest, numbers.values, t, x) for t, x in zip(time, states, strict=True)])
+    found = {}
+    for bearing in manifest.bearings:
+        force, x, y, outer, inner = (signals[bearing.prefix + name] for name in names)
+        found[bearing.prefix] = LoadSamples(
+            time=time,
+            crank=crank,
+            force=np.maximum(force, 0.0),
+            resultant=np.hypot(x[:, 0], y[:, 0]),
+            in_outer=outer[:, 0],
+            in_inner=inner[:, 0],
+        )
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WearField:
+    """Wear of a raceway, over the wear coefficient.
+
+    Attributes
+    ----------
+    across : places across the groove, from its middle on, shape (ACROSS,) [m]
+    rate : depth a second over the coefficient, shape (SECTORS, ACROSS) [N/(m s)]
+    """
+
+    across: Array
+    rate: Array
+
+    @property
+    def deepest(self) -> tuple[float, float, float]:
+        """Largest rate [N/(m s)], its angle in the ring's own coordinates [rad], its place across the groove [m]."""
+        sector, k = np.unravel_index(int(np.argmax(self.rate)), self.rate.shape)
+        return float(self.rate[sector, k]), clock.TURN * (int(sector) + 0.5) / SECTORS, float(self.across[k])
+
+
+def wear_field(samples: LoadSamples, angle: Array, contact: Contact) -> WearField:
+    """Wear that the passing balls leave on a raceway, mean over the samples.
+
+    Parameters
+    ----------
+    angle : of ball 1 as the ring sees it: `LoadSamples.in_outer` or `in_inner`
+    """
+    force = samples.force
+    count, balls = force.shape
+    step = np.diff(angle, append=angle[-1:])
+    moved = np.abs((step + np.pi) % clock.TURN - np.pi)  # angles come back after a turn
+    moved[-1] = moved[-2] if count > 1 else 0.0
+    length = float(samples.time[-1] - samples.time[0]) * count / max(count - 1, 1)
+    widest = float(contact.semi_axes(float(np.max(force)))[0]) if np.max(force) > 0.0 else 0.0
+    across = np.linspace(0.0, widest, ACROSS)
+    row, ball = np.nonzero(force > 0.0)
+    load, passed = force[row, ball], moved[row]
+    place = (angle[row] / clock.TURN + ball / balls) % 1.0
+    sector = np.minimum((SECTORS * place).astype(int), SECTORS - 1)
+    half = contact.semi_axes(load)[0]
+    rate = np.zeros((SECTORS, ACROSS))
+    for k, x in enumerate(across):
+        within = half > x
+        worn = passed[within] * depth_of_pass(x, load[within], contact)
+        rate[:, k] = np.bincount(sector[within], worn, SECTORS)
+    return WearField(across=across, rate=rate * SECTORS / (clock.TURN * length))

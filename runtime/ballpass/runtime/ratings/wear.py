@@ -1,0 +1,34 @@
+"""Wear of a raceway by Archard's law, from the slip within its contacts.
+
+In: loads of a ball, its contact.  Out: depths over the wear coefficient [N/m]; times the coefficient [m^2/N], in m.
+
+Source: Archard 1953, doi:10.1063/1.1721448; slip by Heathcote, see `groove_slip`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ballpass.runtime.ratings.groove_slip import creepage
+from ballpass.runtime.ratings.of_bearing import Contact
+
+#: Wear coefficient of mild wear, least and most [m^2/N]: 1e-8 to 1e-4 mm^3/(N m).  That of a bearing lies between, by
+#: lubricant and surface.
+COEFFICIENTS = (1e-17, 1e-13)
+
+
+def depth_of_pass(place: Any, load: Any, contact: Contact) -> Any:
+    """Depth that a pass of a ball wears off at a place across the groove, over the wear coefficient [N/m].
+
+    The pressure along the way of the ball, integrated, times the share of the way that slips:
+    (π/2) p_0 b (1 - x²/a²) |s(x)|.  It holds within the contact; beyond it there is no wear.
+
+    Parameters
+    ----------
+    place : x, from the middle of the groove, |x| < a [m]
+    load : of the ball, above 0 [N]
+    """
+    across, along = contact.semi_axes(load)
+    slip = creepage(place, across, contact.ball_diameter, contact.raceway_radius, contact.groove_radius)
+    return math.pi / 2.0 * contact.peak_pressure(load) * along * (1.0 - (place / across) ** 2) * abs(slip)

@@ -1,0 +1,151 @@
+"""Loads of the balls along a run, added up until the lives that follow from them settle.
+
+In: a model, numbers, a request.  Out: `LoadHistory`.  The balls meet the load's peak in other places each turn, so the
+life of two turns depends on the balls' first angle: the press of the paper repeats after 134 turns.  The turns are
+doubled, and the run goes on, until that changes no life by more than `LIVES` and no highest ball force by more than
+`PEAKS` of settle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ballpass.runtime.contract import DRIVER_ACCELERATION
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import HEAD, LOAD_POWERS, reduction_rows
+from ballpass.runtime.ratings.of_bearing import ratings_of, why_no_life
+from ballpass.runtime.ratings.readings import LoadPowers, lives
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
+from ballpass.runtime.run.reductions import Reduction, load_powers, reduction_of
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.settle import LEAST, MOST, PEAKS
+
+#: Change of a life, relative to itself, that counts as none [1].
+LIVES = 1e-2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadHistory:
+    """Loads of all bearings over the steady part of a run.
+
+    Attributes
+    ----------
+    turns : how long that was; None where nothing turns
+    duration : [s]
+    shaft_speed : mean of driver or shaft [rad/s]
+    change : by the second half of the turns: of the life, or of the peak, that moved most, relative to itself [1]
+    settled : whether that counts as none
+    powers : of the loads of each bearing, by its prefix
+    peaks : the highest force of any ball of each bearing, likewise
+    """
+
+    turns: float | None
+    duration: float
+    shaft_speed: float
+    change: float
+    settled: bool
+    powers: Mapping[str, LoadPowers]
+    peaks: Mapping[str, Reduction]
+
+
+def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> LoadHistory:
+    """Add up the loads of the balls, over the turns asked for, else over as many as lives take to settle.
+
+    Where nothing turns, or a table gives the speed over time, a run is as long as the scene says.
+
+    Raises
+    ------
+    RequestError
+        A wrong request.
+    SimulationError
+        The computation failed.
+    """
+    manifest = model.manifest
+    turn = clock.period(manifest, numbers.values)
+    run = manifest.run
+    transient = run.transient_cycles if request.transient_cycles is None else request.transient_cycles
+    timed = any(item.name == DRIVER_ACCELERATION for item in manifest.inputs)
+    given = request.cycles is not None or request.duration is not None
+    doubles = not given and not timed and math.isfinite(turn)
+    if doubles:
+        request = replace(request, cycles=transient + LEAST)
+    going = start_reducing(model, numbers, request, _channels(model))
+    if not doubles:
+        going.on_to((going.start + going.end) / 2.0)
+        before = _history(going)
+        going.on_to(going.end)
+        return _compared(going, before)
+    going.on_to(going.end)
+    before, turns = _history(going), LEAST
+    while True:
+        turns *= 2
+        going.on_to(going.start + turns * turn)
+        found = _compared(going, before)
+        if found.settled or 2 * turns > MOST:
+            return found
+        before = found
+
+
+def _channels(model: LoadedModel) -> list[str]:
+    manifest = model.manifest
+    names = [b.prefix + name for b in manifest.bearings for name in ("ball.force", *LOAD_POWERS)]
+    if manifest.mechanism is not None and manifest.mechanism.rate:
+        names.append(manifest.mechanism.rate)
+    return names
+
+
+def _history(going: ReducedRun) -> LoadHistory:
+    """Loads so far."""
+    manifest, layout = going.model.manifest, reduction_rows(going.model.manifest)
+    duration = float(going.row[HEAD.index("duration")])
+    speed = clock.shaft_speed(manifest, going.numbers.values)
+    if manifest.mechanism is not None and manifest.mechanism.rate:
+        speed = reduction_of(layout, going.row, manifest.mechanism.rate, duration).mean
+    powers, peaks = {}, {}
+    for bearing in manifest.bearings:
+        found = load_powers(manifest, bearing, going.row[None, :])
+        powers[bearing.prefix] = LoadPowers(
+            cubes=float(found.cubes[0]),
+            ten_thirds=float(found.ten_thirds[0]),
+            outer_damage=float(found.outer_damage[0]),
+            raceways=found.raceways[0],
+        )
+        peaks[bearing.prefix] = reduction_of(layout, going.row, f"{bearing.prefix}ball.force", duration)
+    return LoadHistory(
+        turns=duration * abs(speed) / clock.TURN if speed else None,
+        duration=duration,
+        shaft_speed=speed,
+        change=math.inf,
+        settled=False,
+        powers=powers,
+        peaks=peaks,
+    )
+
+
+def _compared(going: ReducedRun, before: LoadHistory) -> LoadHistory:
+    """Loads so far, with what has changed since."""
+    found = _history(going)
+    values = going.numbers.values
+    life, peak = 0.0, 0.0
+    for bearing in going.model.manifest.bearings:
+        prefix = bearing.prefix
+        now, then = (h.peaks[prefix].maximum for h in (found, before))
+        peak = max(peak, abs(1.0 - then / now) if now > 0.0 else 0.0)
+        if not why_no_life(bearing, values, found.shaft_speed):
+            ratings = ratings_of(bearing, values)
+            now_by, then_by = (lives(ratings, history.powers[prefix]) for history in (found, before))
+            life = max(life, *(_moved(now_by[name], then_by[name]) for name in now_by))
+    return replace(found, change=max(life, peak), settled=life <= LIVES and peak <= PEAKS)
+
+
+def _moved(now: float, then: float) -> float:
+    """Change of a life, relative to itself; none where neither ends."""
+    if math.isinf(now):
+        return 0.0 if math.isinf(then) else 1.0
+    return float(np.abs(1.0 - then / now))

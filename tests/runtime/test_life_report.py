@@ -1,0 +1,149 @@
+"""Strength and life of bearings: against runs asked for one by one, closed forms and SciPy's integrals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from ballpass.runtime import Model
+from ballpass.runtime.ask.life_report import life_report
+from ballpass.runtime.ask.wear import LoadSamples, wear_field
+from ballpass.runtime.contract import DutyInfo, LubricationInfo
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.ratings import groove_slip, life
+from ballpass.runtime.ratings.of_bearing import Contact, contacts_of
+from ballpass.runtime.ratings.readings import READINGS
+from ballpass.runtime.ratings.wear import depth_of_pass
+from ballpass.runtime.run.request import Request
+
+
+@pytest.fixture(scope="module")
+def press(make_model: Callable[..., Model]) -> Model:
+    return make_model("punching_press")
+
+
+def test_a_report_is_what_its_quantities_give_one_by_one(press: Model) -> None:
+    report = press.life()
+    (state,), (bearing,) = report.states, report.bearings
+    assert state.turns == pytest.approx(128)
+    assert state.settled
+    assert not report.unsettled
+    names = [f"life_{name}" for name in READINGS]
+    table = {"bearing.clearance": [press.parameters["bearing.clearance"]]}
+    found = press.simulate_many(table, [*names, "max:ball.force", "peak_ball:ball.force"], cycles=130, transient=2)
+    for name in READINGS:
+        assert bearing.lives[name] == pytest.approx(float(found[f"life_{name}"][0]), rel=1e-4)
+    assert bearing.peak_force == pytest.approx(float(found["max:ball.force"][0]), rel=1e-4)
+    assert bearing.governing == "sectors"
+    # ISO 76: 4200 MPa at the ring that is worse off under C_0r
+    highest = max(bearing.inner.peak_pressure, bearing.outer.peak_pressure)
+    assert bearing.static_safety == pytest.approx((4.2e9 / highest) ** 3, rel=1e-9)
+    # what both raceways share is the life by sectors
+    assert sum(bearing.inner.damage) + sum(bearing.outer.damage) == pytest.approx(1.0)
+    # the resultant of eight balls and the load on the ring are one force, but for the ring's own inertia
+    steady = press.simulate(cycles=22).steady()
+    load = np.hypot(steady["reaction.A.x"], steady["reaction.A.y"]) / 2.0
+    assert bearing.equivalent_load == pytest.approx(float(np.mean(load**3)) ** (1 / 3), rel=0.05)
+    assert bearing.basic_life == pytest.approx(1e6 * (bearing.dynamic_rating / bearing.equivalent_load) ** 3)
+    assert bearing.hours(bearing.lives["sectors"]) == pytest.approx(bearing.lives["sectors"] / (500 * 60))
+    assert max(map(len, str(report).splitlines())) <= 80
+    assert repr(report).startswith("LifeReport(punching_press: 242")
+
+
+def test_too_few_turns_are_told(press: Model) -> None:
+    report = press.life(cycles=22)
+    assert "20 steady turns, not settled" in report.unsettled[0]
+    assert report.unsettled[0].split(".")[0] in " ".join(str(report).split())
+
+
+def test_states_of_a_duty_cycle_add_up_by_time(press: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    slow = (("mechanism.driver.speed", 30.0), ("mechanism.forces.punch.force.y", 4000.0))
+    states = (
+        DutyInfo(name="work", share=0.2, parameters=()),
+        DutyInfo(name="slow", share=0.5, parameters=slow),
+        DutyInfo(name="stop", share=0.3, parameters=(("mechanism.driver.speed", 0.0),)),
+    )
+    single = [press.life(cycles=6, parameters=dict(state.parameters)).bearings[0] for state in states[:2]]
+    monkeypatch.setattr(press, "manifest", replace(press.manifest, duty=states))
+    (found,) = press.life(cycles=6).duty
+    damage = [
+        state.share / bearing.hours(bearing.lives["sectors"]) for state, bearing in zip(states[:2], single, strict=True)
+    ]
+    assert found.hours["sectors"] == pytest.approx(1.0 / sum(damage), rel=1e-12)
+    assert found.damage == pytest.approx({"work": damage[0] / sum(damage), "slow": damage[1] / sum(damage), "stop": 0})
+    # Miner over shares of the turns says the same
+    turned = [state.share * abs(bearing.speed) for state, bearing in zip(states[:2], single, strict=True)]
+    shares = [each / sum(turned) for each in turned]
+    by_turns = life.miner(shares, [bearing.lives["sectors"] for bearing in single])
+    assert found.turns["sectors"] == pytest.approx(by_turns, rel=1e-12)
+
+
+def test_film_and_dirt_change_the_governing_life(press: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    clean = press.life(cycles=6).bearings[0]
+    film = LubricationInfo(viscosity_ratio=None, viscosity=30e-6, contamination=0.5)
+    bearing = replace(press.manifest.bearings[0], lubrication=film)
+    monkeypatch.setattr(press, "manifest", replace(press.manifest, bearings=(bearing,)))
+    found = press.life(cycles=6).bearings[0]
+    ratio = 30e-6 / (1e-6 * 45000.0 * 500.0**-0.83 * 33.5**-0.5)
+    assert found.viscosity_ratio == pytest.approx(ratio)
+    assert clean.life is not None
+    load = clean.dynamic_rating * (1e6 / clean.life) ** (1 / 3)
+    factor = life.life_factor(ratio, 0.5 * clean.fatigue_limit / load)
+    assert found.modified_life == pytest.approx(factor * clean.life)
+    assert clean.modified_life is None
+
+
+def test_a_scene_without_bearing_is_refused(press: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(press, "manifest", replace(press.manifest, bearings=()))
+    with pytest.raises(RequestError, match="no bearing"):
+        life_report(press, {}, Request(cycles=4))
+
+
+@pytest.mark.long
+def test_a_bearing_that_swings_has_no_life_and_the_others_have(make_model: Callable[..., Model]) -> None:
+    model = make_model("punching_press_hinges")
+    report = model.life(cycles=4)
+    lives = {bearing.name: bearing.life for bearing in report.bearings}
+    assert lives["pin"] is None
+    assert lives["main"] is not None
+    assert lives["big_end"] is not None
+    assert "fretting" in str(report)
+    with pytest.raises(RequestError, match="swings"):
+        model.simulate_many({"mechanism.gravity": [9.81]}, ["pin.life"], cycles=2, transient=1)
+    with pytest.raises(RequestError, match="swings"):
+        model.sensitivity(of="pin.life", wrt="mechanism.gravity", cycles=2, transient=1)
+
+
+def contact(model: Model) -> Contact:
+    return contacts_of(model.manifest.bearings[0], model.numbers({}).values)[0]
+
+
+def test_a_pass_wears_off_what_pressure_and_slip_give(press: Model) -> None:
+    ring, load = contact(press), 2000.0
+    across, along = ring.semi_axes(load)
+    top = float(ring.peak_pressure(load))
+    assert top == pytest.approx(1.5 * load / (np.pi * across * along))
+    for share in (0.0, 0.2, 0.6, 0.9):
+        half = along * np.sqrt(1.0 - share**2)
+        pressed = quad(lambda y, s=share: top * np.sqrt(max(1.0 - s**2 - (y / along) ** 2, 0.0)), -half, half)[0]
+        slip = groove_slip.creepage(share * across, across, ring.ball_diameter, ring.raceway_radius, ring.groove_radius)
+        assert depth_of_pass(share * across, load, ring) == pytest.approx(pressed * abs(slip), rel=1e-6)
+    rolling = groove_slip.PURE_ROLLING * across
+    assert depth_of_pass(rolling, load, ring) == pytest.approx(0.0, abs=1e-9 * depth_of_pass(0.0, load, ring))
+
+
+def test_wear_of_an_even_load_is_that_of_a_pass_times_the_passes(press: Model) -> None:
+    ring, load, speed, balls = contact(press), 500.0, -7.3, 8
+    time = np.linspace(0.0, 40.0, 40001)
+    angle = (speed * time) % (2.0 * np.pi)
+    force = np.full((len(time), balls), load)
+    samples = LoadSamples(time=time, crank=angle, force=force, resultant=0.0 * time, in_outer=angle, in_inner=angle)
+    field = wear_field(samples, angle, ring)
+    expected = balls * abs(speed) / (2.0 * np.pi) * depth_of_pass(0.0, load, ring)
+    np.testing.assert_allclose(field.rate[:, 0], expected, rtol=3e-3)
+    assert field.across[-1] == pytest.approx(ring.semi_axes(load)[0])
+    np.testing.assert_array_equal(field.rate[:, -1], 0.0)
