@@ -291,7 +291,7 @@ static int pass(const bp_job *job, bp_lane_block *b, int linearly)
     b->linearly = linearly;
     b->wanted = job->reductions != NULL ? bp_wanted(job->reductions) : 0;
     b->balls = job->reductions != NULL && bp_balls_wanted(job->reductions);
-    b->powers = job->reductions != NULL && bp_powers_wanted(job->reductions);
+    b->powers = job->reductions != NULL ? bp_powers_wanted(job->reductions) : 0;
     b->numbers.u = b->u;
     b->numbers.p = b->p;
     b->numbers.c = b->c;
