@@ -64,8 +64,17 @@ def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr) -> Cage:
         rate=speed,
         in_outer=angle,
         in_inner=passing.symbol + pass_speed * TIME,
-        inputs=(even, passing, *(() if turning is None else (turning.input,))),
-        constants=(*constants, *(() if turning is None else turning.constants)),
+        inputs=(
+            even,
+            passing,
+            *(() if turning is None else (turning.input,)),
+            *(i for e in bearing.effects for i in EFFECTS[e.kind].inputs(e, bearing, names)),
+        ),
+        constants=(
+            *constants,
+            *(() if turning is None else turning.constants),
+            *(d for e in bearing.effects for d in EFFECTS[e.kind].constants(e, bearing, names)),
+        ),
         spin=None if turning is None else turning.angle,
     )
 

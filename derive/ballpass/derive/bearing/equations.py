@@ -226,7 +226,7 @@ def _own_terms(bearing: Bearing, names: Names, cage: Cage, cos: sp.Symbol, sin: 
     ]
     assert cage.in_outer == cage.angle  # effects are refused where the outer ring turns
     ball = GenericBall(balls=bearing.balls, on_outer=still, on_inner=on_inner, from_first=from_first, spin=cage.spin)
-    taken = sum((EFFECTS[e.kind].term(e, ball) for e in bearing.effects), start=sp.S.Zero)
+    taken = sum((EFFECTS[e.kind].term(e, bearing, names, ball) for e in bearing.effects), start=sp.S.Zero)
     return own_terms(taken, axes, cos, sin, cage.rate, names) if taken != 0 else None
 
 

@@ -92,6 +92,7 @@ def value_relations(scene: Scene) -> tuple[tuple[str, float, str], ...]:
         # the balls fit side by side on the pitch circle, a hair's breadth apart
         relations.append((pitch, (1.0 - 1e-12) / math.sin(math.pi / bearing.balls) if bearing.balls > 1 else 1.0, ball))
         relations.append((bearing.clearance.path, -1.0, ball))  # see `_check_preload`
+        relations += [r for effect in bearing.effects for r in EFFECTS[effect.kind].relations(effect, bearing)]
         if isinstance(bearing.contact, HertzContact):
             grooves = (bearing.contact.inner_groove_radius, bearing.contact.outer_groove_radius)
             relations += [(radius.path, 0.5, ball) for radius in grooves]
@@ -276,7 +277,7 @@ def _check_bearing(checker: Checker, bearing: Bearing) -> None:
     for number in bearing.damping.numbers:
         checker.within(number, law.bounds(number.path.rpartition(".")[2]))
     for effect in bearing.effects:
-        EFFECTS[effect.kind].check(effect, checker)
+        EFFECTS[effect.kind].check(effect, checker, bearing)
     if bearing.inner is not None:
         if isinstance(bearing.inner.mass, EquivalentMass):
             checker.positive(bearing.inner.mass.ring)

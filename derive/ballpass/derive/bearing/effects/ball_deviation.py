@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
-from ballpass.derive.scene.records import BallEffect
+from ballpass.derive.scene.records import BallEffect, Bearing
 from ballpass.derive.scene.schema import Table
-from ballpass.derive.terms import symbol_of
+from ballpass.derive.terms import Names, symbol_of
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -44,7 +44,7 @@ class BallDeviation(Effect):
         hint = "Balls of one bearing differ by tenths of a micrometre: check the unit."
         return [(deviation, DEVIATION, hint) for deviation in effect.numbers]
 
-    def term(self, effect: BallEffect, ball: GenericBall) -> sp.Expr:
+    def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         import sympy as sp
 
         return -sum(

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
 from ballpass.derive.bearing.effects.read_waves import ORDERS, read_waves, usual_amplitudes, with_roughness
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import BallEffect, Quantity
+from ballpass.derive.scene.records import BallEffect, Bearing, Quantity
 from ballpass.derive.scene.schema import Table
-from ballpass.derive.terms import symbol_of
+from ballpass.derive.terms import Names, symbol_of
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -44,7 +44,7 @@ class BallWaviness(Effect):
                 numbers += read
         return BallEffect(kind=self.name, structure=tuple(structure), numbers=tuple(numbers))
 
-    def check(self, effect: BallEffect, checker: Checker) -> None:
+    def check(self, effect: BallEffect, checker: Checker, bearing: Bearing) -> None:
         for amplitude in effect.numbers[::2]:
             checker.not_negative(amplitude, "give the amount, and turn the phase by 180 deg")
 
@@ -54,7 +54,7 @@ class BallWaviness(Effect):
     def usual(self, effect: BallEffect) -> Iterable[Usual]:
         return usual_amplitudes(effect.numbers[::2])
 
-    def term(self, effect: BallEffect, ball: GenericBall) -> sp.Expr:
+    def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         import sympy as sp
 
         assert ball.spin is not None  # `spins`

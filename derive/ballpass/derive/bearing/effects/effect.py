@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import BallEffect, Quantity
+from ballpass.derive.scene.records import BallEffect, Bearing, Quantity
 from ballpass.derive.scene.schema import Table
+from ballpass.derive.terms import Definition, Names
+from ballpass.derive.variables import Input
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -60,8 +62,12 @@ class Effect(ABC):
     def read(self, table: Table, balls: int) -> BallEffect:
         """The effect out of its table; faults are noted."""
 
-    def check(self, effect: BallEffect, checker: Checker) -> None:  # noqa: B027  an effect may take any number
+    def check(self, effect: BallEffect, checker: Checker, bearing: Bearing) -> None:  # noqa: B027  an effect may take any number
         """Note faults of its numbers."""
+
+    def relations(self, effect: BallEffect, bearing: Bearing) -> list[tuple[str, float, str]]:
+        """What its numbers must be to others: the first above so many times the second."""
+        return []
 
     def usual(self, effect: BallEffect) -> Iterable[Usual]:
         """Ranges in which its numbers usually lie, over the ball diameter, with a hint for one beyond."""
@@ -71,8 +77,16 @@ class Effect(ABC):
         """Whether it depends on how the balls are turned."""
         return False
 
+    def inputs(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Input, ...]:
+        """What holds between breakpoints."""
+        return ()
+
+    def constants(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Definition, ...]:
+        """Derived constants of its own."""
+        return ()
+
     @abstractmethod
-    def term(self, effect: BallEffect, ball: GenericBall) -> sp.Expr:
+    def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         """What it takes from the deflection of the generic ball [m]."""
 
     @abstractmethod

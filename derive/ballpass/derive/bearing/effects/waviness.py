@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
 from ballpass.derive.bearing.effects.read_waves import read_waves, usual_amplitudes
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import BallEffect
+from ballpass.derive.scene.records import BallEffect, Bearing
 from ballpass.derive.scene.schema import Table
-from ballpass.derive.terms import symbol_of
+from ballpass.derive.terms import Names, symbol_of
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -28,14 +28,14 @@ class _RacewayWaviness(Effect):
         orders, numbers = read_waves(table, f"around the {self.ring} raceway", ("B", r"\alpha"), self.label)
         return BallEffect(kind=self.name, structure=tuple(orders), numbers=tuple(numbers))
 
-    def check(self, effect: BallEffect, checker: Checker) -> None:
+    def check(self, effect: BallEffect, checker: Checker, bearing: Bearing) -> None:
         for amplitude in effect.numbers[::2]:
             checker.not_negative(amplitude, "give the amount, and turn the phase by 180 deg")
 
     def usual(self, effect: BallEffect) -> Iterable[Usual]:
         return usual_amplitudes(effect.numbers[::2])
 
-    def term(self, effect: BallEffect, ball: GenericBall) -> sp.Expr:
+    def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         import sympy as sp
 
         angle = ball.on_outer if self.ring == "outer" else ball.on_inner

@@ -1,0 +1,325 @@
+"""Spalls of raceways and balls: where a ball meets one it is pressed less by as much as it sinks in.
+
+A spall has a chord L and a middle at an angle of its raceway or ball; half of it is the angle w, sin w = L/2 over the
+radius.  How deep a ball sinks is its profile:
+
+rectangular  the depth between the edges; the deflection jumps at both
+half-sine    depth cos(pi s/L), s along the chord from the middle
+path         the ball turns about one edge, then about the other; their circles meet at the sagitta of the ball less
+             (outer raceway) or plus (inner raceway) that of the raceway; where a depth is given, not below it
+
+At constant speed all entries and exits are known before a run: each edge is a window of the angle that grows by a turn
+with every ball, and steps end on it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
+from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.records import BallEffect, Bearing, Quantity
+from ballpass.derive.scene.schema import Table
+from ballpass.derive.terms import Definition, Names, symbol_of
+from ballpass.derive.variables import Input
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+PROFILES = ("rectangular", "half-sine", "path")
+PLACES = ("outer", "inner", "ball")
+#: Chord and depth over ball diameter.
+CHORD, DEPTH = (None, 0.5), (None, 0.1)
+
+
+class Defects(Effect):
+    """Local defects."""
+
+    name = "defects"
+    words = "local defects of raceways and balls"
+
+    def read(self, table: Table, balls: int) -> BallEffect:
+        structure, numbers = list[int | str](), list[Quantity]()
+        with table:
+            for name in table.names("defect"):
+                with table.table(name, "on, angle, chord, depth and profile") as spall:
+                    on, profile = spall.choice("on", PLACES) or "outer", spall.choice("profile", PROFILES) or "path"
+                    number = spall.integer("ball", 1, balls, example="1") if on == "ball" else 0
+                    numbers += [
+                        spall.quantity(
+                            "angle", "rad", f"Angle of the middle of {name}", r"\alpha_d", example="270 deg"
+                        ),
+                        spall.quantity("chord", "m", f"Chord of {name}", "L_d", example="1 mm"),
+                    ]
+                    deep = profile == "path" and not spall.has("depth")
+                    if not deep:
+                        numbers.append(spall.quantity("depth", "m", f"Depth of {name}", "h_d", example="20 um"))
+                    structure += [name, on, number, "deep path" if deep else profile]
+        return BallEffect(kind=self.name, structure=tuple(structure), numbers=tuple(numbers))
+
+    def check(self, effect: BallEffect, checker: Checker, bearing: Bearing) -> None:
+        ball = bearing.ball_diameter
+        for spall in _spalls(effect):
+            checker.positive(spall.chord)
+            checker.not_negative(spall.depth)
+            widest = ball.value / _room(spall, bearing)
+            if spall.chord.value >= widest > 0.0:
+                checker.fault(
+                    spall.chord.path,
+                    "the chord is as long as the balls are apart",
+                    checker.show(spall.chord),
+                    f"a chord below {widest:.9g} m",
+                    "check its unit: spalls are some millimetres long; give several defects for a longer one",
+                )
+
+    def relations(self, effect: BallEffect, bearing: Bearing) -> list[tuple[str, float, str]]:
+        ball = bearing.ball_diameter.path
+        return [(ball, _room(spall, bearing), spall.chord.path) for spall in _spalls(effect)]
+
+    def usual(self, effect: BallEffect) -> Iterable[Usual]:
+        for spall in _spalls(effect):
+            yield spall.chord, CHORD, "Spalls are shorter than the balls are thick: check the unit."
+            if spall.depth is not None:
+                yield spall.depth, DEPTH, "Spalls are some hundredths of a millimetre deep: check the unit."
+
+    def spins(self, effect: BallEffect) -> bool:
+        return any(spall.on == "ball" for spall in _spalls(effect))
+
+    def inputs(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Input, ...]:
+        return tuple(
+            gate for spall in _spalls(effect) for one in _contacts(spall, bearing, names) for gate in one.gates
+        )
+
+    def constants(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Definition, ...]:
+        return tuple(
+            d for spall in _spalls(effect) for one in _contacts(spall, bearing, names) for d in one.constants()
+        )
+
+    def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
+        import sympy as sp
+
+        taken = sp.S.Zero
+        for spall in _spalls(effect):
+            for one in _contacts(spall, bearing, names):
+                if spall.on == "ball":
+                    assert ball.spin is not None  # `spins`
+                    turned = ball.spin - one.middle
+                    taken += ball.only(spall.ball, one.depth(sp.cos(turned), sp.sin(turned), sp.true))
+                else:
+                    turned = (ball.on_outer if spall.on == "outer" else ball.on_inner) - one.middle
+                    near = sp.cos(turned) > sp.cos(sp.pi / bearing.balls)
+                    taken += one.depth(sp.cos(turned), sp.sin(turned), near)
+        return taken
+
+    def describe(self, effect: BallEffect) -> str:
+        told = []
+        for spall in _spalls(effect):
+            where = f"ball {spall.ball}" if spall.on == "ball" else f"the {spall.on} raceway"
+            told.append(f"{spall.name} on {where}, {spall.profile}")
+        return "local defects: " + "; ".join(told)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Spall:
+    name: str
+    on: str
+    ball: int
+    profile: str
+    angle: Quantity
+    chord: Quantity
+    depth: Quantity | None
+
+
+def _spalls(effect: BallEffect) -> Iterator[_Spall]:
+    numbers = iter(effect.numbers)
+    for k in range(0, len(effect.structure), 4):
+        name, on, ball, profile = effect.structure[k : k + 4]
+        angle, chord = next(numbers), next(numbers)
+        yield _Spall(
+            name=str(name),
+            on=str(on),
+            ball=int(ball),
+            profile=str(profile),
+            angle=angle,
+            chord=chord,
+            depth=None if profile == "deep path" else next(numbers),
+        )
+
+
+def _room(spall: _Spall, bearing: Bearing) -> float:
+    """Times the chord that a ball's diameter must exceed, so that two balls never are in one spall."""
+    return 1.0 / (1.0 - math.sin(math.pi / bearing.balls)) if spall.on == "inner" else 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Contact:
+    """A spall as one kind of contact meets it: once with every ball, or, on a ball, with one of the two raceways.
+
+    Attributes
+    ----------
+    ring : the raceway of the contact
+    middle : angle at which it is met [rad]
+    """
+
+    spall: _Spall
+    bearing: Bearing
+    names: Names
+    ring: str
+    middle: sp.Expr
+
+    @property
+    def _label(self) -> str:
+        return f"{self.spall.name}.{self.ring}" if self.spall.on == "ball" else self.spall.name
+
+    def _symbol(self, name: str) -> sp.Symbol:
+        return self.names.constant(f"defects.{self._label}.{name}")
+
+    @property
+    def _edges(self) -> tuple[tuple[str, str, str], ...]:
+        """Name of each gate, and of the edges of its window."""
+        if self.spall.profile == "path":
+            return (
+                ("", "begin", "bottom_begin"),
+                ("_bottom", "bottom_begin", "bottom_end"),
+                ("_out", "bottom_end", "end"),
+            )
+        if self.spall.profile == "deep path":
+            return (("", "begin", "middle"), ("_out", "middle", "end"))
+        return (("", "begin", "end"),)
+
+    @property
+    def gates(self) -> tuple[Input, ...]:
+        """One while a ball is within a part of the spall."""
+        prefix = self.names.prefix
+        turning = ("spin_start", "spin_speed") if self.spall.on == "ball" else None
+        offset, rate = (
+            (self.names.constant(n).name for n in turning)
+            if turning
+            else (self._symbol(n).name for n in ("passing_start", "passing_speed"))
+        )
+        of = f" of {self.bearing.name}" if self.bearing.name else ""
+        return tuple(
+            Input(
+                name=f"gate.{prefix}defects.{self._label}{part}",
+                symbol=self._gate(part),
+                kind="gate",
+                unit="1",
+                description=f"Whether a ball{of} is in {self._label}{part.replace('_', ', ')}",
+                latex=self.names.latex("g_d"),
+                offset=offset,
+                rate=rate,
+                windows=((self._symbol(begin).name, self._symbol(end).name),),
+            )
+            for part, begin, end in self._edges
+        )
+
+    def _gate(self, part: str) -> sp.Symbol:
+        import sympy as sp
+
+        return sp.Symbol(f"gate.{self.names.prefix}defects.{self._label}{part}", real=True)
+
+    @property
+    def _radii(self) -> tuple[sp.Expr, sp.Expr]:
+        """Of the ball and of the raceway."""
+        ball, pitch = symbol_of(self.bearing.ball_diameter), symbol_of(self.bearing.pitch_diameter)
+        return ball / 2, (pitch + ball) / 2 if self.ring == "outer" else (pitch - ball) / 2
+
+    def constants(self) -> Iterator[Definition]:
+        """Half angle, and the edges of the windows: of a raceway's spall times the number of balls."""
+        import sympy as sp
+
+        spall, define, balls = self.spall, self.names.define, sp.Integer(self.bearing.balls)
+        ball, raceway = self._radii
+        own = ball if spall.on == "ball" else raceway
+        half, chord, words = self._symbol("half_angle"), symbol_of(spall.chord), self._label
+        angle = sp.atan2(chord / 2, sp.sqrt(own**2 - chord**2 / 4))
+        yield define(half, angle, "rad", f"Half the angle of {words}", "w_d")
+        each, what = (sp.S.One, "Angle") if spall.on == "ball" else (balls, "Angle, times the number of balls,")
+        if spall.on != "ball":
+            speed = self.names.constant("cage_speed" if self.ring == "outer" else "inner_pass_speed")
+            start = symbol_of(self.bearing.ball_angle)
+            yield define(
+                self._symbol("passing_start"),
+                balls * start,
+                "rad",
+                f"Angle of the passes over {words} at the start",
+                r"\eta_0",
+            )
+            yield define(
+                self._symbol("passing_speed"),
+                balls * speed,
+                "rad/s",
+                f"Angular frequency of balls over {words}",
+                r"\omega_d",
+            )
+        edges = {"begin": -half, "end": half}
+        if spall.profile == "deep path":
+            edges["middle"] = sp.S.Zero
+        if spall.depth is not None and spall.profile == "path":
+            # where the circle about the edge is down at the depth; chords are shorter than a ball's diameter
+            deep = sp.Min(symbol_of(spall.depth), ball)
+            centre = (raceway - ball + deep) if self.ring == "outer" else (raceway + ball - deep)
+            gap = deep * (2 * ball - deep)
+            if spall.on == "ball":
+                gap = deep * (2 * raceway + deep if self.ring == "outer" else 2 * raceway - deep)
+            sine = sp.Min(sp.sqrt(gap / (4 * centre * own)), sp.sin(angle / 2))
+            down = self._symbol("bottom_angle")
+            yield define(
+                down,
+                2 * sp.atan2(sine, sp.sqrt(1 - sine**2)),
+                "rad",
+                f"Angle from edge to bottom of {words}",
+                r"\beta_d",
+            )
+            edges |= {"bottom_begin": down - half, "bottom_end": half - down}
+        for name, past in edges.items():
+            place = name.replace("_", " ")
+            latex = rf"\eta_{{\mathrm{{{place}}}}}"
+            yield define(
+                self._symbol(name), each * (self.middle + past), "rad", f"{what} of the {place} of {words}", latex
+            )
+
+    def depth(self, c: sp.Expr, s: sp.Expr, near: sp.logic.boolalg.Boolean) -> sp.Expr:
+        """How deep a ball sinks, over cosine and sine of the angle past the middle."""
+        import sympy as sp
+
+        half, one_half = self._symbol("half_angle"), sp.Rational(1, 2)
+        across, along = sp.sin(half), sp.cos(half)
+        depth = sp.S.Zero if self.spall.depth is None else symbol_of(self.spall.depth)
+        if self.spall.profile == "rectangular":
+            sunk: tuple[sp.Expr, ...] = (depth,)
+        elif self.spall.profile == "half-sine":
+            sunk = (depth * sp.cos(sp.pi * one_half * s / across),)
+        else:
+            into = self._about_edge(along * c - across * s, across * c + along * s)
+            out = self._about_edge(along * c + across * s, across * c - along * s)
+            sunk = (into, out) if self.spall.depth is None else (into, depth, out)
+        return sp.Add(
+            *(
+                sp.Piecewise((value, sp.And(near, self._gate(part) > one_half)), (sp.S.Zero, True))
+                for value, (part, _, _) in zip(sunk, self._edges, strict=True)
+            )
+        )
+
+    def _about_edge(self, cosine: sp.Expr, sine: sp.Expr) -> sp.Expr:
+        """How deep a ball sinks that touches the edge, over cosine and sine of the angle past it."""
+        import sympy as sp
+
+        ball, raceway = self._radii
+        own, other = (ball, raceway) if self.spall.on == "ball" else (raceway, ball)
+        aside = sp.sqrt(other**2 - (own * sine) ** 2)
+        if self.ring == "inner":
+            return raceway + ball - own * cosine - aside
+        return ball - raceway + (aside - own * cosine if self.spall.on == "ball" else own * cosine - aside)
+
+
+def _contacts(spall: _Spall, bearing: Bearing, names: Names) -> Iterator[_Contact]:
+    import sympy as sp
+
+    angle = symbol_of(spall.angle)
+    rings = [("outer", sp.S.Zero), ("inner", sp.pi)] if spall.on == "ball" else [(spall.on, sp.S.Zero)]
+    for ring, opposite in rings:
+        yield _Contact(spall=spall, bearing=bearing, names=names, ring=ring, middle=angle + opposite)
