@@ -48,7 +48,7 @@ from ballpass.derive.terms import Definition, Smoothness, symbol_of
 from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, StateSwitch
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class System:
     """The model as mathematics; every stage after this one needs nothing else.
 
@@ -76,6 +76,13 @@ class System:
     smoothness: tuple[tuple[str, Smoothness], ...]
     events: tuple[Event, ...]
     switches: tuple[StateSwitch, ...] = ()
+
+    def __repr__(self) -> str:
+        states, outputs = (", ".join(item.name for item in items) for items in (self.states, self.outputs))
+        return (
+            f"System({self.scene.name}: states {states or 'none'}; {len(self.parameters)} parameters, "
+            f"{len(self.definitions)} definitions; outputs {outputs or 'none'})"
+        )
 
     @property
     def late(self) -> dict[sp.Symbol, sp.Expr]:

@@ -473,7 +473,7 @@ class DutyState:
     parameters: tuple[tuple[str, float], ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Scene:
     """A checked scene.
 
@@ -493,6 +493,12 @@ class Scene:
     quantities: tuple[Quantity, ...]
     duty: tuple[DutyState, ...] = ()
     lines: LineIndex = field(default=LineIndex(lines={}), repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        bodies = [body.name for body in self.mechanism.bodies] if self.mechanism is not None else []
+        bearings = [bearing.name or "bearing" for bearing in self.bearings]
+        parts = [f"bodies {', '.join(bodies)}"] * bool(bodies) + [f"bearings {', '.join(bearings)}"] * bool(bearings)
+        return f"Scene({self.name}: {'; '.join((*parts, f'{len(self.quantities)} numbers'))})"
 
     @property
     def coupled(self) -> bool:

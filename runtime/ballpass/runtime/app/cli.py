@@ -53,6 +53,7 @@ app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["--help", "-h"]},
     help="Planar mechanisms and the ball bearings they load: from a scene file to derived equations, generated C, a "
     "simulation and figures. Start with: ballpass run scenes/punching_press.toml",
     epilog="Results go to stdout, messages and progress to stderr. Exit codes: 0 done, 1 the computation failed, 2 the "
