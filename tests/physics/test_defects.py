@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ballpass.derive import SceneError
+from ballpass.derive import SceneError, derive
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError
 
@@ -50,7 +50,7 @@ profile = "path"
 """
 CHANGES = (
     ("balls = 8", "balls = 9"),
-    ("[bearing.inner_ring]", f"{SPALLS}[bearing.inner_ring]"),
+    ("[bearing.inner_ring]", f"{SPALLS}[bearing.cage]\nslip = 0.0\n[bearing.inner_ring]"),
     ('clearance = "0 um"  ', f'clearance = "{-2e6 * PRELOAD} um"  '),
     ('law = "none"  ', 'law = "tangent"\nratio = "2e-5 s"  '),
     ('["3.9937 um", "0.1 um"]', '["0 um", "0 um"]'),
@@ -108,6 +108,7 @@ def test_a_ball_sinks_as_deep_by_its_own_spall(spalled: Model) -> None:
         assert sunk(spalled, 3, (middle + turned) / spin, OF_6204) == 0.0
 
 
+@pytest.mark.parametrize("slip", [0.0, 0.04])
 @pytest.mark.parametrize(
     ("spall", "factor", "radius"),
     [
@@ -117,10 +118,19 @@ def test_a_ball_sinks_as_deep_by_its_own_spall(spalled: Model) -> None:
     ],
 )
 def test_pulses_come_at_the_published_frequencies_and_last_as_kinematics_say(
-    spalled: Model, spall: str, factor: float, radius: float | None
+    spalled: Model, spall: str, factor: float, radius: float | None, slip: float
 ) -> None:
-    """Edges found in the deflection of the balls alone, by bisection."""
-    numbers = {**CWRU, "bearing.defects.dent.depth": 5e-6, "bearing.defects.flake.depth": 5e-6}
+    """Edges found in the deflection of the balls alone, by bisection.
+
+    A cage that slips moves lines of outer raceway and balls by (1 - s), and of the inner one what it adds to them.
+    """
+    factor = BALLS - (BALLS - factor) * (1 - slip) if spall == "shallow" else factor * (1 - slip)
+    numbers = {
+        **CWRU,
+        "bearing.cage.slip": slip,
+        "bearing.defects.dent.depth": 5e-6,
+        "bearing.defects.flake.depth": 5e-6,
+    }
     others = [name for name in ("deep", "shallow", "dent", "flake", "pit") if name != spall]
     shut = {f"bearing.defects.{name}.chord": 1e-9 for name in others}
     turn = 2.0 * np.pi / spalled.parameters["shaft.speed"]
@@ -143,8 +153,9 @@ def test_pulses_come_at_the_published_frequencies_and_last_as_kinematics_say(
     assert len(period) >= 3
     assert turn / period == pytest.approx(factor, abs=6e-5)  # as published, to its last digit
     ball, pitch = CWRU.values()
-    exact = {"dent": BALLS / 2 * (1 - ball / pitch), "shallow": BALLS / 2 * (1 + ball / pitch)}
-    exact["flake"] = pitch / ball * (1 - (ball / pitch) ** 2)
+    cage = (1 - ball / pitch) / 2 * (1 - slip)
+    exact = {"dent": BALLS * cage, "shallow": BALLS * (1 - cage)}
+    exact["flake"] = pitch / ball * (1 - (ball / pitch) ** 2) * (1 - slip)
     assert period == pytest.approx(turn / exact[spall], rel=1e-6)
     chord = spalled.parameters[f"bearing.defects.{spall}.chord"]
     angle = 2.0 * np.arcsin(chord / 2 / (ball / 2 if radius is None else radius))
@@ -203,6 +214,17 @@ def test_stepper_lanes_and_virtual_machine_agree(spalled: Model, clearance: floa
     )  # fmt: skip
     found = spalled.reduce(cycles=0.5, transient=0, parameters=numbers, rtol=1e-11)["inner.y"].maximum
     assert many["max:inner.y"][1] == pytest.approx(found, rel=1e-6)
+
+
+def test_a_given_ratio_of_the_cage_takes_the_place_of_rolling(scene_text: Callable[..., str]) -> None:
+    text = scene_text(
+        "varying_compliance", ("[bearing.inner_ring]", "[bearing.cage]\nratio = 0.4\n[bearing.inner_ring]")
+    )
+    known = {d.symbol.name: d.expression for d in derive(scene_from_text(text, "given")).constants}
+    assert known["bearing.cage_ratio"].name == "bearing.cage.ratio"
+    for wrong in ("1.2", "-0.1"):
+        with pytest.raises(SceneError, match=r"bearing\.cage\.ratio"):
+            scene_from_text(text.replace("0.4", wrong), "given")
 
 
 def test_a_spall_that_two_balls_would_share_is_refused(spalled: Model, scene_text: Callable[..., str]) -> None:

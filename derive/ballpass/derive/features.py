@@ -212,6 +212,17 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
             modelled="outer ring on an elastic, damped housing: two coordinates more",
             without=_keep(scene, f"{bearing.prefix}outer", bearing=fixed),
         )
+    if bearing.cage is not None:
+        told = [q.path for q in (bearing.cage.ratio, bearing.cage.slip) if q is not None]
+        yield Feature(
+            name=f"cage{of}",
+            path=f"{bearing.path}.cage",
+            modelled="the cage's own speed: " + " and ".join(path.rpartition(".")[2] for path in told),
+            without=replace(
+                _with(scene, replace(bearing, cage=None)),
+                quantities=tuple(q for q in scene.quantities if q.path not in told),
+            ),
+        )
     for effect in bearing.effects:
         rest = tuple(e for e in bearing.effects if e is not effect)
         gone = {q.path for q in effect.numbers}

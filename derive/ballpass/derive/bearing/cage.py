@@ -1,4 +1,4 @@
-"""Angle of the balls: pure rolling between two rings that turn.
+"""Angle of the balls: pure rolling between two rings that turn, unless the scene says of the cage what it does.
 
 In: a bearing and how its rings turn.  Out: a `Cage`: angle and rate of ball 1, and what they are made of.
 """
@@ -48,13 +48,15 @@ def cage_ratio(names: Names) -> sp.Symbol:
 
 
 def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr) -> Cage:
-    """Inner ring at constant speed [rad/s], outer ring at rest, Eq. (7)."""
+    """Inner ring at constant speed [rad/s], outer ring at rest, Eq. (7); a cage that slips lags behind."""
     names = Names(prefix=bearing.prefix, path=bearing.path)
     speed, even = names.constant("cage_speed"), _phase(bearing, names)
     pass_speed, passing = names.constant("inner_pass_speed"), _phase(bearing, names, "inner")
+    slip = None if bearing.cage is None else bearing.cage.slip
+    share = sp.S.One if slip is None else 1 - symbol_of(slip)
     constants = (
         _ratio(bearing, names),
-        names.define(speed, cage_ratio(names) * shaft_speed, "rad/s", "Speed of the cage", r"\omega_c"),
+        names.define(speed, cage_ratio(names) * share * shaft_speed, "rad/s", "Speed of the cage", r"\omega_c"),
         _pass(names, "inner", speed - shaft_speed),
     )
     angle = even.symbol + speed * TIME
@@ -188,11 +190,12 @@ def _pass(names: Names, ring: str, speed: sp.Expr) -> Definition:
 
 def _ratio(bearing: Bearing, names: Names) -> Definition:
     ball_diameter, pitch_diameter = symbol_of(bearing.ball_diameter), symbol_of(bearing.pitch_diameter)
+    given = None if bearing.cage is None else bearing.cage.ratio
     return names.define(
         cage_ratio(names),
-        (1 - ball_diameter / pitch_diameter) / 2,
+        (1 - ball_diameter / pitch_diameter) / 2 if given is None else symbol_of(given),
         "1",
-        "Speed of the cage over speed of the inner ring, r_b/(R_b + r_b), Eq. (7)",
+        "Speed of the cage over speed of the inner ring, " + ("r_b/(R_b + r_b), Eq. (7)" if given is None else "given"),
         r"\omega_c/\omega",
     )
 

@@ -15,6 +15,7 @@ from ballpass.derive.scene.records import (
     FRAME,
     BallEffect,
     Bearing,
+    CageMotion,
     Damping,
     EquivalentMass,
     GivenContact,
@@ -49,7 +50,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
     """
     with table:
         table.know("joint", "share", "balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle", "contact")
-        table.know("coupling", "count", "damping", "inner_ring", "outer_ring", "initial", *EFFECTS)
+        table.know("coupling", "count", "damping", "inner_ring", "outer_ring", "initial", "cage", *EFFECTS)
         coupling = read_coupling(table, mechanism)
         catalogue = fill_by_designation(table)
         joint, share = _read_place(table, mechanism, driven, coupling)
@@ -93,6 +94,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             outer=support,
             initial=_read_initial(table, moving_outer=support is not None),
             catalogue=catalogue,
+            cage=_read_cage(table, "two-way" if coupling == "two-way" else _uneven(mechanism)),
             lubrication=read_lubrication(table),
         )
 
@@ -253,6 +255,29 @@ def _read_damping(table: Table) -> Damping:
 
 def _read_effects(table: Table, balls: int) -> tuple[BallEffect, ...]:
     return tuple(effect.read(table.table(kind), balls) for kind, effect in EFFECTS.items() if table.has(kind))
+
+
+def _uneven(mechanism: Mechanism | None) -> str:
+    """What makes a one-way bearing's rings turn unevenly; empty where nothing does."""
+    return "mechanism.driver.table" if mechanism is not None and mechanism.driver.table is not None else ""
+
+
+def _read_cage(table: Table, uneven: str) -> CageMotion | None:
+    if not table.has("cage"):
+        return None
+    with table.table("cage", "ratio or slip") as cage:
+        words = "Speed of the cage over that of the inner ring"
+        ratio = cage.optional_quantity("ratio", "1", words, r"\kappa_c")
+        slip = cage.optional_quantity("slip", "1", "Part by which the cage turns slower than by rolling", "s_c")
+        if slip is not None and uneven:
+            cage.fault(
+                "slip",
+                "slip of the cage is modelled for rings that turn at constant speed",
+                given=f"slip, and {uneven}",
+                allowed='slip with coupling = "one-way" and a driver of constant speed',
+                remedy="delete slip; ratio may stay",
+            )
+        return CageMotion(ratio=ratio, slip=slip)
 
 
 def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:

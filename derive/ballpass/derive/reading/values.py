@@ -278,6 +278,11 @@ def _check_bearing(checker: Checker, bearing: Bearing) -> None:
         checker.within(number, law.bounds(number.path.rpartition(".")[2]))
     for effect in bearing.effects:
         EFFECTS[effect.kind].check(effect, checker, bearing)
+    if bearing.cage is not None:
+        if bearing.cage.ratio is not None:
+            checker.within(bearing.cage.ratio, Bounds(above=0.0, below=1.0))
+        if bearing.cage.slip is not None:
+            checker.within(bearing.cage.slip, Bounds(above=-1.0, below=1.0))
     if bearing.inner is not None:
         if isinstance(bearing.inner.mass, EquivalentMass):
             checker.positive(bearing.inner.mass.ring)

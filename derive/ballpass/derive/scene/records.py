@@ -343,6 +343,17 @@ class BallEffect:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CageMotion:
+    """What a scene says of the cage: its ratio to the inner ring's speed instead of that of rolling, and its slip.
+
+    `slip` is the part by which it turns slower [1].  None: rolling.
+    """
+
+    ratio: Quantity | None
+    slip: Quantity | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class EquivalentMass:
     """Eq. (3): ring mass m_i, crankpin mass m_x [kg], crank counted whole or halved (a pair of bearings carries it)."""
 
@@ -417,8 +428,8 @@ class Bearing:
     `coupling` two-way: its play moves the bodies of the joint; `inner_body` carries the inner ring, `count` bearings
     stand side by side (None: one).
     `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
-    `outer` is None for a fixed outer ring.  `catalogue` and `lubrication` are None where the scene says nothing of
-    that kind.
+    `outer` is None for a fixed outer ring.  `catalogue`, `cage` and `lubrication` are None where the scene says
+    nothing of that kind.
     """
 
     name: str
@@ -439,6 +450,7 @@ class Bearing:
     outer: OuterRing | None
     initial: InitialState
     catalogue: Catalogue | None = None
+    cage: CageMotion | None = None
     lubrication: Lubrication | None = None
 
     @property
