@@ -33,6 +33,8 @@ NOT_RUN = {
     r"\. \.venv/bin/activate": "the environment is that of the tests",
     r"\S*pip install": "installs",
     r"CC=clang ": "another compiler",
+    r"dask (scheduler|worker)": "they do not end",
+    r".* --scheduler tcp:": "needs them",
     r"ballpass trade ": "measures for minutes; tests/test_cli_trade.py runs it",
 }
 BLOCK = re.compile(r"^( *)```(console|python)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)

@@ -24,7 +24,10 @@ if TYPE_CHECKING:
     from ballpass.runtime.contract.status import Status
     from ballpass.runtime.contract.usual import UnusualWarning
     from ballpass.runtime.many.chunks import MemberFailure
+    from ballpass.runtime.many.data_set import DataSetReport, SignalClass, make_data_set
+    from ballpass.runtime.many.distributions import Distribution
     from ballpass.runtime.many.ensemble import EnsembleResult, EnsembleStatistics
+    from ballpass.runtime.many.signals import Signals
     from ballpass.runtime.model import Model, load
     from ballpass.runtime.native.compile import CacheWarning, NoCompilerWarning
     from ballpass.runtime.native.loaded_model import NoKernelsWarning
@@ -44,6 +47,8 @@ __all__ = [
     "BallpassError",
     "CacheWarning",
     "CompileError",
+    "DataSetReport",
+    "Distribution",
     "EnsembleResult",
     "EnsembleStatistics",
     "Explanation",
@@ -67,6 +72,8 @@ __all__ = [
     "RunEnd",
     "Sensitivities",
     "SensitivityReport",
+    "SignalClass",
+    "Signals",
     "SimulationError",
     "Solution",
     "StaticEquilibrium",
@@ -76,6 +83,7 @@ __all__ = [
     "load",
     "load_results",
     "load_solution",
+    "make_data_set",
     "read_manifest",
 ]
 
@@ -95,8 +103,13 @@ _HOME = {
     "Status": "contract.status",
     "UnusualWarning": "contract.usual",
     "MemberFailure": "many.chunks",
+    "DataSetReport": "many.data_set",
+    "SignalClass": "many.data_set",
+    "make_data_set": "many.data_set",
+    "Distribution": "many.distributions",
     "EnsembleResult": "many.ensemble",
     "EnsembleStatistics": "many.ensemble",
+    "Signals": "many.signals",
     "Model": "model",
     "load": "model",
     "CacheWarning": "native.compile",

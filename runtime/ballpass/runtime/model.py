@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
+from ballpass.runtime.many.ensemble_parts import simulate_parts
 from ballpass.runtime.many.members import Table
 from ballpass.runtime.native.compile import CompiledLibrary, compile_model
 from ballpass.runtime.point.assembly import check_assembly
@@ -428,6 +429,7 @@ class Model(PointModel):
         threads: int | None = None,
         lanes: bool = True,
         growth: bool = False,
+        client: Any = None,
         progress: Callable[[float], None] | None = None,
     ) -> EnsembleResult:
         """Simulate many parameter sets, keeping only observables.
@@ -455,6 +457,8 @@ class Model(PointModel):
         lanes : False advances one member at a time
         growth : run each member a second time from a start moved by the tolerance; ``uncertain`` of the result then
             says which numbers have no digits (see `growth`)
+        client : of `dask.distributed`; its workers simulate parts of the table, in lanes, with the same bits where they
+            have the same processor and compiler.  ``threads`` are then those of the cluster
         progress : called with the finished fraction
 
         Raises
@@ -470,7 +474,8 @@ class Model(PointModel):
             method: str | None = method,
             kinks: str | None = kinks,
         ) -> EnsembleResult:
-            return simulate_many(
+            where = {"threads": threads} if client is None else {"client": client}
+            return (simulate_many if client is None else simulate_parts)(
                 self,
                 table,
                 names,
@@ -480,9 +485,9 @@ class Model(PointModel):
                 rtol=rtol,
                 method=method,
                 kinks=kinks,
-                threads=threads,
                 lanes=lanes,
                 progress=progress,
+                **where,
             )
 
         return simulate_members(self, parameters, observables, run) if growth else run(parameters, observables)

@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from ballpass.derive.reading.read_bearing import read_bearing, read_shaft
@@ -53,11 +54,21 @@ RESERVED = (
 _TABLES = ("mechanism", "shaft", "load", "loads", "bearing", "bearings", "run", "duty")
 
 
-def read_scene(path: str | Path, coupling: Coupling | None = None) -> Scene:
+def read_scene(
+    path: str | Path,
+    coupling: Coupling | None = None,
+    changes: Mapping[str, Any] | None = None,
+    name: str | None = None,
+) -> Scene:
     """Read a scene file.
 
-    The scene's name is the file's stem.  With a `coupling` it is the variant of the scene whose bearings are all
-    coupled so (see `recouple`), and of another name.
+    With a `coupling` it is the variant of the scene whose bearings are all coupled so (see `recouple`), and of another
+    name.
+
+    Parameters
+    ----------
+    changes : tables and values that take the place of those of the file, or come beside them
+    name : of the scene; the file's stem by default
 
     Raises
     ------
@@ -81,7 +92,7 @@ def read_scene(path: str | Path, coupling: Coupling | None = None) -> Scene:
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
         raise _unreadable(file, "the file is not text in UTF-8", "save the file as UTF-8", line) from None
-    return _scene(text, file.stem, str(file), coupling)
+    return _scene(text, name or file.stem, str(file), coupling, changes or {})
 
 
 def scene_from_text(text: str, name: str) -> Scene:
@@ -107,8 +118,23 @@ def _unreadable(file: Path, problem: str, remedy: str, line: int | None = None) 
     return SceneError([fault], source=file)
 
 
-def _scene(text: str, name: str, source: str | None, coupling: Coupling | None = None) -> Scene:
-    data = _parse(text, source)
+def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables with changes put in, at any depth."""
+    found = dict(data)
+    for key, value in changes.items():
+        both = isinstance(value, Mapping) and isinstance(found.get(key), Mapping)
+        found[key] = _merged(found[key], value) if both else value
+    return found
+
+
+def _scene(
+    text: str,
+    name: str,
+    source: str | None,
+    coupling: Coupling | None = None,
+    changes: Mapping[str, Any] = MappingProxyType({}),
+) -> Scene:
+    data = _merged(_parse(text, source), changes)
     if coupling is not None:
         data, name = recoupled(data, coupling), f"{name}_{coupling.replace('-', '_')}"
     collector = Collector(lines=index_lines(text))

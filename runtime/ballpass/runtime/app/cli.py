@@ -16,6 +16,7 @@ import typer
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import Asked, faults_of_numbers, read_asked, read_duration, read_turns
 from ballpass.runtime.app.commands.bearings import bearings
+from ballpass.runtime.app.commands.dataset import dataset
 from ballpass.runtime.app.commands.explain import explain
 from ballpass.runtime.app.commands.jacobian import jacobian, linearize
 from ballpass.runtime.app.commands.life import life
@@ -288,7 +289,7 @@ def export(
     typer.echo(str(folder))
 
 
-for _command in (bearings, explain, jacobian, life, linearize, sensitivity, sweep, trade):
+for _command in (bearings, dataset, explain, jacobian, life, linearize, sensitivity, sweep, trade):
     app.command()(_command)
 
 

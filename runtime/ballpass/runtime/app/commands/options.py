@@ -40,3 +40,12 @@ ResultsFolder = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object on stdout, nothing else.")]
 
 Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")]
+
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Let the workers of this scheduler of Dask do it: tcp://192.168.0.10:8786."),
+]
+
+Workers = Annotated[
+    int | None, typer.Option(metavar="N", help="Let N processes of a Dask cluster on this machine do it.")
+]

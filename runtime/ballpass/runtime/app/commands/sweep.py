@@ -84,6 +84,8 @@ def sweep(
     threads: Annotated[
         int | None, typer.Option(metavar="N", help="Threads; as many as processors if not given.")
     ] = None,
+    scheduler: options.Scheduler = None,
+    workers: options.Workers = None,
     out: options.ResultsFolder = None,
     json_: options.Json = False,
     figures: options.Figures = True,
@@ -97,6 +99,7 @@ def sweep(
     from ballpass.runtime.app.commands.ranges import grid, read_ranges
     from ballpass.runtime.app.commands.sweep_results import TABLE, Sweep
     from ballpass.runtime.certify.whole_run import default_observables
+    from ballpass.runtime.many.cluster import connected
 
     with command(scene) as stages:
         stages("read")
@@ -117,26 +120,27 @@ def sweep(
             )
         at_kinks = checked_kinks(kinks, method or read.run.method)
         folder = results_folder(out, scene)
-        model = load_model(scene, stages, method or read.run.method, at_kinks, rtol, overrides=overrides)
-        _ = model.ensemble_driver  # compiled here, where it is announced
-
         varied = grid(ranges)
         count = math.prod(len(one.values) for one in ranges)
         fixed = {path: np.full(count, value) for path, value in overrides.items()}
-        stages("simulate")
-        result = model.simulate_many(
-            {**varied, **fixed},
-            of or default_observables(model),
-            cycles=cycles,
-            duration=seconds,
-            transient=transient,
-            rtol=rtol,
-            method=method,
-            kinks=at_kinks,
-            threads=threads,
-            growth=count <= TWINS if growth is None else growth,
-            progress=stages.fraction,
-        )
+        with connected(scheduler, workers) as client:
+            model = load_model(scene, stages, method or read.run.method, at_kinks, rtol, overrides=overrides)
+            _ = model.ensemble_driver  # compiled here, where it is announced
+            stages("simulate")
+            result = model.simulate_many(
+                {**varied, **fixed},
+                of or default_observables(model),
+                cycles=cycles,
+                duration=seconds,
+                transient=transient,
+                rtol=rtol,
+                method=method,
+                kinks=at_kinks,
+                threads=threads,
+                growth=count <= TWINS if growth is None else growth,
+                client=client,
+                progress=stages.fraction,
+            )
         refused = [failure for failure in result.failures if failure.status == "REFUSED"]
         if len(refused) == count:
             raise RequestError(f"--vary: none of the {count} members can be simulated. The first: {refused[0].message}")

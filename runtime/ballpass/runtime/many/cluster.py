@@ -1,0 +1,254 @@
+"""Work of ensembles and data sets on the workers of a Dask cluster.
+
+In: a client of `dask.distributed`, models, tasks.  Out: the results of the tasks, in the order in which they come.
+
+A generated folder is sent to each worker once, also to one that comes later.  The worker writes it to a folder of its
+own, and compiles it where its cache of compiled code has no library that fits.  Dask gives the tasks of a lost worker
+to others.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import hashlib
+import importlib
+import io
+import shutil
+import tempfile
+import threading
+import zipfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from ballpass.runtime.contract import read_artefact
+from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.folder import read_unchanged
+from ballpass.runtime.contract.manifest import FILE_NAME
+from ballpass.runtime.native.compile import compile_model
+from ballpass.runtime.native.loaded_model import LoadedModel
+
+#: How long to wait for the first worker, and for a scheduler to answer [s].
+PATIENCE = 60.0
+
+#: Tasks of a thread of a worker that are under way: one that runs, one that waits, so that no thread does.
+AHEAD = 2
+
+
+#: Settings of workers on this machine.  Dask's own environment lets the C library give back freed memory at once, and
+#: each signal then takes its pages from the system anew: a half longer, measured.  Nobody looks at profiles.
+LOCAL = {
+    "distributed.nanny.pre-spawn-environ": {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")},
+    "distributed.worker.profile.enabled": False,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Packed:
+    """A generated folder to be sent.
+
+    Attributes
+    ----------
+    key : digest of the content
+    content : the files, as a ZIP archive
+    version : of this package
+    """
+
+    key: str
+    content: bytes = field(repr=False)
+    version: str
+
+
+def need(module: str) -> Any:
+    """A module of the extra ``scale``.
+
+    Raises
+    ------
+    RequestError
+        It is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        name = {"zarr": "Zarr"}.get(module, "Dask")
+        raise RequestError(f"This needs {name}, which is not installed: pip install 'ballpass[scale]'.") from None
+
+
+def pack(model: LoadedModel) -> Packed:
+    """The generated folder of a model; ArtefactError where it was written anew since."""
+    memory = io.BytesIO()
+    with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED) as archive:
+        # names alone: times of files would make other bytes of the same content
+        archive.writestr(zipfile.ZipInfo(FILE_NAME), model.manifest.to_json())
+        for name, digest in model.manifest.files:
+            archive.writestr(zipfile.ZipInfo(name), read_unchanged(model.folder / name, digest), zipfile.ZIP_DEFLATED)
+    content = memory.getvalue()
+    return Packed(key=hashlib.sha256(content).hexdigest(), content=content, version=version("ballpass"))
+
+
+class _Workshop:
+    """Models of this process by the keys of their folders, each unpacked and compiled when first asked for."""
+
+    def __init__(self) -> None:
+        self._packed: dict[str, Packed] = {}
+        self._models: dict[str, LoadedModel] = {}
+        self._making = threading.Lock()
+
+    def take(self, packed: Sequence[Packed]) -> None:
+        self._packed.update((one.key, one) for one in packed)
+
+    def model(self, key: str) -> LoadedModel:
+        with self._making:
+            if key not in self._models:
+                self._models[key] = self._load(self._packed[key])
+            return self._models[key]
+
+    def _load(self, packed: Packed) -> LoadedModel:
+        here = version("ballpass")
+        if packed.version != here:
+            raise RequestError(
+                f"A worker has ballpass {here}, and {packed.version} sent it work. Install one version everywhere."
+            )
+        place = Path(tempfile.mkdtemp(prefix="ballpass-"))
+        atexit.register(shutil.rmtree, place, ignore_errors=True)
+        with zipfile.ZipFile(io.BytesIO(packed.content)) as archive:
+            archive.extractall(place)
+        manifest = read_artefact(place)
+        return LoadedModel(place, manifest, compile_model(place, manifest))
+
+
+_workshop = _Workshop()
+
+
+def loaded(key: str) -> LoadedModel:
+    """On a worker: the model of a folder that was sent."""
+    return _workshop.model(key)
+
+
+def _receive(packed: Sequence[Packed]) -> None:
+    _workshop.take(packed)
+
+
+@contextlib.contextmanager
+def _sent(client: Any, packed: Sequence[Packed]) -> Iterator[None]:
+    """Folders on all workers, also on those that come while this lasts."""
+    distributed = need("dask.distributed")
+
+    class Sending(distributed.WorkerPlugin):  # type: ignore[misc, name-defined]
+        """Gives the folders to a worker when it starts."""
+
+        name = "ballpass-" + hashlib.sha256("".join(one.key for one in packed).encode()).hexdigest()[:16]
+
+        def setup(self, worker: Any) -> None:
+            _receive(packed)
+
+    client.register_plugin(Sending())
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError, ValueError):  # the scheduler is gone, and the plugin with it
+            client.unregister_worker_plugin(Sending.name)
+
+
+def run_tasks(
+    client: Any,
+    models: Sequence[LoadedModel],
+    function: Callable[..., Any],
+    tasks: Callable[[Sequence[str]], Iterable[tuple[Any, ...]]],
+) -> Iterator[Any]:
+    """What `function` gives for each of the tasks, in the order in which they end; a few at a time are under way.
+
+    Parameters
+    ----------
+    models : that the function asks for with `loaded`
+    function : of a module, so that workers find it
+    tasks : arguments of the function, made of the keys of the models
+
+    Raises
+    ------
+    RequestError
+        There is no worker.
+    SimulationError
+        Dask has given a task up, for example because each worker that took it died.
+    """
+    distributed = need("dask.distributed")
+    packed = [pack(model) for model in models]
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except TimeoutError:
+        raise RequestError(
+            f"The cluster has no worker, and none came in {PATIENCE:g} s. Start one: dask worker "
+            f"{client.scheduler.address}"
+        ) from None
+    with _sent(client, packed):
+        waiting = iter(tasks([one.key for one in packed]))
+        running = distributed.as_completed()
+        under_way: set[Any] = set()
+
+        def hand_out() -> None:
+            most = AHEAD * max(1, sum(client.nthreads().values()))
+            for task in islice(waiting, max(0, most - len(under_way))):
+                future = client.submit(function, *task, pure=False)
+                under_way.add(future)
+                running.add(future)
+
+        try:
+            hand_out()
+            for future in running:
+                try:
+                    result = future.result()
+                except (distributed.KilledWorker, distributed.CancelledError) as fault:
+                    raise SimulationError(
+                        f"Dask has given up a part of the work: {fault}. What was finished before is kept. Look at the "
+                        "logs of the workers; one that needs more memory than it has is ended by the system."
+                    ) from fault
+                under_way.discard(future)
+                hand_out()
+                yield result
+        finally:
+            client.cancel(list(under_way))
+
+
+@contextlib.contextmanager
+def connected(scheduler: str | None, workers: int | None) -> Iterator[Any]:
+    """A client of a scheduler, or of a new cluster of processes on this machine; None where neither is given.
+
+    Raises
+    ------
+    RequestError
+        Both are given, no scheduler answers, or Dask is not installed.
+    """
+    if scheduler is None and workers is None:
+        yield None
+        return
+    if scheduler is not None and workers is not None:
+        raise RequestError(
+            f"--scheduler {scheduler} and --workers {workers} were both given. Allowed: one of them: workers of a "
+            "scheduler that runs, or a cluster on this machine."
+        )
+    if workers is not None and workers < 1:
+        raise RequestError(f"--workers: {workers} workers cannot work. Allowed: a whole number from 1 on.")
+    distributed = need("dask.distributed")
+    if workers is not None:
+        with (
+            need("dask").config.set(LOCAL),
+            distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs="ERROR"
+            ) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            yield client
+        return
+    try:
+        client = distributed.Client(scheduler, timeout=PATIENCE / 4)
+    except (OSError, ValueError) as fault:
+        raise RequestError(
+            f"--scheduler: no scheduler of Dask answers at {scheduler} ({str(fault).splitlines()[0]}). Start one: dask "
+            "scheduler. It prints its address, as in tcp://192.168.0.10:8786."
+        ) from None
+    with client:
+        yield client

@@ -1,0 +1,331 @@
+"""Data sets: thousands of labelled signals with all parameters they were made with.
+
+In: classes of signals, what is recorded, a seed, a file.  Out: Zarr or NetCDF, and a `DataSetReport`.
+
+Members are made in chunks, by this process or by the workers of a cluster.  A worker that sees the store writes its
+samples there, another one sends them; this process notes that a chunk is there.  What a process that ended has left
+unfinished is made again, the rest is not.  NetCDF is written from the finished Zarr, for HDF5 does not survive the end
+of a process that writes.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.folders import locked
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.contract.usual import UnusualWarning, unusual
+from ballpass.runtime.many.chunks import MemberFailure
+from ballpass.runtime.many.cluster import loaded, need, run_tasks
+from ballpass.runtime.many.data_set_store import (
+    MADE,
+    UNFINISHED,
+    Axes,
+    Place,
+    create_store,
+    is_complete,
+    marked,
+    open_store,
+    read_failures,
+    read_finished,
+    refuse_changed,
+    refuse_foreign,
+    write_netcdf,
+    write_samples,
+    write_status,
+)
+from ballpass.runtime.many.distributions import Distribution, draw
+from ballpass.runtime.many.signals import Made, Member, Signals, check_outputs, make_signals
+from ballpass.runtime.native.loaded_model import LoadedModel
+
+#: Bytes of the samples of one output in a chunk, about.
+CHUNK_BYTES = 4_000_000
+
+#: Chunks of a data set at least, as far as it has members: what workers share.
+CHUNKS = 32
+
+#: Most members of a chunk, and of a class.
+MOST_IN_CHUNK, MOST_MEMBERS = 256, 10_000_000
+
+#: Name of the ratio of signal to noise among the numbers that are drawn.
+_SNR = "snr"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalClass:
+    """Members of one label.
+
+    Attributes
+    ----------
+    label : what they are called
+    model : what is simulated
+    members : how many
+    parameters : by name, a distribution or the number that all have; others keep the scene's [SI]
+    """
+
+    label: str
+    model: LoadedModel
+    members: int
+    parameters: Mapping[str, Distribution | float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataSetReport:
+    """What became of a data set.
+
+    Attributes
+    ----------
+    path : the Zarr folder, or the NetCDF file
+    members : how many there are, and how many of them were `made` by this call
+    failures : members without a signal, in order, also of earlier calls
+    """
+
+    path: Path
+    members: int
+    made: int
+    failures: tuple[MemberFailure, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Table:
+    """Class and place in it of each member, and its numbers.
+
+    Attributes
+    ----------
+    kinds, places : shape (members,)
+    columns : of each class, values of what varies by name, each of shape (members of the class,)
+    """
+
+    kinds: np.ndarray
+    places: np.ndarray
+    columns: tuple[dict[str, np.ndarray], ...]
+
+    def member(self, number: int) -> Member:
+        kind, place = int(self.kinds[number]), int(self.places[number])
+        numbers = {name: float(column[place]) for name, column in self.columns[kind].items()}
+        snr = numbers.pop(_SNR, None)
+        return Member(kind=kind, place=place, parameters=numbers, snr=snr)
+
+
+def make_data_set(
+    path: str | Path,
+    classes: Sequence[SignalClass],
+    signals: Signals,
+    *,
+    seed: int,
+    title: str = "",
+    client: Any = None,
+    chunk: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> DataSetReport:
+    """Make a data set, or what is missing of it.
+
+    The samples are the same bits for a seed, whoever makes them and in whatever order, on processors of one kind with
+    one compiler.  Open the result with ``xarray.open_zarr`` or ``xarray.open_dataset``.
+
+    Parameters
+    ----------
+    path : a Zarr folder, or a NetCDF file where it ends in ``.nc``
+    classes : what is simulated; members of all classes alternate, so that a part of the set has all labels
+    signals : what is recorded
+    seed : of all random numbers, a whole number from 0 on
+    title : of the data set
+    client : of `dask.distributed`, whose workers make the signals.  Default: this process
+    chunk : members made and stored together.  Default: about 4 MB of samples
+    progress : called with the finished fraction
+
+    Raises
+    ------
+    RequestError
+        A wrong request; another data set, or something else, is there already; Zarr or Dask is not installed.
+    SimulationError
+        A cluster gave up.  What was finished is kept: a second call goes on.
+    """
+    need("zarr")
+    _check(classes, signals, seed, chunk)
+    table = _draw(classes, signals, seed)
+    fits = CHUNK_BYTES // (signals.samples * np.dtype(signals.precision).itemsize)
+    count = len(table.kinds)
+    size = min(chunk or max(1, min(MOST_IN_CHUNK, fits, -(-count // CHUNKS))), count)
+    spec = json.loads(json.dumps(_spec(classes, signals, seed, size, title)))  # as it will be read back
+    target = Path(path)
+    netcdf = target.suffix == ".nc"
+    if netcdf and target.exists():
+        return DataSetReport(path=target, members=len(table.kinds), made=0, failures=read_finished(target, spec))
+    store = target.with_name(f"{target.name}.parts") if netcdf else target
+    refuse_foreign(store)
+    store.mkdir(parents=True, exist_ok=True)
+    with locked(store):
+        if is_complete(store):
+            group = open_store(store)
+            refuse_changed(store, dict(group.attrs), spec)
+        else:
+            group = create_store(store, _axes(classes, signals, table, spec, size))
+        with marked(store) as place:
+            made = _fill(place, classes, signals, seed, table, size, client, progress)
+        failures = read_failures(group)
+        if netcdf:
+            write_netcdf(group, target)
+    if netcdf:
+        shutil.rmtree(store)
+    return DataSetReport(path=target, members=len(table.kinds), made=made, failures=failures)
+
+
+def _check(classes: Sequence[SignalClass], signals: Signals, seed: int, chunk: int | None) -> None:
+    faults = []
+    if not classes:
+        faults.append("classes: none was given. Allowed: one or more. Give a SignalClass for each label.")
+    labels = [one.label for one in classes]
+    if len(set(labels)) < len(labels):
+        faults.append(f"classes: two have one label among {', '.join(labels)}. Give each its own.")
+    for name, value, least in (("seed", seed, 0), *((("chunk", chunk, 1),) if chunk is not None else ())):
+        if not isinstance(value, int) or isinstance(value, bool) or value < least:
+            faults.append(f"{name}: a whole number from {least} on is expected, not {value!r}.")
+    for one in classes:
+        if not isinstance(one.members, int) or isinstance(one.members, bool) or not 1 <= one.members <= MOST_MEMBERS:
+            faults.append(f"class {one.label}: {one.members!r} members. Allowed: 1 to {MOST_MEMBERS}.")
+        known = [info.name for info in one.model.manifest.parameters]
+        faults += [
+            f"class {one.label}: {unknown_name('parameter', n, known)}" for n in one.parameters if n not in known
+        ]
+    if faults:
+        raise RequestError("\n".join(faults))
+    for one in classes:
+        check_outputs(one.model, signals, one.label)
+
+
+def _draw(classes: Sequence[SignalClass], signals: Signals, seed: int) -> _Table:
+    """Numbers of all members; what is unusual is said once for a class."""
+    counts = [one.members for one in classes]
+    kinds = np.repeat(np.arange(len(classes)), counts)
+    places = np.concatenate([np.arange(count) for count in counts])
+    # members of all classes alternate, each class evenly over the whole set
+    order = np.argsort((places + 0.5) / np.repeat(counts, counts), kind="stable")
+    columns = []
+    for kind, one in enumerate(classes):
+        noise = {} if signals.snr is None else {_SNR: signals.snr}
+        drawn = draw(seed, kind, one.members, {**one.parameters, **noise})
+        columns.append(drawn)
+        defaults = {info.name: np.full(one.members, info.default) for info in one.model.manifest.parameters}
+        for text in unusual(one.model.manifest, defaults | drawn):
+            warnings.warn(f"class {one.label}: {text}", UnusualWarning, stacklevel=3)
+    return _Table(kinds=kinds[order], places=places[order], columns=tuple(columns))
+
+
+def _spec(classes: Sequence[SignalClass], signals: Signals, seed: int, chunk: int, title: str) -> dict[str, Any]:
+    """All that decides what is in the data set."""
+
+    def plain(value: Distribution | float | None) -> Any:
+        return asdict(value) if isinstance(value, Distribution) else value
+
+    return {
+        "title": title,
+        "seed": seed,
+        "chunk": chunk,
+        "signals": asdict(replace(signals, snr=None)) | {_SNR: plain(signals.snr)},
+        "classes": {
+            one.label: {
+                "members": one.members,
+                "parameters": {name: plain(value) for name, value in one.parameters.items()},
+                "scene": {info.name: info.default for info in one.model.manifest.parameters},
+                "rtol": one.model.manifest.run.rtol,
+                "method": one.model.manifest.run.method,
+                "files": dict(one.model.manifest.files),
+            }
+            for one in classes
+        },
+    }
+
+
+def _truth(classes: Sequence[SignalClass], table: _Table, names: Sequence[str]) -> np.ndarray:
+    """Parameters of all members, shape (members, parameters) [SI]."""
+    found = np.full((len(table.kinds), len(names)), np.nan)
+    for kind, (one, columns) in enumerate(zip(classes, table.columns, strict=True)):
+        rows = np.flatnonzero(table.kinds == kind)
+        for info in one.model.manifest.parameters:
+            values = columns.get(info.name, np.full(one.members, info.default))
+            found[rows, names.index(info.name)] = values[table.places[rows]]
+    return found
+
+
+def _axes(classes: Sequence[SignalClass], signals: Signals, table: _Table, spec: Mapping[str, Any], chunk: int) -> Axes:
+    """What is known before anything is simulated."""
+    infos = {info.name: info for one in classes for info in one.model.manifest.parameters}
+    outputs = {info.name: info for info in classes[0].model.manifest.outputs}
+    snr = np.full(len(table.kinds), np.inf)
+    for kind, columns in enumerate(table.columns):
+        if _SNR in columns:
+            snr[table.kinds == kind] = columns[_SNR][table.places[table.kinds == kind]]
+    return Axes(
+        spec=spec,
+        times=signals.times,
+        precision=signals.precision,
+        outputs=[(name, outputs[name].unit, outputs[name].description) for name in signals.outputs],
+        labels=np.array([one.label for one in classes])[table.kinds],
+        names=[(info.name, info.unit, info.description) for info in infos.values()],
+        parameters=_truth(classes, table, list(infos)),
+        snr=snr,
+        chunk=chunk,
+    )
+
+
+def _fill(
+    place: Place,
+    classes: Sequence[SignalClass],
+    signals: Signals,
+    seed: int,
+    table: _Table,
+    size: int,
+    client: Any,
+    progress: Callable[[float], None] | None,
+) -> int:
+    """Make and write the chunks that are not finished; how many members that were."""
+    group = open_store(place.path)
+    status = group["status"][:]
+    firsts = [first for first in range(0, len(status), size) if np.any(status[first : first + size] == UNFINISHED)]
+    made = 0
+
+    def members(first: int) -> list[Member]:
+        return [table.member(number) for number in range(first, min(first + size, len(status)))]
+
+    def tasks(keys: Sequence[str]) -> Iterator[tuple[Any, ...]]:
+        for first in firsts:
+            yield place, first, dict(enumerate(keys)), signals, seed, members(first)
+
+    models = [one.model for one in classes]
+    results: Iterator[tuple[int, Made]]
+    if client is None:
+        here = dict(enumerate(models))
+        results = ((first, make_signals(here, signals, seed, members(first))) for first in firsts)
+    else:
+        results = run_tasks(client, models, _make_chunk, tasks)
+    for first, chunk in results:
+        write_samples(group, first, chunk)
+        write_status(group, first, chunk)
+        count = len(chunk.noise_rms)
+        made += count
+        status[first : first + count] = MADE
+        if progress is not None:
+            progress(float(np.mean(status != UNFINISHED)))
+    return made
+
+
+def _make_chunk(
+    place: Place, first: int, keys: Mapping[int, str], signals: Signals, seed: int, members: Sequence[Member]
+) -> tuple[int, Made]:
+    """On a worker: the signals of a chunk, without the samples where the worker sees the store and has written them."""
+    models = {kind: loaded(keys[kind]) for kind in {member.kind: None for member in members}}
+    made = make_signals(models, signals, seed, members)
+    if place.seen():
+        write_samples(open_store(place.path), first, made)
+        made = replace(made, samples={})
+    return first, made

@@ -1,0 +1,261 @@
+"""Where data sets are stored: Zarr while they are made, and as long as people like; NetCDF from that.
+
+In: axes, labels and parameters of all members; then samples, chunk by chunk.  Out: files.  The status of the members of
+a chunk is written last, so that a chunk counts when it is whole.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.many.chunks import MemberFailure
+from ballpass.runtime.many.cluster import need
+from ballpass.runtime.many.signals import Made
+
+#: Number of the layout of data sets.
+SCHEMA = 1
+
+#: Characters of a message that are kept.
+MESSAGE = 300
+
+#: What the status of a member says, by its number.
+STATUSES = ("unfinished", "made", "failed")
+UNFINISHED, MADE, FAILED = range(3)
+
+#: File by which a worker sees whether a folder is the one that it was told of, on this machine or a shared disk.
+MARK = ".ballpass-mark"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """A store as a worker finds it.
+
+    Attributes
+    ----------
+    path : absolute
+    mark : what its mark says
+    """
+
+    path: str
+    mark: str
+
+    def seen(self) -> bool:
+        """Whether this process sees the store."""
+        try:
+            return (Path(self.path) / MARK).read_text(encoding="utf-8") == self.mark
+        except OSError:
+            return False
+
+
+@contextlib.contextmanager
+def marked(store: Path) -> Iterator[Place]:
+    """A store with a mark, as long as this lasts."""
+    mark = uuid.uuid4().hex
+    (store / MARK).write_text(mark, encoding="utf-8")
+    try:
+        yield Place(path=str(store.absolute()), mark=mark)
+    finally:
+        (store / MARK).unlink(missing_ok=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axes:
+    """What a data set has beside its signals.
+
+    Attributes
+    ----------
+    spec : all that decides its content
+    times : of the samples, shape (samples,) [s]
+    precision : of the samples
+    outputs : name, unit and meaning of each
+    labels : shape (members,)
+    names : name, unit and meaning of each parameter
+    parameters : shape (members, parameters) [SI]
+    snr : shape (members,) [dB]
+    chunk : members of a chunk
+    """
+
+    spec: Mapping[str, Any]
+    times: np.ndarray
+    precision: str
+    outputs: Sequence[tuple[str, str, str]]
+    labels: np.ndarray
+    names: Sequence[tuple[str, str, str]]
+    parameters: np.ndarray
+    snr: np.ndarray
+    chunk: int
+
+
+def open_store(path: str | Path) -> Any:
+    """A store that there is."""
+    return need("zarr").open_group(path, mode="r+", zarr_format=2)
+
+
+def is_complete(store: Path) -> bool:
+    """Whether a store was made with all its axes; the file looked at is written last."""
+    return (store / ".zmetadata").exists()
+
+
+def create_store(path: Path, axes: Axes) -> Any:
+    """A new store with everything but signals."""
+    zarr = need("zarr")
+    count, size = len(axes.labels), axes.chunk
+    group = zarr.open_group(path, mode="w", zarr_format=2)
+    facts = {"title": axes.spec["title"], "ballpass_data_set": SCHEMA, "ballpass_spec": json.dumps(axes.spec)}
+    group.attrs.update(facts)
+
+    def array(name: str, dimensions: str, values: np.ndarray, meaning: str, unit: str = "", chunk: int = 0) -> None:
+        facts = {"_ARRAY_DIMENSIONS": dimensions.split(), "long_name": meaning}
+        group.create_array(
+            name,
+            data=values,
+            chunks=(chunk or values.shape[0], *values.shape[1:]),
+            fill_value=None,  # xarray would make NaN of zeros
+            attributes=facts | ({"units": unit} if unit else {}),
+        )
+
+    array("member", "member", np.arange(count), "number of the member", "1")
+    array("time", "time", axes.times, "time from the start of the run", "s")
+    array("label", "member", axes.labels, "class of the member")
+    for name, dimension, rows in (("parameter", "parameter", axes.names), ("output", "output", axes.outputs)):
+        names, units, meanings = (np.array(column) for column in zip(*rows, strict=True))
+        array(name, dimension, names, f"name of the {name}")
+        array(f"{name}_unit", dimension, units, f"SI unit of the {name}")
+        array(f"{name}_meaning", dimension, meanings, f"what the {name} is")
+    array("parameters", "member parameter", axes.parameters, "parameters of the run; NaN: its class has none such")
+    array("snr", "member", axes.snr, "ratio of signal to noise", "dB")
+    noise = np.full((count, len(axes.outputs)), np.nan)
+    array("noise_rms", "member output", noise, "rms of the noise, in the unit of the output", chunk=size)
+    for name, unit, meaning in axes.outputs:
+        group.create_array(
+            name,
+            shape=(count, len(axes.times)),
+            chunks=(size, len(axes.times)),
+            dtype=axes.precision,
+            fill_value=np.nan,
+            compressors=None,  # noise does not get smaller
+            attributes={"_ARRAY_DIMENSIONS": ["member", "time"], "units": unit, "long_name": meaning},
+        )
+    array("failure", "member", np.full(count, "", f"<U{MESSAGE}"), "why there is no signal", chunk=size)
+    array("status", "member", np.full(count, UNFINISHED, np.int8), "whether there is a signal", chunk=size)
+    group["status"].attrs.update({"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)})
+    zarr.consolidate_metadata(group.store, zarr_format=2)
+    return open_store(path)
+
+
+def write_samples(group: Any, first: int, made: Made) -> None:
+    """Write the samples of a chunk whose first member this is."""
+    for name, samples in made.samples.items():
+        group[name][first : first + len(samples)] = samples
+
+
+def write_status(group: Any, first: int, made: Made) -> None:
+    """Write what else there is of a chunk whose samples are there, and last that they are."""
+    count = len(made.noise_rms)
+    which = slice(first, first + count)
+    group["noise_rms"][which] = made.noise_rms
+    status = np.full(count, MADE, dtype=np.int8)
+    if made.failures:
+        words = np.full(count, "", dtype=f"<U{MESSAGE}")
+        for failure in made.failures:
+            status[failure.member] = FAILED
+            words[failure.member] = f"{failure.status} at {failure.time:.9g} s: {failure.message}"[:MESSAGE]
+        group["failure"][which] = words
+    group["status"][which] = status
+
+
+def read_failures(stored: Any) -> tuple[MemberFailure, ...]:
+    """Members without a signal, in order."""
+    failed = np.flatnonzero(stored["status"][:] == FAILED)
+    words = stored["failure"][:] if len(failed) else []
+    found = []
+    for number in failed.tolist():
+        begin, _, message = str(words[number]).partition(" s: ")
+        status, _, time = begin.partition(" at ")
+        found.append(MemberFailure(member=number, status=status, time=float(time), message=message))
+    return tuple(found)
+
+
+def refuse_foreign(store: Path) -> None:
+    """Refuse a place that holds something else than a data set."""
+    if not store.exists():
+        return
+    names = [path.name for path in store.iterdir() if not path.name.startswith(".ballpass")] if store.is_dir() else []
+    if not store.is_dir() or (names and ".zgroup" not in names):
+        raise RequestError(
+            f"{store}: something else than a data set is there, and nothing was changed. Give a place that is new."
+        )
+
+
+def refuse_changed(place: Path, facts: Mapping[str, Any], spec: Mapping[str, Any]) -> None:
+    """Refuse to go on with a data set of another specification."""
+    before = json.loads(facts["ballpass_spec"]) if facts.get("ballpass_data_set") == SCHEMA else None
+    if before is None:
+        raise RequestError(f"{place}: this is no data set of this version of ballpass. Give a place that is new.")
+    if before != spec:
+        raise RequestError(
+            f"{place}: a data set of another specification is there: {_changes(before, spec)}. It is as it was. Give a "
+            "place that is new, or delete it."
+        )
+
+
+def _changes(before: Any, now: Any, path: str = "") -> str:
+    """What differs between two specifications, first difference at each place."""
+    if isinstance(before, Mapping) and isinstance(now, Mapping):
+        keys = [key for key in {**before, **now} if before.get(key) != now.get(key)]
+        if path.endswith(".files"):
+            return f"{path.removesuffix('.files')} is generated otherwise (another scene, or version of ballpass)"
+        return "; ".join(_changes(before.get(key), now.get(key), f"{path}.{key}".lstrip(".")) for key in keys[:3])
+    return f"{path} was {before!r}, and is {now!r} now"
+
+
+def read_finished(path: Path, spec: Mapping[str, Any]) -> tuple[MemberFailure, ...]:
+    """Failures of a NetCDF file that is there; RequestError where it is of another specification."""
+    import h5netcdf
+
+    try:
+        with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
+            refuse_changed(path, dict(file.attrs), spec)
+            return read_failures({name: file.variables[name][...] for name in ("status", "failure")})
+    except (OSError, KeyError) as fault:
+        raise RequestError(f"{path}: this is no data set of ballpass ({fault}). Give a place that is new.") from None
+
+
+def write_netcdf(group: Any, path: Path) -> None:
+    """Write a finished data set as NetCDF-4, some members at a time: the whole file or none."""
+    import h5netcdf
+    import h5py
+
+    new = path.with_name(f".{path.name}.new")
+    with h5netcdf.File(new, "w") as file:
+        for key, fact in group.attrs.items():
+            file.attrs[key] = fact
+        for name, array in group.arrays():
+            facts = dict(array.attrs)
+            dimensions = facts.pop("_ARRAY_DIMENSIONS")
+            for dimension, length in zip(dimensions, array.shape, strict=True):
+                if dimension not in file.dimensions:
+                    file.dimensions[dimension] = length
+            text = array.dtype.kind == "U"
+            if text:
+                variable = file.create_variable(name, dimensions, h5py.string_dtype())
+            else:
+                fill = {} if array.fill_value is None else {"fillvalue": array.fill_value}
+                variable = file.create_variable(name, dimensions, array.dtype, chunks=array.chunks, **fill)
+            for key, fact in facts.items():
+                variable.attrs[key] = fact
+            for first in range(0, array.shape[0], array.chunks[0]):
+                which = slice(first, first + array.chunks[0])
+                values = array[which]
+                variable[which] = values.astype(object) if text else values
+    os.replace(new, path)

@@ -1,0 +1,176 @@
+"""Signals of members: samples of outputs at a sample rate, with the noise of a sensor.
+
+In: a model, the parameters of some members, a `Signals`.  Out: `Made`, their samples.  A member is a run of its own:
+lanes of ensembles give reductions, and a run of the stepper with samples takes about as long as one in lanes takes
+without (see `docs/howto/data_sets.md`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import BallpassError, RequestError
+from ballpass.runtime.many.chunks import MemberFailure
+from ballpass.runtime.many.distributions import NOISE, Distribution, stream
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.run.integration_error import IntegrationError
+from ballpass.runtime.run.request import TOLERANCES, Request
+from ballpass.runtime.run.simulate import simulate
+
+#: Ways to store samples.
+PRECISIONS = ("float32", "float64")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signals:
+    """What is recorded of every member.
+
+    Attributes
+    ----------
+    outputs : names of outputs with one value at a time ("inner.ax")
+    sample_rate : samples in a second [Hz]
+    duration : time that is recorded [s]
+    transient : time before it, which is simulated and left out [s]
+    snr : ratio of the variance of the signal to that of white Gaussian noise added to it, 10 log10 of it; a
+        distribution gives each member its own; None adds no noise [dB]
+    rtol : tolerance of the runs; None takes the scene's [1]
+    precision : of stored samples, "float32" or "float64"
+
+    Raises
+    ------
+    RequestError
+        A number out of range; all faults at once.
+    """
+
+    outputs: tuple[str, ...]
+    sample_rate: float
+    duration: float
+    transient: float = 0.0
+    snr: Distribution | float | None = None
+    rtol: float | None = None
+    precision: str = "float32"
+
+    def __post_init__(self) -> None:
+        least, most = TOLERANCES
+        checks = (
+            ("outputs", bool(self.outputs), "one name or more"),
+            ("sample_rate", 0.0 < self.sample_rate < math.inf, "a frequency above 0"),
+            ("duration", 0.0 < self.duration < math.inf, "a time above 0"),
+            ("transient", 0.0 <= self.transient < math.inf, "a time from 0 on"),
+            ("rtol", self.rtol is None or least <= self.rtol <= most, f"{least:g} to {most:g}"),
+            ("precision", self.precision in PRECISIONS, " or ".join(PRECISIONS)),
+        )
+        faults = [
+            f"{name}: {getattr(self, name)!r} was given. Allowed: {words}." for name, fine, words in checks if not fine
+        ]
+        if not faults and self.samples < 2:
+            faults.append(
+                f"duration: {self.duration:g} s at {self.sample_rate:g} Hz are fewer than 2 samples. Record longer."
+            )
+        if faults:
+            raise RequestError("\n".join(faults))
+
+    @property
+    def samples(self) -> int:
+        """Samples of a signal."""
+        return round(self.duration * self.sample_rate)
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the samples in the runs, shape (samples,) [s]."""
+        return self.transient + np.arange(self.samples) / self.sample_rate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Member:
+    """One member to make.
+
+    Attributes
+    ----------
+    kind : place of its class
+    place : its place in the class, from 0 on
+    parameters : overrides [SI]
+    snr : [dB]; None for no noise
+    """
+
+    kind: int
+    place: int
+    parameters: Mapping[str, float]
+    snr: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Made:
+    """Signals of some members.
+
+    Attributes
+    ----------
+    samples : by output, each of shape (members, samples); NaN for a member without results
+    noise_rms : root mean square of the noise that was added, shape (members, outputs) [units of the outputs]
+    failures : members without results, by their place here
+    """
+
+    samples: Mapping[str, np.ndarray]
+    noise_rms: np.ndarray
+    failures: tuple[MemberFailure, ...]
+
+
+def make_signals(models: Mapping[int, LoadedModel], signals: Signals, seed: int, members: Sequence[Member]) -> Made:
+    """Simulate some members; one that fails is told, not raised.
+
+    Parameters
+    ----------
+    models : by class
+    """
+    shape = (len(members), signals.samples)
+    samples = {name: np.full(shape, np.nan, signals.precision) for name in signals.outputs}
+    noise_rms = np.zeros((len(members), len(signals.outputs)))
+    failures = []
+    times = signals.times
+    for row, member in enumerate(members):
+        model = models[member.kind]
+        try:
+            numbers = model.numbers(member.parameters)
+            check_assembly(model, numbers)
+            found = simulate(model, numbers, Request(times=times, outputs=signals.outputs, rtol=signals.rtol)).outputs
+        except BallpassError as fault:
+            status, time = (fault.status.name, fault.time) if isinstance(fault, IntegrationError) else ("REFUSED", 0.0)
+            failures.append(MemberFailure(member=row, status=status, time=time, message=str(fault)))
+            continue
+        random = stream(seed, member.kind, member.place, NOISE)
+        for k, name in enumerate(signals.outputs):
+            signal = found[name]
+            if member.snr is not None:
+                noise_rms[row, k] = np.std(signal) * 10.0 ** (-member.snr / 20.0)
+                signal = signal + noise_rms[row, k] * random.standard_normal(len(signal))
+            samples[name][row] = signal
+    return Made(samples=samples, noise_rms=noise_rms, failures=tuple(failures))
+
+
+def check_outputs(model: LoadedModel, signals: Signals, label: str) -> None:
+    """Refuse outputs that the model of a class does not have, or that have a value for each ball.
+
+    Raises
+    ------
+    RequestError
+        All faults at once.
+    """
+    from ballpass.runtime.run.request import no_output
+
+    infos = {info.name: info for info in model.manifest.outputs}
+    faults = []
+    for name in signals.outputs:
+        if name not in infos:
+            faults.append(f"class {label}: {no_output(model.manifest, name, tuple(infos), 'output')}")
+        elif infos[name].size != 1:
+            faults.append(
+                f"class {label}: {name} has a value for each ball, and a signal has one. Allowed: outputs with one "
+                "value, such as inner.ax or reaction.A.x."
+            )
+    if faults:
+        raise RequestError("\n".join(faults))
