@@ -787,7 +787,7 @@ static inline void bp_acceleration_jacobian(const double *restrict x, const doub
     B[15] = w0;
 }
 
-/* Partial time derivative of the accelerations at fixed state. 44 operations. */
+/* Partial time derivative of the accelerations at fixed state. 32 operations. */
 static inline void bp_acceleration_rate(const double *restrict x, const double *restrict S, const double *restrict G, const double *restrict r, const double *restrict u, const double *restrict p, const double *restrict c, const double *restrict w, const double *restrict wt, double *restrict at)
 {
     (void)x;
@@ -796,8 +796,7 @@ static inline void bp_acceleration_rate(const double *restrict x, const double *
     (void)w;
     double w0 = c[17];
     double w1 = wt[2];
-    w1 = w0 * w1;
-    double w2 = r[6];
+    double w2 = r[5];
     double w3 = r[2];
     double w4 = G[0];
     w4 = w3 * w4;
@@ -816,19 +815,17 @@ static inline void bp_acceleration_rate(const double *restrict x, const double *
     w10 = S[1];
     w4 = w4 - w10;
     w10 = w2 * w4;
-    double w11 = w0 * w10;
-    double w12 = wt[0];
-    w11 = w11 * w12;
-    double w13 = r[5];
-    w4 = w13 * w4;
-    double w14 = w0 * w4;
-    double w15 = wt[1];
-    w14 = w14 * w15;
-    w11 = w11 - w14;
-    w1 = w1 + w11;
+    double w11 = wt[1];
+    w10 = w10 * w11;
+    double w12 = r[6];
+    w4 = w12 * w4;
+    double w13 = wt[0];
+    w4 = w4 * w13;
+    w10 = w10 - w4;
+    w1 = w1 - w10;
+    w1 = w0 * w1;
     at[0] = w1;
     w1 = wt[3];
-    w1 = w0 * w1;
     w3 = w3 * w6;
     w6 = G[2];
     w5 = w5 * w6;
@@ -841,27 +838,18 @@ static inline void bp_acceleration_rate(const double *restrict x, const double *
     w9 = S[0];
     w3 = w3 + w9;
     w2 = w2 * w3;
-    w9 = w0 * w2;
-    w9 = w9 * w12;
-    w13 = w13 * w3;
-    w0 = w0 * w13;
-    w0 = w0 * w15;
-    w9 = w9 - w0;
-    w1 = w1 + w9;
-    at[1] = w1;
-    w1 = c[32];
-    w4 = w1 * w4;
-    w4 = w4 * w15;
-    w10 = w1 * w10;
-    w10 = w10 * w12;
-    w4 = w4 - w10;
-    at[2] = w4;
-    w13 = w1 * w13;
-    w13 = w13 * w15;
-    w1 = w1 * w2;
-    w1 = w1 * w12;
-    w13 = w13 - w1;
-    at[3] = w13;
+    w2 = w2 * w11;
+    w12 = w12 * w3;
+    w12 = w12 * w13;
+    w2 = w2 - w12;
+    w1 = w1 - w2;
+    w0 = w0 * w1;
+    at[1] = w0;
+    w0 = c[32];
+    w10 = w0 * w10;
+    at[2] = w10;
+    w0 = w0 * w2;
+    at[3] = w0;
 }
 
 /* Of each bearing: angle of ball 1 as the outer and the inner ring see it. 4 operations. */

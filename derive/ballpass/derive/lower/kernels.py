@@ -169,7 +169,10 @@ class KernelBuilder:
         own_rate = ca.vertcat(*(sums_by_time(slopes[k], own=b.ball.own is not None) for k, b in enumerate(bearings)))
         w = ca.vertcat(*self._stage.values())
         wt = ca.SX.sym("wt", w.numel())
-        by_time = ca.jtimes(acceleration, w, wt) + by_relative @ ca.jtimes(relative, w, wt) + by_sums @ own_rate
+        # along one direction: the matrices above would cost four times as many operations
+        moved = ca.jtimes(relative, w, wt)
+        own_rate += by_rings @ moved[: rings.numel()]
+        by_time = ca.jtimes(acceleration, ca.vertcat(w, held, sums), ca.vertcat(wt, moved, own_rate))
         stage = ca.vertcat(*(self._visit(e) for e in self._stage))
         state = {k: self._arguments[k] for k in "up"} | {"c": ca.SX(0, 1)}
         tail = {**state, "w": w}
