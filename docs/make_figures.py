@@ -1,13 +1,16 @@
 """Make the pictures of README and documentation anew: ``.venv/bin/python docs/make_figures.py``.
 
-Every picture is a figure of ``ballpass run SCENE``, copied to ``docs/images/<scene>_<figure>.png``.
+Every picture is a figure of ``ballpass run SCENE``, copied to ``docs/images/<scene>_<figure>.png``, but that of
+waviness, which is of ``ballpass spectrum`` as the how-to calls it.
 """
 
 from __future__ import annotations
 
 import shutil
+import sys
 import tempfile
 from pathlib import Path
+from subprocess import run
 
 from ballpass.derive import generate
 from ballpass.runtime import load
@@ -34,6 +37,14 @@ def main() -> None:
                 target = IMAGES / f"{scene}_{name}.png"
                 shutil.copyfile(drawn[name], target)
                 print(target.relative_to(ROOT))
+    with tempfile.TemporaryDirectory() as folder:
+        scene_file = Path(folder) / "wavy.toml"
+        waves = '\n[bearing.inner_waviness]\n9 = { amplitude = "0.2 um" }\n'
+        scene_file.write_text((ROOT / "scenes" / "rotor.toml").read_text(encoding="utf-8") + waves, encoding="utf-8")
+        words = ("--of", "inner.ay", "--set", "bearing.clearance=-8 um", "--cycles", "420", "--window", "flattop")
+        ballpass = Path(sys.executable).parent / "ballpass"
+        run([ballpass, "spectrum", scene_file, *words, "--out", folder], cwd=folder, check=True)
+        shutil.copyfile(Path(folder) / "spectrum.png", IMAGES / "spectrum_waviness.png")
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ from ballpass.runtime.run.sensitivity import Sensitivities, refuse_located, sens
 from ballpass.runtime.run.settle import MOST, Settled, settle
 from ballpass.runtime.run.simulate import method_names, simulate
 from ballpass.runtime.run.start import RunEnd, Start
+from ballpass.runtime.run.stream import stream_run
 
 #: State at the start: given, "equilibrium", or the end of a run that another goes on from; None takes the scene's.
 Initial = Sequence[float] | np.ndarray | RunEnd | Literal["equilibrium"] | None
@@ -36,7 +37,7 @@ Initial = Sequence[float] | np.ndarray | RunEnd | Literal["equilibrium"] | None
 if TYPE_CHECKING:
     from ballpass.runtime.ask.life_records import LifeReport
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport
-    from ballpass.runtime.run.solution import Solution
+    from ballpass.runtime.run.solution import Solution, Statistics
 
 
 def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True) -> Model:
@@ -127,6 +128,7 @@ class Model(PointModel):
         rtol: float | None = None,
         samples_per_cycle: int | None = None,
         times: Sequence[float] | np.ndarray | None = None,
+        sample_rate: float | None = None,
         outputs: Sequence[str] | None = None,
         initial: Initial = None,
         transient: float | None = None,
@@ -148,6 +150,7 @@ class Model(PointModel):
         times : times of the samples instead, increasing, within the run; where neither cycles nor duration is given,
             the run ends at the last one.  The stepper takes the same steps however a run of one length is sampled; the
             other methods go from sample to sample [s]
+        sample_rate : samples at whole multiples of one over this, instead [Hz]
         outputs : names of the outputs to keep, none of them for ``[]``, where none is evaluated.  Default: all of the
             scene
         initial : state at the start, shape (states,); ``"equilibrium"`` for rings at rest under the load of t = 0, with
@@ -180,6 +183,7 @@ class Model(PointModel):
             rtol=rtol,
             samples_per_cycle=samples_per_cycle,
             times=times,
+            sample_rate=sample_rate,
             outputs=outputs,
             initial=self._start(numbers, initial),
             transient_cycles=transient,
@@ -190,6 +194,53 @@ class Model(PointModel):
         if error is None:
             return simulate(self, numbers, request)
         return simulate_to_error(self, numbers, request, error, of)
+
+    def stream(
+        self,
+        path: str | Path,
+        *,
+        sample_rate: float,
+        cycles: float | None = None,
+        duration: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        method: str | None = None,
+        rtol: float | None = None,
+        outputs: Sequence[str] | None = None,
+        initial: Initial = None,
+        transient: float | None = None,
+        kinks: Kinks | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Statistics:
+        """Simulate into a file, in memory that does not grow with the run (see `ballpass.runtime.run.stream`).
+
+        Parameters are those of `simulate`.
+
+        Parameters
+        ----------
+        path : of the NetCDF-4 file, which `load_solution` and xarray read
+        sample_rate : of the samples [Hz]
+
+        Raises
+        ------
+        RequestError
+            A wrong request, or a file that cannot be written.
+        IntegrationError
+            The computation failed; no file is written.
+        """
+        numbers = self._runnable(parameters)
+        request = Request(
+            cycles=cycles,
+            duration=duration,
+            method=method,
+            rtol=rtol,
+            sample_rate=sample_rate,
+            outputs=outputs,
+            initial=self._start(numbers, initial),
+            transient_cycles=transient,
+            kinks=kinks,
+            progress=progress,
+        )
+        return stream_run(self, numbers, request, Path(path))
 
     def sensitivities(
         self,

@@ -14,7 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import Asked, faults_of_numbers, read_asked, read_duration, read_turns
+from ballpass.runtime.app.commands.asked import (
+    Asked,
+    faults_of_numbers,
+    read_asked,
+    read_duration,
+    read_quantity,
+    read_turns,
+)
 from ballpass.runtime.app.commands.bearings import bearings
 from ballpass.runtime.app.commands.dataset import dataset
 from ballpass.runtime.app.commands.explain import explain
@@ -36,6 +43,8 @@ from ballpass.runtime.app.commands.shared import (
     warn,
     warn_of_scene,
 )
+from ballpass.runtime.app.commands.spectrum import spectrum
+from ballpass.runtime.app.commands.stream import stream
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import read_error, trade
 from ballpass.runtime.contract import read_artefact, read_manifest
@@ -92,6 +101,7 @@ def run(
     transient: Annotated[
         float | None, typer.Option(metavar="N", help="Turns at the start that summary and figures leave out.")
     ] = None,
+    sample_rate: options.SampleRate = None,
     initial: Annotated[
         str | None,
         typer.Option(
@@ -148,6 +158,7 @@ def run(
         seconds = read_duration(duration, cycles)
         asked = read_asked(scene, set_, seconds, transient)
         start = _read_start(initial)
+        rate = read_quantity("--sample-rate", sample_rate, "Hz")
         _check_request(asked, cycles, transient, rtol, method, goes_on=start not in (None, "equilibrium"))
         at_kinks = checked_kinks(kinks, method or asked.run.method, error)
         target = read_error(error, of, method, rtol)
@@ -162,6 +173,7 @@ def run(
             method=method,
             rtol=rtol,
             kinks=at_kinks,
+            sample_rate=rate,
             progress=stages.fraction,
             error=target,
             of=of,
@@ -289,7 +301,7 @@ def export(
     typer.echo(str(folder))
 
 
-for _command in (bearings, dataset, explain, jacobian, life, linearize, sensitivity, sweep, trade):
+for _command in (bearings, dataset, explain, jacobian, life, linearize, sensitivity, spectrum, stream, sweep, trade):
     app.command()(_command)
 
 

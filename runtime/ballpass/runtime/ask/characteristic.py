@@ -14,8 +14,9 @@ from ballpass.runtime.ask.observables import KinematicFrequencies
 from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.run import inputs as clock
 
-#: Multiples that are looked for, of the cage (more are ball passes), and the most shafts or cages to their sides.
-MOST_MULTIPLES, MOST_OF_CAGE, MOST_SIDEBANDS = 30, 3, 3
+#: Multiples that are looked for: of the shaft, of ball passes, of the cage (more are ball passes); and the most shafts
+#: or cages to their sides.  With more of them everything would be something.
+MOST_OF_SHAFT, MOST_MULTIPLES, MOST_OF_CAGE, MOST_SIDEBANDS = 30, 10, 3, 5
 #: A second name is told where it is hardly less simple.
 NEARLY_AS_SIMPLE = 2
 
@@ -116,7 +117,7 @@ def identify(frequency: float, lines: Sequence[CharacteristicLine], resolution: 
     for line in lines:
         if line.frequency == 0.0:
             continue
-        most = MOST_OF_CAGE if line.name == "FTF" else MOST_MULTIPLES
+        most = {"shaft": MOST_OF_SHAFT, "FTF": MOST_OF_CAGE}.get(line.name, MOST_MULTIPLES)
         for m in range(-MOST_SIDEBANDS, MOST_SIDEBANDS + 1) if line.side else (0,):
             k = round((frequency - m * line.side) / line.frequency)
             beside = abs(frequency - k * line.frequency - m * line.side)

@@ -52,6 +52,7 @@ class Request:
     sensitivity_rtol : that of the derivatives, where a run has some; None lets the states alone choose the steps [1]
     samples_per_cycle : samples in a turn; in the whole run where nothing turns
     times : sample times instead, increasing, shape (samples,) [s]
+    sample_rate : samples at whole multiples of one over this, instead [Hz]
     outputs : names of the outputs to evaluate; None: all of the scene
     initial : state at the start, shape (states,), or the end of a run that this one goes on from
     transient_cycles : turns from t = 0 on that `Solution.steady` leaves out
@@ -66,6 +67,7 @@ class Request:
     sensitivity_rtol: float | None = None
     samples_per_cycle: int | None = None
     times: Sequence[float] | np.ndarray | None = None
+    sample_rate: float | None = None
     outputs: Sequence[str] | None = None
     initial: Start = None
     transient_cycles: float | None = None
@@ -126,7 +128,7 @@ def make_plan(model: LoadedModel, numbers: Numbers, request: Request) -> Plan:
         begin=start_time(request.initial),
         duration=duration,
         times=times,
-        even=request.times is None,
+        even=request.times is None and request.sample_rate is None,
         rtol=tolerance("rtol", run.rtol if request.rtol is None else request.rtol),
         sensitivity_rtol=(
             None if request.sensitivity_rtol is None else tolerance("sensitivity_rtol", request.sensitivity_rtol)
@@ -142,6 +144,22 @@ def _sample_times(
 ) -> tuple[float, np.ndarray]:
     """Length of the run, and the times of its samples."""
     begin = start_time(request.initial)
+    given = ("samples_per_cycle", "times", "sample_rate")
+    several = [f"{name} = {getattr(request, name)!r:.40}" for name in given if getattr(request, name) is not None]
+    if len(several) > 1:
+        raise RequestError(f"{' and '.join(several)} were both given: give one of them.")
+    if request.sample_rate is not None:
+        duration = run_length(model, request, turn)
+        check_length(begin + duration, turn)
+        rate = checked_rate(request.sample_rate)
+        _check_memory(model, duration * rate, outputs)
+        times = times_at(rate, begin, begin + duration)
+        if not times.size:
+            raise RequestError(
+                f"sample_rate: {rate:g} Hz has no sample within the run of {duration:g} s. Give a higher rate, or run "
+                "longer."
+            )
+        return duration, times
     if request.times is None:
         duration = run_length(model, request, turn)
         check_length(begin + duration, turn)
@@ -150,10 +168,6 @@ def _sample_times(
         _check_memory(model, wanted, outputs)
         count = max(1, int(wanted))
         return duration, begin + duration * (np.arange(count + 1) / count)
-    if request.samples_per_cycle is not None:
-        raise RequestError(
-            f"samples_per_cycle = {request.samples_per_cycle!r} and times were both given: give one of them."
-        )
     times = vector(request.times)
     if times.ndim != 1 or not times.size or not np.all(np.isfinite(times)):
         raise RequestError(
@@ -188,6 +202,18 @@ def _sample_times(
         )
     _check_memory(model, len(times), outputs)
     return duration, times
+
+
+def checked_rate(given: float) -> float:
+    """A sampling rate above zero [Hz]; RequestError for another."""
+    if not 0.0 < real(given) < math.inf:
+        raise RequestError(f"sample_rate: a frequency above 0 Hz is expected, not {given!r:.80}.")
+    return float(given)
+
+
+def times_at(rate: float, begin: float, end: float) -> np.ndarray:
+    """Whole multiples of one over a rate [Hz] within a run, shape (samples,) [s]."""
+    return np.maximum(np.arange(math.ceil(begin * rate - 1e-6), math.floor(end * rate + 1e-6) + 1) / rate, begin)
 
 
 def _check_memory(model: LoadedModel, count: float, outputs: Sequence[str]) -> None:

@@ -31,8 +31,8 @@ FILE_SCHEMA = 1
 #: What stands behind the data of a saved file, which HDF5 does not look at: the digest of all bytes before it.  The
 #: HDF5 library may end the process, or give other numbers, where bytes of a file have changed; so they are checked
 #: first.
-_SEAL = b"\nballpass sha256 "
-_SEAL_LENGTH = len(_SEAL) + 64 + 1
+SEAL = b"\nballpass sha256 "
+_SEAL_LENGTH = len(SEAL) + 64 + 1
 
 #: Dimensions, values and attributes of a variable in a file.
 _Variable = tuple[tuple[str, ...], np.ndarray, dict[str, str]]
@@ -202,7 +202,7 @@ class Solution:
         """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions."""
         import xarray
 
-        variables, facts = _contents(self)
+        variables, facts = contents(self)
         axes = ("time", *(f"{bearing.prefix}ball" for bearing in self.manifest.bearings))
         coordinates = {name: variables.pop(name) for name in axes if name in variables}
         return xarray.Dataset(variables, coords=coordinates, attrs=facts)
@@ -218,7 +218,7 @@ class Solution:
         target = Path(path)
         content = _netcdf(self)
         try:
-            replace_file(target, content + _SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n")
+            replace_file(target, content + SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n")
         except OSError as fault:
             raise RequestError(
                 f"{target}: cannot be written ({fault.strerror or fault}); a file that was there is as it was. Give a "
@@ -250,7 +250,7 @@ def load_solution(path: str | Path) -> Solution:
 def read_bytes(path: str | Path, content: bytes) -> Solution:
     """Solution from the bytes of a file; errors as for `load_solution`."""
     inner, seal = content[:-_SEAL_LENGTH], content[-_SEAL_LENGTH:]
-    if seal != _SEAL + hashlib.sha256(inner).hexdigest().encode() + b"\n":
+    if seal != SEAL + hashlib.sha256(inner).hexdigest().encode() + b"\n":
         ours = content.startswith(b"\x89HDF")
         what = "the digest at its end does not fit its content" if ours else "not a NetCDF-4 file"
         raise RequestError(
@@ -260,7 +260,7 @@ def read_bytes(path: str | Path, content: bytes) -> Solution:
     return _read(path, inner)
 
 
-def _contents(solution: Solution) -> tuple[dict[str, _Variable], dict[str, Any]]:
+def contents(solution: Solution) -> tuple[dict[str, _Variable], dict[str, Any]]:
     """Variables of a file, each with dimensions, values and attributes, and the facts that stand beside them."""
     manifest = solution.manifest
     infos = {info.name: info for info in manifest.outputs}
@@ -305,7 +305,7 @@ def _netcdf(solution: Solution) -> bytes:
     """A NetCDF-4 file, in memory: a disk that is full then fails in one plain write, not somewhere within HDF5."""
     import h5netcdf
 
-    variables, facts = _contents(solution)
+    variables, facts = contents(solution)
     memory = io.BytesIO()
     with h5netcdf.File(memory, "w") as file:
         for _, (dimensions, values, _) in variables.items():

@@ -28,6 +28,13 @@ Duration = Annotated[
     typer.Option(metavar="TIME", help='Time to simulate instead of turns: --duration "0.5 s", also at speed 0.'),
 ]
 
+SampleRate = Annotated[
+    str | None,
+    typer.Option(
+        metavar="RATE", help='Samples a second instead of the scene\'s samples in a turn: --sample-rate "25.6 kHz".'
+    ),
+]
+
 #: Of commands that give numbers of the steady motion; ``ballpass run`` keeps the transient in its solution.
 Transient = Annotated[float | None, typer.Option(metavar="N", help="Turns at the start that do not count.")]
 

@@ -47,6 +47,7 @@ STAGES = {
     "compile": "compiling",
     "export": "writing the C program",
     "simulate": "simulating",
+    "spectrum": "computing the spectrum",
     "draw": "drawing figures",
     "write": "writing results",
 }

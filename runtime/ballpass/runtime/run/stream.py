@@ -1,0 +1,175 @@
+"""A run of any length into a file, in memory that does not grow with it.
+
+In: a model, numbers, a request with a sampling rate.  Out: a NetCDF-4 file of the layout of `Solution.save`.
+
+The run is made of pieces of some million numbers, each of which goes on where the one before ended and is written
+before the next begins.  A piece ends on a sample, where a step of the integrator ends as well: the samples are those of
+one run within its tolerance.  Extremes of every step (`Solution.reductions`) are not kept.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import reduce
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.request import Request, check_length, checked_rate, run_length
+from ballpass.runtime.run.simulate import simulate
+from ballpass.runtime.run.solution import SEAL, Solution, Statistics, contents
+from ballpass.runtime.run.start import start_time
+
+#: Numbers of the samples of a piece, 16 MB; in memory a few times as much is needed.
+PIECE = 2**21
+#: Bytes that are read at once for the digest.
+BLOCK = 2**20
+
+
+def stream_run(model: LoadedModel, numbers: Numbers, request: Request, path: Path, piece: int = PIECE) -> Statistics:
+    """Write a run to a file, which appears when it is done.
+
+    Parameters
+    ----------
+    request : with a sampling rate
+    piece : numbers of the samples that are kept in memory
+
+    Raises
+    ------
+    RequestError
+        A wrong request, or a file that cannot be written.
+    IntegrationError
+        The computation failed; the file is as it was.
+    """
+    rate = checked_rate(request.sample_rate or 0.0)
+    turn = clock.period(model.manifest, numbers.values)
+    begin = start_time(request.initial)
+    length = run_length(model, request, turn)
+    check_length(begin + length, turn)
+    edges = _edges(model, request, rate, begin, begin + length, piece)
+    try:
+        with _replaced(path) as made:
+            statistics = _write(model, numbers, request, made, rate, edges)
+            _seal(made)
+    except OSError as fault:
+        raise RequestError(
+            f"{path}: cannot be written ({fault.strerror or fault}); a file that was there is as it was. Give a path "
+            "in a folder you may write, with enough free space."
+        ) from fault
+    return statistics
+
+
+def _edges(model: LoadedModel, request: Request, rate: float, begin: float, end: float, piece: int) -> list[int]:
+    """Numbers of the samples with which pieces begin, and the one behind the last."""
+    first, behind = int(np.ceil(begin * rate - 1e-6)), int(np.floor(end * rate + 1e-6)) + 1
+    if behind - first < 2:
+        raise RequestError(f"sample_rate: {rate:g} Hz has fewer than two samples within the run. Give a higher rate.")
+    wanted = set(model.outputs if request.outputs is None else request.outputs)
+    columns = len(model.states) + sum(info.size for info in model.manifest.outputs if info.name in wanted)
+    rows = max(piece // (columns + len(model.manifest.inputs)), 2)
+    edges = list(range(first, behind, rows))
+    return [*(edges[:-1] if len(edges) > 1 and behind - edges[-1] < 2 else edges), behind]
+
+
+def _write(
+    model: LoadedModel, numbers: Numbers, request: Request, path: Path, rate: float, edges: list[int]
+) -> Statistics:
+    import h5netcdf
+
+    count, done = edges[-1] - edges[0], 0
+    parts: list[Statistics] = []
+    with h5netcdf.File(path, "w") as file:
+        start = request.initial
+        for first, behind in pairwise(edges):
+            times = np.maximum(np.arange(first, behind) / rate, start_time(start))
+            one = replace(
+                request,
+                cycles=None,
+                duration=None,
+                sample_rate=None,
+                times=times,
+                initial=start,
+                progress=_part(request.progress, done / count, (behind - first) / count),
+            )
+            solution = simulate(model, numbers, one)
+            start = solution.end
+            _append(file, solution, done)
+            parts.append(solution.statistics)
+            done += behind - first
+        total = reduce(_added, parts)
+        whole = replace(solution, statistics=total, reductions=None, steady_reductions=None)
+        for key, fact in contents(whole)[1].items():
+            file.attrs[key] = fact
+    return total
+
+
+def _append(file: Any, solution: Solution, done: int) -> None:
+    """Samples of a piece behind those of the pieces before it."""
+    variables, _ = contents(solution)
+    rows = len(solution)
+    if not done:
+        file.dimensions["time"] = None  # it grows
+        for name, (dimensions, values, attributes) in variables.items():
+            for dimension, size in zip(dimensions, values.shape, strict=True):
+                if dimension not in file.dimensions:
+                    file.dimensions[dimension] = size
+            chunks = (min(rows, 2**14), *values.shape[1:]) if dimensions[0] == "time" else None
+            variable = file.create_variable(name, dimensions, values.dtype, chunks=chunks)
+            for key, text in attributes.items():
+                variable.attrs[key] = text
+            if dimensions[0] != "time":
+                variable[...] = values
+    file.resize_dimension("time", done + rows)
+    for name, (dimensions, values, _) in variables.items():
+        if dimensions[0] == "time":
+            file.variables[name][done : done + rows] = values
+    file.flush()
+
+
+def _added(before: Statistics, now: Statistics) -> Statistics:
+    """Statistics of two pieces that follow each other."""
+
+    def both(name: str) -> Any:
+        a, b = getattr(before, name), getattr(now, name)
+        return None if a is None or b is None else a + b
+
+    counts = ("steps", "rejected", "located", "segments", "calls", "wall_time", "duration")
+    return replace(before, **{name: both(name) for name in counts})
+
+
+def _part(progress: Callable[[float], None] | None, done: float, share: float) -> Callable[[float], None] | None:
+    """Progress of a piece as that of the whole run."""
+    if progress is None:
+        return None
+    tell = progress
+    return lambda fraction: tell(done + share * fraction)
+
+
+def _seal(path: Path) -> None:
+    """Put the digest of its bytes behind a file, as `Solution.save` does."""
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        while block := stream.read(BLOCK):
+            digest.update(block)
+    with path.open("ab") as stream:
+        stream.write(SEAL + digest.hexdigest().encode() + b"\n")
+
+
+@contextmanager
+def _replaced(path: Path) -> Iterator[Path]:
+    """A place beside a file, to be put in its place when all went well."""
+    with tempfile.TemporaryDirectory(dir=path.absolute().parent, prefix=f".{path.name}-") as folder:
+        made = Path(folder) / path.name
+        yield made
+        os.replace(made, path)
