@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,10 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
+from sklearn.ensemble import RandomForestClassifier
 from typer.testing import CliRunner
 
+from ballpass.runtime import Model, load
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.commands.data_set_spec import read_spec
+from ballpass.runtime.ask.characteristic import characteristic_lines
+from ballpass.runtime.ask.vibration import diagnosis, envelope
 from ballpass.runtime.contract.errors import BallpassError
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -138,3 +143,47 @@ def test_a_command_that_was_killed_is_taken_up_again(tmp_path: Path) -> None:
     run("--out", "set.nc")
     with xarray.open_dataset(tmp_path / "set.nc") as netcdf:
         xarray.testing.assert_equal(netcdf.load(), one)
+
+
+def envelope_features(path: Path, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Peaks of the envelope's spectrum at characteristic lines and their first sidebands, kurtosis and crest factor."""
+    with xarray.open_zarr(path, chunks=None) as found:
+        t, signals, labels = found.time.values, found["inner.ay"].values.astype(float), found.label.values
+        table, names = found.parameters.values, found.parameter.values.tolist()
+    rows = []
+    for signal_, numbers in zip(signals, table, strict=True):
+        own = {name: value for name, value in zip(names, numbers, strict=True) if name in model.parameters}
+        over = envelope(t, signal_, (500.0, 10e3))
+        over -= over.mean()
+        spectrum = np.abs(np.fft.rfft(over * np.hanning(len(over)))) / over.std()
+        frequencies = np.fft.rfftfreq(len(over), t[1] - t[0])
+        lines = characteristic_lines(model.manifest, own | model.constants(own))
+        places = [k * line.frequency + n * line.side for line in lines for k in (1, 2, 3) for n in (-1, 0, 1)]
+        told = diagnosis(signal_)
+        peaks = [spectrum[np.abs(frequencies - place) <= 3.0].max(initial=0.0) for place in places]
+        rows.append([*peaks, told.kurtosis, told.crest_factor])
+    return np.array(rows), labels
+
+
+@pytest.mark.long
+def test_a_classifier_that_nobody_tuned_tells_four_classes_of_another_seed_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(ROOT / "scenes", tmp_path / "scenes")
+    monkeypatch.chdir(tmp_path)
+    spec = tmp_path / "scenes" / "data_sets" / "bearing_faults.toml"
+    text = spec.read_text(encoding="utf-8")
+    features = []
+    for seed in (1, 2):
+        spec.write_text(text.replace("seed = 1\n", f"seed = {seed}\n"))
+        done = CliRunner().invoke(app, ["dataset", str(spec), "--out", f"{seed}.zarr"])
+        assert done.exit_code == 0, done.output
+        assert "100 members, 100 made now, 0 without a signal" in done.output
+        features.append(envelope_features(tmp_path / f"{seed}.zarr", load("generated/bearing_faults_healthy")))
+    (seen, labels), (unseen, truth) = features
+    assert sorted(set(truth)) == ["ball", "healthy", "inner", "outer"]
+    forest = RandomForestClassifier(random_state=0)
+    assert forest.fit(seen, labels).score(unseen, truth) > 0.95
+    # it is the labels that it learns from
+    mixed = np.random.default_rng(1).permutation(labels)
+    assert forest.fit(seen, mixed).score(unseen, truth) < 0.5

@@ -221,6 +221,39 @@ def test_missing_packages_are_named_with_the_command(
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("speed", ["3000 rpm", "-3000 rpm"])
+def test_entry_times_of_a_spall_are_those_of_the_cage(
+    make_model: Callable[..., Model], tmp_path: Path, speed: str
+) -> None:
+    spall = 'on = "outer"\nangle = "270 deg"\nchord = "2 mm"\nprofile = "half-sine"\ndepth = "5 um"'
+    here = "[bearing.initial]"
+    pitted = make_model("rotor", (here, f"[bearing.defects.pit]\n{spall}\n\n{here}"), ("3000 rpm", speed))
+    healthy = make_model("rotor")
+    vary = {"bearing.ball_angle": uniform(0.0, 6.0)}
+    some = [
+        SignalClass(label="healthy", model=healthy, members=3, parameters={}),
+        SignalClass(label="pitted", model=pitted, members=5, parameters=vary),
+    ]
+    make_data_set(tmp_path / "a", some, replace(SIGNALS, outputs=("inner.y",), duration=0.1), seed=1)
+    found = read(tmp_path / "a")
+    times = found["entry_time.defects.pit"].values
+    assert np.all(np.isnan(times[found.label.values == "healthy"]))
+    names = found.parameter.values.tolist()
+    for member in np.flatnonzero(found.label == "pitted"):
+        own = dict(zip(names, found.parameters.values[member], strict=True))
+        ball, pitch = own["bearing.ball_diameter"], own["bearing.pitch_diameter"]
+        cage = own["shaft.speed"] / 2.0 * (1.0 - ball / pitch)
+        radius = pitted.constants()["bearing.outer_raceway_radius"]
+        edge = np.radians(270.0) - np.sign(cage) * np.arcsin(2e-3 / (2.0 * radius))
+        entries = times[member][np.isfinite(times[member])]
+        angles = own["bearing.ball_angle"] + cage * entries[:, None] + 2.0 * np.pi * np.arange(8) / 8
+        beside = np.abs(np.angle(np.exp(1j * (angles - edge)))).min(axis=1)
+        assert np.all(beside < 1e-9)
+        assert len(entries) in (int(0.1 * 8 * abs(cage) / (2 * np.pi)) + k for k in (0, 1))
+        assert np.all((entries >= 0.01) & (entries < 0.11))
+
+
+@pytest.mark.long
 def test_bits_are_the_same_for_any_number_of_workers(rotor: Model, tmp_path: Path) -> None:
     noisy = replace(SIGNALS, snr=10.0)
     make_data_set(tmp_path / "none", classes(rotor), noisy, seed=1, chunk=3)

@@ -45,6 +45,7 @@ from ballpass.runtime.many.data_set_store import (
 )
 from ballpass.runtime.many.distributions import Distribution, draw
 from ballpass.runtime.many.signals import Made, Member, Signals, check_outputs, make_signals
+from ballpass.runtime.many.spall_entries import entry_times
 from ballpass.runtime.native.loaded_model import LoadedModel
 
 #: Bytes of the samples of one output in a chunk, about.
@@ -257,6 +258,24 @@ def _truth(classes: Sequence[SignalClass], table: _Table, names: Sequence[str]) 
     return found
 
 
+def _entries(classes: Sequence[SignalClass], signals: Signals, table: _Table) -> dict[str, np.ndarray]:
+    """Times in the record at which a ball reaches a spall, by spall, shape (members, entries); NaN behind the last."""
+    end = signals.transient + signals.samples / signals.sample_rate
+    found: dict[str, np.ndarray] = {}
+    for kind, (one, columns) in enumerate(zip(classes, table.columns, strict=True)):
+        rows = np.flatnonzero(table.kinds == kind)
+        own = {name: column for name, column in columns.items() if name != _SNR}
+        # a class without a varied number has as many equal members
+        own = own or {info.name: np.full(one.members, info.default) for info in one.model.manifest.parameters[:1]}
+        for name, times in entry_times(one.model, own, signals.transient, end).items():
+            all_times = found.get(name, np.full((len(table.kinds), 1), np.nan))
+            missing = max(0, times.shape[1] - all_times.shape[1])
+            all_times = np.pad(all_times, ((0, 0), (0, missing)), constant_values=np.nan)
+            all_times[rows, : times.shape[1]] = times[table.places[rows]]
+            found[name] = all_times
+    return found
+
+
 def _axes(classes: Sequence[SignalClass], signals: Signals, table: _Table, spec: Mapping[str, Any], chunk: int) -> Axes:
     """What is known before anything is simulated."""
     infos = {info.name: info for one in classes for info in one.model.manifest.parameters}
@@ -274,6 +293,7 @@ def _axes(classes: Sequence[SignalClass], signals: Signals, table: _Table, spec:
         names=[(info.name, info.unit, info.description) for info in infos.values()],
         parameters=_truth(classes, table, list(infos)),
         snr=snr,
+        entries=_entries(classes, signals, table),
         chunk=chunk,
     )
 

@@ -82,6 +82,7 @@ class Axes:
     names : name, unit and meaning of each parameter
     parameters : shape (members, parameters) [SI]
     snr : shape (members,) [dB]
+    entries : by spall, times at which a ball reaches it, shape (members, entries), NaN behind the last [s]
     chunk : members of a chunk
     """
 
@@ -93,6 +94,7 @@ class Axes:
     names: Sequence[tuple[str, str, str]]
     parameters: np.ndarray
     snr: np.ndarray
+    entries: Mapping[str, np.ndarray]
     chunk: int
 
 
@@ -134,6 +136,9 @@ def create_store(path: Path, axes: Axes) -> Any:
         array(f"{name}_meaning", dimension, meanings, f"what the {name} is")
     array("parameters", "member parameter", axes.parameters, "parameters of the run; NaN: its class has none such")
     array("snr", "member", axes.snr, "ratio of signal to noise", "dB")
+    for name, times in axes.entries.items():
+        meaning = f"times in the record at which a ball reaches {name}; NaN behind the last"
+        array(f"entry_time.{name}", f"member entry.{name}", times, meaning, "s")
     noise = np.full((count, len(axes.outputs)), np.nan)
     array("noise_rms", "member output", noise, "rms of the noise, in the unit of the output", chunk=size)
     for name, unit, meaning in axes.outputs:
