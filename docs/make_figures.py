@@ -26,6 +26,21 @@ PICTURES = {
     "varying_compliance": ("orbit", "peak_moment"),
 }
 
+#: Spectra of the rotor with a table more, as the how-to pages call `ballpass spectrum`.
+SPECTRA = {
+    "waviness": (
+        '\n[bearing.inner_waviness]\n9 = { amplitude = "0.2 um" }\n',
+        ("--set", "bearing.clearance=-8 um", "--cycles", "420", "--window", "flattop"),
+    ),
+    "inner_spall": (
+        '\n[bearing.defects.spall]\non = "inner"\nangle = "0 deg"\nchord = "1 mm"\nprofile = "path"\n',
+        (
+            *("--envelope", "2kHz:10kHz", "--cycles", "220"),
+            *("--set", "loads.weight.force.y=-1 kN", "--set", "bearing.clearance=10 um"),
+        ),
+    ),
+}
+
 
 def main() -> None:
     IMAGES.mkdir(exist_ok=True)
@@ -37,14 +52,14 @@ def main() -> None:
                 target = IMAGES / f"{scene}_{name}.png"
                 shutil.copyfile(drawn[name], target)
                 print(target.relative_to(ROOT))
-    with tempfile.TemporaryDirectory() as folder:
-        scene_file = Path(folder) / "wavy.toml"
-        waves = '\n[bearing.inner_waviness]\n9 = { amplitude = "0.2 um" }\n'
-        scene_file.write_text((ROOT / "scenes" / "rotor.toml").read_text(encoding="utf-8") + waves, encoding="utf-8")
-        words = ("--of", "inner.ay", "--set", "bearing.clearance=-8 um", "--cycles", "420", "--window", "flattop")
-        ballpass = Path(sys.executable).parent / "ballpass"
-        run([ballpass, "spectrum", scene_file, *words, "--out", folder], cwd=folder, check=True)
-        shutil.copyfile(Path(folder) / "spectrum.png", IMAGES / "spectrum_waviness.png")
+    for name, (table, words) in SPECTRA.items():
+        with tempfile.TemporaryDirectory() as folder:
+            scene_file = Path(folder) / "rotor.toml"
+            text = (ROOT / "scenes" / "rotor.toml").read_text(encoding="utf-8")
+            scene_file.write_text(text + table, encoding="utf-8")
+            ballpass = Path(sys.executable).parent / "ballpass"
+            run([ballpass, "spectrum", scene_file, "--of", "inner.ay", *words, "--out", folder], cwd=folder, check=True)
+            shutil.copyfile(Path(folder) / "spectrum.png", IMAGES / f"spectrum_{name}.png")
 
 
 if __name__ == "__main__":
