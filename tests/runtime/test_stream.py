@@ -34,6 +34,7 @@ def test_a_streamed_run_has_the_samples_of_one_run(rotor: Model, tmp_path: Path)
     for name in (*whole.states, *whole.outputs):
         assert found[name] == pytest.approx(whole[name], abs=2e-5 * np.max(np.abs(whole[name])))
     assert statistics.steps == found.statistics.steps
+    assert found.statistics.duration == pytest.approx(0.4, abs=1.0 / rate)  # each piece goes on from the one before
     assert found.statistics.segments > whole.statistics.segments  # it was made of pieces
     assert len(found.steady()) == len(whole.steady())
     with xarray.open_dataset(path, engine="h5netcdf") as stored:
