@@ -62,7 +62,8 @@ def _of_input(item: Input) -> Iterator[Event]:
     if item.kind == "gate":
         for edge in (edge for window in item.windows for edge in window):
             function = passed - sp.Symbol(edge, real=True)
-            yield Event(name=edge, kind="angle", function=function, rate=rate, changes=f"`{item.name}`")
+            lags = ", the angle less the lag of the cage" if item.times else ""
+            yield Event(name=edge, kind="angle", function=function, rate=rate, changes=f"`{item.name}`{lags}")
     elif item.kind in ("table", "table_rate"):
         changes = f"the slope of `{item.name}`" if item.kind == "table" else f"`{item.name}`"
         for knot in item.times[:1]:

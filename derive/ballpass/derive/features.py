@@ -213,11 +213,12 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
             without=_keep(scene, f"{bearing.prefix}outer", bearing=fixed),
         )
     if bearing.cage is not None:
-        told = [q.path for q in (bearing.cage.ratio, bearing.cage.slip) if q is not None]
+        cage = bearing.cage
+        told = [q.path for q in (cage.ratio, cage.slip, *cage.time, *cage.slips) if q is not None]
         yield Feature(
             name=f"cage{of}",
             path=f"{bearing.path}.cage",
-            modelled="the cage's own speed: " + " and ".join(path.rpartition(".")[2] for path in told),
+            modelled="the cage's own speed: " + ("slip" if cage.slipping else "a given ratio"),
             without=replace(
                 _with(scene, replace(bearing, cage=None)),
                 quantities=tuple(q for q in scene.quantities if q.path not in told),

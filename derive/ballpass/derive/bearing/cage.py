@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from ballpass.derive.bearing.cage_slip import kept_share, lag_of
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.kinematics import Ledger, Pose
@@ -52,24 +53,31 @@ def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr) -> Cage:
     names = Names(prefix=bearing.prefix, path=bearing.path)
     speed, even = names.constant("cage_speed"), _phase(bearing, names)
     pass_speed, passing = names.constant("inner_pass_speed"), _phase(bearing, names, "inner")
-    slip = None if bearing.cage is None else bearing.cage.slip
-    share = sp.S.One if slip is None else 1 - symbol_of(slip)
-    constants = (
+    rolling = cage_ratio(names) * shaft_speed
+    constants: tuple[Definition, ...] = (
         _ratio(bearing, names),
-        names.define(speed, cage_ratio(names) * share * shaft_speed, "rad/s", "Speed of the cage", r"\omega_c"),
+        names.define(speed, kept_share(bearing) * rolling, "rad/s", "Speed of the cage", r"\omega_c"),
         _pass(names, "inner", speed - shaft_speed),
     )
-    angle = even.symbol + speed * TIME
-    turning = _spin(bearing, names, speed) if any(EFFECTS[e.kind].spins(e) for e in bearing.effects) else None
+    lag = lag_of(bearing, names, rolling)
+    behind, ledger, rate = sp.S.Zero, Ledger(), speed
+    if lag is not None:
+        behind, constants = lag.angle, (*constants, *lag.constants)
+        words = "speed of the balls about the bearing's axis"
+        rate = ledger.define(f"{bearing.prefix}cage.rate", speed - lag.rate, "rad/s", words, names.latex(r"\dot\psi"))
+    angle = even.symbol + speed * TIME - behind
+    spins = any(EFFECTS[e.kind].spins(e) for e in bearing.effects)
+    turning = _spin(bearing, names, speed, behind) if spins else None
     return Cage(
         angle=angle,
-        rate=speed,
+        rate=rate,
         in_outer=angle,
-        in_inner=passing.symbol + pass_speed * TIME,
+        in_inner=passing.symbol + pass_speed * TIME - behind,
         inputs=(
             even,
             passing,
             *(() if turning is None else (turning.input,)),
+            *(() if lag is None else lag.inputs),
             *(i for e in bearing.effects for i in EFFECTS[e.kind].inputs(e, bearing, names)),
         ),
         constants=(
@@ -77,6 +85,7 @@ def cage_on_shaft(bearing: Bearing, shaft_speed: sp.Expr) -> Cage:
             *(() if turning is None else turning.constants),
             *(d for e in bearing.effects for d in EFFECTS[e.kind].constants(e, bearing, names)),
         ),
+        definitions=ledger.definitions,
         spin=None if turning is None else turning.angle,
     )
 
@@ -88,7 +97,7 @@ class _Spin:
     constants: tuple[Definition, ...]
 
 
-def _spin(bearing: Bearing, names: Names, cage_speed: sp.Symbol) -> _Spin:
+def _spin(bearing: Bearing, names: Names, cage_speed: sp.Symbol, behind: sp.Expr) -> _Spin:
     """Balls that roll on the outer raceway, which stands: as much of their surface passes as of the raceway."""
     start, speed = names.constant("spin_start"), names.constant("spin_speed")
     rolls = 1 + symbol_of(bearing.pitch_diameter) / symbol_of(bearing.ball_diameter)
@@ -101,7 +110,7 @@ def _spin(bearing: Bearing, names: Names, cage_speed: sp.Symbol) -> _Spin:
         rate=speed.name,
     )
     return _Spin(
-        angle=turned.symbol + speed * TIME,
+        angle=turned.symbol + speed * TIME - rolls * behind,
         input=turned,
         constants=(
             names.define(start, sp.S.Zero, "rad", f"{words} at the start, from which it is counted", r"\chi_{00}"),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.laws import LAWS
+from ballpass.derive.reading.read_cage import read_cage
 from ballpass.derive.reading.read_coupling import read_count, read_coupling, read_inner_body, refuse_effects
 from ballpass.derive.reading.read_designation import fill_by_designation
 from ballpass.derive.reading.read_duty import read_lubrication
@@ -15,7 +16,6 @@ from ballpass.derive.scene.records import (
     FRAME,
     BallEffect,
     Bearing,
-    CageMotion,
     Damping,
     EquivalentMass,
     GivenContact,
@@ -94,7 +94,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             outer=support,
             initial=_read_initial(table, moving_outer=support is not None),
             catalogue=catalogue,
-            cage=_read_cage(table, "two-way" if coupling == "two-way" else _uneven(mechanism)),
+            cage=read_cage(table, "two-way" if coupling == "two-way" else _uneven(mechanism)),
             lubrication=read_lubrication(table),
         )
 
@@ -260,24 +260,6 @@ def _read_effects(table: Table, balls: int) -> tuple[BallEffect, ...]:
 def _uneven(mechanism: Mechanism | None) -> str:
     """What makes a one-way bearing's rings turn unevenly; empty where nothing does."""
     return "mechanism.driver.table" if mechanism is not None and mechanism.driver.table is not None else ""
-
-
-def _read_cage(table: Table, uneven: str) -> CageMotion | None:
-    if not table.has("cage"):
-        return None
-    with table.table("cage", "ratio or slip") as cage:
-        words = "Speed of the cage over that of the inner ring"
-        ratio = cage.optional_quantity("ratio", "1", words, r"\kappa_c")
-        slip = cage.optional_quantity("slip", "1", "Part by which the cage turns slower than by rolling", "s_c")
-        if slip is not None and uneven:
-            cage.fault(
-                "slip",
-                "slip of the cage is modelled for rings that turn at constant speed",
-                given=f"slip, and {uneven}",
-                allowed='slip with coupling = "one-way" and a driver of constant speed',
-                remedy="delete slip; ratio may stay",
-            )
-        return CageMotion(ratio=ratio, slip=slip)
 
 
 def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:

@@ -21,7 +21,7 @@ GROOVE = (0.505, 0.56)
 #: Clearance or preload over ball diameter.
 CLEARANCE = (-0.01, 0.01)
 #: Slip of a cage: beyond, balls skid, and the model of a cage that turns evenly is none.
-SLIP = (0.0, 0.3)
+SLIP, SLIPS = (0.0, 0.3), (-0.3, 0.3)
 #: Young's modulus from magnesium to silicon carbide [Pa].
 MODULUS = (50e9, 400e9)
 #: Half width of the smoothed contact onset over clearance.
@@ -96,6 +96,9 @@ def _of_bearing(bearing: Bearing) -> Iterator[UsualInfo]:
         yield _range(contact.smoothing, SMOOTHING, hint, bearing.clearance)
     if bearing.cage is not None and bearing.cage.slip is not None:
         yield _range(bearing.cage.slip, SLIP, "A cage lags by some hundredths: check whether percents were given.")
+    if bearing.cage is not None:
+        for slip in bearing.cage.slips:
+            yield _range(slip, SLIPS, "A cage lags by some hundredths: check whether percents were given.")
     for effect in bearing.effects:
         for number, bounds, hint in EFFECTS[effect.kind].usual(effect):
             yield _range(number, bounds, hint, ball)

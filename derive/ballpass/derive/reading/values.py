@@ -21,6 +21,7 @@ from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.records import (
     Bearing,
     Bounds,
+    CageMotion,
     Driver,
     EquivalentMass,
     HertzContact,
@@ -283,6 +284,7 @@ def _check_bearing(checker: Checker, bearing: Bearing) -> None:
             checker.within(bearing.cage.ratio, Bounds(above=0.0, below=1.0))
         if bearing.cage.slip is not None:
             checker.within(bearing.cage.slip, Bounds(above=-1.0, below=1.0))
+        _check_slip(checker, bearing.cage, bearing.path)
     if bearing.inner is not None:
         if isinstance(bearing.inner.mass, EquivalentMass):
             checker.positive(bearing.inner.mass.ring)
@@ -297,6 +299,23 @@ def _check_bearing(checker: Checker, bearing: Bearing) -> None:
         checker.positive(bearing.outer.mass, 'give the moved mass, or write support = "fixed"')
         checker.not_negative(bearing.outer.stiffness)
         checker.not_negative(bearing.outer.damping)
+
+
+def _check_slip(checker: Checker, cage: CageMotion, path: str) -> None:
+    """Rows of a slip over time."""
+    remedy = "give each row a time and a slip"
+    if not checker.rows(f"{path}.cage.slip", cage.time, cage.slips, "time", remedy):
+        return
+    for slip in cage.slips:
+        checker.within(slip, Bounds(above=-1.0, below=1.0))
+    if cage.time[0].value != 0.0:
+        checker.fault(
+            cage.time[0].path,
+            "the first row does not begin at the start",
+            checker.show(cage.time[0]),
+            "zero",
+            'write "0 s" in the first row',
+        )
 
 
 def _check_balls(checker: Checker, bearing: Bearing) -> None:

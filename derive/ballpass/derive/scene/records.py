@@ -346,11 +346,19 @@ class BallEffect:
 class CageMotion:
     """What a scene says of the cage: its ratio to the inner ring's speed instead of that of rolling, and its slip.
 
-    `slip` is the part by which it turns slower [1].  None: rolling.
+    `slip` is the part by which it turns slower [1].  None: rolling, or the slip of each row of a table holds from its
+    `time` [s] until the next; the first is zero.
     """
 
     ratio: Quantity | None
-    slip: Quantity | None
+    slip: Quantity | None = None
+    time: tuple[Quantity, ...] = ()
+    slips: tuple[Quantity, ...] = ()
+
+    @property
+    def slipping(self) -> bool:
+        """Whether it slips at all."""
+        return self.slip is not None or bool(self.time)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

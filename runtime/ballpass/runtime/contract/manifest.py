@@ -110,7 +110,7 @@ class InputInfo:
     kind ``phase``: the angle ``offset + rate * t_ref`` [rad] at the reference time; `offset` names a parameter, `rate`
     a parameter or derived constant [rad/s].
     kind ``gate``: 1 while ``offset + rate * t`` modulo a turn lies in one of `windows` (pairs of parameter names),
-    else 0.
+    else 0.  Where it has `times`, the piecewise linear table of `times` and `values` is added to that angle.
     kind ``table``: value at the reference time of the piecewise linear table with the knots `times` and `values`
     (names of parameters); kind ``table_rate``: its slope there.  Where `rate` is named, `times` are values of the angle
     ``offset + rate * t`` [rad], the table is periodic over a turn, and its slope is that over the angle.

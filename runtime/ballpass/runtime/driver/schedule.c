@@ -63,6 +63,21 @@ static void window(double first, double last, double *start, double *width)
     *width = wide;
 }
 
+/* Piece k of the time in which the angle of a gate grows evenly: its value at t = 0, its rate, begin and end. */
+static void piece_of_gate(const schedule_input *gate, const double *values, int k, double *offset, double *rate, double *begin, double *end)
+{
+    *offset = values[gate->offset];
+    *rate = values[gate->rate];
+    if (!gate->knots) return;
+    const int left = k > 0 ? k - 1 : 0, inside = k > 0 && k < gate->knots;
+    const double height = values[gate->heights[left]], knot = values[gate->times[left]];
+    const double slope = inside ? (values[gate->heights[k]] - height) / (values[gate->times[k]] - knot) : 0.0;
+    *offset += height - slope * knot;
+    *rate += slope;
+    if (k > 0 && knot > *begin) *begin = knot;
+    if (k < gate->knots && values[gate->times[k]] < *end) *end = values[gate->times[k]];
+}
+
 /* Times in [begin, end] at which offset + rate t passes `edge` modulo a turn. */
 static void add_passages(time_list *list, double edge, double offset, double rate, double begin, double end)
 {
@@ -114,7 +129,10 @@ void schedule_inputs(const schedule_input *inputs, int count, const double *valu
         if (input->kind == SCHEDULE_PHASE) {
             u[i] = modulo(values[input->offset] + values[input->rate] * t, TURN);
         } else if (input->kind == SCHEDULE_GATE) {
-            const double angle = values[input->offset] + values[input->rate] * inside;
+            const int piece = input->knots ? knots_before(input, values, inside) : 0;
+            double offset, rate, begin = inside, end = inside;
+            piece_of_gate(input, values, piece, &offset, &rate, &begin, &end);
+            const double angle = offset + rate * inside;
             u[i] = 0.0;
             for (int k = 0; k < input->windows; k++) {
                 double start, width;
@@ -135,7 +153,7 @@ int schedule_fault(const schedule_input *inputs, int count, const double *values
         const int *times = inputs[i].times, knots = inputs[i].knots;
         for (int k = 1; k < knots; k++)
             if (!(values[times[k]] > values[times[k - 1]])) return i;
-        if (knots && inputs[i].rate >= 0 && !(values[times[knots - 1]] - values[times[0]] < TURN - ANGLE_RESOLUTION)) return i;
+        if (knots && inputs[i].rate >= 0 && inputs[i].kind != SCHEDULE_GATE && !(values[times[knots - 1]] - values[times[0]] < TURN - ANGLE_RESOLUTION)) return i;
     }
     return -1;
 }
@@ -146,15 +164,19 @@ static void add_breakpoints(time_list *list, const schedule_input *inputs, int c
     time_list found = {NULL, 0, 0, 0};
     for (int i = 0; i < count; i++) {
         const schedule_input *input = &inputs[i];
-        if (input->kind == SCHEDULE_GATE && values[input->rate] != 0.0) {
+        for (int piece = 0; input->kind == SCHEDULE_GATE && piece <= input->knots; piece++) {
+            double offset, rate, from = begin, to = end;
+            piece_of_gate(input, values, piece, &offset, &rate, &from, &to);
+            if (rate == 0.0 || from >= to) continue;
             for (int k = 0; k < input->windows; k++) {
                 double start, width;
                 window(values[input->edges[2 * k]], values[input->edges[2 * k + 1]], &start, &width);
                 if (width <= 0.0 || width >= TURN) continue;
-                add_passages(&found, start, values[input->offset], values[input->rate], begin, end);
-                add_passages(&found, start + width, values[input->offset], values[input->rate], begin, end);
+                add_passages(&found, start, offset, rate, from, to);
+                add_passages(&found, start + width, offset, rate, from, to);
             }
         }
+        if (input->kind == SCHEDULE_GATE) continue; /* its knots are those of a table */
         for (int k = 0; k < input->knots; k++) {
             const double knot = values[input->times[k]];
             if (input->rate < 0) add(&found, knot);

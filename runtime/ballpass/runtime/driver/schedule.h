@@ -7,7 +7,7 @@ enum schedule_kind { SCHEDULE_PHASE, SCHEDULE_GATE, SCHEDULE_TABLE, SCHEDULE_TAB
 /* An input that is constant within a segment.  Numbers are named by their place among parameters and, behind these, derived constants.
 
    phase        the angle offset + rate t at the segment's start [rad]
-   gate         1 while that angle lies in one of the windows, else 0
+   gate         1 while that angle, plus a table over time where there are knots, lies in one of the windows, else 0
    table        value of the piecewise linear table at the segment's start
    table rate   its slope there
    border       0: of a switching function of the state

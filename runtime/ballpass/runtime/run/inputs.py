@@ -8,8 +8,8 @@ Angles are reduced modulo a turn here, so that the generated code sees small arg
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -118,6 +118,8 @@ def inputs_over(inputs: Sequence[InputInfo], values: Values, t: np.ndarray, insi
             found[:, k] = (values[item.offset] + values[item.rate] * t) % TURN
         elif item.kind == "gate":
             angle = values[item.offset] + values[item.rate] * inside
+            if item.times:
+                angle = angle + _table(_lag_of(item), values, inside, inside)
             covered = np.zeros(len(t), dtype=bool)
             for start, width in _windows(item, values):
                 covered |= _covers(angle, start, width)
@@ -146,11 +148,11 @@ def breakpoints(inputs: Sequence[InputInfo], values: Values, t0: float, t1: floa
     found: list[np.ndarray] = [np.zeros(0)]
     for item in inputs:
         if item.kind == "gate":
-            offset, rate = values[item.offset], values[item.rate]
-            if rate != 0.0:
-                for start, width in _windows(item, values):
-                    if 0.0 < width < TURN:
-                        found += [_passages(edge, offset, rate, t0, t1) for edge in (start, start + width)]
+            for offset, rate, begin, end in _turning(item, values, t0, t1):
+                if rate != 0.0:
+                    for start, width in _windows(item, values):
+                        if 0.0 < width < TURN:
+                            found += [_passages(edge, offset, rate, begin, end) for edge in (start, start + width)]
         elif item.kind in ("table", "table_rate"):
             knots = _knots(item, values)[0]
             if not item.rate:
@@ -167,6 +169,27 @@ def breakpoints(inputs: Sequence[InputInfo], values: Values, t0: float, t1: floa
         if not apart or time - apart[-1] > near:
             apart.append(time)
     return np.array(apart)
+
+
+def _lag_of(gate: InputInfo) -> InputInfo:
+    """The table over time that is added to the angle of a gate."""
+    return replace(gate, kind="table", offset="", rate="", windows=())
+
+
+def _turning(gate: InputInfo, values: Values, t0: float, t1: float) -> Iterator[tuple[float, float, float, float]]:
+    """Of each piece of time in which a gate's angle grows evenly: its value at t = 0, its rate, begin and end."""
+    offset, rate = values[gate.offset], values[gate.rate]
+    if not gate.times:
+        yield offset, rate, t0, t1
+        return
+    knots, heights = _knots(_lag_of(gate), values)
+    slopes = np.concatenate([[0.0], np.diff(heights) / np.diff(knots), [0.0]])
+    edges = np.concatenate([[-math.inf], knots, [math.inf]])
+    for k, slope in enumerate(slopes.tolist()):
+        begin, end = max(t0, float(edges[k])), min(t1, float(edges[k + 1]))
+        if begin < end:
+            left = max(k - 1, 0)
+            yield offset + float(heights[left] - slope * knots[left]), rate + slope, begin, end
 
 
 def input_derivatives(inputs: Sequence[InputInfo], values: Values, t: float) -> list[tuple[int, str, float]]:
@@ -209,12 +232,18 @@ def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float)
         if item.kind == "gate" and values[item.rate] != 0.0:
             rate = values[item.rate]
             angle = values[item.offset] + rate * t
+            moved: list[tuple[str, float]] = []
+            if item.times:
+                lag = _lag_of(item)
+                angle += float(_table(lag, values, np.array([t]), np.array([t]))[0])
+                rate += float(_table(replace(lag, kind="table_rate"), values, np.array([t]), np.array([t]))[0])
+                moved = [(name, -slope / rate) for _, name, slope in input_derivatives([lag], values, t)]
             for names, (start, width) in zip(item.windows, _windows(item, values), strict=True):
                 if not 0.0 < width < TURN:
                     continue
                 for name, edge in zip(names, (start, start + width), strict=True):
                     if _passes(angle, edge):
-                        found[((name, 1.0 / rate), (item.offset, -1.0 / rate), (item.rate, -t / rate))] = None
+                        found[((name, 1.0 / rate), (item.offset, -1.0 / rate), (item.rate, -t / rate), *moved)] = None
         elif item.kind == "table" and item.rate:
             rate = values[item.rate]
             for name, edge in zip(item.times, _knots(item, values)[0].tolist(), strict=True):

@@ -19,6 +19,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ballpass.derive.bearing.cage_slip import lag_names
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import BallEffect, Bearing, Quantity
@@ -212,9 +213,20 @@ class _Contact:
                 offset=offset,
                 rate=rate,
                 windows=((self._symbol(begin).name, self._symbol(end).name),),
+                times=() if self.bearing.cage is None else tuple(q.path for q in self.bearing.cage.time),
+                values=tuple(symbol.name for symbol, _ in self._lags),
             )
             for part, begin, end in self._edges
         )
+
+    @property
+    def _lags(self) -> tuple[tuple[sp.Symbol, sp.Expr], ...]:
+        """What the lag of a cage whose slip changes adds to the angle of the windows, row by row."""
+        each = self.bearing.balls
+        if self.spall.on == "ball":
+            each = 1 + symbol_of(self.bearing.pitch_diameter) / symbol_of(self.bearing.ball_diameter)
+        lags = lag_names(self.bearing, self.names)
+        return tuple((self._symbol(f"lag.{k}"), -each * lag) for k, lag in enumerate(lags, start=1))
 
     def _gate(self, part: str) -> sp.Symbol:
         import sympy as sp
@@ -281,6 +293,9 @@ class _Contact:
             yield define(
                 self._symbol(name), each * (self.middle + past), "rad", f"{what} of the {place} of {words}", latex
             )
+
+        for k, (symbol, lag) in enumerate(self._lags, start=1):
+            yield define(symbol, lag, "rad", f"Lag of the cage at {words}, row {k}", rf"\lambda_{{d,{k}}}")
 
     def depth(self, c: sp.Expr, s: sp.Expr, near: sp.logic.boolalg.Boolean) -> sp.Expr:
         """How deep a ball sinks, over cosine and sine of the angle past the middle."""

@@ -163,7 +163,7 @@ def _absent(scene: Scene) -> list[str]:
             out.append(f"viscous damping of the inner ring to the frame ({path}.inner_ring.damping)")
         if bearing.outer is None:
             out.append(f'motion of the outer ring ({path}.outer_ring, support = "elastic")')
-        if bearing.coupling == "one-way" and (bearing.cage is None or bearing.cage.slip is None):
+        if bearing.coupling == "one-way" and not (bearing.cage and bearing.cage.slipping):
             out.append(f"slip of the cage ({path}.cage.slip)")
         present = {effect.kind for effect in bearing.effects}
         out += [f"{effect.words} ({path}.{kind})" for kind, effect in EFFECTS.items() if kind not in present]
