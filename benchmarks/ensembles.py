@@ -10,8 +10,13 @@ from benchmarks.problem import CASES, parameter_sets
 from benchmarks.timing import spread
 
 CYCLES, TRANSIENT, RTOL = 2, 1, 1e-6
-#: Reductions that cost differently: the end alone, of states, of balls.
-ASKED = {"end": ["end:inner.y"], "states": ["rms:inner.y", "range:inner.y"], "balls": ["max:ball.force", "rms:inner.y"]}
+#: Reductions that cost differently: the end alone, of states, of balls, peak and life of the bearing.
+ASKED = {
+    "end": ["end:inner.y"],
+    "states": ["rms:inner.y", "range:inner.y"],
+    "balls": ["max:ball.force", "rms:inner.y"],
+    "life": ["max:ball.force", "life"],
+}
 
 
 def measure(members: int, rounds: int) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Make the pictures of README and documentation anew: ``.venv/bin/python docs/make_figures.py``.
 
-Every picture is a figure of ``ballpass run SCENE``, copied to ``docs/images/<scene>_<figure>.png``, but that of
-waviness, which is of ``ballpass spectrum`` as the how-to calls it.
+Every picture is a figure of ``ballpass run SCENE`` or ``ballpass life SCENE``, copied to
+``docs/images/<scene>_<figure>.png``, but that of waviness, which is of ``ballpass spectrum`` as the how-to calls it.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from subprocess import run
 
 from ballpass.derive import generate
 from ballpass.runtime import load
+from ballpass.runtime.app.commands.life import draw_life
 from ballpass.runtime.app.figures.gallery import draw_all
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -42,8 +43,31 @@ SPECTRA = {
 }
 
 
+#: Keys of the press's bearing that a designation gives.
+OWN = ("balls", "ball_diameter", "pitch_diameter", "inner_groove_radius", "outer_groove_radius", "young_modulus")
+
+
+def draw_lives() -> None:
+    """Figures of the press's life; against clearance with the group that the bearing's name brings."""
+    text = (ROOT / "scenes" / "punching_press.toml").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith((*(f"{key} = " for key in OWN), "poisson"))]
+    named = "\n".join(lines).replace("[bearing]\n", '[bearing]\ndesignation = "6204"\n')
+    named = named.replace('clearance = "10 um"', 'clearance = "CN"')
+    for written, names in ((text, ("damage", "pressure")), (named, ("life_of_clearance",))):
+        with tempfile.TemporaryDirectory() as folder:
+            scene = Path(folder) / "punching_press.toml"
+            scene.write_text(written, encoding="utf-8")
+            model = load(generate(scene, Path(folder) / "generated"))
+            draw_life(model, model.life(), {}, Path(folder))
+            for name in names:
+                target = IMAGES / f"punching_press_{name}.png"
+                shutil.copyfile(Path(folder) / f"{name}.png", target)
+                print(target.relative_to(ROOT))
+
+
 def main() -> None:
     IMAGES.mkdir(exist_ok=True)
+    draw_lives()
     for scene, names in PICTURES.items():
         model = load(generate(ROOT / "scenes" / f"{scene}.toml", ROOT / "generated" / scene))
         with tempfile.TemporaryDirectory() as folder:

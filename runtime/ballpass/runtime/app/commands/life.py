@@ -11,7 +11,6 @@ import typer
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked
 from ballpass.runtime.app.commands.shared import (
-    Stages,
     check_folder,
     command,
     json_text,
@@ -59,8 +58,9 @@ def life(
         )
         written: list[Path] = []
         if out is not None:
+            stages("draw")
             out.mkdir(parents=True, exist_ok=True)
-            written = [out / "life.json", *_draw(model, report, overrides, out, stages)]
+            written = [out / "life.json", *draw_life(model, report, overrides, out)]
             written[0].write_text(json_text(report.to_json()), encoding="utf-8")
         for words in (*report.unsettled, *_swinging(report)):
             warn(words)
@@ -78,15 +78,14 @@ def _swinging(report: LifeReport) -> list[str]:
     return list(dict.fromkeys(words))
 
 
-def _draw(model: Model, report: LifeReport, overrides: Mapping[str, float], folder: Path, stages: Stages) -> list[Path]:
-    """Figures of every bearing in the first state of the duty cycle in which something turns."""
+def draw_life(model: Model, report: LifeReport, overrides: Mapping[str, float], folder: Path) -> list[Path]:
+    """Write figures of every bearing in the first state of the duty cycle in which something turns; their paths."""
     from ballpass.runtime.app.figures import life as figures
     from ballpass.runtime.app.figures.canvas import save
 
     state = next((state for state in report.states if state.bearings), None)
     if state is None:
         return []
-    stages("draw")
     title = f"{report.title}, {state.name}" if state.name else report.title
     duty = {info.name: dict(info.parameters) for info in model.manifest.duty}
     numbers = {**overrides, **duty.get(state.name, {})}
