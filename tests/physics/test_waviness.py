@@ -173,6 +173,14 @@ def test_an_order_that_is_none_is_refused(scene_text: Callable[..., str], tmp_pa
         generate(scene_from_text(text, "wavy"), tmp_path)
 
 
+def test_waves_that_all_balls_have_alike_may_stand_alone(scene_text: Callable[..., str], tmp_path: Path) -> None:
+    """Nothing of the ball's place is left in the term then."""
+    table = '[bearing.ball_waviness.each]\n2 = { amplitude = "0.1 um" }\n[bearing.inner_ring]'
+    text = scene_text("varying_compliance", ("[bearing.inner_ring]", table))
+    folder = generate(scene_from_text(text, "alike"), tmp_path)
+    assert "kernels.h" in "".join(path.name for path in folder.iterdir())
+
+
 def test_a_roughness_is_its_waves(scene_text: Callable[..., str]) -> None:
     """Amplitudes fall with a power of the order, a seed draws the phases, of each ball its own; they stay numbers."""
     rough = '{{ amplitude = "0.2 um", exponent = 1.5, lowest = 4, highest = 9, seed = {} }}'

@@ -131,7 +131,8 @@ class BallBuilder:
         taken = [nothing] * 3
         if ball.own is not None:
             at = self._of_state.child({ball.cos: co, ball.sin: si}, self._definitions)
-            taken = [at(s) for s in (ball.own.deflection, ball.own.rate, ball.own.acceleration)]
+            # their expressions: where all balls are alike these are hoisted whole
+            taken = [at(self._definitions[s]) for s in (ball.own.deflection, ball.own.rate, ball.own.acceleration)]
             delta, rate = delta - taken[0], rate - taken[1]
         inner = (ball.deflection, ball.deflection_rate)
         rest = {k: v for k, v in self._definitions.items() if k not in inner}
