@@ -29,6 +29,7 @@ PAGE = ROOT / "docs" / "howto" / "data_set_numbers.md"
 def measure(members: int, rounds: int) -> dict[str, Any]:
     """Signals a second of each way, best of interleaved rounds, and processor time of a signal."""
     best: dict[str, list[float]] = {}
+    load_average = psutil.getloadavg()[0]
     with tempfile.TemporaryDirectory() as place:
         scene = read_scene(ROOT / "scenes" / "rotor.toml", changes={"run": {"outputs": list(SIGNALS.outputs)}})
         model = load(generate(scene, Path(place) / "rotor"))
@@ -47,7 +48,7 @@ def measure(members: int, rounds: int) -> dict[str, Any]:
                     raise RuntimeError(f"{len(report.failures)} members failed: {report.failures[0]}")
                 found = best.setdefault(way, [0.0, float("inf")])
                 best[way] = [max(found[0], members / taken), min(found[1], used / members)]
-    return {"members": members, "rounds": rounds, "ways": best}
+    return {"members": members, "rounds": rounds, "load": load_average, "ways": best}
 
 
 def _processor_time() -> float:
@@ -65,7 +66,8 @@ def page(result: dict[str, Any]) -> str:
         "Do not edit. -->",
         "",
         f"{result['members']} signals of 1 s at 25.6 kHz of `scenes/rotor.toml`, on {psutil.cpu_count()} processors, "
-        f"best of {result['rounds']}:",
+        f"best of {result['rounds']}. When it began, programs wanted {result['load']:.1f} processors: where it is more "
+        "than there are, rates mean little, and processor times more.",
         "",
         "| made by | signals a second | beside one process | processor time of a signal | 10 000 signals |",
         "| --- | ---: | ---: | ---: | ---: |",

@@ -35,8 +35,8 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 #: How long to wait for the first worker, and for a scheduler to answer [s].
 PATIENCE = 60.0
 
-#: Tasks of a thread of a worker that are under way: one that runs, one that waits, so that no thread does.
-AHEAD = 2
+#: Tasks of a thread of a worker that are under way: one that runs, and others that wait, so that no thread does.
+AHEAD = 4
 
 
 #: Settings of workers on this machine.  Dask's own environment lets the C library give back freed memory at once, and
