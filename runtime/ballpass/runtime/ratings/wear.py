@@ -22,11 +22,11 @@ def depth_of_pass(place: Any, load: Any, contact: Contact) -> Any:
     """Depth that a pass of a ball wears off at a place across the groove, over the wear coefficient [N/m].
 
     The pressure along the way of the ball, integrated, times the share of the way that slips:
-    (π/2) p_0 b (1 - x²/a²) |s(x)|.  It holds within the contact; beyond it there is no wear.
+    (π/2) p_0 b (1 - x²/a²) abs(s(x)).  It holds within the contact; beyond it there is no wear.
 
     Parameters
     ----------
-    place : x, from the middle of the groove, |x| < a [m]
+    place : x, from the middle of the groove, abs(x) < a [m]
     load : of the ball, above 0 [N]
     """
     across, along = contact.semi_axes(load)
