@@ -133,7 +133,7 @@ def test_pages_name_the_commands_and_options_that_there_are() -> None:
                 words = re.findall(r"(?:^|/| )ballpass (\w+)(.*)", command.partition(" #")[0])
                 for name, rest in words:
                     assert name in known, f"{page}:{line}: {command}"
-                    options = {option for item in known[name].params for option in item.opts}
+                    options = {o for item in known[name].params for o in (*item.opts, *item.secondary_opts)}
                     for option in re.findall(r" (--[\w-]+)", rest):
                         assert option in options, f"{page}:{line}: {command} has no {option}"
 
