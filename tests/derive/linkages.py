@@ -15,16 +15,8 @@ from ballpass.derive.mechanism.forces.windows import Window
 from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
 from ballpass.derive.mechanism.numeric import Evaluator
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
-from ballpass.derive.scene.records import (
-    Body,
-    Driver,
-    Force,
-    Joint,
-    Mechanism,
-    NamedPoint,
-    Quantity,
-    Vector,
-)
+from ballpass.derive.scene.quantity import Quantity, Vector
+from ballpass.derive.scene.records import Body, Driver, Force, Joint, Mechanism, NamedPoint
 from ballpass.derive.variables import phase
 
 ANGLE = sp.Symbol("theta", real=True)

@@ -13,8 +13,9 @@ from scene_texts import PRESS, ROTOR, edited
 from ballpass.derive import SceneError, generate
 from ballpass.derive.emit.signature import signature
 from ballpass.derive.reading.read import parse_override, scene_from_text
+from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.designations import CatalogueRating, bearing_types
-from ballpass.derive.scene.records import Bearing, Scene
+from ballpass.derive.scene.records import Scene
 from ballpass.runtime.app.commands.ranges import read_ranges
 from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.ratings import load_ratings, of_bearing

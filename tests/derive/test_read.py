@@ -17,16 +17,10 @@ from scene_texts import PRESS, ROTOR, SCENES, edited
 
 from ballpass.derive.emit.signature import source_key
 from ballpass.derive.reading.read import parse_override, read_scene, scene_from_text, with_values
+from ballpass.derive.scene.bearing_records import EquivalentMass, GivenContact, HertzContact
 from ballpass.derive.scene.errors import SceneError
-from ballpass.derive.scene.records import (
-    EquivalentMass,
-    GivenContact,
-    HarmonicLoad,
-    HertzContact,
-    Quantity,
-    Scene,
-    TableLoad,
-)
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.records import HarmonicLoad, Scene, TableLoad
 from ballpass.derive.scene.units import parse_quantity
 
 FILES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "crank_shaper", "varying_compliance")

@@ -14,7 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.derive.scene.records import FRAME, Bearing, Joint, Scene, Vector
+from ballpass.derive.scene.bearing_records import Bearing
+from ballpass.derive.scene.quantity import Vector
+from ballpass.derive.scene.records import FRAME, Joint, Scene
 
 Array = np.ndarray
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])

@@ -18,7 +18,8 @@ from ballpass.derive import derive
 from ballpass.derive.lower.functions import _Lowering
 from ballpass.derive.mechanism.forces import PointForce
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.derive.scene.records import NamedPoint, Quantity, Scene, Vector
+from ballpass.derive.scene.quantity import Quantity, Vector
+from ballpass.derive.scene.records import NamedPoint, Scene
 from ballpass.derive.variables import Input
 
 UNDAMPED = 'law = "none"'

@@ -23,7 +23,7 @@ from ballpass.derive.mechanism.forces.spring_damper import SpringDamper
 from ballpass.derive.mechanism.forces.stop import Stop
 from ballpass.derive.mechanism.forces.two_bodies import TwoBodies
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
-from ballpass.derive.scene.records import Bearing, GivenContact
+from ballpass.derive.scene.bearing_records import Bearing, GivenContact
 
 
 @dataclass

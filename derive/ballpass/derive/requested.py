@@ -19,7 +19,8 @@ from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import CENTER_OF_MASS, Linkage
 from ballpass.derive.mechanism.power import work_of
 from ballpass.derive.mechanism.reactions import Reactions
-from ballpass.derive.scene.records import Bearing, Mechanism
+from ballpass.derive.scene.bearing_records import Bearing
+from ballpass.derive.scene.records import Mechanism
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
 

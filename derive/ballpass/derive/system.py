@@ -42,8 +42,9 @@ from ballpass.derive.requested import (
     power_outputs,
     ring_outputs,
 )
+from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import LinkageError, SceneError
-from ballpass.derive.scene.records import FRAME, Bearing, Mechanism, Scene
+from ballpass.derive.scene.records import FRAME, Mechanism, Scene
 from ballpass.derive.terms import Definition, Smoothness, symbol_of
 from ballpass.derive.variables import Coordinate, Input, Output, Parameter, State, StateSwitch
 

@@ -12,7 +12,7 @@ from enum import Enum
 
 import sympy as sp
 
-from ballpass.derive.scene.records import Quantity, Vector
+from ballpass.derive.scene.quantity import Quantity, Vector
 
 #: Time since the reference time of the phases [s] (see `System.inputs`).
 TIME = sp.Symbol("t", real=True)

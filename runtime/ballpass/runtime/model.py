@@ -262,7 +262,7 @@ class Model(PointModel):
         ----------
         wrt : names of parameters; any number in one pass
         sensitivity_rtol : error allowed per step in the derivatives, which then take part in the choice of step sizes,
-            relative to the states' magnitudes over the parameters' scales (`derivatives/direction_scales.py`) or to
+            relative to the states' magnitudes over the parameters' scales (`run/direction_scales.py`) or to
             the derivative itself where it is larger; None: the states alone choose the steps
         kinks : ``stepped-over`` at any tolerance: what is differentiated are steps that go over the kinks of the laws
         others : as for `simulate`

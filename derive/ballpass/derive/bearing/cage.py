@@ -14,7 +14,8 @@ from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.kinematics import Ledger, Pose
 from ballpass.derive.mechanism.swing import STILL, Swing
-from ballpass.derive.scene.records import Bearing, Driver
+from ballpass.derive.scene.bearing_records import Bearing
+from ballpass.derive.scene.records import Driver
 from ballpass.derive.terms import TIME, Definition, Names, symbol_of
 from ballpass.derive.variables import Input, phase
 

@@ -11,7 +11,7 @@ from typing import Literal
 
 import sympy as sp
 
-from ballpass.derive.scene.records import Bearing
+from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.terms import TIME, Definition, Names, symbol_of
 from ballpass.derive.variables import Input
 

@@ -21,7 +21,7 @@ from ballpass.derive.bearing.laws.contact import Contact, Rest
 from ballpass.derive.bearing.own_terms import Axes, OwnTerms, own_terms
 from ballpass.derive.bearing.stiffness import stiffness_constants
 from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
-from ballpass.derive.scene.records import Bearing
+from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.terms import TIME, Definition, Names, symbol_of
 from ballpass.derive.variables import Coordinate
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sympy as sp
 
+from ballpass.derive.scene.bearing_records import Bearing, EquivalentMass
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.records import FRAME, Bearing, EquivalentMass, Mechanism
+from ballpass.derive.scene.records import FRAME, Mechanism
 from ballpass.derive.terms import components, symbol_of
 
 

@@ -13,14 +13,14 @@ import sympy as sp
 
 from ballpass.derive.drive.constant_speed import ConstantSpeed
 from ballpass.derive.mechanism.reactions import Reactions
+from ballpass.derive.scene.bearing_records import Bearing
+from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.records import (
     FRAME,
-    Bearing,
     ConstantLoad,
     HarmonicLoad,
     Load,
     LoadWindow,
-    Quantity,
     Scene,
     Shaft,
     TableLoad,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sympy as sp
 
 from ballpass.derive.bearing import hertz
-from ballpass.derive.scene.records import Bearing, GivenContact, HertzContact
+from ballpass.derive.scene.bearing_records import Bearing, GivenContact, HertzContact
 from ballpass.derive.terms import Definition, Names, symbol_of
 
 

@@ -19,7 +19,8 @@ from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.kinematics import ZERO, Motion, add, body_point, cross, quarter_turn, scale, subtract
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import Linkage
-from ballpass.derive.scene.records import FRAME, Bearing, Joint, Mechanism
+from ballpass.derive.scene.bearing_records import Bearing
+from ballpass.derive.scene.records import FRAME, Joint, Mechanism
 from ballpass.derive.terms import components, symbol_of
 from ballpass.derive.variables import Coordinate
 

@@ -18,7 +18,8 @@ from ballpass.runtime import contract as mf
 from ballpass.runtime.contract.errors import ArtefactError
 
 if TYPE_CHECKING:
-    from ballpass.derive.scene.records import Bearing, Scene
+    from ballpass.derive.scene.bearing_records import Bearing
+    from ballpass.derive.scene.records import Scene
 
 
 def signature(scene: Scene) -> str:

@@ -23,9 +23,10 @@ from ballpass.derive.reading.read_load import read_load
 from ballpass.derive.reading.read_mechanism import read_mechanism
 from ballpass.derive.reading.recouple import Coupling, recoupled
 from ballpass.derive.reading.values import parse_override, quantities_of, replaced, value_faults, with_values
+from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.file_columns import with_columns
-from ballpass.derive.scene.records import Bearing, Load, Mechanism, Run, Scene
+from ballpass.derive.scene.records import Load, Mechanism, Run, Scene
 from ballpass.derive.scene.schema import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show

@@ -12,8 +12,7 @@ from ballpass.derive.reading.read_coupling import read_count, read_coupling, rea
 from ballpass.derive.reading.read_designation import fill_by_designation
 from ballpass.derive.reading.read_duty import read_lubrication
 from ballpass.derive.reading.read_fit import mounted
-from ballpass.derive.scene.records import (
-    FRAME,
+from ballpass.derive.scene.bearing_records import (
     BallEffect,
     Bearing,
     Damping,
@@ -23,11 +22,10 @@ from ballpass.derive.scene.records import (
     InitialState,
     InnerRing,
     Material,
-    Mechanism,
     OuterRing,
-    Quantity,
-    Shaft,
 )
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.records import FRAME, Mechanism, Shaft
 from ballpass.derive.scene.schema import Table, listing, suggest
 from ballpass.derive.scene.units import show
 

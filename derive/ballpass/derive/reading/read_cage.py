@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from ballpass.derive.scene.records import CageMotion
+from ballpass.derive.scene.bearing_records import CageMotion
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.scene.units import show
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 from typing import Literal
 
 from ballpass.derive.bearing.effects import EFFECTS
-from ballpass.derive.scene.records import FRAME, Mechanism, Quantity
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.records import FRAME, Mechanism
 from ballpass.derive.scene.schema import Table, listing, suggest
 from ballpass.derive.scene.units import show
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from decimal import Decimal
 
+from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import GROOVES, GROUPS, BearingType, bearing_types
-from ballpass.derive.scene.records import Catalogue
 from ballpass.derive.scene.schema import Table, listing, suggest
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 

@@ -11,8 +11,9 @@ from dataclasses import replace
 from typing import Any
 
 from ballpass.derive.reading.values import parse_override, with_values
+from ballpass.derive.scene.bearing_records import Lubrication
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.records import DutyState, Lubrication, Scene
+from ballpass.derive.scene.records import DutyState, Scene
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.scene.units import show
 

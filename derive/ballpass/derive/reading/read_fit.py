@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import bearing_types
-from ballpass.derive.scene.records import Catalogue, Quantity
+from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.schema import Table
 from ballpass.runtime.ratings.mounted_clearance import inner_growth, outer_shrinkage, thermal_reduction
 

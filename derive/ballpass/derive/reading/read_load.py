@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.records import (
     ConstantLoad,
     HarmonicLoad,
     Load,
     LoadLaw,
     LoadWindow,
-    Quantity,
     TableLoad,
     UnbalanceLoad,
 )

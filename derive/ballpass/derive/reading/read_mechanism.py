@@ -14,17 +14,8 @@ from ballpass.derive.drive.laws import TorqueLaw
 from ballpass.derive.mechanism.dyads import BRANCHES
 from ballpass.derive.mechanism.forces import FORCE_TABLES
 from ballpass.derive.scene.body_keys import Points, read_pair, refuse_unknown_body, refuse_unknown_point
-from ballpass.derive.scene.records import (
-    FRAME,
-    Body,
-    Driver,
-    Force,
-    Joint,
-    Mechanism,
-    NamedPoint,
-    Quantity,
-    SpeedOverTime,
-)
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.records import FRAME, Body, Driver, Force, Joint, Mechanism, NamedPoint, SpeedOverTime
 from ballpass.derive.scene.schema import Table, VectorWords, listing, suggest, upright
 from ballpass.derive.scene.units import show
 

@@ -13,7 +13,9 @@ from itertools import groupby
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.mechanism.forces.friction import Friction
 from ballpass.derive.mechanism.forces.windows import Windows
-from ballpass.derive.scene.records import Bearing, HertzContact, Mechanism, Quantity, Scene
+from ballpass.derive.scene.bearing_records import Bearing, HertzContact
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.records import Mechanism, Scene
 from ballpass.runtime.contract.manifest import UsualInfo
 
 #: Groove radius over ball diameter: ISO 16281 takes 0.52 and 0.53; the bounds are those of made bearings, wide.

@@ -16,19 +16,11 @@ from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.reading.check_load import check_load
 from ballpass.derive.reading.clearance_groups import clearance_of_group
+from ballpass.derive.scene.bearing_records import Bearing, CageMotion, EquivalentMass, HertzContact
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.records import (
-    Bearing,
-    Bounds,
-    CageMotion,
-    Driver,
-    EquivalentMass,
-    HertzContact,
-    Mechanism,
-    Quantity,
-    Scene,
-)
+from ballpass.derive.scene.quantity import Bounds, Quantity
+from ballpass.derive.scene.records import Driver, Mechanism, Scene
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 
 #: Ends of keys that stand in the file beside quantities, for the message where somebody asks to override one.

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from ballpass.derive.scene.errors import Fault
-from ballpass.derive.scene.records import Bounds, Quantity, Vector
+from ballpass.derive.scene.quantity import Bounds, Quantity, Vector
 
 
 class Checker:

@@ -16,7 +16,8 @@ from types import TracebackType
 from typing import Any, TypeVar
 
 from ballpass.derive.scene.errors import Fault
-from ballpass.derive.scene.records import FRAME, Quantity, Vector
+from ballpass.derive.scene.quantity import Quantity, Vector
+from ballpass.derive.scene.records import FRAME
 from ballpass.derive.scene.toml_lines import LineIndex
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 

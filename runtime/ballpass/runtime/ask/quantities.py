@@ -8,7 +8,7 @@ A name is ``kind:output``, with ``[ball]`` for one ball and ``@place`` where a k
     max:ball.force[3]       range:inner.x      value:inner.y@0.41s       amplitude:inner.y@2x
 
 Without ``[ball]`` an output of the balls is that of the most loaded ball at each moment.  The names of observables of
-ensembles (`integrate/reductions.py`) mean the same numbers here, ``peak_ball_force`` and ``rms_inner_y`` included.
+ensembles (`run/reductions.py`) mean the same numbers here, ``peak_ball_force`` and ``rms_inner_y`` included.
 What each kind does with a run stands in `ballpass.runtime.ask.kinds`.
 """
 

@@ -195,7 +195,7 @@ class DampingInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CatalogueInfo:
-    """What the scene takes from a catalogue: see `ballpass.derive.scene.records.Catalogue`.
+    """What the scene takes from a catalogue: see `ballpass.derive.scene.bearing_records.Catalogue`.
 
     `clearance_least` and `clearance_most` bound the group of clearance [m]; ratings are in N.
     """
@@ -211,7 +211,7 @@ class CatalogueInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LubricationInfo:
-    """Film and dirt: see `ballpass.derive.scene.records.Lubrication`; viscosity in m^2/s."""
+    """Film and dirt: see `ballpass.derive.scene.bearing_records.Lubrication`; viscosity in m^2/s."""
 
     viscosity_ratio: float | None
     viscosity: float | None

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
-from ballpass.derive.scene.records import BallEffect, Bearing
+from ballpass.derive.scene.bearing_records import BallEffect, Bearing
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.terms import Names, symbol_of
 

@@ -21,8 +21,9 @@ from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.cage_slip import lag_names
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
+from ballpass.derive.scene.bearing_records import BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import BallEffect, Bearing, Quantity
+from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Input

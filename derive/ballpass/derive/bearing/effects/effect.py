@@ -10,8 +10,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
+from ballpass.derive.scene.bearing_records import BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import BallEffect, Bearing, Quantity
+from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.terms import Definition, Names
 from ballpass.derive.variables import Input

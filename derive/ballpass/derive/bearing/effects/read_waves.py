@@ -10,7 +10,7 @@ import random
 from collections.abc import Iterable
 
 from ballpass.derive.bearing.effects.effect import Usual
-from ballpass.derive.scene.records import Quantity
+from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.scene.units import show
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
 from ballpass.derive.bearing.effects.read_waves import read_waves, usual_amplitudes
+from ballpass.derive.scene.bearing_records import BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import BallEffect, Bearing
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.terms import Names, symbol_of
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.laws.law import DampingLaw
-from ballpass.derive.scene.records import Bounds, Quantity
+from ballpass.derive.scene.quantity import Bounds, Quantity
 from ballpass.derive.scene.schema import Table, listing
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
-from ballpass.derive.scene.records import Bounds, Quantity
+from ballpass.derive.scene.quantity import Bounds, Quantity
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.scene.units import show
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.laws.law import DampingLaw
-from ballpass.derive.scene.records import Quantity
+from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.scene.units import show
 

@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import sympy as sp
 
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import Quantity
+from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.terms import Smoothness
 

@@ -9,7 +9,7 @@ import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw, not_zero, same_sign
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import Quantity
+from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.schema import Table, listing
 from ballpass.derive.terms import symbol_of
 

@@ -10,7 +10,7 @@ import sympy as sp
 from ballpass.derive.drive.laws.law import TorqueLaw
 from ballpass.derive.drive.piecewise_linear import piecewise_linear
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import Quantity
+from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.schema import Table
 from ballpass.derive.terms import Smoothness, symbol_of
 

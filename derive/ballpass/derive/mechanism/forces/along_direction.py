@@ -11,7 +11,8 @@ from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Law, Measure, Pathway, Points, Setting
 from ballpass.derive.mechanism.kinematics import body_point, cross, dot, scale, subscript, subtract
 from ballpass.derive.scene.body_keys import read_two_points
-from ballpass.derive.scene.records import FRAME, Force, Quantity
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.records import FRAME, Force
 from ballpass.derive.scene.schema import Table, upright
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output

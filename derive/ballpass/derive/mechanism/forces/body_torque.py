@@ -8,7 +8,8 @@ from typing import ClassVar, Self
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points, Setting
 from ballpass.derive.scene.body_keys import read_moving_body
-from ballpass.derive.scene.records import Force, Quantity
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.schema import Table, upright
 from ballpass.derive.terms import symbol_of
 

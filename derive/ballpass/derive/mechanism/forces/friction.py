@@ -10,7 +10,8 @@ import sympy as sp
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import Force, Quantity
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.schema import Table, upright
 from ballpass.derive.scene.units import show
 from ballpass.derive.terms import symbol_of

@@ -12,7 +12,8 @@ from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points,
 from ballpass.derive.mechanism.kinematics import body_point, scale
 from ballpass.derive.scene.body_keys import read_moving_body, refuse_unknown_point
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import Force, Quantity, Vector
+from ballpass.derive.scene.quantity import Quantity, Vector
+from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.schema import Table, upright, words_of_force
 from ballpass.derive.terms import components, symbol_of
 

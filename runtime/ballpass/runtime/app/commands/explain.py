@@ -23,7 +23,7 @@ from ballpass.runtime.contract.smoothness import WORDS
 if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.derive.features import Cost
-    from ballpass.derive.scene.records import Bearing
+    from ballpass.derive.scene.bearing_records import Bearing
     from ballpass.runtime.contract import Manifest
     from ballpass.runtime.point.explain import Explanation
 
