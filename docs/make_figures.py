@@ -15,7 +15,7 @@ from subprocess import run
 from ballpass.derive import generate
 from ballpass.runtime import load
 from ballpass.runtime.app.commands.life import draw_life
-from ballpass.runtime.app.figures.gallery import draw_all
+from ballpass.runtime.plot.gallery import draw_all
 
 ROOT = Path(__file__).resolve().parent.parent
 IMAGES = ROOT / "docs" / "images"

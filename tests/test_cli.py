@@ -25,7 +25,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from ballpass.runtime import NoCompilerWarning, load_solution
-from ballpass.runtime.app import figures
+from ballpass.runtime import plot as figures
 from ballpass.runtime.app.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -477,7 +477,7 @@ def test_interruption_while_writing_leaves_nothing_half_written(
         assert list(tmp_path.rglob("solution.nc")), "the solution is written before the figures"
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("ballpass.runtime.app.figures.gallery.draw_all", interrupted)
+    monkeypatch.setattr("ballpass.runtime.plot.gallery.draw_all", interrupted)
     words = ("run", SCENES / "varying_compliance.toml", "--cycles", "3", "--transient", "1", "--out")
     says_no(ballpass(site.folder, *words, tmp_path / "new" / "results"), "interrupted", code=130)
     assert not list(tmp_path.iterdir())

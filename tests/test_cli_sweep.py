@@ -19,9 +19,9 @@ from ballpass.derive import read_scene
 from ballpass.runtime import load
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.commands.ranges import MOST, read_ranges
-from ballpass.runtime.app.figures.canvas import GREY
-from ballpass.runtime.app.figures.sweep import LUMINANCE, VariedAxis, draw_sweep
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.plot.canvas import GREY
+from ballpass.runtime.plot.sweep import LUMINANCE, VariedAxis, draw_sweep
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = ROOT / "scenes" / "varying_compliance.toml"

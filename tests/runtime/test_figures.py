@@ -20,12 +20,12 @@ from matplotlib.patches import Circle
 from matplotlib.text import Annotation, Text
 
 from ballpass.runtime import Model, Solution
-from ballpass.runtime.app.figures import NAMES
-from ballpass.runtime.app.figures.canvas import INK, PALE, SAND, SIGNAL
-from ballpass.runtime.app.figures.gallery import FIGURES, draw, draw_all
-from ballpass.runtime.app.figures.mechanism import draw_mechanism
-from ballpass.runtime.app.figures.record import gather
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.plot import NAMES
+from ballpass.runtime.plot.canvas import INK, PALE, SAND, SIGNAL
+from ballpass.runtime.plot.gallery import FIGURES, draw, draw_all
+from ballpass.runtime.plot.mechanism import draw_mechanism
+from ballpass.runtime.plot.record import gather
 
 Run = tuple[Model, Solution]
 
@@ -333,7 +333,7 @@ def test_palette_keeps_its_order_in_greyscale() -> None:
 
 def test_figures_leave_pyplot_alone() -> None:
     unwanted = "'matplotlib.pyplot' in sys.modules or 'sympy' in sys.modules"
-    code = f"import sys, ballpass.runtime.app.figures; sys.exit({unwanted})"
+    code = f"import sys, ballpass.runtime.plot; sys.exit({unwanted})"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

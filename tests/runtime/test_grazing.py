@@ -10,9 +10,9 @@ import pytest
 from scipy.optimize import brentq
 
 from ballpass.runtime import Model
-from ballpass.runtime.app.figures.tornado import tornado
 from ballpass.runtime.certify.grazing import Grazing, describe, find_grazing, merge_grazing
 from ballpass.runtime.certify.sensitivity_report import SensitivityReport
+from ballpass.runtime.plot.tornado import tornado
 
 #: Ball and time [s].
 PLACES = ((1, 0.1), (5, 0.1), (2, 0.2))

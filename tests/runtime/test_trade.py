@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model, RequestError
-from ballpass.runtime.app.figures.canvas import save
-from ballpass.runtime.app.figures.trade import draw_trade
 from ballpass.runtime.certify.trade import Measured, Trade, measure_trade, perturbed
 from ballpass.runtime.certify.trade_report import percent, table, to_plain, words
 from ballpass.runtime.certify.whole_run import Way
+from ballpass.runtime.plot.canvas import save
+from ballpass.runtime.plot.trade import draw_trade
 
 PEAK, SWING = "peak_ball_force", "range_inner_x"
 LOOSE, TIGHT = Way(method="stepper", rtol=1e-3), Way(method="stepper", rtol=1e-7)

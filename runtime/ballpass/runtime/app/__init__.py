@@ -1,1 +1,1 @@
-"""Command line, tables, figures, files of results."""
+"""Command line, tables, files of results."""

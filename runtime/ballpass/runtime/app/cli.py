@@ -369,13 +369,13 @@ def _write_results(
     -------
     The summary, and the names of the files.
     """
-    from ballpass.runtime.app.figures import NAMES as FIGURES
     from ballpass.runtime.app.results import SOLUTION, write_results
+    from ballpass.runtime.plot import NAMES as FIGURES
 
     def write(made: Path) -> dict[str, Any]:
         solution.save(made / SOLUTION)
         if figures:
-            from ballpass.runtime.app.figures.gallery import draw_all
+            from ballpass.runtime.plot.gallery import draw_all
 
             stages("draw")
             draw_all(model, solution, made)

@@ -80,8 +80,8 @@ def _swinging(report: LifeReport) -> list[str]:
 
 def draw_life(model: Model, report: LifeReport, overrides: Mapping[str, float], folder: Path) -> list[Path]:
     """Write figures of every bearing in the first state of the duty cycle in which something turns; their paths."""
-    from ballpass.runtime.app.figures import life as figures
-    from ballpass.runtime.app.figures.canvas import save
+    from ballpass.runtime.plot import life as figures
+    from ballpass.runtime.plot.canvas import save
 
     state = next((state for state in report.states if state.bearings), None)
     if state is None:
@@ -106,9 +106,9 @@ def _pressure(
     """The ring with the higher pressure, over a turn behind the transient."""
     import numpy as np
 
-    from ballpass.runtime.app.figures import life as figures
-    from ballpass.runtime.app.figures.canvas import save
     from ballpass.runtime.ask.wear import load_samples
+    from ballpass.runtime.plot import life as figures
+    from ballpass.runtime.plot.canvas import save
     from ballpass.runtime.ratings.of_bearing import contacts_of
     from ballpass.runtime.run.request import Request
 
@@ -127,8 +127,8 @@ def _clearance(
     """Life over the bearing's group of clearance and half its width on both sides; else up to twice the clearance."""
     import numpy as np
 
-    from ballpass.runtime.app.figures import life as figures
-    from ballpass.runtime.app.figures.canvas import save
+    from ballpass.runtime.plot import life as figures
+    from ballpass.runtime.plot.canvas import save
     from ballpass.runtime.ratings.readings import READINGS
 
     name = f"{info.path}.clearance"

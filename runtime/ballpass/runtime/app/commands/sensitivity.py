@@ -85,7 +85,7 @@ def sensitivity(
         )
         written: list[Path] = []
         if out is not None:
-            from ballpass.runtime.app.figures.tornado import draw_tornados
+            from ballpass.runtime.plot.tornado import draw_tornados
 
             stages("draw")
             out.mkdir(parents=True, exist_ok=True)

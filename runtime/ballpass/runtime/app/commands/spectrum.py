@@ -272,8 +272,8 @@ def _draw(
     *,
     as_map: bool,
 ) -> Path:
-    from ballpass.runtime.app.figures.canvas import save
-    from ballpass.runtime.app.figures.vibration import draw_lines, draw_spectrogram
+    from ballpass.runtime.plot.canvas import save
+    from ballpass.runtime.plot.vibration import draw_lines, draw_spectrogram
 
     what = f"Envelope of {of}, {band[0]:g} to {band[1]:g} Hz" if band else of
     title = f"{solution.manifest.title}: {what}"

@@ -163,8 +163,8 @@ class Sweep:
                 lines.writerow([member, *map(repr, self.point(member)), *cells, *ends.get(member, ("DONE", ""))])
 
     def _draw(self, folder: Path) -> None:
-        from ballpass.runtime.app.figures.canvas import save
-        from ballpass.runtime.app.figures.sweep import VariedAxis, draw_sweep
+        from ballpass.runtime.plot.canvas import save
+        from ballpass.runtime.plot.sweep import VariedAxis, draw_sweep
 
         axes = [
             VariedAxis(path=one.path, unit=one.shown_unit, values=one.shown, logarithmic=one.logarithmic)

@@ -138,8 +138,8 @@ def read_error(text: str | None, of: list[str] | None, method: str | None, rtol:
 
 
 def _draw(measured: Trade, folder: Path, stages: Stages) -> list[str]:
-    from ballpass.runtime.app.figures.canvas import save
-    from ballpass.runtime.app.figures.trade import draw_trade
+    from ballpass.runtime.plot.canvas import save
+    from ballpass.runtime.plot.trade import draw_trade
 
     stages("draw")
     folder.mkdir(parents=True, exist_ok=True)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from ballpass.runtime.app.figures.bearing import draw_bearing, ring_centre
-from ballpass.runtime.app.figures.canvas import frame, new_figure, styled
-from ballpass.runtime.app.figures.mechanism import draw_mechanism
-from ballpass.runtime.app.figures.record import Record
+from ballpass.runtime.ask.peaks import refine_peak
+from ballpass.runtime.plot.bearing import draw_bearing, ring_centre
+from ballpass.runtime.plot.canvas import frame, new_figure, styled
+from ballpass.runtime.plot.mechanism import draw_mechanism
+from ballpass.runtime.plot.record import Record
 
 
 def can_draw_bearing(record: Record) -> bool:
@@ -64,7 +65,8 @@ def _between_samples(record: Record) -> str:
     if len(record.solution) < 3:
         return ""
     name = "ball.force" if record.has("ball.force") else "ball.elastic_force"
-    peak = record.model.refine_peak(record.solution, record.output(name))
+    numbers = record.model.numbers(record.solution.parameters)
+    peak = refine_peak(record.model, numbers, record.solution, record.output(name))
     shown, true = f"{peak.sampled:.4g}", f"{peak.value:.4g}"
     return "" if shown == true else f"\n{shown} N; between the samples it reaches {true} N"
 

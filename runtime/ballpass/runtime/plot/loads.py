@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ballpass.runtime.app.figures.canvas import (
+from ballpass.runtime.plot.canvas import (
     FIRST,
     GREY,
     INK,
@@ -17,7 +17,7 @@ from ballpass.runtime.app.figures.canvas import (
     shade_windows,
     styled,
 )
-from ballpass.runtime.app.figures.record import Array, Record
+from ballpass.runtime.plot.record import Array, Record
 
 
 def reaction_joints(record: Record) -> tuple[str, ...]:

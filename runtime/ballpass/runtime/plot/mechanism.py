@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
-from ballpass.runtime.app.figures.canvas import GREY, INK, SAND, SIGNAL, arrow, write
-from ballpass.runtime.app.figures.record import FRAME, Array, Record
+from ballpass.runtime.plot.canvas import GREY, INK, SAND, SIGNAL, arrow, write
+from ballpass.runtime.plot.record import FRAME, Array, Record
 
 #: Positions in which the paths of moving joints are traced.
 _TRACE = 72

@@ -1,6 +1,6 @@
 """Which figures exist, what each needs, and writing them.
 
-In: a `Model` and its `Solution`.  Out: PNG files, the same bytes for the same run.
+In: a model and its `Solution`.  Out: PNG files, the same bytes for the same run.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from ballpass.runtime.app.figures import loads, moment, motion
-from ballpass.runtime.app.figures.canvas import save
-from ballpass.runtime.app.figures.record import Record, gather
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.plot import loads, moment, motion
+from ballpass.runtime.plot.canvas import save
+from ballpass.runtime.plot.record import Record, gather
 
 if TYPE_CHECKING:
-    from ballpass.runtime.model import Model
+    from ballpass.runtime.point.point_model import PointModel
     from ballpass.runtime.run.solution import Solution
 
 
@@ -68,7 +68,7 @@ FIGURES = (
 )
 
 
-def draw(name: str, model: Model, solution: Solution) -> Figure:
+def draw(name: str, model: PointModel, solution: Solution) -> Figure:
     """One figure by name, as a matplotlib figure.
 
     Raises
@@ -89,7 +89,7 @@ def draw(name: str, model: Model, solution: Solution) -> Figure:
     return kind.draw(record)
 
 
-def draw_all(model: Model, solution: Solution, folder: Path) -> list[Path]:
+def draw_all(model: PointModel, solution: Solution, folder: Path) -> list[Path]:
     """Write every figure for which the outputs exist, as PNG, into `folder`.
 
     Left out are figures whose outputs were not asked for, and, for a steady part shorter than a turn, load curve and

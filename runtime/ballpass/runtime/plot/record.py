@@ -1,6 +1,6 @@
 """What every figure needs of a run, gathered once.
 
-In: a `Model` and its `Solution`.  Out: a frozen `Record`: the steady part, its turns, angles, and what a caption says.
+In: a model and its `Solution`.  Out: a frozen `Record`: the steady part, its turns, angles, and what a caption says.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ballpass.runtime.run.ball_angles import ball_angles
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract import BearingInfo, InputInfo, Manifest, MechanismInfo
-    from ballpass.runtime.model import Model
+    from ballpass.runtime.point.point_model import PointModel
     from ballpass.runtime.run.solution import Solution
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ class Record:
     turns : whole turns of the steady part, oldest first; empty without them
     """
 
-    model: Model
+    model: PointModel
     solution: Solution
     bearing: BearingInfo | None
     cycle_length: float | None
@@ -228,7 +228,7 @@ def _unit(angle: float) -> Array:
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def gather(model: Model, solution: Solution, bearing: BearingInfo | None = None) -> Record:
+def gather(model: PointModel, solution: Solution, bearing: BearingInfo | None = None) -> Record:
     """The steady part of `solution`, with its turns, for figures of a bearing; the first one if none is given."""
     steady = solution.steady()
     length = steady.period

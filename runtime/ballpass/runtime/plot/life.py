@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from ballpass.runtime.app.figures.canvas import FIRST, INK, PALE, SAND, SECOND, SIGNAL, caption, new_figure, styled
-from ballpass.runtime.app.figures.sweep import LUMINANCE
 from ballpass.runtime.ask.life_records import BearingStrength
+from ballpass.runtime.plot.canvas import FIRST, INK, PALE, SAND, SECOND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.plot.sweep import LUMINANCE
 from ballpass.runtime.ratings.life import MILLION
 
 Array = NDArray[np.float64]

@@ -14,8 +14,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.patches import Annulus, Circle
 
-from ballpass.runtime.app.figures.canvas import INK, SIGNAL, arrow, write
-from ballpass.runtime.app.figures.record import Array, Record
+from ballpass.runtime.plot.canvas import INK, SIGNAL, arrow, write
+from ballpass.runtime.plot.record import Array, Record
 
 #: White for unloaded, dark for the highest load: the order survives greyscale.
 _LOAD_COLOURS = LinearSegmentedColormap.from_list("load", ("#ffffff", "#f4c95d", "#d1495b", "#4a0e23"))

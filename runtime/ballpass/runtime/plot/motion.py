@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import StrMethodFormatter
 
-from ballpass.runtime.app.figures.canvas import GREY, INK, SAND, SIGNAL, frame, legend_above, new_figure, styled
-from ballpass.runtime.app.figures.record import Array, Record
 from ballpass.runtime.ask.observables import hermite, orbits, stroboscopic_points
 from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
+from ballpass.runtime.plot.canvas import GREY, INK, SAND, SIGNAL, frame, legend_above, new_figure, styled
+from ballpass.runtime.plot.record import Array, Record
 
 #: Points drawn between two samples where velocities are known: a resonance has but ten samples a period.
 _FINER = 8

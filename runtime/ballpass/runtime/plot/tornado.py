@@ -12,11 +12,11 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from ballpass.runtime.app.figures.canvas import GREY, INK, PALE, SAND, caption, new_figure, save, styled
 from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.certify.grazing import merge_grazing
 from ballpass.runtime.certify.sensitivity_report import Sensitivity, SensitivityReport
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.plot.canvas import GREY, INK, PALE, SAND, caption, new_figure, save, styled
 
 #: Bars of a chart.
 BARS = 15
