@@ -94,6 +94,11 @@ def test_table_grid_and_report_hold_the_same_numbers_with_units(grid: Path) -> N
             value = float(row[f"{name} [{unit}]"])
             assert value == point[name].item() == report["quantities"][name]["values"][member]
         assert row["status"] == point["status"].item() == "DONE"
+    assert dataset.attrs["title"] == report["title"]
+    assert set(dataset.coords) == {CLEARANCE, LOAD, "bearing.inner_ring.damping"}  # also what one value was set for
+    damping = dataset.coords["bearing.inner_ring.damping"]
+    assert (damping.item(), damping.attrs["units"]) == (300.0, "N*s/m")
+    assert all(values.attrs["long_name"] for values in dataset.variables.values())
     assert dataset[CLEARANCE].attrs["units"] == "m"
     assert dataset[CLEARANCE].to_numpy() == pytest.approx([-4e-6, -1e-6, 2e-6], rel=1e-12)
     assert dataset["bearing.inner_ring.damping"].item() == 300.0

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
 
 #: Name of a window.
 Window = str
@@ -108,10 +109,10 @@ def power_spectrum(
             f"segment is {segment!r} s, {count} samples; allowed: 4 samples up to the record's length of "
             f"{time.size / rate:.6g} s"
         )
-    from scipy.signal import welch  # here: the import takes longer than a run
+    signals = need("scipy.signal")  # here: the import takes longer than a run
 
     weight = window_weights(window, count)
-    frequency, power = welch(values, rate, window=weight, nperseg=count, scaling=scaling, detrend="constant")
+    frequency, power = signals.welch(values, rate, window=weight, nperseg=count, scaling=scaling, detrend="constant")
     return PowerSpectrum(frequency=frequency, power=power, resolution=rate / count, window=window, scaling=scaling)
 
 
@@ -156,9 +157,9 @@ def whole_cycles(
     if abs(per_cycle * step - cycle_length) * cycles < _STEP_TOLERANCE * step:
         first = time.size - 1 - count
         return grid, values[first : first + count], cycles
-    from scipy.interpolate import CubicSpline  # here: the import takes longer than a run
+    interpolate = need("scipy.interpolate")  # here: the import takes longer than a run
 
-    return grid, np.asarray(CubicSpline(time, values)(grid), dtype=float), cycles
+    return grid, np.asarray(interpolate.CubicSpline(time, values)(grid), dtype=float), cycles
 
 
 def amplitude_spectrum(
@@ -208,10 +209,10 @@ def window_weights(window: Window, count: int) -> NDArray[np.float64]:
     """Weights of a window in its periodic form, the one for spectra."""
     if window == "boxcar":
         return np.ones(count)
-    from scipy.signal import get_window  # here: the import takes longer than a run
+    signals = need("scipy.signal")  # here: the import takes longer than a run
 
     try:
-        return np.asarray(get_window(window, count), dtype=float)
+        return np.asarray(signals.get_window(window, count), dtype=float)
     except (TypeError, ValueError):
         raise RequestError(
             f"window is {window!r}; allowed: boxcar, hann, flattop, or another one that scipy.signal.get_window knows "

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum, even_samples, window_weights
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
 
 Array = NDArray[np.float64]
 
@@ -55,15 +56,15 @@ def diagnosis(signal: ArrayLike) -> DiagnosisStatistics:
     rms = float(np.sqrt(np.mean(centred**2)))
     if not rms > 1e-14 * float(np.max(np.abs(values))):
         raise RequestError("the signal does not change, so that it has no crest factor; allowed: one that vibrates")
-    from scipy.stats import kurtosis, skew  # here: the import takes longer than a run
+    stats = need("scipy.stats")  # here: the import takes longer than a run
 
     peak = float(np.max(np.abs(centred)))
     return DiagnosisStatistics(
         rms=rms,
         peak=peak,
         crest_factor=peak / rms,
-        kurtosis=float(kurtosis(centred, fisher=False)),
-        skewness=float(skew(centred)),
+        kurtosis=float(stats.kurtosis(centred, fisher=False)),
+        skewness=float(stats.skew(centred)),
     )
 
 
@@ -96,10 +97,10 @@ def envelope(t: ArrayLike, signal: ArrayLike, band: tuple[float, float]) -> Arra
             f"band is {low:g} to {high:g} Hz; allowed: two frequencies that increase, between 0 and half the sampling "
             f"rate, {rate / 2.0:g} Hz; sample the run faster or lower the band"
         )
-    from scipy.signal import butter, hilbert, sosfiltfilt  # here: the import takes longer than a run
+    signals = need("scipy.signal")  # here: the import takes longer than a run
 
-    stages = butter(BAND_ORDER, [low, high], "bandpass", fs=rate, output="sos")
-    return np.asarray(np.abs(hilbert(sosfiltfilt(stages, values))), dtype=float)
+    stages = signals.butter(BAND_ORDER, [low, high], "bandpass", fs=rate, output="sos")
+    return np.asarray(np.abs(signals.hilbert(signals.sosfiltfilt(stages, values))), dtype=float)
 
 
 def over_angle(angle: ArrayLike, signal: ArrayLike, per_turn: int | None = None) -> tuple[Array, Array]:
@@ -136,10 +137,10 @@ def over_angle(angle: ArrayLike, signal: ArrayLike, per_turn: int | None = None)
         raise RequestError(
             f"the record has {turned[-1]:.4g} turns, and per_turn is {per_turn}; allowed: a turn or more, 2 or more"
         )
-    from scipy.interpolate import CubicSpline  # here: the import takes longer than a run
+    interpolate = need("scipy.interpolate")  # here: the import takes longer than a run
 
     even = np.minimum(np.arange(count) / per_turn, turned[-1])
-    return np.arange(count) / per_turn, np.asarray(CubicSpline(turned, values)(even), dtype=float)
+    return np.arange(count) / per_turn, np.asarray(interpolate.CubicSpline(turned, values)(even), dtype=float)
 
 
 def order_spectrum(
@@ -196,11 +197,11 @@ def spectrogram(
             f"segment is {segment!r} s, {count} samples, overlap {overlap!r}; allowed: 4 samples up to the record's "
             f"length of {time.size / rate:.6g} s, an overlap from 0 to below 1"
         )
-    from scipy.signal import ShortTimeFFT  # here: the import takes longer than a run
+    signals = need("scipy.signal")  # here: the import takes longer than a run
 
     weight = window_weights(window, count)
     hop = max(1, round(count * (1.0 - overlap)))
-    transform = ShortTimeFFT(weight, hop, rate, scale_to="magnitude", fft_mode="onesided2X")
+    transform = signals.ShortTimeFFT(weight, hop, rate, scale_to="magnitude", fft_mode="onesided2X")
     centred = values - np.mean(values)
     first, last = transform.lower_border_end[1], transform.upper_border_begin(centred.size)[1]
     found = np.abs(transform.stft(centred, p0=first, p1=max(last, first + 1)))

@@ -12,7 +12,6 @@ from __future__ import annotations
 import atexit
 import contextlib
 import hashlib
-import importlib
 import io
 import shutil
 import tempfile
@@ -27,6 +26,7 @@ from typing import Any
 
 from ballpass.runtime.contract import read_artefact
 from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folder import read_unchanged
 from ballpass.runtime.contract.manifest import FILE_NAME
 from ballpass.runtime.native.compile import compile_model
@@ -61,21 +61,6 @@ class Packed:
     key: str
     content: bytes = field(repr=False)
     version: str
-
-
-def need(module: str) -> Any:
-    """A module of the extra ``scale``.
-
-    Raises
-    ------
-    RequestError
-        It is not installed.
-    """
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        name = {"zarr": "Zarr"}.get(module, "Dask")
-        raise RequestError(f"This needs {name}, which is not installed: pip install 'ballpass[scale]'.") from None
 
 
 def pack(model: LoadedModel) -> Packed:

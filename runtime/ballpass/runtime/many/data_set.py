@@ -21,11 +21,12 @@ from typing import Any
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import locked
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.contract.usual import UnusualWarning, unusual
 from ballpass.runtime.many.chunks import MemberFailure
-from ballpass.runtime.many.cluster import loaded, need, run_tasks
+from ballpass.runtime.many.cluster import loaded, run_tasks
 from ballpass.runtime.many.data_set_store import (
     MADE,
     UNFINISHED,

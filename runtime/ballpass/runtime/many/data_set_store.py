@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.many.chunks import MemberFailure
-from ballpass.runtime.many.cluster import need
 from ballpass.runtime.many.signals import Made
 
 #: Number of the layout of data sets.

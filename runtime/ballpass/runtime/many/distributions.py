@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import unknown_name
 
 #: Streams of a member: of its parameters, and of its noise.
@@ -80,7 +81,7 @@ def shape_names(name: str) -> tuple[str, ...]:
 
 
 def _continuous(name: str) -> Any:
-    from scipy import stats
+    stats = need("scipy.stats")
 
     found = getattr(stats, name, None)
     if not isinstance(found, stats.rv_continuous):

@@ -21,6 +21,7 @@ import numpy as np
 
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import real, unknown_name
 from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, run_chunks
 from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
@@ -119,21 +120,23 @@ class EnsembleResult(Mapping[str, np.ndarray]):
 
     def to_xarray(self) -> xarray.Dataset:
         """Dataset with the dimension ``member``; the varied parameters are coordinates along it, with units."""
-        import xarray
+        facts = self.attributes()
+        coordinates: dict[str, Any] = {"member": np.arange(len(next(iter(self.parameters.values()))))}
+        coordinates |= {name: ("member", values, facts[name]) for name, values in self.parameters.items()}
+        variables = {name: ("member", values, facts[name]) for name, values in self.observables.items()}
+        return need("xarray").Dataset(variables, coords=coordinates, attrs={"title": self.manifest.title})
 
+    def attributes(self) -> dict[str, dict[str, str]]:
+        """``units`` and ``long_name`` of varied parameters and observables, by name."""
         infos = {info.name: info for info in self.manifest.parameters}
-        count = len(next(iter(self.parameters.values())))
-        coordinates: dict[str, Any] = {"member": np.arange(count)}
-        for name, values in self.parameters.items():
-            facts = {"units": infos[name].unit, "long_name": infos[name].description}
-            coordinates[name] = ("member", values, facts)
+        found = {name: {"units": infos[name].unit, "long_name": infos[name].description} for name in self.parameters}
         aliases = observable_aliases(channel_names(self.manifest))
-        variables = {}
-        for name, values in self.observables.items():
+        for name in self.observables:
             kind, channel = aliases[name]
-            facts = {"units": observable_unit(self.manifest, kind, channel), "long_name": f"{kind} of {channel}"}
-            variables[name] = ("member", values, facts)
-        return xarray.Dataset(variables, coords=coordinates, attrs={"title": self.manifest.title})
+            found[name] = {
+                "units": observable_unit(self.manifest, kind, channel), "long_name": f"{kind} of {channel}"
+            }  # fmt: skip
+        return found
 
 
 def simulate_many(

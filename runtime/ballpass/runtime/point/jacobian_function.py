@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
@@ -158,10 +159,8 @@ class JacobianFunction:
 
     def to_scipy(self) -> csc_array:
         """Matrix of the last call as ``scipy.sparse.csc_array``."""
-        from scipy.sparse import csc_array
-
         pattern = self.sparsity
-        return csc_array((self.values.copy(), pattern.rows, pattern.starts), shape=pattern.shape)
+        return need("scipy.sparse").csc_array((self.values.copy(), pattern.rows, pattern.starts), shape=pattern.shape)
 
 
 def _pattern(function: casadi.Function) -> NDArray[np.bool_]:

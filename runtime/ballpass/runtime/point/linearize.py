@@ -24,6 +24,7 @@ from rich.console import Group
 from rich.table import Table
 
 from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
@@ -190,9 +191,9 @@ def _modes(mass: Array, damping: Array, stiffness: Array) -> tuple[Mode, ...]:
     unit = math.sqrt(max(float(np.max(np.abs(np.linalg.solve(mass, stiffness)))), 1e-300))
     left = np.block([[zero, one], [-stiffness / unit**2, -damping / unit]])
     right = np.block([[one, zero], [zero, mass]])
-    import scipy.linalg  # here: the import takes longer than a run
+    linalg = need("scipy.linalg")  # here: the import takes longer than a run
 
-    values, vectors = scipy.linalg.eig(left, right)
+    values, vectors = linalg.eig(left, right)
     values = values * unit
     largest = float(np.max(np.abs(values)))
     modes = []

@@ -14,9 +14,11 @@ import numpy as np
 
 from ballpass.runtime.contract import Manifest, VariableInfo
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.run.accuracy import Accuracy
+from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import no_output
 from ballpass.runtime.run.start import RunEnd
@@ -33,9 +35,6 @@ FILE_SCHEMA = 1
 #: first.
 SEAL = b"\nballpass sha256 "
 _SEAL_LENGTH = len(SEAL) + 64 + 1
-
-#: Dimensions, values and attributes of a variable in a file.
-_Variable = tuple[tuple[str, ...], np.ndarray, dict[str, str]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,12 +199,10 @@ class Solution:
 
     def to_xarray(self) -> xarray.Dataset:
         """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions."""
-        import xarray
-
         variables, facts = contents(self)
         axes = ("time", *(f"{bearing.prefix}ball" for bearing in self.manifest.bearings))
         coordinates = {name: variables.pop(name) for name in axes if name in variables}
-        return xarray.Dataset(variables, coords=coordinates, attrs=facts)
+        return need("xarray").Dataset(variables, coords=coordinates, attrs=facts)
 
     def save(self, path: str | Path) -> Path:
         """Write NetCDF-4: the old file or the new one, never half of it.  `load_solution` reads it back.
@@ -216,7 +213,7 @@ class Solution:
             The folder does not exist or cannot be written, or the disk is full.
         """
         target = Path(path)
-        content = _netcdf(self)
+        content = netcdf_bytes(*contents(self))
         try:
             replace_file(target, content + SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n")
         except OSError as fault:
@@ -260,11 +257,11 @@ def read_bytes(path: str | Path, content: bytes) -> Solution:
     return _read(path, inner)
 
 
-def contents(solution: Solution) -> tuple[dict[str, _Variable], dict[str, Any]]:
+def contents(solution: Solution) -> tuple[dict[str, Variable], dict[str, Any]]:
     """Variables of a file, each with dimensions, values and attributes, and the facts that stand beside them."""
     manifest = solution.manifest
     infos = {info.name: info for info in manifest.outputs}
-    found: dict[str, _Variable] = {
+    found: dict[str, Variable] = {
         state.name: (("time",), solution.x[:, k], _attributes(state)) for k, state in enumerate(manifest.states)
     }
     found["time"] = (("time",), solution.t, {"units": "s", "long_name": "time"})
@@ -299,26 +296,6 @@ def _ball_dimension(manifest: Manifest, output: str) -> str:
     """Axis of an output that has a value for each ball: ``ball``, or ``<name>.ball`` where bearings have names."""
     prefix = next((b.prefix for b in manifest.bearings if output.startswith(b.prefix)), "")
     return f"{prefix}ball"
-
-
-def _netcdf(solution: Solution) -> bytes:
-    """A NetCDF-4 file, in memory: a disk that is full then fails in one plain write, not somewhere within HDF5."""
-    import h5netcdf
-
-    variables, facts = contents(solution)
-    memory = io.BytesIO()
-    with h5netcdf.File(memory, "w") as file:
-        for _, (dimensions, values, _) in variables.items():
-            for dimension, length in zip(dimensions, values.shape, strict=True):
-                if dimension not in file.dimensions:
-                    file.dimensions[dimension] = length
-        for name, (dimensions, values, attributes) in variables.items():
-            variable = file.create_variable(name, dimensions, values.dtype, data=values)
-            for key, text in attributes.items():
-                variable.attrs[key] = text
-        for key, fact in facts.items():
-            file.attrs[key] = fact
-    return memory.getvalue()
 
 
 def _read(path: str | Path, content: bytes) -> Solution:

@@ -41,7 +41,8 @@ def dataset(
     with command() as stages:
         stages("read")
         from ballpass.runtime.app.commands.data_set_spec import read_spec
-        from ballpass.runtime.many.cluster import connected, need
+        from ballpass.runtime.contract.extras import need
+        from ballpass.runtime.many.cluster import connected
         from ballpass.runtime.many.data_set import make_data_set
 
         need("zarr")

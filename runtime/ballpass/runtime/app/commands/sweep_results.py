@@ -20,10 +20,9 @@ from ballpass.runtime.app.commands.shared import json_text
 from ballpass.runtime.app.summary import TABLE_UNITS
 from ballpass.runtime.app.tables import simple_table
 from ballpass.runtime.contract.folders import replace_files
+from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
 
 if TYPE_CHECKING:
-    import xarray
-
     from ballpass.runtime.many.ensemble import EnsembleResult
 
 #: Files of a sweep, beside a figure for each quantity.
@@ -50,30 +49,34 @@ class Sweep:
         return tuple(len(one.values) for one in self.ranges)
 
     @cached_property
-    def grid(self) -> xarray.Dataset:
-        """A dimension for each varied parameter; ``status`` is how each member ended."""
-        import xarray
+    def _attributes(self) -> dict[str, dict[str, str]]:
+        return self.result.attributes()
 
-        flat = self.result.to_xarray()
-        paths = [one.path for one in self.ranges]
+    def grid(self) -> bytes:
+        """A NetCDF-4 file with a dimension for each varied parameter; ``status`` is how each member ended."""
+        facts = self._attributes
+        paths = tuple(one.path for one in self.ranges)
         status = np.full(math.prod(self.shape), "DONE", dtype=object)
         for failure in self.result.failures:
             status[failure.member] = failure.status
-        observables = self.result.observables.items()
-        variables = {name: (paths, values.reshape(self.shape), flat[name].attrs) for name, values in observables}
+        variables: dict[str, Variable] = {one.path: ((one.path,), one.values, facts[one.path]) for one in self.ranges}
+        variables |= {path: ((), np.array(value), facts[path]) for path, value in self.fixed.items()}
+        for name, values in self.result.observables.items():
+            variables[name] = (paths, values.reshape(self.shape), facts[name])
         variables["status"] = (paths, status.reshape(self.shape), {"long_name": "how the member's run ended"})
-        coordinates: dict[str, Any] = {one.path: (one.path, one.values, flat[one.path].attrs) for one in self.ranges}
-        coordinates |= {path: ((), value, flat[path].attrs) for path, value in self.fixed.items()}
-        return xarray.Dataset(variables, coords=coordinates, attrs=flat.attrs)
+        attributes = {"title": self.result.manifest.title}
+        if self.fixed:
+            attributes["coordinates"] = " ".join(self.fixed)  # xarray takes these for coordinates
+        return netcdf_bytes(variables, attributes)
 
     def unit(self, quantity: str) -> str:
         """SI unit of a quantity."""
-        return str(self.grid[quantity].attrs["units"])
+        return self._attributes[quantity]["units"]
 
     def shown(self, quantity: str) -> tuple[np.ndarray, str]:
         """Values of a quantity on the grid, and their unit, as tables and figures show them."""
         factor, unit = TABLE_UNITS.get(self.unit(quantity), (1.0, self.unit(quantity)))
-        return factor * self.grid[quantity].to_numpy(), unit
+        return factor * self.result.observables[quantity].reshape(self.shape), unit
 
     def point(self, member: int) -> list[float]:
         """Values of a member's varied parameters [SI]."""
@@ -137,7 +140,7 @@ class Sweep:
 
         def write_all(made: Path) -> list[str]:
             self._write_table(made / TABLE)
-            (made / GRID).write_bytes(bytes(self.grid.to_netcdf(engine="h5netcdf")))
+            (made / GRID).write_bytes(self.grid())
             (made / REPORT).write_text(json_text(self.report()), encoding="utf-8")
             if figures and len(self.ranges) <= 2:
                 self._draw(made)
@@ -188,7 +191,7 @@ class Sweep:
         columns = {name: self.shown(name) for name in self.result.observables}
         heads = [_head(one.path, one.shown_unit) for one in self.ranges]
         heads += [_head(name, unit) for name, (_, unit) in columns.items()]
-        table = simple_table(self.grid.attrs["title"], heads, right=heads)
+        table = simple_table(self.result.manifest.title, heads, right=heads)
         for member in range(math.prod(self.shape)):
             values = zip(self.ranges, self.point(member), strict=True)
             cells = [f"{value / one.factor:.5g}" for one, value in values]
@@ -198,7 +201,7 @@ class Sweep:
 
     def extremes(self) -> Table:
         """Smallest and largest value of each quantity, and where."""
-        table = simple_table(self.grid.attrs["title"], ("quantity", "", "value", "unit", "at"), right=("value",))
+        table = simple_table(self.result.manifest.title, ("quantity", "", "value", "unit", "at"), right=("value",))
         for name in self.result.observables:
             values, unit = self.shown(name)
             if not np.any(np.isfinite(values)):

@@ -1,0 +1,47 @@
+"""Packages that not every installation has: the extra that brings each, said where it is missing."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from typing import Any
+
+from ballpass.runtime.contract.errors import RequestError
+
+#: Name for people, and extra, of the packages that are loaded where they are needed.
+EXTRAS = {
+    "dask": ("Dask", "scale"),
+    "matplotlib": ("matplotlib", "figures"),
+    "scipy": ("SciPy", "analysis"),
+    "xarray": ("xarray", "labelled"),
+    "zarr": ("Zarr", "scale"),
+}
+
+
+def need(module: str) -> Any:
+    """A module of a package of `EXTRAS`.
+
+    Raises
+    ------
+    RequestError
+        It is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as fault:
+        package = module.partition(".")[0]
+        if (fault.name or "").partition(".")[0] not in (package, "distributed"):
+            raise
+        raise RequestError(missing(package)) from None
+
+
+def missing(package: str) -> str:
+    """What to say where a package of `EXTRAS` is not installed."""
+    name, extra = EXTRAS[package]
+    distribution = "ballpass" if can_derive() else "ballpass-runtime"
+    return f"This needs {name}, which is not installed: pip install '{distribution}[{extra}]'."
+
+
+def can_derive() -> bool:
+    """Whether the deriving half is installed, `ballpass.derive`."""
+    return importlib.util.find_spec("ballpass.derive") is not None

@@ -1,0 +1,42 @@
+"""NetCDF-4 files in memory: a disk that is full then fails in one plain write, not somewhere within HDF5.
+
+In: variables with dimensions, units and descriptions.  Out: the bytes of a file that xarray and `h5netcdf` read.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+#: Dimensions, values and attributes of a variable.
+Variable = tuple[tuple[str, ...], np.ndarray, dict[str, str]]
+
+
+def netcdf_bytes(variables: Mapping[str, Variable], facts: Mapping[str, Any]) -> bytes:
+    """A NetCDF-4 file.
+
+    Parameters
+    ----------
+    variables : by name; values of type object are texts; one with the name of a dimension gives its coordinates
+    facts : attributes of the file
+    """
+    import h5netcdf
+    import h5py
+
+    memory = io.BytesIO()
+    with h5netcdf.File(memory, "w") as file:
+        for dimensions, values, _ in variables.values():
+            for dimension, length in zip(dimensions, values.shape, strict=True):
+                if dimension not in file.dimensions:
+                    file.dimensions[dimension] = length
+        for name, (dimensions, values, attributes) in variables.items():
+            kind = h5py.string_dtype() if values.dtype == object else values.dtype
+            variable = file.create_variable(name, dimensions, kind, data=values)
+            for key, text in attributes.items():
+                variable.attrs[key] = text
+        for key, fact in facts.items():
+            file.attrs[key] = fact
+    return memory.getvalue()
