@@ -2,9 +2,9 @@
 
 In: what stands in a scene file ("611.7 kg*mm^2", 0.5).  Out: one float in the SI unit the key asks for.
 
-A scene is data, so nothing in it is evaluated: the grammar below is read by a small parser of its own, and pint is
-asked for one thing only, the size of a unit of a given name.  Sizes of the names most scenes are written with stand
-here, equal to pint's: pint and its definitions take a third of a second to load.
+A scene is data, so nothing in it is evaluated: the grammar below is read by a small parser of its own.  Sizes of the
+names most scenes are written with stand here, equal to pint's; whoever has more names, as `ballpass.derive` has pint's,
+gives a function that looks them up.
 
 ::
 
@@ -23,15 +23,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.contract.errors import RequestError
-
-if TYPE_CHECKING:
-    import pint
 
 #: Longest text read as a quantity; the longest sensible one has some thirty characters.
 MAX_LENGTH = 100
@@ -88,7 +85,11 @@ class UnitSize:
     base: tuple[tuple[str, Fraction], ...]
 
 
-class _GrammarError(Exception):
+#: Size of a unit by its name; GrammarError where there is none.
+LookUp = Callable[[str], UnitSize]
+
+
+class GrammarError(Exception):
     """Why a text is no unit; `parse_quantity` turns it into a `QuantityError`."""
 
     def __init__(self, problem: str, remedy: str) -> None:
@@ -96,13 +97,14 @@ class _GrammarError(Exception):
         self.problem, self.remedy = problem, remedy
 
 
-def parse_quantity(given: object, unit: str) -> float:
+def parse_quantity(given: object, unit: str, look_up: LookUp | None = None) -> float:
     """Value in SI of what stands in a scene file.
 
     Parameters
     ----------
     given : text such as "6 mm"; a plain number only where `unit` is "1"
     unit : SI unit of the result, one of `KINDS` or any other text of the same grammar
+    look_up : for names that are not `COMMON`; None: they are refused
 
     Returns
     -------
@@ -143,10 +145,10 @@ def parse_quantity(given: object, unit: str) -> float:
     if re.match(r"[,'_]\s*[0-9]", rest):
         raise refuse("a number with a comma or another mark between its digits", 'write a decimal point: "6.5", "1000"')
     try:
-        size = unit_size(rest)
-    except _GrammarError as error:
+        size = unit_size(rest, look_up)
+    except GrammarError as error:
         raise refuse(error.problem, error.remedy) from None
-    target = unit_size(unit)
+    target = unit_size(unit, look_up)
     if size.base != target.base:
         raise refuse(*_dimension_fault(rest, size, target, kind, example, unit))
     try:
@@ -185,20 +187,20 @@ def _show_inner(given: object) -> str:
 
 
 @lru_cache(maxsize=512)
-def unit_size(text: str) -> UnitSize:
+def unit_size(text: str, look_up: LookUp | None = None) -> UnitSize:
     """Size of the unit written as `text`; the empty text is "1"."""
     tokens: list[tuple[str, str]] = []
     position = 0
     while position < len(text):
         match = _TOKEN.match(text, position)
         if match is None or match.lastgroup is None:
-            raise _GrammarError(
+            raise GrammarError(
                 f"the character {show(text[position])} has no place in a unit",
                 'write units with names, "*", "/" and "^", as in "N*s/m" or "N/m^1.5"',
             )
         tokens.append((match.lastgroup, match.group()))
         position = match.end()
-    reader = _UnitReader(tokens=[token for token in tokens if token[0] != "blank"])
+    reader = _UnitReader(tokens=[t for t in tokens if t[0] != "blank"], look_up=look_up or unknown_unit)
     return reader.read()
 
 
@@ -215,6 +217,7 @@ class _UnitReader:
     """Recursive descent over the tokens of one unit; depth is bounded by the length of a quantity's text."""
 
     tokens: list[tuple[str, str]]
+    look_up: LookUp
     index: int = 0
 
     def read(self) -> UnitSize:
@@ -234,15 +237,15 @@ class _UnitReader:
         self.index += 1
         return self.tokens[self.index - 1][1]
 
-    def _misplaced(self) -> _GrammarError:
+    def _misplaced(self) -> GrammarError:
         first = self.index == 0
         if self._peek() in ("sign", "power", *(("times",) if first else ("number",))):
-            return _GrammarError(
+            return GrammarError(
                 f"{show(self.tokens[self.index][1])} makes this a computation, which is not done here",
                 "write the result: one number and its unit",
             )
         what = show(self.tokens[self.index][1]) if self.index < len(self.tokens) else "the end of the text"
-        return _GrammarError(
+        return GrammarError(
             f"{what} stands where no unit can go on", 'write units with names, "*", "/" and "^", as in "kg*m^2/s"'
         )
 
@@ -259,7 +262,8 @@ class _UnitReader:
     def _factor(self) -> UnitSize:
         word = self._peek()
         if word == "name":
-            size = _named_size(self._next())
+            name = self._next()
+            size = COMMON[name] if name in COMMON else self.look_up(name)
         elif word == "number" and self.tokens[self.index][1] == "1":
             self._next()
             size = UnitSize(exact=Fraction(1), rounded=1.0, base=())
@@ -289,13 +293,13 @@ class _UnitReader:
                 self._next()
                 divisor = self._decimal()
                 if divisor == 0:
-                    raise _GrammarError("a power with the denominator 0", 'write the power as in "m^1.5" or "m^(3/2)"')
+                    raise GrammarError("a power with the denominator 0", 'write the power as in "m^1.5" or "m^(3/2)"')
                 exponent /= divisor
             if self._peek() != "close":
                 raise self._misplaced()
             self._next()
         if abs(exponent) > MAX_EXPONENT:
-            raise _GrammarError(
+            raise GrammarError(
                 "the power of a unit is too large", f"use powers between -{MAX_EXPONENT} and {MAX_EXPONENT}"
             )
         return exponent
@@ -328,13 +332,13 @@ def _power(size: UnitSize, exponent: Fraction) -> UnitSize:
     except (OverflowError, ZeroDivisionError):
         rounded = math.inf
     if not (math.isfinite(rounded) and rounded > 0.0):
-        raise _GrammarError("the size of the unit is not a finite number", "use units nearer to SI")
+        raise GrammarError("the size of the unit is not a finite number", "use units nearer to SI")
     return UnitSize(exact=Fraction(1), rounded=rounded, base=base)
 
 
 #: Pint's number, to its last digit.
 _PI = Fraction("3.1415926535897932384626433832795028841971693993751")
-_PREFIXES = {"": 0, "k": 3, "M": 6, "G": 9, "m": -3, "u": -6, "µ": -6, "n": -9}
+_PREFIXES = {"": 0, "k": 3, "M": 6, "G": 9, "m": -3, "u": -6, "µ": -6, "μ": -6, "n": -9}
 _UNITS: dict[str, tuple[int, dict[str, int]]] = {
     "m": (1, {"meter": 1}),
     "g": (1, {"gram": 1}),
@@ -343,6 +347,7 @@ _UNITS: dict[str, tuple[int, dict[str, int]]] = {
     "Pa": (1000, {"gram": 1, "meter": -1, "second": -2}),
     "Hz": (1, {"second": -1}),
     "rad": (1, {"radian": 1}),
+    "K": (1, {"kelvin": 1}),
 }
 _ANGLES = {"deg": _PI / 180, "°": _PI / 180, "turn": 2 * _PI}
 
@@ -359,51 +364,18 @@ COMMON: dict[str, UnitSize] = {
         for prefix, power in _PREFIXES.items()
     },
     **{name: _size(size, {"radian": 1}) for name, size in _ANGLES.items()},
+    "%": _size(Fraction(1, 100), {}),
     "rpm": _size(_PI / 30, {"radian": 1, "second": -1}),
 }
 
 
-@lru_cache(maxsize=1)
-def _registry() -> pint.UnitRegistry[Any]:
-    """Pint's registry in rational arithmetic; made at the first use, because reading its definitions takes 0.2 s."""
-    import pint
-
-    return pint.UnitRegistry(non_int_type=Fraction, cache_folder=None)
+def unknown_unit(name: str) -> UnitSize:
+    """GrammarError: the name is not among `COMMON`, and there is nobody to ask."""
+    raise GrammarError(f"no unit is called {show(name)} here", unit_hint(name))
 
 
-def _named_size(name: str) -> UnitSize:
-    return COMMON[name] if name in COMMON else looked_up_size(name)
-
-
-@lru_cache(maxsize=512)
-def looked_up_size(name: str) -> UnitSize:
-    """Size of a unit of this name, as pint has it."""
-    import pint
-    from pint.util import UnitsContainer
-
-    registry = _registry()
-    try:
-        # A container instead of text: pint's parser of expressions is not used.
-        unit = UnitsContainer({registry.get_name("deg" if name == "°" else name): 1})
-        zero, one = (registry.Quantity(Fraction(number), unit).to_root_units() for number in (0, 1))
-    except (pint.UndefinedUnitError, pint.DefinitionSyntaxError):
-        raise _GrammarError(f"no unit is called {show(name)}", _unit_hint(name)) from None
-    except TypeError:  # a logarithmic unit (dB), which rational arithmetic cannot hold
-        raise _not_proportional(name) from None
-    if zero.magnitude != 0:
-        raise _not_proportional(name)
-    return UnitSize(
-        exact=Fraction(str(one.magnitude)),
-        rounded=1.0,
-        base=tuple(sorted((str(base), Fraction(str(power))) for base, power in one.unit_items())),
-    )
-
-
-def _not_proportional(name: str) -> _GrammarError:
-    return _GrammarError(f'"{name}" is an offset or logarithmic unit', "use a unit that is proportional to its SI unit")
-
-
-def _unit_hint(name: str) -> str:
+def unit_hint(name: str) -> str:
+    """What to write instead of a name that is no unit's."""
     if re.fullmatch(r"[kMm]?N[mn]*m?", name):
         return 'write products with "*", as in "N*m"'
     if re.search(r"\d", name):
