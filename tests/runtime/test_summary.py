@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -14,9 +15,9 @@ from rich.console import Console
 
 from ballpass.runtime import Model, Solution
 from ballpass.runtime.app.summary import add_turns, render_summary, summarize
-from ballpass.runtime.app.tables import simple_table, wide_console
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.run.settle import look_further
+from ballpass.runtime.run.tables import printed, show_tables, simple_table
 
 
 @pytest.fixture(scope="module")
@@ -137,15 +138,30 @@ def test_table_fits_a_terminal_and_shows_micrometres(summary: dict[str, Any]) ->
     assert "one-sided" in text
 
 
-def test_a_table_that_does_not_fit_a_terminal_is_wider(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "20")
-    table = simple_table("T", ("quantity", "value"), right=("value",))
-    table.add_row("left.frequencies.ball_pass_outer", "-2.575e-13")
-    console = wide_console(table)
-    with console.capture() as text:
-        console.print(table)
-    assert "-2.575e-13" in text.get()
-    assert "ball_pass_outer" in text.get()
+def test_names_and_numbers_of_tables_are_whole_at_any_width(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name, numbers, words = (
+        "left.frequencies.ball pass outer",
+        ("-2.575e-13", "1.044e+05"),
+        "a sentence of six words here",
+    )
+    table = simple_table(
+        "T", ("quantity", "value", "another value", "what"), right=("value", "another value"), wrapped=("what",)
+    )
+    table.add_row(name, *numbers, words)
+    (row,) = (line for line in printed(table, width=20).splitlines() if name in line)
+    assert row.split()[3:5] == list(numbers), row
+    # a terminal: no line is wider, each block has the name; the sentence takes several lines
+    monkeypatch.setenv("COLUMNS", "50")
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    show_tables(table)
+    lines = re.sub(r"\x1b\[[\d;]*m", "", capsys.readouterr().out).splitlines()
+    assert max(len(line.rstrip()) for line in lines) <= 50
+    assert sum(name in line for line in lines) == 3
+    assert " ".join(word for line in lines for word in line.split() if word in words.split()) == words
+    assert all(any(number in line for line in lines) for number in numbers)
 
 
 def test_a_run_with_some_outputs_has_the_summary_of_these(

@@ -150,8 +150,8 @@ def run(
     with command(scene) as stages:
         # within: an interrupt while they are imported is one of the command
         from ballpass.runtime.app.summary import add_turns, render_accuracy, render_summary, summarize
-        from ballpass.runtime.app.tables import wide_console
         from ballpass.runtime.run.settle import look_further
+        from ballpass.runtime.run.tables import show_tables
 
         stages("read")
         settles = read_turns(turns, duration if cycles is None else cycles)
@@ -220,12 +220,12 @@ def run(
         show_json(summary)
         return
     table = render_summary(summary)
-    wide_console(table).print(table)
+    show_tables(table)
     if turned:
         show(turned)
     if solution.accuracy is not None:
         told = render_accuracy(model, solution.accuracy)
-        wide_console(told).print(told)
+        show_tables(told)
         show(solution.accuracy.words)
     size = _size((folder / "solution.nc").stat().st_size)
     show(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")

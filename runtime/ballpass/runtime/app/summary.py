@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.table import Table
 
-from ballpass.runtime.app.tables import simple_table
 from ballpass.runtime.ask.characteristic import frequencies_of
 from ballpass.runtime.ask.observables import drive_work, statistics, turns
 from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks
@@ -33,6 +32,7 @@ from ballpass.runtime.many.ensemble import observable_unit
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.run.inputs import breakpoints
 from ballpass.runtime.run.settle import MEANS, PEAKS
+from ballpass.runtime.run.tables import simple_table
 
 if TYPE_CHECKING:
     from ballpass.runtime.certify.growth import Growth
@@ -404,8 +404,8 @@ def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
     """A number of the table; where it has no digits, mean and standard deviation over the turns."""
     spread = item.get("over_turns", {}).get(key)
     if spread is not None:
-        return f"{factor * spread['mean']:.3g} ± {factor * spread['std']:.1g}"
-    return f"{factor * item[key]:.4g}" if key in item else ""
+        return f"{factor * spread['mean']:z.3g} ± {factor * spread['std']:.1g}"
+    return f"{factor * item[key]:z.4g}" if key in item else ""
 
 
 def render_accuracy(model: Model, accuracy: Accuracy) -> Table:
@@ -415,7 +415,7 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> Table:
     for name, found in zip(accuracy.of, check_observables(model, accuracy.of), strict=True):
         unit = observable_unit(model.manifest, *found)
         factor, unit = TABLE_UNITS.get(unit, (1.0, unit))
-        table.add_row(name, f"{factor * accuracy.values[name]:.7g}", f"{100 * accuracy.estimates[name]:.2g} %", unit)
+        table.add_row(name, f"{factor * accuracy.values[name]:z.7g}", f"{100 * accuracy.estimates[name]:.2g} %", unit)
     return table
 
 

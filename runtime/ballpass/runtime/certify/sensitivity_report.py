@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rich import box
 from rich.console import Group
 from rich.markup import escape
 from rich.table import Table
@@ -20,13 +19,10 @@ from ballpass.runtime.certify.certificate import Check, Verdict
 from ballpass.runtime.certify.grazing import Grazing, describe, merge_grazing
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import unknown_name
-from ballpass.runtime.run.printed import printed
+from ballpass.runtime.run.tables import printed, simple_table
 
 #: Grazing places that are listed; the JSON has all.
 LISTED = 3
-
-#: Characters of a line where nobody says how wide the paper is.
-WIDTH = 110
 
 #: The route of derivatives of the stepper's own steps.
 STEPS = "steps"
@@ -121,7 +117,7 @@ class SensitivityReport:
 
     def __str__(self) -> str:
         """The tables of ``ballpass sensitivity``, without colours."""
-        return printed(render_report(self), WIDTH)
+        return printed(render_report(self))
 
     def __getitem__(self, key: tuple[str, str]) -> Sensitivity:
         """The pair of a quantity and a parameter."""
@@ -240,21 +236,13 @@ def render_report(report: SensitivityReport, *, top: int | None = None) -> Group
     """
     parts: list[Table | Text] = []
     for quantity in report.quantities:
-        table = Table(
-            title=_title(report, quantity.name),
+        table = simple_table(
+            _title(report, quantity.name),
+            ("parameter", "p/Q dQ/dp", "dQ/dp", "unit", "apart", "verdict"),
+            right=("p/Q dQ/dp", "dQ/dp", "apart"),
+            wrapped=("verdict",),
             caption="; ".join(quantity.notes) or None,
-            title_justify="left",
-            caption_justify="left",
-            header_style="bold",
-            box=box.SIMPLE_HEAD,
-            padding=(0, 1, 0, 0),
         )
-        table.add_column("parameter", overflow="fold", min_width=20)
-        for name in ("p/Q dQ/dp", "dQ/dp"):
-            table.add_column(name, justify="right", no_wrap=True)
-        table.add_column("unit", overflow="fold", min_width=7)
-        table.add_column("apart", justify="right", no_wrap=True)
-        table.add_column("verdict", min_width=12)
         ranked = report.of(quantity.name)
         _add_rows(table, [pair for pair in ranked if math.isfinite(pair.dimensionless)], top)
         without = [pair for pair in ranked if not math.isfinite(pair.dimensionless)]
@@ -291,17 +279,17 @@ def _title(report: SensitivityReport, name: str) -> str:
 
 def _row(pair: Sensitivity) -> tuple[str, ...]:
     check = pair.check
-    relative = f"{pair.dimensionless:+.4f}" if math.isfinite(pair.dimensionless) else "–"
+    relative = f"{pair.dimensionless:+z.4f}" if math.isfinite(pair.dimensionless) else "–"
     size = max(abs(pair.derivative), abs(check.value or 0.0))
     apart = "-" if check.disagreement is None else f"{check.disagreement / size:.0e}" if size > 0.0 else "0"
     style = _STYLES[check.verdict]
-    number, words = f"{pair.derivative:.4g}", check.verdict.value
+    number, words = f"{pair.derivative:z.4g}", check.verdict.value
     if pair.is_nothing:
         # digits that nothing vouches for are not shown
         relative = "~0" if math.isfinite(pair.dimensionless) else relative
         number, apart, words = f"~0 (<{check.quantum:.0e})", "-", f"{words}: ~0"
     elif check.sides is not None:
-        number, words = f"{check.sides[0]:.4g} | {check.sides[1]:.4g}", "kink: below | above"
+        number, words = f"{check.sides[0]:z.4g} | {check.sides[1]:z.4g}", "kink: below | above"
     elif check.verdict is Verdict.NOT_CHECKED and pair.uncertainty is not None:
         number = _known(pair.derivative, pair.uncertainty)
         words += "" if pair.route == STEPS else f": by {pair.route}"

@@ -84,9 +84,9 @@ def rows(found: Simplification) -> tuple[tuple[str, ...], list[tuple[str, ...]]]
         (
             name,
             found.units[name],
-            f"{found.values[name]:.4g}",
-            f"{found.simpler_values[name]:.4g}",
-            f"{100.0 * found.change[name]:+.3g} %",
+            f"{found.values[name]:z.4g}",
+            f"{found.simpler_values[name]:z.4g}",
+            f"{100.0 * found.change[name]:+z.3g} %",
             percent(found.error[name]),
         )
         for name in found.quantities

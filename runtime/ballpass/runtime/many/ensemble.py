@@ -31,11 +31,11 @@ from ballpass.runtime.ratings.of_bearing import refuse_swinging
 from ballpass.runtime.ratings.readings import KINDS as LIFE
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
-from ballpass.runtime.run.printed import printed
 from ballpass.runtime.run.reduced_run import check_span, choose_family
 from ballpass.runtime.run.reductions import channel_names, channels_needed, observable_aliases, observe
 from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, check_memory, on_request
 from ballpass.runtime.run.request import tolerance as relative_tolerance
+from ballpass.runtime.run.tables import printed, simple_table
 
 if TYPE_CHECKING:
     import xarray
@@ -322,30 +322,22 @@ def _span(model: LoadedModel, members: Members, cycles: float | None, duration: 
 
 def _render(result: EnsembleResult) -> Any:
     """Smallest, middle and largest value of each varied parameter and observable over the members."""
-    from rich import box
-    from rich.table import Table as Printed
-
     count = len(next(iter(result.parameters.values())))
     statistic = result.statistics
-    table = Printed(
-        title=f"{result.manifest.title}: {count} members",
+    right = ("min", "median", "max")
+    table = simple_table(
+        f"{result.manifest.title}: {count} members",
+        ("parameter or observable", *right, "unit"),
+        right=right,
         caption=f"{len(result.failures)} without results; {statistic.threads} threads, rtol {statistic.rtol:g}, "
         f"{statistic.wall_time:.3g} s",
-        title_justify="left",
-        caption_justify="left",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
     )
-    table.add_column("parameter or observable", no_wrap=True)
-    for head in ("min", "median", "max"):
-        table.add_column(head, justify="right", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
     units = {info.name: info.unit for info in result.manifest.parameters}
     aliases = observable_aliases(channel_names(result.manifest))
     units |= {name: observable_unit(result.manifest, *aliases[name]) for name in result.observables}
     for name, values in (*result.parameters.items(), *result.observables.items()):
         known = values[np.isfinite(values)]
-        cells = [f"{f(known):.6g}" for f in (np.min, np.median, np.max)] if len(known) else ["", "", ""]
+        cells = [f"{f(known):z.6g}" for f in (np.min, np.median, np.max)] if len(known) else ["", "", ""]
         table.add_row(name, *cells, units[name])
     return table
 

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich import box
 from rich.table import Table
 
 from ballpass.runtime.contract.errors import RequestError, SimulationError
@@ -28,7 +27,7 @@ from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import RHS, Rows, contract, directions_of, rows_of
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.equilibrium_newton import Rest, settle
-from ballpass.runtime.run.printed import printed
+from ballpass.runtime.run.tables import printed, simple_table
 
 Array = NDArray[np.float64]
 
@@ -348,21 +347,17 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
 
 def _render(found: StaticEquilibrium) -> Table:
     """Positions, load and balls as a table, a row for each."""
-    table = Table(
-        title=f"Static equilibrium at t = {found.time:.6g} s",
-        caption=f"load {', '.join(f'{part:.6g} N' for part in found.load)}; net force left {found.residual:.2g} N",
-        title_justify="left",
-        caption_justify="left",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
+    right = ("position or deflection, µm", "elastic force, N")
+    table = simple_table(
+        f"Static equilibrium at t = {found.time:.6g} s",
+        ("position or ball", *right),
+        right=right,
+        caption=f"load {', '.join(f'{part:z.6g} N' for part in found.load)}; net force left {found.residual:.2g} N",
     )
-    table.add_column("position or ball", no_wrap=True)
-    for head in ("position or deflection, µm", "elastic force, N"):
-        table.add_column(head, justify="right", no_wrap=True)
     for name, q in zip(found.coordinates, found.positions.tolist(), strict=True):
-        table.add_row(name, f"{1e6 * q:.6g}", "")
+        table.add_row(name, f"{1e6 * q:z.6g}", "")
     for k, (deflection, force) in enumerate(zip(found.deflection.tolist(), found.ball_force.tolist(), strict=True)):
-        table.add_row(f"ball {k + 1}", f"{1e6 * deflection:.6g}", f"{force:.6g}")
+        table.add_row(f"ball {k + 1}", f"{1e6 * deflection:z.6g}", f"{force:z.6g}")
     return table
 
 

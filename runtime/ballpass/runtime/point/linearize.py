@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich import box
 from rich.console import Group
 from rich.table import Table
 
@@ -31,7 +30,7 @@ from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import RHS, STATES, directions_of, rows_of
 from ballpass.runtime.point.slopes import Deflections, KinkWarning, Point, Slopes, named, slopes
 from ballpass.runtime.run.magnitudes import mass_matrix
-from ballpass.runtime.run.printed import printed
+from ballpass.runtime.run.tables import printed, simple_table
 
 Array = NDArray[np.float64]
 
@@ -99,8 +98,7 @@ class Linearization:
         return f"Linearization({where} at t = {self.time:.6g} s; natural frequencies {frequencies} Hz)"
 
     def __str__(self) -> str:
-        # no terminal's width: numbers are not cut, and the notes are as wide as the tables
-        return printed(Group(render_linearization(self), render_matrices(self)), width=10_000)
+        return printed(Group(render_linearization(self), render_matrices(self)))
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
@@ -248,17 +246,13 @@ def render_linearization(result: Linearization) -> Table:
     """Modes as a table for a terminal of 80 columns."""
     where = "static equilibrium" if result.at_equilibrium else "given state"
     words = "f: natural frequency; ratio: damping over critical damping; shapes: size and phase, the largest 1"
-    table = Table(
-        title=f"Small vibrations about the {where} at t = {result.time:.6g} s",
+    heads = ("f, Hz", "damped, Hz", "ratio", *result.coordinates)
+    table = simple_table(
+        f"Small vibrations about the {where} at t = {result.time:.6g} s",
+        heads,
+        right=heads,
         caption="\n".join((words, *result.notes)),
-        title_justify="left",
-        caption_justify="left",
-        header_style="bold",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
     )
-    for head in ("f, Hz", "damped, Hz", "ratio", *result.coordinates):
-        table.add_column(head, justify="right", no_wrap=True)
     for mode in result.modes:
         ratio = "" if mode.rigid else f"{mode.damping_ratio:.4g}"
         shape = [_polar(z) for z in mode.shape.tolist()]
@@ -275,16 +269,12 @@ def _polar(z: complex) -> str:
 
 def render_matrices(result: Linearization) -> Table:
     """Mass, damping and stiffness as one table, a row for each coordinate."""
-    table = Table(box=box.SIMPLE_HEAD, header_style="bold", padding=(0, 1, 0, 0))
-    table.add_column("matrix", no_wrap=True)
-    table.add_column("row", no_wrap=True)
-    for name in result.coordinates:
-        table.add_column(name, justify="right", no_wrap=True)
+    table = simple_table("", ("matrix", "row", *result.coordinates), right=result.coordinates)
     for words, matrix in (
         ("M kg", result.mass),
         ("C N·s/m", result.damping),
         ("K N/m", result.stiffness),
     ):
         for k, (name, row) in enumerate(zip(result.coordinates, matrix.tolist(), strict=True)):
-            table.add_row(words if k == 0 else "", name, *(f"{value:.5g}" for value in row))
+            table.add_row(words if k == 0 else "", name, *(f"{value:z.5g}" for value in row))
     return table

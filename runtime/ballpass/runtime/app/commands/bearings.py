@@ -21,7 +21,7 @@ def bearings(
     """Print the bearings that a scene can name by designation: dimensions, balls, ratings and normal clearance."""
     with command():
         from ballpass.derive.scene.designations import bearing_types
-        from ballpass.runtime.app.tables import simple_table, wide_console
+        from ballpass.runtime.run.tables import show_tables, simple_table
 
         types = bearing_types()
         found = [_row(kind) for name, kind in types.items() if fnmatchcase(name, pattern)]
@@ -51,7 +51,7 @@ def bearings(
                 *(f"{1e-3 * row[key]:.3g}" for key in ("dynamic_rating", "static_rating", "fatigue_limit")),
                 f"{1e6 * least:.0f}–{1e6 * most:.0f}",
             )
-        wide_console(table).print(table)
+        show_tables(table)
 
 
 def _row(kind: Any) -> dict[str, Any]:

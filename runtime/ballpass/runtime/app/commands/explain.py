@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
@@ -17,8 +17,8 @@ from rich.table import Table
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_with_settings
 from ballpass.runtime.app.commands.shared import command, load_model, show_json
-from ballpass.runtime.app.tables import plain_table
 from ballpass.runtime.contract.smoothness import WORDS
+from ballpass.runtime.run.tables import show_tables, simple_table
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
@@ -56,7 +56,7 @@ def explain(scene: options.SceneFile, set_: options.Settings = None, json_: opti
     if json_:
         show_json(report)
     else:
-        Console().print(_render(report), highlight=False)
+        show_tables(_render(report))
 
 
 def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest: Manifest) -> dict[str, Any]:
@@ -195,7 +195,9 @@ def _render(report: dict[str, Any]) -> Group:
 
 def _modelled(report: dict[str, Any]) -> Table:
     """The parts of the model, and how much of the right-hand side each one is."""
-    table = plain_table("Modelled", ("part", "line", "what", "share of rhs"), right=("share of rhs",))
+    table = simple_table(
+        "Modelled", ("part", "line", "what", "share of rhs"), right=("line", "share of rhs"), wrapped=("what",)
+    )
     total = report["functions"].get("rhs", {}).get("operations", 0)
     several = sum(part["path"].endswith(".contact") for part in report["modelled"]) > 1
     for part in report["modelled"]:
@@ -208,7 +210,9 @@ def _modelled(report: dict[str, Any]) -> Table:
 
 
 def _functions(report: dict[str, Any]) -> Table:
-    table = plain_table("Generated functions", ("function", "operations", "what"), right=("operations",))
+    table = simple_table(
+        "Generated functions", ("function", "operations", "what"), right=("operations",), wrapped=("what",)
+    )
     queries = sum(_DERIVATIVE.search(name) is not None for name in report["functions"])
     for name, info in report["functions"].items():
         if info["operations"] and not _DERIVATIVE.search(name):
@@ -219,9 +223,11 @@ def _functions(report: dict[str, Any]) -> Table:
 
 def _scales(report: dict[str, Any]) -> Table:
     angle = "crank angle" if report["mechanism"] else "shaft angle"
-    table = plain_table(
+    right = (angle, "fastest decay", "fastest frequency f", "slowest rate", "decay / (2π f)")
+    table = simple_table(
         "Time scales of small motions",
-        ("at", angle, "fastest decay", "fastest frequency f", "slowest rate", "decay / (2π f)"),
+        ("at", *right),
+        right=right,
         caption="decay / (2π f): of a single mode, up to 1, its damping ratio; above 3 decay bounds explicit steps",
     )
     for entry in report["time_scales"]:

@@ -11,8 +11,8 @@ import typer
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked, read_quantity
 from ballpass.runtime.app.commands.shared import Stages, command, complain, load_model, show, show_json
-from ballpass.runtime.app.tables import simple_table, wide_console
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.run.tables import show_tables, simple_table
 
 if TYPE_CHECKING:
     from ballpass.runtime.certify.jacobian_check import CheckedJacobian
@@ -85,8 +85,7 @@ def linearize(
         return
     from ballpass.runtime.point.linearize import render_linearization, render_matrices
 
-    for table in (render_linearization(result), render_matrices(result)):
-        wide_console(table).print(table, highlight=False)
+    show_tables(render_linearization(result), render_matrices(result))
 
 
 def _model_at(
@@ -155,11 +154,11 @@ def _show(result: CheckedJacobian) -> None:
         right=("derivative", "by differences"),
     )
     for entry in shown:
-        value, second = (None if entry[key] is None else f"{entry[key]:.7g}" for key in ("value", "second"))
+        value, second = (None if entry[key] is None else f"{entry[key]:z.7g}" for key in ("value", "second"))
         if entry["sides"]:
-            value = "{:.7g} or {:.7g}".format(*entry["sides"])
+            value = "{:z.7g} or {:z.7g}".format(*entry["sides"])
         table.add_row(entry["of"], entry["wrt"], value or "not finite", second or "", entry["unit"], entry["verdict"])
-    wide_console(table).print(table, highlight=False)
+    show_tables(table)
     still = len(entries) - len(shown)
     for text in ([f"{still} more {'is' if still == 1 else 'are'} zero."] if still else []) + list(result.notes):
         show(text)

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked
 from ballpass.runtime.app.commands.shared import check_folder, command, complain, json_text, load_model, show, show_json
+from ballpass.runtime.run.tables import show_tables
 
 #: Rows of a table on the terminal.
 ROWS = 15
@@ -97,7 +97,7 @@ def sensitivity(
     else:
         from ballpass.runtime.certify.sensitivity_report import render_report
 
-        Console().print(render_report(report, top=ROWS))
+        show_tables(render_report(report, top=ROWS))
         if written:
             show(f"results in {out}: {', '.join(path.name for path in written)}")
     if report.disagreements:

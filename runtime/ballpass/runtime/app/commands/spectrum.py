@@ -15,8 +15,8 @@ import typer
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked, read_duration, read_quantity
 from ballpass.runtime.app.commands.shared import Stages, check_folder, command, load_model, show, show_json
-from ballpass.runtime.app.tables import simple_table, wide_console
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.run.tables import show_tables, simple_table
 
 if TYPE_CHECKING:
     from ballpass.runtime.ask.characteristic import CharacteristicLine
@@ -320,7 +320,7 @@ def _show(
     for row in rows:
         position, height, line = row.values()
         table.add_row(f"{position:.6g}", f"{height:.4g}", line)
-    wide_console(table).print(table)
+    show_tables(table)
     if marks:
         words = ", ".join(f"{mark.label} {mark.frequency:.6g}" for mark in marks)
         show(f"{words}{'' if orders else ' Hz'}; lines {found.resolution:.3g} apart")

@@ -25,8 +25,8 @@ from ballpass.runtime.app.commands.shared import (
     warn,
 )
 from ballpass.runtime.app.interrupted import say_interrupted
-from ballpass.runtime.app.tables import wide_console
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.run.tables import show_tables
 
 #: Members that the terminal shows one by one; of more, the extremes.
 ROWS = 24
@@ -155,7 +155,7 @@ def sweep(
         show_json(swept.report())
     else:
         table = swept.all_members() if count <= ROWS else swept.extremes()
-        wide_console(table).print(table)
+        show_tables(table)
         drawn = sum(name.endswith(".png") for name in files)
         told = [name for name in files if not name.endswith(".png")]
         told += [f"{drawn} figure{'s' if drawn > 1 else ''}"] if drawn else []

@@ -18,9 +18,9 @@ from rich.table import Table
 from ballpass.runtime.app.commands.ranges import Range
 from ballpass.runtime.app.commands.shared import json_text
 from ballpass.runtime.app.summary import TABLE_UNITS
-from ballpass.runtime.app.tables import simple_table
 from ballpass.runtime.contract.folders import replace_files
 from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
+from ballpass.runtime.run.tables import simple_table
 
 if TYPE_CHECKING:
     from ballpass.runtime.many.ensemble import EnsembleResult
@@ -184,17 +184,17 @@ class Sweep:
         """A number with the digits that it has."""
         if not math.isfinite(value):
             return "-"
-        return f"~{value:.2g}" if quantity in self.uncertain.get(member, ()) else f"{value:.5g}"
+        return f"~{value:z.2g}" if quantity in self.uncertain.get(member, ()) else f"{value:z.5g}"
 
     def all_members(self) -> Table:
         """All members, each a row."""
         columns = {name: self.shown(name) for name in self.result.observables}
         heads = [_head(one.path, one.shown_unit) for one in self.ranges]
         heads += [_head(name, unit) for name, (_, unit) in columns.items()]
-        table = simple_table(self.result.manifest.title, heads, right=heads)
+        table = simple_table(self.result.manifest.title, heads, right=heads[len(self.ranges) :])
         for member in range(math.prod(self.shape)):
             values = zip(self.ranges, self.point(member), strict=True)
-            cells = [f"{value / one.factor:.5g}" for one, value in values]
+            cells = [f"{value / one.factor:z.5g}" for one, value in values]
             cells += [self._cell(name, float(column.flat[member]), member) for name, (column, _) in columns.items()]
             table.add_row(*cells)
         return table
@@ -214,5 +214,5 @@ class Sweep:
 
 
 def _head(name: str, unit: str) -> str:
-    """A column's head in a line for each part of the name: numbers are shorter than names."""
-    return "\n".join([*re.findall(r"[^._]+[._]?", name), escape(f"[{unit}]")])
+    """A column's head, the unit in a line of its own."""
+    return f"{name}\n{escape(f'[{unit}]')}"

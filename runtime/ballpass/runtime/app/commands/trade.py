@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked
 from ballpass.runtime.app.commands.shared import Stages, command, load_model, results_folder, show, show_json
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.run.tables import show_tables, simple_table
 
 if TYPE_CHECKING:
     from ballpass.derive.reading.recouple import Coupling
@@ -77,10 +76,10 @@ def trade(
         return
     heads, rows = table(measured, measured.quantities[0])
     title = f"{measured.title}: {measured.quantities[0]}, what no other way beats"
-    shown = Table(*heads, title=title, title_justify="left")
+    shown = simple_table(title, heads, right=heads[:-1], wrapped=heads[-1:])
     for row in rows:
         shown.add_row(*row)
-    Console().print(shown)
+    show_tables(shown)
     for line in words(measured):
         show(line)
     if files:
@@ -104,10 +103,10 @@ def _show_simplification(found: Simplification, *, json_: bool) -> None:
         show_json(to_plain(found))
         return
     heads, lines = rows(found)
-    shown = Table(*heads, title=f"{found.title}; other: {found.simpler_title}", title_justify="left")
+    shown = simple_table(f"{found.title}; other: {found.simpler_title}", heads, right=heads[2:])
     for line in lines:
         shown.add_row(*line)
-    Console().print(shown)
+    show_tables(shown)
     show(found.words)
 
 
