@@ -1,8 +1,9 @@
-"""Sphinx configuration: MyST pages, autodoc of the public interface, furo."""
+"""Sphinx configuration: MyST pages, autodoc of the public interface, executed gallery, furo."""
 
 from __future__ import annotations
 
 import re
+from importlib.metadata import distribution
 from importlib.metadata import version as installed_version
 from typing import Any
 
@@ -16,12 +17,38 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "gallery", "auto_gallery/*.ipynb"]
 html_theme = "furo"
 html_title = f"ballpass {release}"
+html_css_files = ["site.css"]
 
-myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+# one file that has TeX input, SVG output and the letters in it: formulas show without a network
+_MATHJAX = "tex-svg.js"
+_MATHJAX_WHEEL = "sphinx-mathjax-offline"
+html_static_path = [
+    "static",
+    str(distribution(_MATHJAX_WHEEL).locate_file(f"{_MATHJAX_WHEEL}/static/mathjax/{_MATHJAX}")),
+]
+mathjax_path = _MATHJAX
+
+copybutton_prompt_text = "$ "
+copybutton_line_continuation_character = "\\"
+
+sphinx_gallery_conf = {
+    "examples_dirs": "gallery",
+    "gallery_dirs": "auto_gallery",
+    "abort_on_example_error": True,
+    "within_subsection_order": "FileNameSortKey",
+    "min_reported_time": 1000,
+    "remove_config_comments": True,
+    "show_memory": False,
+    "copyfile_regex": r".*\.toml",
+}
+
+myst_enable_extensions = ["amsmath", "attrs_block", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 # words of signatures that name several things, as two classes Statistics: a link to either would do

@@ -1,0 +1,58 @@
+"""
+Which waves are heard
+=====================
+
+Waves on the inner raceway of a bearing with Z balls move the ring as a whole only where
+their number is k Z ± 1. Other numbers of waves cancel around the balls.
+"""
+
+# %%
+# Waves of one amplitude: their numbers are structure, so all are in one scene, at first
+# with zero amplitude.
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from ballpass.derive import generate
+from ballpass.runtime import load
+
+orders = range(5, 12)
+waves = "\n[bearing.inner_waviness]\n" + "".join(
+    f'{n} = {{ amplitude = "0 um" }}\n' for n in orders
+)
+Path("generated").mkdir(exist_ok=True)
+scene = Path("generated/wavy_rotor.toml")
+scene.write_text(Path("../../scenes/rotor.toml").read_text() + waves)
+model = load(generate(scene))
+
+# %%
+# One member of an ensemble for each number of waves, in a preloaded bearing without
+# unbalance and weight.
+quiet = {
+    "bearing.clearance": -8e-6,
+    "loads.weight.force.y": 0.0,
+    "loads.unbalance.mass": 0.0,
+}
+members = [quiet | {f"bearing.inner_waviness.{n}.amplitude": 0.2e-6} for n in orders]
+found = model.simulate_many(members, ["range:inner.y"], cycles=30, transient=15)
+motion = 1e9 * np.asarray(found["range:inner.y"]) / 2
+
+# %%
+# Eight balls: 7 and 9.
+heard = [
+    n
+    for n, amplitude in zip(orders, motion, strict=True)
+    if amplitude > 0.1 * motion.max()
+]
+print("heard:", *heard)
+
+figure, axes = plt.subplots(figsize=(8, 3.4), layout="constrained")
+axes.bar(orders, motion)
+axes.set_xticks(orders)
+axes.set(
+    xlabel="waves on the inner raceway",
+    ylabel="motion of the ring [nm]",
+    title="Eight balls hear 7 and 9 waves",
+)
+plt.show()
