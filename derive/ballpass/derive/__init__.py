@@ -2,7 +2,7 @@
 
     read_scene -> Scene        what to model: frozen, SI, all faults of a file at once
     derive     -> System       SymPy: states, inputs, parameters, definitions, equations of motion, outputs
-    lower      -> Functions    CasADi: right-hand side, Jacobians, contact, outputs, derived constants (`lower.functions`)
+    lower.functions.lower -> Functions    CasADi: right-hand side, Jacobians, contact, outputs, derived constants
     generate   -> folder       C, serialised functions, EQUATIONS.md, manifest.json
 
 Nothing flows back.  `ballpass.runtime` reads the folder and never imports this package.
