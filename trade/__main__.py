@@ -16,8 +16,8 @@ from pathlib import Path
 from ballpass.derive import generate
 from ballpass.runtime import load
 from ballpass.runtime.app.commands.shared import Stages
-from ballpass.runtime.certify.trade import Trade, measure_trade
-from ballpass.runtime.certify.trade_report import percent, table, words
+from ballpass.runtime.certify.trade import measure_trade
+from ballpass.runtime.certify.trade_report import Trade, percent, table, words
 from ballpass.runtime.plot.canvas import save
 from ballpass.runtime.plot.trade import draw_trade
 from trade.promise import ROOT, SCENES, markdown

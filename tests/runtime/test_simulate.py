@@ -375,7 +375,7 @@ def test_jacobian_refuses_what_it_does_not_know(model: Model) -> None:
 
 
 def test_parameters_print_as_a_table(model: Model) -> None:
-    lines = repr(model.parameters).splitlines()
+    lines = str(model.parameters).splitlines()
     assert lines[0].split() == ["name", "value", "unit", "description"]
     assert lines[4].split() == ["body.weight", "4", "kg", "body.weight", "of", "the", "test"]
     assert model.constants({"body.weight": 9.0}) == {"mass": 4.5}

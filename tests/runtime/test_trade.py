@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model, RequestError
-from ballpass.runtime.certify.trade import Measured, Trade, measure_trade, perturbed
-from ballpass.runtime.certify.trade_report import percent, table, to_plain, words
+from ballpass.runtime.certify.trade import measure_trade, perturbed
+from ballpass.runtime.certify.trade_report import Measured, Trade, percent, table, to_plain, words
 from ballpass.runtime.certify.whole_run import Way
 from ballpass.runtime.plot.canvas import save
 from ballpass.runtime.plot.trade import draw_trade

@@ -85,6 +85,12 @@ class System:
             f"{len(self.definitions)} definitions; outputs {outputs or 'none'})"
         )
 
+    def _repr_html_(self) -> str:
+        from ballpass.derive.emit.equations_html import equations_html  # above, by name in pyproject.toml: an object's
+        # view is found at the object
+
+        return equations_html(self)
+
     @property
     def late(self) -> dict[sp.Symbol, sp.Expr]:
         """Definitions that use the sums over the balls or the accelerations, by their symbols."""

@@ -27,6 +27,7 @@ from ballpass.derive.lower.visitor import Visitor
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
 from ballpass.derive.variables import Output
+from ballpass.runtime.show.short import ShortRepr
 
 #: A visitor for each ball of each bearing, by the bearing's prefix.
 Balls = dict[str, list[Visitor]]
@@ -43,8 +44,8 @@ class Constant:
     latex: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Functions:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Functions(ShortRepr):
     """Named functions in the order they are written, with a line for people each.
 
     `jacobians` go to files of their own, read and compiled when a derivative is first asked for; `groups` says which

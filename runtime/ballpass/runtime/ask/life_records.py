@@ -8,16 +8,25 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import groupby
 from typing import Any
 
 from ballpass.runtime.ratings.life import MILLION, hours
 from ballpass.runtime.ratings.wear import COEFFICIENTS
+from ballpass.runtime.show import html
+from ballpass.runtime.show.short import ShortRepr
+
+#: Beside the reading that gives the shortest life.
+GOVERNS = "  <- governs"
+
+#: A line of a report, or a row of a table: head, two cells, mark.
+_Part = str | tuple[str, str, str, str]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RingStrength:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class RingStrength(ShortRepr):
     """One ring of a bearing.
 
     Attributes
@@ -42,8 +51,8 @@ class RingStrength:
     wear_across: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BearingStrength:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class BearingStrength(ShortRepr):
     """One bearing under the load of a run.
 
     Attributes
@@ -103,8 +112,8 @@ class BearingStrength:
         return float(hours(turns, abs(self.speed)))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StateStrength:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class StateStrength(ShortRepr):
     """The bearings of a scene in one state of its duty cycle, or as the scene stands.
 
     Attributes
@@ -126,8 +135,8 @@ class StateStrength:
     samples: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DutyLife:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class DutyLife(ShortRepr):
     """Life of one bearing over a duty cycle, by Miner's rule.
 
     Attributes
@@ -196,23 +205,32 @@ class LifeReport:
         return found
 
     def __str__(self) -> str:
-        lines = textwrap.wrap(f"{self.title}: strength and life of its bearings", 80)
+        return "\n".join(line for part in self._parts() for line in _text(part))
+
+    def _repr_html_(self) -> str:
+        head, *others = self._parts()
+        found = [html.title(str(head))]
+        for rows, group in groupby(others, key=lambda part: isinstance(part, tuple)):
+            parts = list(group)
+            found += [_table(parts)] if rows else [html.paragraph(str(part).strip()) for part in parts if part]
+        return html.block(*found)
+
+    def _parts(self) -> list[_Part]:
+        """What there is to read, in order."""
+        lines: list[_Part] = [f"{self.title}: strength and life of its bearings"]
         for state in self.states:
             if state.name:
                 lines += ["", f"State {state.name}, {100.0 * state.share:.3g} % of the time"]
             if not state.bearings:
                 lines.append("  nothing turns: no damage")
                 continue
-            lines += _wrapped(_turns_words(state))
+            lines.append(f"  {_turns_words(state)}")
             for bearing in state.bearings:
-                lines += ["", *_bearing_lines(bearing)]
-            lines += [
-                "",
-                f"  Wear and P: means of {state.samples} samples; angles from each ring's x axis.",
-            ]
+                lines += ["", *_bearing_parts(bearing)]
+            lines += ["", f"  Wear and P: means of {state.samples} samples; angles from each ring's x axis."]
         for life in self.duty:
-            lines += ["", *_duty_lines(life)]
-        return "\n".join(lines)
+            lines += ["", *_duty_parts(life)]
+        return lines
 
     def __repr__(self) -> str:
         parts = []
@@ -234,12 +252,12 @@ def _turns_words(state: StateStrength) -> str:
     return f"{run}, not settled: the second half moved a life or a peak by {100.0 * state.change:.2g} %."
 
 
-def _bearing_lines(bearing: BearingStrength) -> list[str]:
+def _bearing_parts(bearing: BearingStrength) -> list[_Part]:
     rings = (bearing.inner, bearing.outer)
     at = f"{bearing.peak_time:.5g} s"
     if bearing.peak_angle is not None:
         at += f", {math.degrees(bearing.peak_angle):.1f} deg of crank or shaft"
-    lines = [
+    lines: list[_Part] = [
         f"Bearing {bearing.name}".rstrip() + (" (grooves 0.52 and 0.53, steel: assumed)" if bearing.assumed else ""),
         f"  C_r {_force(bearing.dynamic_rating)} ({_source(bearing, 'dynamic_rating', 'ISO 281')}), "
         f"C_0r {_force(bearing.static_rating)} ({_source(bearing, 'static_rating', 'ISO 76')}), "
@@ -264,43 +282,54 @@ def _bearing_lines(bearing: BearingStrength) -> list[str]:
     places = (f"{math.degrees(ring.wear_angle):.0f} deg, {1e3 * ring.wear_across:.2f} mm" for ring in rings)
     lines += [_row("  there: angle, off the middle", *places), ""]
     if bearing.why_no_life:
-        return lines + _wrapped(f"No rating life. {bearing.why_no_life}")
+        return [*lines, f"  No rating life. {bearing.why_no_life}"]
     lines.append(_row("", "million turns", "hours"))
     lines.append(_life_row(bearing, f"  L_10, P = {_force(bearing.equivalent_load)}", bearing.basic_life))
     for reading, life in bearing.lives.items():
-        mark = "  <- governs" if reading == bearing.governing else ""
-        lines.append(_life_row(bearing, f"  L_10r, {reading}", life) + mark)
+        mark = GOVERNS if reading == bearing.governing else ""
+        lines.append(_life_row(bearing, f"  L_10r, {reading}", life, mark))
     if bearing.factor is not None:
         words = f"  L_nmr, a_ISO {bearing.factor:.3g}, kappa {bearing.viscosity_ratio:.3g}"
         lines.append(_life_row(bearing, words, bearing.modified_life))
     return lines
 
 
-def _duty_lines(life: DutyLife) -> list[str]:
-    lines = [f"Duty cycle, bearing {life.name}".rstrip() + ", Miner's rule over the states"]
+def _duty_parts(life: DutyLife) -> list[_Part]:
+    lines: list[_Part] = [f"Duty cycle, bearing {life.name}".rstrip() + ", Miner's rule over the states"]
     if life.why_no_life:
-        return lines + _wrapped(f"No rating life. {life.why_no_life}")
+        return [*lines, f"  No rating life. {life.why_no_life}"]
     lines.append(_row("", "million turns", "hours"))
     for reading in life.hours:
-        mark = "  <- governs" if reading == life.governing else ""
-        lines.append(_row(f"  L_10r, {reading}", *_life(life.turns[reading], life.hours[reading])) + mark)
+        mark = GOVERNS if reading == life.governing else ""
+        lines.append(_row(f"  L_10r, {reading}", *_life(life.turns[reading], life.hours[reading]), mark))
     if life.modified_hours is not None and life.modified_turns is not None:
         lines.append(_row("  L_nmr", *_life(life.modified_turns, life.modified_hours)))
     shares = ", ".join(f"{name} {100.0 * share:.3g} %" for name, share in life.damage.items())
-    return lines + _wrapped(f"Damage: {shares}.")
+    return [*lines, f"  Damage: {shares}."]
 
 
-def _wrapped(text: str) -> list[str]:
-    return textwrap.wrap(text, 78, initial_indent="  ", subsequent_indent="  ")
+def _text(part: _Part) -> list[str]:
+    """Lines of a terminal of 80 columns."""
+    if isinstance(part, tuple):
+        head, first, second, mark = part
+        return [f"{head:<32}{first:>18}{second:>18}{mark}".rstrip()]
+    lead = "  " if part.startswith("  ") else ""
+    return textwrap.wrap(part.strip(), 78, initial_indent=lead, subsequent_indent=lead) or [""]
 
 
-def _row(head: str, first: str, second: str) -> str:
-    return f"{head:<32}{first:>18}{second:>18}".rstrip()
+def _table(rows: Sequence[Any]) -> str:
+    """Rows as HTML, the first of them heads."""
+    heads, *others = rows
+    return html.table(heads, others, right=heads[1:3])
 
 
-def _life_row(bearing: BearingStrength, head: str, life: float | None) -> str:
+def _row(head: str, first: str, second: str, mark: str = "") -> _Part:
+    return head, first, second, mark
+
+
+def _life_row(bearing: BearingStrength, head: str, life: float | None, mark: str = "") -> _Part:
     assert life is not None  # the bearing turns
-    return _row(head, *_life(life, bearing.hours(life)))
+    return _row(head, *_life(life, bearing.hours(life)), mark)
 
 
 def _life(turns: float, spent: float) -> tuple[str, str]:

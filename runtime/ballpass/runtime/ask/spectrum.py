@@ -26,18 +26,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
+from ballpass.runtime.show import html
+from ballpass.runtime.show.short import ShortRepr
 
 #: Name of a window.
 Window = str
 #: Powers of lines [unit^2], or per bandwidth [unit^2/Hz], as in `scipy.signal`.
 Scaling = Literal["spectrum", "density"]
 
+#: Lines that a notebook shows.
+LISTED = 8
+
 #: Largest difference between steps that still counts as equal, relative to the step; rounding of t is far below.
 _STEP_TOLERANCE = 1e-6
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AmplitudeSpectrum:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class AmplitudeSpectrum(ShortRepr):
     """Single-sided amplitude spectrum.
 
     Attributes
@@ -55,9 +60,12 @@ class AmplitudeSpectrum:
     cycles: int | None
     window: Window
 
+    def _repr_html_(self) -> str:
+        return _highest(self, "amplitude", self.amplitude)
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PowerSpectrum:
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class PowerSpectrum(ShortRepr):
     """Single-sided power spectrum, by Welch's method.
 
     Attributes
@@ -73,6 +81,25 @@ class PowerSpectrum:
     resolution: float
     window: Window
     scaling: Scaling
+
+    def _repr_html_(self) -> str:
+        return _highest(self, "power", self.power)
+
+
+def _highest(spectrum: AmplitudeSpectrum | PowerSpectrum, head: str, sizes: NDArray[np.float64]) -> str:
+    """The highest lines of a spectrum as HTML."""
+    chosen = np.argsort(-sizes, kind="stable")[:LISTED]
+    return html.block(
+        html.title(
+            f"{type(spectrum).__name__}: {sizes.size} lines up to {spectrum.frequency[-1]:.6g} Hz",
+            f"lines {spectrum.resolution:.4g} Hz apart, window {spectrum.window}; the highest:",
+        ),
+        html.table(
+            ("frequency [Hz]", head),
+            [(f"{spectrum.frequency[k]:.6g}", f"{sizes[k]:.4g}") for k in chosen],
+            right=("frequency [Hz]", head),
+        ),
+    )
 
 
 def power_spectrum(

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum, even_samples, window_weights
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
+from ballpass.runtime.show.short import ShortRepr
 
 Array = NDArray[np.float64]
 
@@ -156,8 +157,8 @@ def order_spectrum(
     return amplitude_spectrum(turns, values, cycle_length=1.0, window=window)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spectrogram:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Spectrogram(ShortRepr):
     """Amplitudes over time and frequency.
 
     Attributes

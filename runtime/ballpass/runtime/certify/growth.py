@@ -25,6 +25,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.locating import LOCATED, choose_kinks
 from ballpass.runtime.run.reductions import channel_names, observable_aliases
 from ballpass.runtime.run.request import Request, make_plan
+from ballpass.runtime.show.short import ShortRepr
 
 #: Relative change of a number that four printed digits do not bear [1].
 DIGITS = 5e-4
@@ -45,8 +46,8 @@ KINDS = ("min", "max", "rms")
 PLACES = ("peak_time", "peak_ball", "min_time")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Growth:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Growth(ShortRepr):
     """What a moved start changes.
 
     Attributes

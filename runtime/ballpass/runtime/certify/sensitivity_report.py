@@ -20,6 +20,7 @@ from ballpass.runtime.certify.grazing import Grazing, describe, merge_grazing
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.run.tables import printed, simple_table
+from ballpass.runtime.show import html
 
 #: Grazing places that are listed; the JSON has all.
 LISTED = 3
@@ -118,6 +119,9 @@ class SensitivityReport:
     def __str__(self) -> str:
         """The tables of ``ballpass sensitivity``, without colours."""
         return printed(render_report(self))
+
+    def _repr_html_(self) -> str:
+        return html.block(html.from_terminal(render_report(self)))
 
     def __getitem__(self, key: tuple[str, str]) -> Sensitivity:
         """The pair of a quantity and a parameter."""

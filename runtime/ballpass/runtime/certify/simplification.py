@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ballpass.runtime.certify.trade import MEMBERS, PROMISED, SPREAD, perturbed, reference
-from ballpass.runtime.certify.trade_report import milliseconds, percent
+from ballpass.runtime.certify.trade import MEMBERS, SPREAD, perturbed, reference
+from ballpass.runtime.certify.trade_report import PROMISED, milliseconds, percent
 from ballpass.runtime.certify.whole_run import Way, check_observables, default_observables, prepare
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel

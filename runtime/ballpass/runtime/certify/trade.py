@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from ballpass.runtime.certify.trade_report import PROMISED, Measured, Trade
 from ballpass.runtime.certify.whole_run import (
     Observable,
     Way,
@@ -41,77 +41,6 @@ SPREAD = 0.005
 
 #: Members of the ensemble.
 MEMBERS = 40
-
-#: Errors that people ask for [1].
-TARGETS = (0.1, 0.01, 0.001, 0.0001)
-
-#: Part of the members whose error is at most what is promised.
-PROMISED = 0.95
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Measured:
-    """What a way to integrate gave.
-
-    Attributes
-    ----------
-    way : how it was integrated
-    time : median over the members, of the integration of one cycle [s]
-    median, promised : relative error of each quantity: median and 95 % point over the members, none below the
-        reference's uncertainty [1]
-    failures : members it could not finish
-    """
-
-    way: Way
-    time: float
-    median: Mapping[str, float]
-    promised: Mapping[str, float]
-    failures: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Trade:
-    """Accuracy against time on one scene.
-
-    Attributes
-    ----------
-    scene, title : of the scene
-    quantities : what errors are measured of
-    values : of the quantities, medians over the members, in SI
-    uncertainty : relative, of the reference: 95 % point of the difference of two methods [1]
-    members : parameter sets
-    spread : half the width of the interval they are drawn from [1]
-    cycles : turns of a run
-    measured : all ways
-    """
-
-    scene: str
-    title: str
-    quantities: tuple[str, ...]
-    values: Mapping[str, float]
-    uncertainty: Mapping[str, float]
-    members: int
-    spread: float
-    cycles: float
-    measured: tuple[Measured, ...]
-
-    def error(self, one: Measured, quantity: str | None = None) -> float:
-        """95 % point of a quantity's error; of the worst quantity where none is named."""
-        return max(one.promised.values()) if quantity is None else one.promised[quantity]
-
-    def front(self, quantity: str | None = None) -> tuple[Measured, ...]:
-        """Ways that no other beats in both error and time, from cheap to accurate."""
-        found: list[Measured] = []
-        for one in sorted(self.measured, key=lambda m: (m.time, self.error(m, quantity))):
-            error = self.error(one, quantity)
-            if math.isfinite(error) and (not found or error < self.error(found[-1], quantity)):
-                found.append(one)
-        return tuple(found)
-
-    def cheapest(self, target: float, quantity: str | None = None) -> Measured | None:
-        """The fastest way whose error is within the target for 95 % of the members; None where none is."""
-        fit = [one for one in self.measured if self.error(one, quantity) <= target]
-        return min(fit, key=lambda m: m.time) if fit else None
 
 
 def ways_of(model: LoadedModel) -> tuple[Way, ...]:

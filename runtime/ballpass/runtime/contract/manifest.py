@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.json_text import from_plain
+from ballpass.runtime.show.short import ShortRepr
 
 SCHEMA = 5
 FILE_NAME = "manifest.json"
@@ -271,8 +272,8 @@ class MechanismInfo:
     rate: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Manifest:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Manifest(ShortRepr):
     """Everything `runtime` knows of a model."""
 
     schema: int = SCHEMA

@@ -13,13 +13,17 @@ import numpy as np
 from ballpass.runtime.contract import Manifest, ParameterInfo
 from ballpass.runtime.contract.bounds import violations
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.show import html
+from ballpass.runtime.show.short import ShortRepr
 
 #: Most characters of an unknown name that a message shows.
 LONGEST_NAME = 100
 
+_HEADS = ("name", "value", "unit", "description")
+
 
 class Parameters(Mapping[str, float]):
-    """Run-time parameters: name to value in SI; printed as a table with units and descriptions."""
+    """Run-time parameters: name to value in SI; ``print`` shows a table with units and descriptions."""
 
     __slots__ = ("_infos", "_values")
 
@@ -45,15 +49,28 @@ class Parameters(Mapping[str, float]):
         return self._infos[name]
 
     def __repr__(self) -> str:
-        rows = [("name", "value", "unit", "description")]
-        rows += [(name, f"{self[name]:.8g}", info.unit, info.description) for name, info in self._infos.items()]
+        first = ", ".join(f"{name} {self[name]:.8g} {info.unit}" for name, info in list(self._infos.items())[:3])
+        return f"Parameters({len(self)}: {first}{', ...' if len(self) > 3 else ''})"
+
+    def __str__(self) -> str:
+        rows = [_HEADS, *self._rows()]
         names, values, units, _ = (max(map(len, column)) for column in zip(*rows, strict=True))
         lines = [f"{a:<{names}}  {b:>{values}}  {c:<{units}}  {d}".rstrip() for a, b, c, d in rows]
         return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
 
+    def _repr_html_(self) -> str:
+        return html.block(self.table_html())
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Numbers:
+    def table_html(self) -> str:
+        """The table as HTML, for a larger block of a notebook."""
+        return html.table(_HEADS, self._rows(), right=("value",))
+
+    def _rows(self) -> list[tuple[str, str, str, str]]:
+        return [(name, f"{self[name]:.8g}", info.unit, info.description) for name, info in self._infos.items()]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Numbers(ShortRepr):
     """The numbers of one run: parameters and constants, as vectors and by name."""
 
     parameters: Parameters

@@ -48,6 +48,7 @@ from ballpass.runtime.many.distributions import Distribution, draw
 from ballpass.runtime.many.signals import Made, Member, Signals, check_outputs, make_signals
 from ballpass.runtime.many.spall_entries import entry_times
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.show.short import ShortRepr
 
 #: Bytes of the samples of one output in a chunk, about.
 CHUNK_BYTES = 4_000_000
@@ -80,8 +81,8 @@ class SignalClass:
     parameters: Mapping[str, Distribution | float]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DataSetReport:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class DataSetReport(ShortRepr):
     """What became of a data set.
 
     Attributes

@@ -36,6 +36,7 @@ from ballpass.runtime.run.reductions import channel_names, channels_needed, obse
 from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, check_memory, on_request
 from ballpass.runtime.run.request import tolerance as relative_tolerance
 from ballpass.runtime.run.tables import printed, simple_table
+from ballpass.runtime.show import html
 
 if TYPE_CHECKING:
     import xarray
@@ -105,6 +106,9 @@ class EnsembleResult(Mapping[str, np.ndarray]):
 
     def __str__(self) -> str:
         return printed(_render(self))
+
+    def _repr_html_(self) -> str:
+        return html.block(html.from_terminal(_render(self)))
 
     def __getitem__(self, name: str) -> np.ndarray:
         try:

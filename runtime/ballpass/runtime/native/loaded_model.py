@@ -28,6 +28,7 @@ from ballpass.runtime.native.driver_library import (
 from ballpass.runtime.native.ensemble_driver import EnsembleDriver
 from ballpass.runtime.native.functions import Functions
 from ballpass.runtime.native.stepper import Stepper
+from ballpass.runtime.show import html
 
 _Driver = TypeVar("_Driver", Stepper, EnsembleDriver)
 
@@ -56,6 +57,21 @@ class LoadedModel(Functions):
         how = "compiled" if self.compiled else "in CasADi's virtual machine"
         counts = f"{len(self.states)} states, {len(self.manifest.parameters)} parameters, {len(self.outputs)} outputs"
         return f"{type(self).__name__}({self.manifest.scene}: {counts}, {how})"
+
+    def _repr_html_(self) -> str:
+        manifest, parameters = self.manifest, self.parameters
+        heads = ("name", "unit", "description")
+        lists = {"states": manifest.states, "outputs": manifest.outputs}
+        return html.block(
+            html.title(manifest.title or manifest.scene, repr(self)),
+            *(
+                html.folded(
+                    f"{len(infos)} {words}", html.table(heads, [(i.name, i.unit, i.description) for i in infos])
+                )
+                for words, infos in lists.items()
+            ),
+            html.folded(f"{len(parameters)} parameters", parameters.table_html()),
+        )
 
     @property
     def compiled(self) -> bool:

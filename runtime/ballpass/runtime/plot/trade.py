@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from ballpass.runtime.certify.trade import Measured, Trade
+from ballpass.runtime.certify.trade_report import Measured, Trade
 from ballpass.runtime.plot.canvas import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
 from ballpass.runtime.run.locating import LOCATED
 

@@ -28,6 +28,7 @@ from ballpass.runtime.point.jacobian import RHS, Rows, contract, directions_of, 
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.equilibrium_newton import Rest, settle
 from ballpass.runtime.run.tables import printed, simple_table
+from ballpass.runtime.show import html
 
 Array = NDArray[np.float64]
 
@@ -91,6 +92,9 @@ class StaticEquilibrium:
 
     def __str__(self) -> str:
         return printed(_render(self))
+
+    def _repr_html_(self) -> str:
+        return html.block(html.from_terminal(_render(self)))
 
     def __getitem__(self, name: str) -> float:
         """Position by name [m]."""

@@ -26,6 +26,7 @@ from ballpass.runtime.point.slopes import jacobian
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.run.simulate import STIFF_RATIO, choose_method
+from ballpass.runtime.show.short import ShortRepr
 
 #: Instants of a turn that are searched for the lightest and the heaviest load.
 INSTANTS = 360
@@ -74,8 +75,8 @@ class TimeScale:
         return self.decay / self.frequency if self.frequency > 0.0 else math.inf if self.decay > 0.0 else 0.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Explanation:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Explanation(ShortRepr):
     """What a run of a model consists of.
 
     Attributes

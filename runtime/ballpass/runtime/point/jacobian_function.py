@@ -65,6 +65,12 @@ class JacobianFunction:
     evaluate : the compiled code alone, for whoever writes `x` and reads the memory himself
     """
 
+    def __repr__(self) -> str:
+        return (
+            f"JacobianFunction({len(self.rows)} rows {self.rows[0]} ... by {len(self.columns)} columns "
+            f"{self.columns[0]} ..., {len(self.sparsity.rows)} entries)"
+        )
+
     def __init__(
         self, model: LoadedModel, numbers: Numbers, of: str | Sequence[str], wrt: str | Sequence[str], *, t: float
     ) -> None:

@@ -31,6 +31,7 @@ from ballpass.runtime.point.jacobian import RHS, STATES, directions_of, rows_of
 from ballpass.runtime.point.slopes import Deflections, KinkWarning, Point, Slopes, named, slopes
 from ballpass.runtime.run.magnitudes import mass_matrix
 from ballpass.runtime.run.tables import printed, simple_table
+from ballpass.runtime.show import html
 
 Array = NDArray[np.float64]
 
@@ -99,6 +100,9 @@ class Linearization:
 
     def __str__(self) -> str:
         return printed(Group(render_linearization(self), render_matrices(self)))
+
+    def _repr_html_(self) -> str:
+        return html.block(html.from_terminal(Group(render_linearization(self), render_matrices(self))))
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:

@@ -6,9 +6,11 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ballpass.runtime.show.short import ShortRepr
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Accuracy:
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Accuracy(ShortRepr):
     """What was asked, chosen and found.
 
     Attributes

@@ -28,6 +28,7 @@ from ballpass.runtime.native.reduction_rows import (
 from ballpass.runtime.ratings.of_bearing import ratings_of
 from ballpass.runtime.ratings.readings import KINDS as LIFE
 from ballpass.runtime.ratings.readings import LoadPowers, lives
+from ballpass.runtime.show.short import ShortRepr
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,8 +64,8 @@ class Reduction:
         return self.maximum - self.minimum
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reductions(Mapping[str, Reduction]):
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Reductions(ShortRepr, Mapping[str, Reduction]):
     """Reductions of a run by channel: ``reductions["ball.force"].maximum``.
 
     Attributes

@@ -20,10 +20,11 @@ from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, check_kinks, re
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution
+from ballpass.runtime.show.short import ShortRepr
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sensitivities:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class Sensitivities(ShortRepr):
     """A solution and the derivatives of its states.
 
     Attributes

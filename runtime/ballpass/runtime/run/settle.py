@@ -23,6 +23,7 @@ from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.run.start import RunEnd, start_time
+from ballpass.runtime.show.short import ShortRepr
 
 #: Change of extremes, relative to the channel's range, and of rms, relative to itself, that counts as none [1].
 PEAKS, MEANS = 5e-3, 1e-2
@@ -34,8 +35,8 @@ LEAST, MOST = 64, 4096
 STEPS = 100_000
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Settled:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Settled(ShortRepr):
     """A run whose extremes and means more turns do not change.
 
     Attributes

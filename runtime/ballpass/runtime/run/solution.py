@@ -22,6 +22,7 @@ from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import no_output
 from ballpass.runtime.run.start import RunEnd
+from ballpass.runtime.show import html
 
 if TYPE_CHECKING:
     import xarray
@@ -145,6 +146,18 @@ class Solution:
             f"rtol {self.statistics.rtol:g}; {self.status.name.lower()}; outputs: {', '.join(self.outputs) or 'none'})"
         )
 
+    def _repr_html_(self) -> str:
+        infos = {info.name: info for info in (*self.manifest.states, *self.manifest.outputs)}
+        names = dict.fromkeys((*self.states, *self.outputs))
+        rows = [(name, *_extent(self[name]), infos[name].unit, infos[name].description) for name in names]
+        heads = ("name", "min", "mean", "max", "unit", "description")
+        words = repr(self).partition("; outputs:")[0].partition("(")[2]
+        return html.block(
+            html.title(self.manifest.title or self.manifest.scene, words),
+            html.paragraph(self.accuracy.words) if self.accuracy is not None else "",
+            html.table(heads, rows, right=heads[1:4]),
+        )
+
     @property
     def nbytes(self) -> int:
         """Bytes of the samples, which is about the size of the file that `save` writes."""
@@ -222,6 +235,13 @@ class Solution:
                 "folder you may write, with enough free space."
             ) from fault
         return target
+
+
+def _extent(samples: np.ndarray) -> tuple[str, str, str]:
+    """Minimum, mean of the samples and maximum, as text."""
+    if not samples.size:
+        return ("", "", "")
+    return (f"{np.min(samples):.4g}", f"{np.mean(samples):.4g}", f"{np.max(samples):.4g}")
 
 
 def load_solution(path: str | Path) -> Solution:

@@ -17,13 +17,14 @@ from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.ball_angles import ball_angles
+from ballpass.runtime.show.short import ShortRepr
 
 #: Angles of driver and balls that differ by less are one, but for the rounding of many turns [rad].
 SAME_ANGLE = 1e-9
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class RunEnd:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class RunEnd(ShortRepr):
     """Where a run has come to: another one goes on from it, ``initial=solution.end``.
 
     Attributes

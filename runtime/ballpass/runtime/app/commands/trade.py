@@ -18,7 +18,7 @@ from ballpass.runtime.run.tables import show_tables, simple_table
 if TYPE_CHECKING:
     from ballpass.derive.reading.recouple import Coupling
     from ballpass.runtime.certify.simplification import Simplification
-    from ballpass.runtime.certify.trade import Trade
+    from ballpass.runtime.certify.trade_report import Trade
     from ballpass.runtime.model import Model
 
 

@@ -1,0 +1,117 @@
+"""HTML of objects in notebooks: one look, no script, everything escaped.
+
+In: heads and rows of text, or the tables of a terminal.  Out: HTML that stands alone, light on dark as dark on light.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from html import escape
+from typing import Any
+
+#: Colours come from the notebook; rules and heads are translucent, so that they fit both a light and a dark page.
+_STYLE = """
+.ballpass { font-size: 0.92em; line-height: 1.4; margin: 0.3em 0; }
+.ballpass .scroll { overflow-x: auto; max-width: 100%; }
+.ballpass .formula { display: block; overflow-y: hidden; }
+.ballpass table { border-collapse: collapse; margin: 0.3em 0 0.6em; }
+.ballpass th, .ballpass td { padding: 0.15em 0.8em 0.15em 0; text-align: left; vertical-align: top; border: 0; }
+.ballpass thead th { border-bottom: 1px solid rgba(128, 128, 128, 0.6); font-weight: 600; vertical-align: bottom; }
+.ballpass .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.ballpass td:last-child:not(.number) { min-width: 9em; }
+.ballpass .title { font-weight: 600; }
+.ballpass .note { opacity: 0.75; }
+.ballpass p { margin: 0.2em 0; }
+.ballpass summary { cursor: pointer; font-weight: 600; }
+.ballpass math { font-size: 1.1em; }
+.ballpass .good { color: #2e8b57; }
+.ballpass .bad { color: #d1495b; font-weight: 600; }
+.ballpass .doubt { color: #b7791f; }
+"""
+
+#: Styles of the terminal, and the classes that take their place.
+_CLASSES = {"green": "good", "bold red": "bad", "yellow": "doubt"}
+
+
+def block(*parts: str) -> str:
+    """Parts, HTML already, as one output of a notebook."""
+    return f'<div class="ballpass"><style>{_STYLE}</style>{"".join(parts)}</div>'
+
+
+def title(words: str, note: str = "") -> str:
+    """A line that says what this is, and a fainter one about it."""
+    return f'<p><span class="title">{escape(words)}</span></p>' + (paragraph(note) if note else "")
+
+
+def paragraph(words: str) -> str:
+    """A line of text."""
+    return f'<p class="note">{escape(words)}</p>'
+
+
+def folded(words: str, content: str, *, opened: bool = False) -> str:
+    """Content, HTML already, under a line that opens and closes it."""
+    state = ' open=""' if opened else ""
+    return f"<details{state}><summary>{escape(words)}</summary>{content}</details>"
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[object]], *, right: Collection[str] = ()) -> str:
+    """A table.
+
+    Parameters
+    ----------
+    rows : of cells, shown as ``str`` shows them
+    right : heads of the columns that are aligned to the right
+    """
+    return _table(heads, ([escape(str(cell)) for cell in row] for row in rows), [head in right for head in heads])
+
+
+def _table(heads: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[bool]) -> str:
+    """A table of cells that are HTML."""
+    looks = [' class="number"' if numbers else "" for numbers in right]
+    head = "".join(f'<th scope="col"{look}>{escape(name)}</th>' for look, name in zip(looks, heads, strict=True))
+    body = "".join(
+        f"<tr>{''.join(f'<td{look}>{cell}</td>' for look, cell in zip(looks, row, strict=True))}</tr>" for row in rows
+    )
+    return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def from_terminal(printed: Any) -> str:
+    """Tables and lines of a terminal (rich's Table, Text, Group of them) as HTML."""
+    return "".join(_parts(printed))
+
+
+def _parts(printed: Any) -> Iterator[str]:
+    from rich.console import Group
+    from rich.table import Table
+
+    if isinstance(printed, Group):
+        for part in printed.renderables:
+            yield from _parts(part)
+    elif isinstance(printed, Table):
+        if printed.title:
+            yield f'<p class="title">{_cell(printed.title)}</p>'
+        columns = [[_cell(cell) for cell in column.cells] for column in printed.columns]
+        heads = [_text(column.header).plain for column in printed.columns]
+        yield _table(heads, list(zip(*columns, strict=True)), [c.justify == "right" for c in printed.columns])
+        if printed.caption:
+            yield f'<p class="note">{_cell(printed.caption)}</p>'
+    else:
+        yield f"<p>{_cell(printed)}</p>"
+
+
+def _text(cell: Any) -> Any:
+    from rich.text import Text
+
+    return cell if isinstance(cell, Text) else Text.from_markup(str(cell))
+
+
+def _cell(cell: Any) -> str:
+    """A cell's text with the colours that mean something."""
+    text = _text(cell)
+    words, at, parts = text.plain, 0, []
+    for span in sorted(text.spans):
+        if str(span.style) in _CLASSES and span.start >= at:
+            parts += [escape(words[at : span.start])]
+            parts += [f'<span class="{_CLASSES[str(span.style)]}">{escape(words[span.start : span.end])}</span>']
+            at = span.end
+    return "".join([*parts, escape(words[at:])])

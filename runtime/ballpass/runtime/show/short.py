@@ -1,0 +1,38 @@
+"""Short reprs of records: a line or a few, whatever arrays and tables they hold."""
+
+from __future__ import annotations
+
+import reprlib
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+#: Most characters of a repr.
+LONGEST = 800
+
+
+class _Values(reprlib.Repr):
+    """Values of fields: of containers the first few, of arrays the shape."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel, self.maxdict, self.maxlist, self.maxtuple = 3, 3, 4, 4
+        self.maxstring = self.maxother = 80
+
+    def repr_float64(self, number: Any, level: int) -> str:
+        return repr(float(number))
+
+    def repr_ndarray(self, array: Any, level: int) -> str:
+        return f"array{array.shape}" if array.size > 4 else repr(array)
+
+
+class ShortRepr:
+    """Gives a dataclass (with ``repr=False``) a repr that does not print what it holds to the last number."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        assert is_dataclass(self)
+        values = _Values()
+        shown = (f"{item.name}={values.repr(getattr(self, item.name))}" for item in fields(self) if item.repr)
+        text = f"{type(self).__name__}({', '.join(shown)})"
+        return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...)"

@@ -1,0 +1,140 @@
+"""What objects show in notebooks and consoles: HTML that parses and escapes, texts that stay short."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from ballpass.derive import derive, equations, lower
+from ballpass.derive.reading.read import scene_from_text
+from ballpass.runtime import Model
+from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
+from ballpass.runtime.ask.vibration import diagnosis, spectrogram
+from ballpass.runtime.certify.trade import measure_trade
+from ballpass.runtime.certify.whole_run import Way
+from ballpass.runtime.many.signals import Signals
+
+#: What must not reach a page as it is.
+ATTACK = '<script>alert("&")</script>'
+
+WAYS = (Way(method="stepper", rtol=1e-5), Way(method="stepper-rodas4", rtol=1e-3))
+
+CLEARANCE = "bearing.clearance"
+
+
+def titled(model: Model) -> Model:
+    return Model(model.folder, replace(model.manifest, title=ATTACK), model.library)
+
+
+def by_class(*items: Any) -> dict[str, Any]:
+    return {type(item).__name__: item for item in items}
+
+
+@pytest.fixture(scope="module")
+def shown(rotor: Model, scene_text: Callable[..., str]) -> dict[str, Any]:
+    """Objects of calls that take no time, of a scene whose title is an attack."""
+    system = derive(replace(scene_from_text(scene_text("varying_compliance"), "rotor"), title=ATTACK))
+    model = titled(rotor)
+    solution = model.simulate(3)
+    t, x = solution.t, solution["inner.x"]
+    return by_class(
+        *(system, system.scene, lower(system), model, model.manifest, model.parameters, model.numbers()),
+        *(solution, solution.statistics, solution.end, solution.reductions, solution.reductions),
+        *(model.refine_peak(solution, "ball.elastic_force"), model.explain(), model.static_equilibrium()),
+        *(model.linearize(), model.linearize().modes[0], model.jacobian_function("rhs"), model.library),
+        *(amplitude_spectrum(t, x), power_spectrum(t, x), spectrogram(t, x, segment=0.02), diagnosis(x)),
+        Signals(outputs=("inner.x",), sample_rate=1e4, duration=0.1),
+    )
+
+
+@pytest.fixture(scope="module")
+def reports(make_model: Callable[..., Model]) -> dict[str, Any]:
+    """The same of calls that run often, or compile more."""
+    model = titled(make_model("punching_press"))
+    life, trade = model.life(3), measure_trade(model, members=2, ways=WAYS)
+    sensitivity = model.sensitivity("peak_ball_force", CLEARANCE, 3)
+    many = model.simulate_many({CLEARANCE: [5e-6, 8e-6]}, "peak_ball_force", cycles=3)
+    exact = model.simulate(3, error=0.05)
+    return by_class(
+        *(life, life.states[0], life.bearings[0], life.bearings[0].inner, trade, trade.measured[0]),
+        *(sensitivity, sensitivity.pairs[0], many, many.statistics, model.sensitivities(CLEARANCE, 1)),
+        *(exact, exact.accuracy, model.settle(), model.growth(3)),
+    )
+
+
+def check_reprs(items: dict[str, Any]) -> None:
+    lengths = {name: len(repr(item)) for name, item in items.items()}
+    assert {name: length for name, length in lengths.items() if length > 1000} == {}
+
+
+def check_html(item: Any, words: str, *, with_title: bool) -> None:
+    page = ET.fromstring(item._repr_html_())  # each element closed, each sign escaped
+    text = "".join(page.itertext())
+    assert words in text
+    assert not list(page.iter("script"))
+    assert (ATTACK in text) == with_title
+
+
+def test_reprs_are_short(shown: dict[str, Any]) -> None:
+    """The system of the press once printed 84 124 characters."""
+    check_reprs(shown)
+
+
+@pytest.mark.long
+def test_reprs_of_reports_are_short(reports: dict[str, Any]) -> None:
+    check_reprs(reports)
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "with_title"),
+    [
+        ("System", "Equations of motion", True),
+        ("Model", "bearing.clearance", True),
+        ("Parameters", "Diametral clearance", False),
+        ("Solution", "centre of the inner ring", True),
+        ("Linearization", "ratio", False),
+        ("StaticEquilibrium", "ball 8", False),
+        ("AmplitudeSpectrum", "frequency", False),
+        ("PowerSpectrum", "power", False),
+    ],
+)
+def test_notebooks_get_html_that_parses_and_escapes(
+    shown: dict[str, Any], name: str, words: str, with_title: bool
+) -> None:
+    check_html(shown[name], words, with_title=with_title)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "words", "with_title"),
+    [
+        ("Solution", "estimated", True),
+        ("SensitivityReport", "verified", False),
+        ("Trade", "stepper-rodas4", True),
+        ("EnsembleResult", "median", True),
+        ("LifeReport", "peak pressure", True),
+    ],
+)
+def test_reports_give_html_that_parses_and_escapes(
+    reports: dict[str, Any], name: str, words: str, with_title: bool
+) -> None:
+    check_html(reports[name], words, with_title=with_title)
+
+
+def test_equations_are_mathml_with_every_formula_of_the_page(shown: dict[str, Any]) -> None:
+    """No `$` is left for a notebook to typeset, which some do with a script of the network and some not at all."""
+    page = ET.fromstring(shown["System"]._repr_html_())
+    text = "".join(page.itertext())
+    assert "$" not in text
+    assert "\\" not in text
+    maths = [item for item in page.iter() if item.tag.endswith("}math")]
+    markdown = equations(shown["System"])
+    displayed = markdown.count("$$") // 2
+    assert len(maths) == displayed + (markdown.count("$") - 4 * displayed) // 2
+    head = next(item for item in page.iter("details") if "open" in item.attrib)
+    assert head[0].text == "Equations of motion, Eq. (2)"
+    assert len([item for item in head.iter() if item.tag.endswith("}math")]) == 2  # along x and y
