@@ -102,6 +102,7 @@ _HOME = {
     "Parameters": "contract.parameters",
     "Status": "contract.status",
     "UnusualWarning": "contract.usual",
+    "__version__": "contract.version",
     "MemberFailure": "many.chunks",
     "DataSetReport": "many.data_set",
     "SignalClass": "many.data_set",
@@ -134,8 +135,6 @@ _HOME = {
 
 
 def __getattr__(name: str) -> Any:
-    if name == "__version__":
-        return import_module("importlib.metadata").version("ballpass")
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

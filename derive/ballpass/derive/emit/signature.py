@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from ballpass.derive.scene.file_columns import named_files
 from ballpass.runtime import contract as mf
 from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.version import __version__
 
 if TYPE_CHECKING:
     from ballpass.derive.scene.bearing_records import Bearing
@@ -49,7 +50,7 @@ def source_key(path: Path) -> str:
 
 def versions() -> tuple[tuple[str, str], ...]:
     """Names and versions of the packages that decide what is generated."""
-    return tuple((name, version(name)) for name in ("ballpass", "casadi", "sympy"))
+    return (("ballpass", __version__), *((name, version(name)) for name in ("casadi", "sympy")))
 
 
 def folder_of(scene: str | Path | Scene, out: str | Path | None = None) -> Path:

@@ -7,7 +7,6 @@ to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 t
 from __future__ import annotations
 
 import math
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
@@ -27,14 +26,18 @@ from ballpass.runtime.app.commands.dataset import dataset
 from ballpass.runtime.app.commands.explain import explain
 from ballpass.runtime.app.commands.jacobian import jacobian, linearize
 from ballpass.runtime.app.commands.life import life
+from ballpass.runtime.app.commands.new import new
 from ballpass.runtime.app.commands.sensitivity import sensitivity
 from ballpass.runtime.app.commands.shared import (
     Stages,
+    can_draw,
     check_folder,
     checked_kinks,
     command,
     complain,
+    generated_folder,
     load_model,
+    name_of,
     note,
     read_own,
     results_folder,
@@ -49,6 +52,7 @@ from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import read_error, trade
 from ballpass.runtime.contract import read_artefact, read_manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.version import __version__
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
@@ -59,13 +63,15 @@ if TYPE_CHECKING:
 #: Bytes of samples that are written without a word.
 LARGE = 200_000_000
 
+#: Groups of commands in ``ballpass --help``, in this order.
+DESCRIBE, SIMULATE, ASK = "From scene to equations", "Simulate and export", "Ask of a scene"
+
 app = typer.Typer(
-    add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["--help", "-h"]},
     help="Planar mechanisms and the ball bearings they load: from a scene file to derived equations, generated C, a "
-    "simulation and figures. Start with: ballpass run scenes/punching_press.toml",
+    "simulation and figures. Start with: ballpass new press, then ballpass run punching_press.toml",
     epilog="Results go to stdout, messages and progress to stderr. Exit codes: 0 done, 1 the computation failed, 2 the "
     "request was wrong.",
 )
@@ -73,7 +79,7 @@ app = typer.Typer(
 
 def _print_version(asked: bool) -> None:
     if asked:
-        typer.echo(f"ballpass {version('ballpass')}")
+        typer.echo(f"ballpass {__version__}")
         raise typer.Exit
 
 
@@ -86,9 +92,12 @@ def _common(
     """Options of `ballpass` itself; the commands have their own."""
 
 
-@app.command()
+app.command(rich_help_panel=DESCRIBE)(new)
+
+
+@app.command(rich_help_panel=SIMULATE)
 def run(
-    scene: options.SceneFile,
+    scene: options.SceneOrFolder,
     cycles: options.Cycles = None,
     turns: Annotated[
         str | None,
@@ -163,6 +172,7 @@ def run(
         at_kinks = checked_kinks(kinks, method or asked.run.method, error)
         target = read_error(error, of, method, rtol)
         folder = results_folder(out, scene)
+        figures = figures and can_draw()
         model = load_model(scene, stages, method or asked.run.method, kinks, rtol, overrides=asked.overrides)
         stages("simulate")
         solution = model.simulate(
@@ -231,7 +241,7 @@ def run(
     show(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")
 
 
-@app.command()
+@app.command(rich_help_panel=DESCRIBE)
 def derive(
     scene: options.SceneFile,
     out: Annotated[
@@ -242,9 +252,9 @@ def derive(
     ] = False,
 ) -> None:
     """Derive the equations of a scene and generate its C, functions, manifest and EQUATIONS.md."""
-    from ballpass import derive as deriving
-
     with command(scene) as stages:
+        import ballpass.derive as deriving
+
         if check:
             stages("check")
             result = deriving.check(scene, out)
@@ -262,19 +272,19 @@ def derive(
         typer.echo(f"{result.folder} is up to date")
 
 
-@app.command()
+@app.command(rich_help_panel=DESCRIBE)
 def equations(scene: options.SceneFile) -> None:
     """Print the derived equations of a scene as Markdown with LaTeX."""
-    from ballpass import derive as deriving
-
     with command(scene):
+        import ballpass.derive as deriving
+
         text = deriving.equations(deriving.derive(deriving.read_scene(scene)))
     typer.echo(text, nl=False)
 
 
-@app.command()
+@app.command(rich_help_panel=SIMULATE)
 def export(
-    scene: options.SceneFile,
+    scene: options.SceneOrFolder,
     c: Annotated[
         bool, typer.Option("--c", help="A C99 program with the model, the stepper, a Makefile and a main.")
     ] = False,
@@ -283,26 +293,29 @@ def export(
     ] = None,
 ) -> None:
     """Write a scene as a program that runs without Python: make, and it prints the motion as CSV."""
-    from ballpass.derive.emit.signature import folder_of
-
     with command(scene) as stages:
         if not c:
             raise RequestError("export: no format was given. Allowed: --c, a program in C99.")
         stages("read")
-        folder = out if out is not None else Path("export") / scene.stem
+        folder = out if out is not None else Path("export") / name_of(scene)
         check_folder(folder)
         manifest = read_own(scene, stages, read_artefact, lambda manifest: manifest)
         stages("export")
         # here, for it brings CasADi
         from ballpass.runtime.export.c_program import export_c
 
-        export_c(folder_of(scene), folder, manifest=manifest)
+        export_c(generated_folder(scene), folder, manifest=manifest)
         warn_of_scene(manifest)
     typer.echo(str(folder))
 
 
-for _command in (bearings, dataset, explain, jacobian, life, linearize, sensitivity, spectrum, stream, sweep, trade):
-    app.command()(_command)
+for _panel, _commands in {
+    DESCRIBE: (bearings, explain),
+    SIMULATE: (dataset, stream, sweep),
+    ASK: (jacobian, life, linearize, sensitivity, spectrum, trade),
+}.items():
+    for _command in _commands:
+        app.command(rich_help_panel=_panel)(_command)
 
 
 def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:

@@ -27,7 +27,9 @@ from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks
 from ballpass.runtime.certify.whole_run import check_observables
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.contract.extras import is_installed
 from ballpass.runtime.contract.usual import UnusualWarning, unusual
+from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.many.ensemble import observable_unit
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.run.inputs import breakpoints
@@ -43,7 +45,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.run.solution import Solution
 
 #: Packages whose version may change a number.
-_TOOLS = ("ballpass", "casadi", "numpy", "scipy")
+_TOOLS = ("casadi", "numpy", "scipy")
 
 #: The ball forces of a bearing whose peaks are told, by the key they stand under.
 _BALL_FORCES = {"elastic": "ball.elastic_force", "total": "ball.force"}
@@ -341,7 +343,8 @@ def _number(sol: Solution, name: str) -> float:
 
 def _versions(sol: Solution) -> dict[str, Any]:
     """Versions of the tools that generated the model, and of those that ran it."""
-    running = {"python": platform.python_version()} | {name: version(name) for name in _TOOLS}
+    running = {"python": platform.python_version(), "ballpass": __version__}
+    running |= {name: version(name) for name in _TOOLS if is_installed(name)}
     return {"generated_with": dict(sol.manifest.versions), "run_with": running}
 
 

@@ -42,6 +42,11 @@ def missing(package: str) -> str:
     return f"This needs {name}, which is not installed: pip install '{distribution}[{extra}]'."
 
 
+def is_installed(package: str) -> bool:
+    """Whether a package is there; it is not imported."""
+    return importlib.util.find_spec(package) is not None
+
+
 def can_derive() -> bool:
     """Whether the deriving half is installed, `ballpass.derive`."""
     return importlib.util.find_spec("ballpass.derive") is not None

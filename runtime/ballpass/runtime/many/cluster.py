@@ -19,7 +19,6 @@ import threading
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -29,6 +28,7 @@ from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folder import read_unchanged
 from ballpass.runtime.contract.manifest import FILE_NAME
+from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.compile import compile_model
 from ballpass.runtime.native.loaded_model import LoadedModel
 
@@ -72,7 +72,7 @@ def pack(model: LoadedModel) -> Packed:
         for name, digest in model.manifest.files:
             archive.writestr(zipfile.ZipInfo(name), read_unchanged(model.folder / name, digest), zipfile.ZIP_DEFLATED)
     content = memory.getvalue()
-    return Packed(key=hashlib.sha256(content).hexdigest(), content=content, version=version("ballpass"))
+    return Packed(key=hashlib.sha256(content).hexdigest(), content=content, version=__version__)
 
 
 class _Workshop:
@@ -93,7 +93,7 @@ class _Workshop:
             return self._models[key]
 
     def _load(self, packed: Packed) -> LoadedModel:
-        here = version("ballpass")
+        here = __version__
         if packed.version != here:
             raise RequestError(
                 f"A worker has ballpass {here}, and {packed.version} sent it work. Install one version everywhere."

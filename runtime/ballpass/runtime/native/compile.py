@@ -33,6 +33,7 @@ import platformdirs
 
 from ballpass.runtime.contract import Manifest, read_unchanged
 from ballpass.runtime.contract.errors import CompileError, RequestError
+from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.compilers import Compiler, find_compiler, run_compiler
 
 #: Name of the C source in a generated folder.
@@ -265,7 +266,7 @@ def _key(contents: Sequence[bytes], compiler: Compiler) -> str:
         *compiler.command[1:],
         *compiler.flags,
         f"casadi {importlib.metadata.version('casadi')}",
-        f"ballpass {importlib.metadata.version('ballpass')}",
+        f"ballpass {__version__}",
         f"{platform.system()} {platform.machine()} {sys.maxsize > 2**32}",
         _processor(),
     )

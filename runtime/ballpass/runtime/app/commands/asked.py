@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import can_derive
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
@@ -55,23 +57,72 @@ def read_asked(
     """What is asked of a scene by ``--set``, ``--duration`` [s] and ``--transient`` [turns].
 
     Where the generated folder is fresh its manifest tells all that is needed; the scene is read where it is not, and
-    where something is wrong, to say so in the scene's words.
+    where something is wrong, to say so in the scene's words.  A generated folder may stand in place of the scene.
     """
+    if path.is_dir():
+        present = read_manifest(path)
+        return _of_manifest(present, _overrides_of(present, settings or []), duration, transient)
     from ballpass.derive.emit.signature import fresh_manifest
 
     manifest = fresh_manifest(path)
     overrides = _plain_overrides(manifest, settings or []) if manifest is not None else None
     if manifest is not None and overrides is not None:
-        run: Run | RunInfo = manifest.run
-        names = [m.speed for m in (manifest.mechanism,) if m] + [b.ring_speed for b in manifest.bearings]
-        values = {info.name: info.default for info in manifest.parameters} | overrides
-        speed = values.get(names[0], 0.0) if names else 0.0
-    else:
-        _, scene, overrides = read_with_settings(path, settings, duration, transient)
-        run = scene.run
-        shaft = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
-        speed = shaft.value if shaft is not None else 0.0
-    return Asked(run=_asked_run(run, duration, transient), overrides=overrides, speed=speed)
+        return _of_manifest(manifest, overrides, duration, transient)
+    _, scene, overrides = read_with_settings(path, settings, duration, transient)
+    shaft = scene.mechanism.driver.speed if scene.mechanism else scene.shaft.speed if scene.shaft else None
+    speed = shaft.value if shaft is not None else 0.0
+    return Asked(run=_asked_run(scene.run, duration, transient), overrides=overrides, speed=speed)
+
+
+def _of_manifest(
+    manifest: Manifest, overrides: dict[str, float], duration: float | None, transient: float | None
+) -> Asked:
+    names = [m.speed for m in (manifest.mechanism,) if m] + [b.ring_speed for b in manifest.bearings]
+    values = {info.name: info.default for info in manifest.parameters} | overrides
+    speed = values.get(names[0], 0.0) if names else 0.0
+    return Asked(run=_asked_run(manifest.run, duration, transient), overrides=overrides, speed=speed)
+
+
+def _overrides_of(manifest: Manifest, settings: list[str]) -> dict[str, float]:
+    """Numbers of ``--set`` by path, of a generated folder whose scene may not be here.
+
+    Raises
+    ------
+    RequestError
+        No number of the model, no quantity of its unit, a value out of its bounds, or a number set twice.
+    """
+    from ballpass.runtime.contract.parameters import resolve_parameters, unknown_name
+
+    units = {info.name: info.unit for info in manifest.parameters}
+    found: dict[str, float] = {}
+    for text in settings:
+        path, _, value = (part.strip() for part in text.partition("="))
+        if path.startswith("run."):
+            raise RequestError(
+                f"--set {text}: a setting of the run, not a parameter of the model. Allowed: {', '.join(RUN_OPTIONS)} "
+                f"by the options {', '.join(RUN_OPTIONS.values())}."
+            )
+        if path not in units:
+            raise RequestError(f"--set {text}: {unknown_name('parameter', path, units)}")
+        if path in found:
+            raise RequestError(f"--set {path}: the number is set twice. Allowed: one value. Leave one --set away.")
+        found[path] = _quantity(f"--set {path}", value, units[path])
+    resolve_parameters(manifest, found)
+    return found
+
+
+def _quantity(option: str, text: str, unit: str) -> float:
+    """What an option gives [unit]; with the units that pint knows where it is there."""
+    from ballpass.runtime.contract.units import QuantityError, parse_quantity
+
+    try:
+        if can_derive():
+            from ballpass.derive.scene.units import parse_quantity as parse_any
+
+            return parse_any(text, unit)
+        return parse_quantity(text, unit)
+    except QuantityError as error:
+        raise RequestError(f"{option}: {error}") from None
 
 
 def _asked_run(run: _Run, duration: float | None, transient: float | None) -> _Run:
@@ -106,6 +157,11 @@ def read_with_settings(
     path: Path, settings: list[str] | None, duration: float | None = None, transient: float | None = None
 ) -> tuple[Scene, Scene, dict[str, float]]:
     """The scene as the file has it, the scene as asked for, and the overrides in SI; checked as if in the file."""
+    if path.is_dir():
+        raise RequestError(
+            f"{path} is a folder. Allowed: the scene file, which this command reads. A generated folder is enough for "
+            f"commands that only simulate, as ballpass run {path}."
+        )
     from ballpass.derive import SceneError, read_scene
     from ballpass.derive.reading.read import parse_override, with_values
     from ballpass.derive.scene.errors import Fault
@@ -144,14 +200,9 @@ def read_with_settings(
 
 def read_quantity(option: str, text: str | None, unit: str) -> float | None:
     """A finite quantity of an option [unit], None where it was not given."""
-    from ballpass.derive.scene.units import QuantityError, parse_quantity
-
     if text is None:
         return None
-    try:
-        value = parse_quantity(text, unit)
-    except QuantityError as error:
-        raise RequestError(f"{option}: {error}") from None
+    value = _quantity(option, text, unit)
     if not math.isfinite(value):
         raise RequestError(f"{option}: {text!r} is no finite quantity.")
     return value

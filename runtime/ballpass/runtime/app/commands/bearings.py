@@ -14,7 +14,7 @@ from ballpass.runtime.contract.errors import RequestError
 
 def bearings(
     pattern: Annotated[
-        str, typer.Argument(metavar="[PATTERN]", help="Designations wanted: 6204, 63*, 61?/*.", show_default=False)
+        str, typer.Argument(metavar="PATTERN", help="Designations wanted: 6204, 63*, 61?/*.", show_default=False)
     ] = "*",
     json_: options.Json = False,
 ) -> None:

@@ -28,7 +28,7 @@ _TIME = Annotated[str | None, typer.Option("--time", metavar="TIME", help='The i
 
 
 def jacobian(
-    scene: options.SceneFile,
+    scene: options.SceneOrFolder,
     of: Annotated[
         list[str],
         typer.Option(help='What to differentiate: rhs, a quantity, a pattern as "reaction.A.*". May be repeated.'),
@@ -69,7 +69,7 @@ def jacobian(
 
 
 def linearize(
-    scene: options.SceneFile,
+    scene: options.SceneOrFolder,
     at_angle: _ANGLE = None,
     time: _TIME = None,
     set_: options.Settings = None,

@@ -11,6 +11,7 @@ import typer
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked
 from ballpass.runtime.app.commands.shared import (
+    can_draw,
     check_folder,
     command,
     json_text,
@@ -30,7 +31,7 @@ POINTS, TURNS = 17, 64
 
 
 def life(
-    scene: options.SceneFile,
+    scene: options.SceneOrFolder,
     set_: options.Settings = None,
     cycles: options.Cycles = None,
     transient: options.Transient = None,
@@ -60,7 +61,7 @@ def life(
         if out is not None:
             stages("draw")
             out.mkdir(parents=True, exist_ok=True)
-            written = [out / "life.json", *draw_life(model, report, overrides, out)]
+            written = [out / "life.json", *(draw_life(model, report, overrides, out) if can_draw() else ())]
             written[0].write_text(json_text(report.to_json()), encoding="utf-8")
         for words in (*report.unsettled, *_swinging(report)):
             warn(words)

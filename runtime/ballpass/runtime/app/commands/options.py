@@ -8,8 +8,13 @@ from typing import Annotated
 import typer
 
 SceneFile = Annotated[
+    Path, typer.Argument(metavar="SCENE", help="Scene file (TOML); `ballpass new` copies one.", show_default=False)
+]
+
+#: Of commands that need only what `ballpass derive` wrote.
+SceneOrFolder = Annotated[
     Path,
-    typer.Argument(help="Scene file (TOML). The folder scenes/ has some to copy.", show_default=False),
+    typer.Argument(metavar="SCENE", help="Scene file (TOML), or a generated folder in its place.", show_default=False),
 ]
 
 Settings = Annotated[

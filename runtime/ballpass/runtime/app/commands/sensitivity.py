@@ -9,7 +9,16 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked
-from ballpass.runtime.app.commands.shared import check_folder, command, complain, json_text, load_model, show, show_json
+from ballpass.runtime.app.commands.shared import (
+    can_draw,
+    check_folder,
+    command,
+    complain,
+    json_text,
+    load_model,
+    show,
+    show_json,
+)
 from ballpass.runtime.run.tables import show_tables
 
 #: Rows of a table on the terminal.
@@ -17,7 +26,7 @@ ROWS = 15
 
 
 def sensitivity(
-    scene: options.SceneFile,
+    scene: options.SceneOrFolder,
     of: Annotated[
         list[str] | None,
         typer.Option(
@@ -85,13 +94,15 @@ def sensitivity(
         )
         written: list[Path] = []
         if out is not None:
-            from ballpass.runtime.plot.tornado import draw_tornados
-
             stages("draw")
             out.mkdir(parents=True, exist_ok=True)
             place = out / "sensitivity.json"
             place.write_text(json_text(report.to_json()), encoding="utf-8")
-            written = [place, *draw_tornados(report, out)]
+            written = [place]
+            if can_draw():
+                from ballpass.runtime.plot.tornado import draw_tornados
+
+                written += draw_tornados(report, out)
     if json_:
         show_json(report.to_json())
     else:

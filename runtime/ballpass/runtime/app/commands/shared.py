@@ -24,6 +24,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 
 from ballpass.runtime.app.interrupted import say_interrupted
 from ballpass.runtime.contract.errors import BallpassError, RequestError
+from ballpass.runtime.contract.extras import can_derive, is_installed, missing
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract import Manifest
@@ -36,6 +37,12 @@ errors_console = Console(stderr=True, emoji=False)  # A:B:N is no picture
 ATTEMPTS = 100
 
 _Read = TypeVar("_Read")
+
+#: Where a command needs `ballpass.derive` and only the runtime is installed.
+NO_DERIVE = (
+    "This reads a scene or derives its equations, and only the runtime is installed: pip install ballpass. Without it "
+    "commands that simulate take a generated folder in place of the scene: ballpass run generated/punching_press"
+)
 
 #: Names of the stages as they are announced.
 STAGES = {
@@ -73,12 +80,18 @@ def command(scene: Path | None = None) -> Iterator[Stages]:
             warnings.showwarning = once
             yield stages
     except BallpassError as error:
-        from ballpass.derive.scene.errors import SceneError
+        if can_derive():
+            from ballpass.derive.scene.errors import SceneError
 
-        if isinstance(error, SceneError) and error.source is None:
-            error = SceneError(error.faults, source=scene)
+            if isinstance(error, SceneError) and error.source is None:
+                error = SceneError(error.faults, source=scene)
         complain(str(error))
         raise typer.Exit(2 if isinstance(error, ValueError) else 1) from None
+    except ModuleNotFoundError as fault:
+        if can_derive() or not str(fault.name).startswith("ballpass.derive"):
+            raise
+        complain(NO_DERIVE)
+        raise typer.Exit(2) from None
     except BrokenPipeError:  # the reader has seen enough, as in `ballpass equations SCENE | head`
         raise
     except OSError as error:
@@ -176,9 +189,32 @@ class Stages:
             self._progress.update(self._task, total=1.0, completed=done)
 
 
+def name_of(scene: Path) -> str:
+    """Name of a scene file, or of the generated folder in its place."""
+    return scene.resolve().name if scene.is_dir() else scene.stem
+
+
+def generated_folder(scene: Path) -> Path:
+    """The generated folder of a scene file; a folder itself."""
+    if scene.is_dir():
+        return scene
+    from ballpass.derive.emit.signature import folder_of
+
+    return folder_of(scene)
+
+
+def can_draw() -> bool:
+    """Whether figures can be drawn; says what is missing where they cannot."""
+    for package in ("matplotlib", "scipy"):
+        if not is_installed(package):
+            note(f"No figures are drawn. {missing(package)}")
+            return False
+    return True
+
+
 def results_folder(out: Path | None, scene: Path) -> Path:
     """Folder of a scene's results; one that cannot be written is refused."""
-    folder = out if out is not None else Path("results") / scene.stem
+    folder = out if out is not None else Path("results") / name_of(scene)
     check_folder(folder)
     return folder
 
@@ -211,7 +247,7 @@ def checked_kinks(kinks: str | None, method: str, error: str | None = None) -> K
 def read_own(
     scene: Path, stages: Stages, read: Callable[[Path], _Read], manifest: Callable[[_Read], Manifest]
 ) -> _Read:
-    """What `read` gives of the scene's folder, derived where it is stale.
+    """What `read` gives of the scene's folder, derived where it is stale; of a generated folder, as it is.
 
     Scenes of one file name in different folders share a generated folder: where another process has written its own
     scene there between writing and reading, both are done again.
@@ -220,6 +256,8 @@ def read_own(
     ----------
     manifest : of what was read
     """
+    if scene.is_dir():
+        return read(scene)
     from ballpass.derive.emit.generate import generate
     from ballpass.derive.emit.signature import source_key
 

@@ -14,7 +14,16 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked, read_duration, read_quantity
-from ballpass.runtime.app.commands.shared import Stages, check_folder, command, load_model, show, show_json
+from ballpass.runtime.app.commands.shared import (
+    Stages,
+    can_draw,
+    check_folder,
+    command,
+    load_model,
+    name_of,
+    show,
+    show_json,
+)
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.run.tables import show_tables, simple_table
 
@@ -75,7 +84,8 @@ def spectrum(
     with command(scene) as stages:
         band = _read_band(envelope)
         _check(scaling, top, orders=orders, spectrogram=spectrogram)
-        folder = out if out is not None else Path("results") / scene.stem
+        folder = out if out is not None else Path("results") / name_of(scene)
+        figures = figures and can_draw()
         if figures:
             check_folder(folder)
         if scene.suffix == ".nc":

@@ -13,7 +13,7 @@ from ballpass.runtime.app.commands.shared import command, load_model, show
 
 
 def stream(
-    scene: options.SceneFile,
+    scene: options.SceneOrFolder,
     out: Annotated[Path, typer.Option(metavar="FILE", help="NetCDF-4 file to write.")],
     sample_rate: Annotated[str, typer.Option(metavar="RATE", help='Samples a second: --sample-rate "51.2 kHz".')],
     cycles: options.Cycles = None,

@@ -14,6 +14,7 @@ import typer
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import faults_of_numbers, read_duration, read_with_settings
 from ballpass.runtime.app.commands.shared import (
+    can_draw,
     checked_kinks,
     command,
     complain,
@@ -120,6 +121,7 @@ def sweep(
             )
         at_kinks = checked_kinks(kinks, method or read.run.method)
         folder = results_folder(out, scene)
+        figures = figures and can_draw()
         varied = grid(ranges)
         count = math.prod(len(one.values) for one in ranges)
         fixed = {path: np.full(count, value) for path, value in overrides.items()}

@@ -11,7 +11,7 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked
-from ballpass.runtime.app.commands.shared import Stages, command, load_model, results_folder, show, show_json
+from ballpass.runtime.app.commands.shared import Stages, can_draw, command, load_model, results_folder, show, show_json
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.run.tables import show_tables, simple_table
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def trade(
-    scene: options.SceneFile,
+    scene: options.SceneOrFolder,
     of: Annotated[
         list[str] | None,
         typer.Option(
@@ -58,6 +58,7 @@ def trade(
         stages("read")
         overrides = read_asked(scene, set_).overrides
         folder = results_folder(out, scene)
+        figures = figures and can_draw()
         model = load_model(scene, stages, "stepper", overrides=overrides)
         count = MEMBERS if members is None else members
         if against is not None:

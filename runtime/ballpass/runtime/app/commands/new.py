@@ -1,0 +1,51 @@
+"""``ballpass new``: a copy of a shipped scene, to run and edit."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ballpass.runtime.app.commands.shared import command, show
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import unknown_name
+
+
+def new(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="NAME", help="Name of a scene: press, four-bar, rotor, toggle ...", show_default=False),
+    ] = None,
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder to copy it to, made where it is not there.")
+    ] = Path(),
+    list_: Annotated[bool, typer.Option("--list", help="Print the names and titles of all scenes.")] = False,
+) -> None:
+    """Copy a scene that comes with ballpass into a folder. A file that is there is left as it is."""
+    with command():
+        from ballpass.derive.scene.shipped import shipped_scenes, title_of
+
+        scenes = shipped_scenes()
+        if list_:
+            width = max(map(len, scenes))
+            for known, path in scenes.items():
+                show(f"{known:<{width}}  {title_of(path)}")
+            return
+        if name is None:
+            raise RequestError(f"new: no scene was named. Allowed: {', '.join(scenes)}. Their titles: --list.")
+        source = scenes.get(name.replace("_", "-")) or {path.stem: path for path in scenes.values()}.get(name)
+        if source is None:
+            raise RequestError(f"new: {unknown_name('scene', name, scenes)}")
+        folder.mkdir(parents=True, exist_ok=True)
+        target = folder / source.name
+        try:
+            with target.open("x", encoding="utf-8") as copy:
+                copy.write(source.read_text(encoding="utf-8"))
+        except FileExistsError:
+            raise RequestError(
+                f"{target} is there already and is left as it is. Allowed: a folder without it. Give another folder, "
+                "or move the file."
+            ) from None
+        show(f"{target}\nNext: ballpass run {shlex.quote(str(target))}")
