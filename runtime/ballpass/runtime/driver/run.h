@@ -41,6 +41,13 @@ typedef struct {
 } bp_driver;
 #endif
 
+/* A step that was accepted: its size [s] and the one that was tried, what the controller makes of it, the kink it met, whether the
+   segment ends with it. */
+typedef struct {
+    double h, tried, factor;
+    int met, last;
+} bp_taken;
+
 typedef struct {
     const ballpass_options *options;
     ballpass_result *result;
@@ -59,6 +66,8 @@ typedef struct {
     double elapsed; /* [s] */
     int rejected_last;
     bp_family family;
+    bp_taken taken;
+    int waiting; /* whether that step is kept, for output times of another call */
     long outputs;
     const double *output_times;
     double *output_states;

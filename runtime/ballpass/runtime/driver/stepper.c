@@ -77,8 +77,71 @@ static void begin_segment(bp_run *run, double start, double length, double resol
     else linearize(run, t, 1);
     tangent_start(run, t);
     run->elapsed = t;
-    run->rejected_last = 0;
+    run->rejected_last = run->waiting = 0;
     run->family = (bp_family){0};
+}
+
+/* Keep what a run needs to go on in another call; returns the status. */
+static int set_aside(bp_run *run, const bp_family *family, double t, int rejected_last, int status)
+{
+    run->elapsed = t;
+    run->rejected_last = rejected_last;
+    run->family = *family;
+    return status;
+}
+
+/* Write what lies in the accepted step from time *t, and move on to its end, unless the run pauses with it. */
+static int take_step(bp_run *run, bp_family *family, double start, double end, double *time, int changeable)
+{
+    ballpass_result *result = run->result;
+    const bp_taken taken = run->taken;
+    const double t = *time, h = taken.h, length = end - start;
+    write_outputs(run, start, t, h, taken.last ? end : start + (t + h));
+    run->waiting = run->options->pause && result->written >= run->outputs;
+    if (run->waiting) {
+        result->step = run->step;
+        return BALLPASS_PAUSED;
+    }
+    reduce_step(run, start, t, h);
+    /* a step that was cut, or has its own pace, says nothing about the families */
+    const int chosen = changeable && taken.met == NO_KINK && !is_paced(run) ? judge_family(run, family, t, h) : run->method;
+    tangent_accept(run);
+    memcpy(run->x, run->next, sizeof run->next);
+    if (taken.met == CUT) {
+        if (taken.factor < 1.0) run->step = taken.tried * taken.factor;
+    } else if (!taken.last || taken.factor < 1.0) {
+        run->step = stretched(run, start, t, h, taken.factor, 1);
+    }
+    if (taken.met == NO_KINK) remember_touch(run, h, taken.factor);
+    const double reached = *time = taken.last ? length : t + h;
+    if (taken.met == CUT) {
+        tangent_switch(run, reached);
+        turn_sides(run, start + reached, taken.tried);
+    }
+    sides_move_on(run);
+    if (has_stalled(run)) {
+        result->time = start + reached;
+        return BALLPASS_STALLED;
+    }
+    if (chosen != run->method) {
+        run->method = chosen;
+        result->switches++;
+        if (is_explicit(chosen)) {
+            if (run->step > family->stable) run->step = family->stable;
+            first_slope(run, reached);
+            tangent_start(run, reached);
+        } else {
+            linearize(run, reached, 1);
+        }
+    } else if (taken.met == CUT && is_explicit(run->method)) {
+        first_slope(run, reached);
+        tangent_start(run, reached);
+    } else if (is_explicit(run->method)) {
+        next_slope(run, reached);
+    } else if (reached < length) {
+        linearize(run, reached, 0);
+    }
+    return BALLPASS_DONE;
 }
 
 /* Integrate one segment from `start` to `end`; its clock starts at zero.  `resumed`: it goes on where another call ended. */
@@ -94,6 +157,11 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
     double t = run->elapsed;
     int rejected_last = run->rejected_last;
     bp_family family = run->family;
+    if (resumed && run->waiting) {
+        const int ended = take_step(run, &family, start, end, &t, changeable);
+        if (ended != BALLPASS_DONE) return set_aside(run, &family, t, 0, ended);
+        result->time = start + t;
+    }
     while (t < length) {
         double h = run->step < options->largest_step ? run->step : options->largest_step;
         const double left = length - t;
@@ -109,10 +177,7 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
         if (aimed) last = 0;
         if (result->steps + result->rejected >= options->max_steps) {
             result->step = h;
-            run->elapsed = t;
-            run->rejected_last = rejected_last;
-            run->family = family;
-            return BALLPASS_TOO_MANY_STEPS;
+            return set_aside(run, &family, t, rejected_last, BALLPASS_TOO_MANY_STEPS);
         }
         if (!last && run->step <= resolution) {
             /* accepted steps may shrink as well: they would no longer move the time */
@@ -144,47 +209,10 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
         bp_step_factor(error_exponent(run->method), &error, &accepted, &rejected_before, &run->last_error, &factor);
         if (accepted != 0.0) {
             result->steps++;
-            write_outputs(run, start, t, h, last ? end : start + (t + h));
-            reduce_step(run, start, t, h);
-            /* a step that was cut, or has its own pace, says nothing about the families */
-            const int chosen = changeable && met == NO_KINK && !is_paced(run) ? judge_family(run, &family, t, h) : run->method;
-            tangent_accept(run);
-            memcpy(run->x, run->next, sizeof run->next);
-            if (met == CUT) {
-                if (factor < 1.0) run->step = tried * factor;
-            } else if (!last || factor < 1.0) {
-                run->step = stretched(run, start, t, h, factor, 1);
-            }
-            if (met == NO_KINK) remember_touch(run, h, factor);
-            t = last ? length : t + h;
-            if (met == CUT) {
-                tangent_switch(run, t);
-                turn_sides(run, start + t, tried);
-            }
-            sides_move_on(run);
-            if (has_stalled(run)) {
-                result->time = start + t;
-                return BALLPASS_STALLED;
-            }
             rejected_last = 0;
-            if (chosen != run->method) {
-                run->method = chosen;
-                result->switches++;
-                if (is_explicit(chosen)) {
-                    if (run->step > family.stable) run->step = family.stable;
-                    first_slope(run, t);
-                    tangent_start(run, t);
-                } else {
-                    linearize(run, t, 1);
-                }
-            } else if (met == CUT && is_explicit(run->method)) {
-                first_slope(run, t);
-                tangent_start(run, t);
-            } else if (is_explicit(run->method)) {
-                next_slope(run, t);
-            } else if (t < length) {
-                linearize(run, t, 0);
-            }
+            run->taken = (bp_taken){h, tried, factor, met, last};
+            const int ended = take_step(run, &family, start, end, &t, changeable);
+            if (ended != BALLPASS_DONE) return set_aside(run, &family, t, 0, ended);
         } else {
             const int finite = error >= 0.0 && error <= DBL_MAX && is_finite(run->next);
             result->rejected++;
@@ -222,7 +250,8 @@ static int run_segments(bp_run *run, double *x, long first, long segments, const
 #endif
     }
     result->method = run->method;
-    if (result->status == BALLPASS_TOO_MANY_STEPS && options->work != NULL) memcpy(options->work, run, sizeof *run);
+    const int goes_on = result->status == BALLPASS_TOO_MANY_STEPS || result->status == BALLPASS_PAUSED;
+    if (goes_on && options->work != NULL) memcpy(options->work, run, sizeof *run);
     return result->status;
 }
 

@@ -29,6 +29,7 @@ enum ballpass_status {
     BALLPASS_STEP_TOO_SMALL = 2, /* the error test fails at the smallest step */
     BALLPASS_NOT_FINITE = 3,     /* the state or its rate is not a number even for the smallest step */
     BALLPASS_STALLED = 5,        /* the driver comes back to the edge of a window again and again */
+    BALLPASS_PAUSED = 6,         /* all output times are written, and the step that passed the last is kept (`pause`) */
     BALLPASS_BAD_ARGUMENT = 4    /* method unknown, times out of order, an output time outside the run, a count below zero, a tolerance or a
                                    largest step that is not positive, another step that is negative; a number that is none */
 };
@@ -44,6 +45,7 @@ typedef struct {
     void *work;              /* keeps a run that has taken all its steps, so that a later call can go on; NULL: it is not kept */
     int resume;              /* nonzero: go on with the run kept there */
     double *before;          /* reductions of the time before the one where `reduction` begins; NULL: none */
+    int pause;               /* nonzero, with `work`: end with the step that passes the last output time, before x moves on */
 } ballpass_options;
 
 typedef struct {
@@ -77,7 +79,9 @@ typedef struct {
 
    With `work`, of the bytes that ballpass_sizes tells and aligned for double, a run may be made in several calls: one that ends for
    having taken max_steps is followed by one with `resume`, more steps, and all else as the first left it, x, reduction and result as
-   well.  Counts are those of all calls, max_steps too, and every bit is that of a run in one call.  Not for runs with derivatives. */
+   well.  Counts are those of all calls, max_steps too, and every bit is that of a run in one call.  Not for runs with derivatives.
+   With `pause` as well, the next call brings output times of its own, none below those before, and result->written = 0; those within the
+   step that was kept are read from its dense output.  x is where that step started. */
 BALLPASS_EXPORT int ballpass_run(const ballpass_options *options, const double *p, const double *c, double *x, long segments,
                                const double *times, const double *inputs, const unsigned char *restarts, long outputs,
                                const double *output_times, double *output_states, ballpass_result *result);

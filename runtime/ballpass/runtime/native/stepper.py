@@ -74,6 +74,7 @@ class _Options(ctypes.Structure):
         ("work", ctypes.c_void_p),
         ("resume", ctypes.c_int),
         ("before", ctypes.c_void_p),
+        ("pause", ctypes.c_int),
     )
 
 
