@@ -1,7 +1,7 @@
 """From a generated folder to a folder of plain C that runs without Python.
 
-In: a generated folder.  Out: the model's kernels, the driver with its methods, the scene's numbers, a main that prints
-a CSV, a Makefile and a README.  `make` needs gcc, clang or another compiler of C99
+In: a generated folder.  Out: the model's kernels, the driver with its methods, the scene's numbers, an interface for
+other programs, a main that prints a CSV, a Makefile and a README.  `make` needs gcc, clang or another compiler of C99
 that knows their vector types, and nothing else.
 
 The program finds the segments of a run in C (``schedule.c``, as ensembles do), the magnitudes
@@ -21,10 +21,12 @@ from ballpass.runtime.contract import Manifest, check_files, read_artefact
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.export.scene_numbers import (
     STANDALONE,
+    columns_of,
     constants_source,
     filled,
     margins_of,
     margins_source,
+    outputs_source,
     scene_header,
     scene_source,
 )
@@ -89,14 +91,17 @@ def _texts(model: LoadedModel, folder: Path) -> dict[str, str]:
         "scene.h": scene_header(manifest),
         "scene.c": scene_source(manifest),
         "constants.c": constants_source(model),
+        "outputs.c": outputs_source(model),
     }
     if margins_of(manifest):
         texts["margins.c"] = margins_source(model)
     extra = [STANDALONE / "located.c"] if has_kinks(manifest) else []
     extra += [STANDALONE / "assembly.c"] if margins_of(manifest) else []
-    for source in (STANDALONE / "main.c", DRIVER / "schedule.c", DRIVER / "stepper.c", *extra):
+    sources = (STANDALONE / "main.c", STANDALONE / "ballpass.c", DRIVER / "schedule.c", DRIVER / "stepper.c", *extra)
+    for source in sources:
         texts.update(_with_includes(source, (STANDALONE, DRIVER, folder), texts))
     objects = sorted(name for name in texts if name.endswith(".c"))
+    texts["example.c"] = (STANDALONE / "example.c").read_text(encoding="utf-8")
     headers = sorted(name for name in texts if name.endswith(".h"))
     texts["Makefile"] = _makefile(manifest, objects, headers)
     texts["README.md"] = _readme(manifest)
@@ -132,7 +137,7 @@ def _makefile(manifest: Manifest, sources: Sequence[str], headers: Sequence[str]
 
 def _program(manifest: Manifest) -> str:
     """Name of the program: the scene's, unless that is a file or a target of the Makefile."""
-    taken = ("all", "clean", "makefile", "run")
+    taken = ("all", "clean", "example", "makefile", "run")
     return f"{manifest.scene}_program" if manifest.scene.lower() in taken else manifest.scene
 
 
@@ -143,5 +148,5 @@ def _readme(manifest: Manifest) -> str:
         TITLE=manifest.title,
         PROGRAM=_program(manifest),
         EXAMPLE=f"{example.name}={example.default!r}",
-        STATES=", ".join(state.name for state in manifest.states),
+        COLUMNS=", ".join(f"`{name}`" for name, _ in columns_of(manifest)),
     )

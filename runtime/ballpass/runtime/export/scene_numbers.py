@@ -1,7 +1,7 @@
-"""The C that a scene brings to its stand-alone program: its numbers, derived constants, margins of its linkage.
+"""The C that a scene brings to its stand-alone program: its numbers, constants, outputs, margins of its linkage.
 
-In: a manifest, or a model whose functions CasADi can write.  Out: texts of ``scene.h``, ``scene.c``, ``constants.c``
-and ``margins.c``.
+In: a manifest, or a model whose functions CasADi can write.  Out: texts of ``scene.h``, ``scene.c``, ``constants.c``,
+``outputs.c`` and ``margins.c``.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import casadi
 
-from ballpass.runtime.contract import InputInfo, Manifest, MarginInfo
+from ballpass.runtime.contract import InputInfo, Manifest, MarginInfo, VariableInfo
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
@@ -23,6 +23,15 @@ STANDALONE = DRIVER / "standalone"
 
 #: First line of every file that is written.
 NOTE = "/* Written by ballpass export. */"
+
+#: Names of parameters that may change in a run.
+_VARYING = re.compile(
+    r"loads?(\.\w+)?\.force\.[xy]"
+    r"|mechanism\.forces\.\w+\.force\.(x|y|magnitude|direction)"
+    r"|mechanism\.torques\.\w+\.torque"
+    r"|mechanism\.driver\.torque\.torque"
+    r"|shaft\.speed"
+)
 
 _KINDS = {
     "phase": "SCHEDULE_PHASE",
@@ -39,6 +48,30 @@ def margins_of(manifest: Manifest) -> tuple[MarginInfo, ...]:
     return () if mechanism is None or mechanism.angle else mechanism.margins
 
 
+def columns_of(manifest: Manifest) -> tuple[tuple[str, str], ...]:
+    """Name and unit of the numbers of a sample: time, states, outputs that are no states; balls count from 1."""
+    rows = [
+        (info.name if info.size == 1 else f"{info.name}[{k + 1}]", info.unit)
+        for info in computed_outputs(manifest)
+        for k in range(info.size)
+    ]
+    return (("t", "s"), *((info.name, info.unit) for info in manifest.states), *rows)
+
+
+def computed_outputs(manifest: Manifest) -> tuple[VariableInfo, ...]:
+    """Outputs that are no states."""
+    states = {info.name for info in manifest.states}
+    return tuple(info for info in manifest.outputs if info.name not in states)
+
+
+def varying(manifest: Manifest) -> tuple[str, ...]:
+    """Parameters that may change in a run: forces, torques, loads, speed of a shaft.
+
+    Not the speed of a driver: one at constant speed has no acceleration that a change of it would need.
+    """
+    return tuple(info.name for info in manifest.parameters if _VARYING.fullmatch(info.name))
+
+
 def filled(template: Path, **values: str) -> str:
     """Text of a template with values in place of ``@NAME@``."""
     return re.sub("@([A-Z]+)@", lambda found: values[found[1]], template.read_text(encoding="utf-8"))
@@ -53,6 +86,7 @@ def scene_header(manifest: Manifest) -> str:
         "SCENE_CONSTANTS": len(manifest.constants),
         "SCENE_RELATIONS": len(manifest.relations),
         "SCENE_MARGINS": len(margins_of(manifest)),
+        "SCENE_OUTPUTS": sum(info.size for info in computed_outputs(manifest)),
     }
     kinks = "\n/* The laws have kinks, which located.c ends steps on. */\n#define SCENE_KINKS\n"
     return filled(
@@ -75,26 +109,30 @@ def scene_source(manifest: Manifest) -> str:
         speed = place[manifest.bearing.ring_speed]
     run = manifest.run
     method = run.method.removeprefix("stepper-") if run.method in STEPPERS and run.method != "stepper" else "auto"
+    changing = varying(manifest)
     parameters = [
         f"    {{{_string(p.name)}, {_string(p.unit)}, {_string(p.description)}, {p.default!r}, "
         f"{_bound(p.above, '-INFINITY')}, {_bound(p.least, '-INFINITY')}, {_bound(p.most, 'INFINITY')}, "
-        f"{_bound(p.below, 'INFINITY')}}},"
+        f"{_bound(p.below, 'INFINITY')}, {int(p.name in changing)}}},"
         for p in manifest.parameters
     ]
     relations = [f"    {{{place[name]}, {place[other]}, {factor!r}}}," for name, factor, other in manifest.relations]
+    columns = [f"    {{{_string(name)}, {_string(unit)}}}," for name, unit in columns_of(manifest)]
     indices, inputs = _inputs(manifest.inputs, place)
+    offsets = [str(place[item.offset]) if item.offset else "-1" for item in manifest.inputs]
     return filled(
         STANDALONE / "scene.c.in",
         TITLE=_string(manifest.title),
         PARAMETERS="\n".join(parameters),
         RELATIONS="\n".join(relations) or "    {0, 0, 0.0}, /* none */",  # C has no arrays of length zero
         CONSTANTS=_listed(_string(info.name) for info in manifest.constants),
-        STATES=_listed(_string(info.name) for info in manifest.states),
+        COLUMNS="\n".join(columns),
         INITIAL=_listed(str(place[name]) for name in manifest.initial),
         SPEED=str(speed),
         LINKAGE="".join(f"{line}\n" for line in _linkage(manifest, place)),
         PLACES="".join(f"{line}\n" for line in indices),
         INPUTS=inputs,
+        OFFSETS=_listed(offsets) or "-1",  # C has no arrays of length zero
         CYCLES=repr(float(run.cycles or 0.0)),
         DURATION=repr(float(run.duration or 0.0)),
         RTOL=repr(run.rtol),
@@ -128,7 +166,7 @@ def _inputs(inputs: Sequence[InputInfo], place: dict[str, int]) -> tuple[list[st
         edges = array(f"edges_{k}", [edge for window in item.windows for edge in window])
         times = array(f"times_{k}", item.times)
         heights = array(f"heights_{k}", item.values)
-        offset = place[item.offset] if item.offset else -1
+        offset = len(place) + k if item.offset else -1  # an angle of its own, which starts from the parameter
         rate = place[item.rate] if item.rate else -1
         entries.append(
             f"    {{{_KINDS[item.kind]}, {offset}, {rate}, {len(item.windows)}, {edges}, {len(item.times)}, {times}, "
@@ -147,10 +185,39 @@ def constants_source(model: LoadedModel) -> str:
     return _behind("The derived constants", model.symbolic("constants"), "scene_constants", given, "c")
 
 
+def outputs_source(model: LoadedModel) -> str:
+    """C of the outputs that are no states; of nothing where there are none."""
+    wanted = [info.name for info in computed_outputs(model.manifest)]
+    if not wanted:
+        body = "{\n    (void)t;\n    (void)x;\n    (void)u;\n    (void)p;\n    (void)c;\n    (void)y;\n}"
+        given = "double t, const double *x, const double *u, const double *p, const double *c, double *y"
+        return f'{NOTE}\n#include "scene.h"\n\nvoid scene_outputs({given})\n{body}\n'
+    return _behind("The outputs", outputs_function(model), "scene_outputs", MOMENT, "y")
+
+
+def outputs_function(model: LoadedModel) -> casadi.Function:
+    """Outputs that are no states, one below the other, over t, x, u, p and c."""
+    graph = model.symbolic("outputs")
+    arguments = dict(zip(graph.name_in(), graph.sx_in(), strict=True))
+    results = dict(zip((info.name for info in model.manifest.outputs), graph(*arguments.values()), strict=True))
+    rows = casadi.vertcat(*(casadi.densify(results[info.name]) for info in computed_outputs(model.manifest)))
+    return casadi.Function("outputs", [*arguments.values()], [rows], [*arguments], ["y"])
+
+
 def margins_source(model: LoadedModel) -> str:
     """C of ``assembly``, in the same way."""
     given = (("double t", "&t"), ("const double *u", "u"), ("const double *p", "p"), ("const double *c", "c"))
     return _behind("The linkage's margins", model.symbolic("assembly"), "scene_margins", given, "margins")
+
+
+#: What functions of a moment are given: declarations, and the addresses of the numbers.
+MOMENT = (
+    ("double t", "&t"),
+    ("const double *x", "x"),
+    ("const double *u", "u"),
+    ("const double *p", "p"),
+    ("const double *c", "c"),
+)
 
 
 def _behind(what: str, function: casadi.Function, name: str, given: Sequence[tuple[str, str]], result: str) -> str:

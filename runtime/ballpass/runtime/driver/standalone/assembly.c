@@ -2,7 +2,6 @@
 #include "assembly.h"
 
 #include <math.h>
-#include <stdio.h>
 
 #include "scene.h"
 #include "schedule.h"
@@ -28,11 +27,10 @@ static void keep_smaller(double margin, double time, double *worst, double *when
     *when = time;
 }
 
-int refuse_unassembled(const double *values, double turn)
+void refuse_unassembled(const double *values, double turn, ballpass_faults *faults)
 {
     double inputs[SCENE_INPUTS > 0 ? SCENE_INPUTS : 1] = {0.0};
     const int turns = isfinite(turn);
-    int faults = 0;
     schedule_inputs(scene_inputs, SCENE_INPUTS, values, 0.0, 0.0, inputs);
     for (int row = 0; row < SCENE_MARGINS; row++) {
         double worst = margin_at(values, inputs, row, 0.0), when = 0.0, reach = turn / ANGLES;
@@ -51,11 +49,9 @@ int refuse_unassembled(const double *values, double turn)
         if (worst > 0.0) continue;
         double angle = fmod(values[scene_start_angle] + values[scene_speed] * when, TURN);
         if (angle < 0.0) angle += TURN;
-        fprintf(stderr,
-                "error: the linkage cannot be assembled at joint %s, worst at crank angle %.2f deg (%s: margin %.4g). Allowed: lengths that "
-                "keep the margin above 0 in the whole turn. Change those of the bodies that meet at the joint.\n",
-                scene_margin_infos[row].joint, 360.0 / TURN * angle, scene_margin_infos[row].description, worst);
-        faults++;
+        add_fault(faults,
+                  "the linkage cannot be assembled at joint %s, worst at crank angle %.2f deg (%s: margin %.4g). Allowed: lengths that "
+                  "keep the margin above 0 in the whole turn. Change those of the bodies that meet at the joint.",
+                  scene_margin_infos[row].joint, 360.0 / TURN * angle, scene_margin_infos[row].description, worst);
     }
-    return faults;
 }

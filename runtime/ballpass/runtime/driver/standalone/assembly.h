@@ -2,10 +2,12 @@
 #ifndef BALLPASS_ASSEMBLY_H
 #define BALLPASS_ASSEMBLY_H
 
-/* Says on stderr which dyads cannot be assembled, and at which crank angle they are worst; returns how many.
+#include "faults.h"
+
+/* Says which dyads cannot be assembled, and at which crank angle they are worst.
 
    values   parameters and derived constants
    turn     time of a turn [s], or infinity: then the linkage stands as it starts */
-int refuse_unassembled(const double *values, double turn);
+void refuse_unassembled(const double *values, double turn, ballpass_faults *faults);
 
 #endif

@@ -7,5 +7,6 @@
 BALLPASS_EXPORT int ballpass_run_located(const ballpass_options *options, const double *p, const double *c, double *x, long segments,
                                        const double *times, const double *inputs, const unsigned char *restarts, long outputs,
                                        const double *output_times, double *output_states, ballpass_result *result);
+BALLPASS_EXPORT void ballpass_sizes_located(int *sizes);
 
 #endif

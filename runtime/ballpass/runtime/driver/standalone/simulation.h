@@ -1,0 +1,22 @@
+/* What main.c and the interface of FMI ask of an instance besides ballpass.h. */
+#ifndef BALLPASS_SIMULATION_H
+#define BALLPASS_SIMULATION_H
+
+#include "ballpass.h"
+
+/* Sets a parameter that is looked at later, with all others. */
+void ballpass_put(ballpass *simulation, int place, double value);
+
+/* Looks at bounds and relations of all values. */
+int ballpass_check_bounds(ballpass *simulation);
+
+/* Parameters and, behind them, derived constants; states and time reached. */
+const double *ballpass_values(const ballpass *simulation);
+const double *ballpass_states(const ballpass *simulation);
+double ballpass_time(const ballpass *simulation);
+int ballpass_started(const ballpass *simulation);
+
+/* Inputs u that hold at the time reached; returns the time since the one they belong to [s]. */
+double ballpass_moment(const ballpass *simulation, double *u);
+
+#endif
