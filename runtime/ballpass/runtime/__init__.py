@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ballpass.runtime.app.results import Results, load_results
     from ballpass.runtime.ask.peaks import Peak
+    from ballpass.runtime.certify.quantity_function import QuantityFunction
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport
     from ballpass.runtime.contract import Manifest, read_manifest
     from ballpass.runtime.contract.errors import (
@@ -65,6 +66,7 @@ __all__ = [
     "NoKernelsWarning",
     "Parameters",
     "Peak",
+    "QuantityFunction",
     "Reduction",
     "Reductions",
     "RequestError",
@@ -91,6 +93,7 @@ _HOME = {
     "Results": "app.results",
     "load_results": "app.results",
     "Peak": "ask.peaks",
+    "QuantityFunction": "certify.quantity_function",
     "SensitivityReport": "certify.sensitivity_report",
     "Manifest": "contract",
     "read_manifest": "contract",

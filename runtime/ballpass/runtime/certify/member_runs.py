@@ -41,6 +41,20 @@ REDUCED = ("max", "min", "range", "mean", "rms")
 NODES, ROUGHNESS = 1.3, 0.3
 
 
+def reduced_by_ensembles(model: LoadedModel, quantities: Sequence[Quantity]) -> dict[int, str]:
+    """Quantities, by their place, that are observables of an ensemble as well, and are as near there: their names."""
+    channels = channel_names(model.manifest) if model.states else ()
+    return {
+        k: f"{item.kind}:{item.channel}"
+        for k, item in enumerate(quantities)
+        if item.kind in REDUCED
+        and item.ball is None
+        and item.channel in channels
+        # the most loaded ball carries least where two change rank, which the driver's steps do not end on
+        and (item.channel in model.states or item.kind in ("max", "mean", "rms"))
+    }
+
+
 class MemberRuns:
     """Quantities of runs beside a run.
 
@@ -67,17 +81,14 @@ class MemberRuns:
     ) -> None:
         self._model, self._numbers, self._span = model, numbers, span
         self._stepping = Stepping(family=family, rtol=RTOL, magnitude=magnitude, kinks=LOCATED)
-        channels = channel_names(model.manifest) if model.states else ()
         self._count = len(quantities)
-        self._reduced = {
-            k: f"{item.kind}:{item.channel}"
-            for k, item in enumerate(quantities)
-            if item.kind in REDUCED
-            and item.ball is None
-            and item.channel in channels
-            # the most loaded ball carries least where two change rank, which the driver's steps do not end on
-            and (item.channel in model.states or item.kind == "max" or (item.kind in ("mean", "rms") and not closer))
-        }
+        self._reduced = reduced_by_ensembles(model, quantities)
+        if closer:
+            self._reduced = {
+                k: name
+                for k, name in self._reduced.items()
+                if quantities[k].channel in model.states or quantities[k].kind == "max"
+            }
         # steps do not end where two balls change rank; the shorter ones of a lower order take less noise from there
         ranked = any(item.kind in ("mean", "rms") and item.channel not in model.states for item in quantities)
         self._family = Family.DP54 if ranked and family is Family.DOP853 else family

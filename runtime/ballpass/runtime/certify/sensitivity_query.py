@@ -22,7 +22,7 @@ from ballpass.runtime.ask.nodes import Window
 from ballpass.runtime.ask.panels import ROUGH
 from ballpass.runtime.ask.quantities import default_quantities, parse_quantity
 from ballpass.runtime.ask.study import Course, Span, Study
-from ballpass.runtime.ask.track import Outlook, Stepping
+from ballpass.runtime.ask.track import Outlook
 from ballpass.runtime.certify.certificate import (
     AGREEMENT,
     CAUTION,
@@ -32,8 +32,8 @@ from ballpass.runtime.certify.certificate import (
     by_differences,
     compare,
 )
+from ballpass.runtime.certify.derivative_runs import differentiate, refuse_chaos, stepping_with_derivatives
 from ballpass.runtime.certify.grazing import TOLERANCE, Grazing, find_grazing
-from ballpass.runtime.certify.growth import refuse_growth
 from ballpass.runtime.certify.member_runs import MemberRuns
 from ballpass.runtime.certify.sensitivity_report import (
     STEPS,
@@ -43,28 +43,19 @@ from ballpass.runtime.certify.sensitivity_report import (
     ratio_unit,
 )
 from ballpass.runtime.contract import Manifest
-from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import METHODS, Family
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.direction_scales import ANGLE
-from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, refuse_jumps
-from ballpass.runtime.run.magnitudes import model_scales
-from ballpass.runtime.run.reductions import channel_names
-from ballpass.runtime.run.request import TOLERANCES, Request, asked_length
-from ballpass.runtime.run.scales import Scales
-from ballpass.runtime.run.simulate import STIFF_RATIO
+from ballpass.runtime.run.locating import refuse_jumps
+from ballpass.runtime.run.request import TOLERANCES, asked_length
 
 Array = NDArray[np.float64]
 
 #: Tolerance of the states in a run with derivatives, and that of the derivatives themselves.
 RTOL, SENSITIVITY_RTOL = 1e-11, 1e-10
-
-#: The derivatives' tolerance is loosened tenfold, down to this, where steps would fall below the resolution of time:
-#: under laws whose slope is infinite at contact onset derivatives have singular rates there.
-LOOSEST = 1e-6
 
 #: Nodes of quadratures in a turn to begin with.  They have nothing to do with the samples of a run.
 NODES = 4096
@@ -185,34 +176,16 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     names = _chosen(_listed("wrt", query.wrt, tuple(numbers.parameters)), numbers.parameters)
     study = Study(model, quantities, query.span, 4)
     window = study.window(numbers)
-    magnitude, family, fine = np.zeros(0), Family.AUTO, Family.AUTO
-    scales = Scales(magnitude=magnitude, frequency=0.0, decay=0.0)
-    if model.states:
-        start = np.array([numbers.values[name] for name in manifest.initial])
-        scales = model_scales(model, numbers, start, window.duration, window.turn)
-        magnitude = scales.magnitude
-        family, fine = _families(query.method, scales)
+    stepping, fine = stepping_with_derivatives(
+        model, numbers, window, method=query.method, rtol=query.rtol, sensitivity_rtol=query.sensitivity_rtol
+    )
+    magnitude = stepping.magnitude
     study.per_turn = max(query.samples_per_cycle or 0, NODES)
     tell = query.progress or (lambda _words, _fraction: None)
-    moving = [item.name for item in quantities if item.channel in channel_names(manifest)]
-    if moving and model.has_stepper:
-        tell("looking for growth", 0.0)
-        refuse_growth(
-            model,
-            numbers,
-            Request(cycles=query.span.cycles, duration=query.span.duration, transient_cycles=0.0),
-            moving,
-        )
-    stepping = Stepping(
-        family=family,
-        rtol=query.rtol,
-        magnitude=magnitude,
-        kinks=LOCATED if manifest.borders else STEPPED_OVER,  # as the steps with derivatives
-        sensitivity_rtol=query.sensitivity_rtol,
-    )
-
+    tell("looking for growth", 0.0)
+    refuse_chaos(model, numbers, quantities, query.span)
     tell("differentiating", 0.0)
-    course, tolerance = _differentiate(study, numbers, names, stepping)
+    course, tolerance = differentiate(study, numbers, names, stepping)
     values = np.array([item.value for item in course.estimates])
     slopes = np.array([item.slope for item in course.estimates])
     own = np.zeros_like(slopes)
@@ -220,7 +193,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
         tell("differentiating", 0.5)
         looser = replace(stepping, rtol=min(10.0 * query.rtol, 1e-3), sensitivity_rtol=10.0 * tolerance)
         study.rough = COARSER * ROUGH
-        found, _ = _differentiate(study, numbers, names, looser)
+        found, _ = differentiate(study, numbers, names, looser)
         own = np.abs(slopes - np.array([item.slope for item in found.estimates]))
     difference_scales = _difference_scales(manifest, numbers, names, magnitude, window)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -335,33 +308,6 @@ def _chosen(patterns: Sequence[str], known: Mapping[str, float]) -> list[str]:
             raise RequestError(unknown_name("parameter", pattern, known))
         found += matches
     return list(dict.fromkeys(found))
-
-
-def _families(method: str, scales: Scales) -> tuple[Family, Family]:
-    """Family for derivatives, and family for the tight runs of difference quotients."""
-    if method not in ("auto", *METHODS):
-        raise RequestError(
-            f"sensitivity: the method {method!r} was given; allowed are auto, {', '.join(METHODS)}, which "
-            "differentiate their own steps."
-        )
-    stiff = scales.stiffness > STIFF_RATIO
-    family = METHODS.get(method, Family.AUTO)
-    if family is Family.AUTO:
-        family = Family.RODAS5P if stiff else Family.DP54
-    return family, Family.RODAS5P if stiff else Family.DOP853
-
-
-def _differentiate(study: Study, numbers: Numbers, names: Sequence[str], stepping: Stepping) -> tuple[Course, float]:
-    """Derivatives at the tightest tolerance that the resolution of time allows; that tolerance."""
-    tolerance = stepping.sensitivity_rtol
-    assert tolerance is not None
-    while True:
-        try:
-            return study.differentiate(numbers, names, replace(stepping, sensitivity_rtol=tolerance)), tolerance
-        except SimulationError:
-            if tolerance * 10.0 > max(LOOSEST, stepping.sensitivity_rtol or 0.0):
-                raise
-            tolerance *= 10.0
 
 
 def _difference_scales(

@@ -11,8 +11,10 @@ from ballpass.runtime.contract.errors import RequestError
 #: Name for people, and extra, of the packages that are loaded where they are needed.
 EXTRAS = {
     "dask": ("Dask", "scale"),
+    "jax": ("JAX", "jax"),
     "matplotlib": ("matplotlib", "figures"),
     "scipy": ("SciPy", "analysis"),
+    "torch": ("PyTorch", "torch"),
     "xarray": ("xarray", "labelled"),
     "zarr": ("Zarr", "scale"),
 }

@@ -1,0 +1,246 @@
+"""Quantities as a function of parameters: batches, Jacobians and failures, in arrays, in JAX and in PyTorch.
+
+JAX's and PyTorch's own checkers compare the derivatives with differences of the values.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import approx_fprime
+
+from ballpass.runtime import BallpassError, Model, QuantityFunction, RequestError, SimulationError
+
+CLEARANCE, MASS, ANGLE = "bearing.clearance", "mechanism.bodies.slider.mass", "mechanism.driver.start_angle"
+#: Reduced by ensembles, and not.
+OF = ("peak_ball_force", "rms:inner.y", "value:inner.y@200deg")
+SPAN: dict[str, Any] = {"cycles": 0.8, "transient": 0.4}
+#: Differences see no noise of steps over kinks then.
+TIGHT: dict[str, Any] = {**SPAN, "rtol": 1e-11}
+WIDE = {CLEARANCE: 60e-6}
+#: Of PyTorch, which warns of a call of its own.
+SCRIPT = "ignore:.torch.jit.script. is deprecated:DeprecationWarning"
+
+
+@pytest.fixture(scope="module")
+def smooth(make_model: Callable[..., Model]) -> Model:
+    """The punching press whose ring moves little between two strokes, so that differences have digits."""
+    return make_model("punching_press")
+
+
+@pytest.fixture(scope="module")
+def function(smooth: Model) -> QuantityFunction:
+    return QuantityFunction(smooth, OF, (CLEARANCE, MASS), **SPAN)
+
+
+@pytest.fixture(scope="module")
+def rows(function: QuantityFunction) -> np.ndarray:
+    """Neighbours of the scene, shape (9, 2): a whole set of lanes and a member more."""
+    return function.start * (1.0 + 0.05 * np.random.default_rng(1).uniform(-1.0, 1.0, (9, 2)))
+
+
+@pytest.fixture(scope="module")
+def jax() -> Iterator[ModuleType]:
+    jax = pytest.importorskip("jax", reason="JAX is not installed: pip install ballpass[jax]")
+    before = jax.config.jax_enable_x64
+    jax.config.update("jax_enable_x64", True)
+    yield jax
+    jax.config.update("jax_enable_x64", before)
+
+
+@pytest.fixture(scope="module")
+def torch() -> ModuleType:
+    return pytest.importorskip("torch", reason="PyTorch is not installed: pip install ballpass[torch]")
+
+
+def in_jax(function: QuantityFunction) -> Callable[..., Any]:
+    from ballpass.jax import wrap
+
+    return wrap(function)
+
+
+def in_torch(function: QuantityFunction) -> Callable[..., Any]:
+    from ballpass.torch import wrap
+
+    return wrap(function)
+
+
+def test_values_and_derivatives_are_those_of_the_report(smooth: Model, function: QuantityFunction) -> None:
+    report = smooth.sensitivity(OF, (CLEARANCE, MASS), **SPAN, check=False)
+    expected = np.array([[report[name, by].derivative for by in function.wrt] for name in OF])
+    np.testing.assert_allclose(function.jacobian(function.start), expected, rtol=1e-3)
+    values = [report[name, CLEARANCE].value for name in OF]
+    np.testing.assert_allclose(function(function.start), values, rtol=1e-6)
+
+
+def test_a_batch_is_a_loop_to_the_bit(function: QuantityFunction, rows: np.ndarray) -> None:
+    assert np.array_equal(function(rows), [function(row) for row in rows])
+    assert np.array_equal(function.jacobian(rows[:3]), [function.jacobian(row) for row in rows[:3]])
+    assert function(rows[:8].reshape(2, 4, 2)).shape == (2, 4, 3)
+    one = QuantityFunction(function._model, OF[0], CLEARANCE, **SPAN, parameters={MASS: rows[0, 1]})
+    assert one(rows[0, :1]) == function(rows[0])[0]
+    assert one(rows[:, :1]).shape == (9,)
+    assert one.jacobian(rows[:2, :1]).shape == (2, 1)
+
+
+def test_what_fails_is_told_or_nan_as_asked(smooth: Model, function: QuantityFunction, rows: np.ndarray) -> None:
+    table = rows[:3].copy()
+    table[1, 1] = -1.0
+    for call in (function, function.jacobian):
+        with pytest.raises(RequestError, match=r"slider\.mass = -1: .*allowed is a number above 0"):
+            call(table)
+    lenient = QuantityFunction(smooth, OF, (CLEARANCE, MASS), **SPAN, failed="nan")
+    table[2, 0] = np.nan
+    for mine, own in ((lenient(table), function(rows[:1])), (lenient.jacobian(table), function.jacobian(rows[:1]))):
+        assert np.array_equal(mine[:1], own)
+        assert np.isnan(mine[1:]).all()
+
+
+def test_derivatives_that_mean_nothing_are_refused(
+    press: Model, smooth: Model, function: QuantityFunction, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings: dict[str, Any] = {"cycles": 12, "transient": 0, "parameters": WIDE}
+    chaotic = QuantityFunction(press, "range:inner.x", MASS, **settings)
+    assert np.isfinite(chaotic(chaotic.start))
+    with pytest.raises(SimulationError, match="chaotic"):
+        chaotic.jacobian(chaotic.start)
+    assert np.isnan(QuantityFunction(press, "range:inner.x", MASS, **settings, failed="nan").jacobian([16.8])).all()
+    jumping = replace(smooth.manifest, smoothness=(("damping", "discontinuous"),))
+    monkeypatch.setattr(smooth, "manifest", jumping)
+    with pytest.raises(RequestError, match="discontinuous"):
+        function.jacobian(function.start)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"of": "peak_bal_force"}, "peak_ball_force"),
+        ({"of": ()}, "one name or more"),
+        ({"wrt": ["bearing.clearanc"]}, "bearing.clearance"),
+        ({"wrt": [MASS, MASS]}, "each once"),
+        ({"failed": "ignore"}, "nan"),
+        ({"chaos": "raise"}, "refuse"),
+        ({"rtol": 1.0}, "rtol"),
+        ({"transient": 1.0}, "transient"),
+    ],
+)
+def test_wrong_requests_are_told_before_anything_runs(smooth: Model, wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(RequestError, match=message):
+        QuantityFunction(smooth, **{"of": OF, "wrt": MASS, **SPAN, **wrong})
+
+
+def test_jax_finds_derivatives_right(smooth: Model, jax: ModuleType) -> None:
+    from jax.test_util import check_grads
+
+    function = QuantityFunction(smooth, OF, (CLEARANCE, MASS, ANGLE), **TIGHT)
+    f, start = in_jax(function), jax.numpy.asarray(function.start)
+    scaled = f(start)
+    check_grads(
+        lambda x: f(start * x) / scaled, (jax.numpy.ones(3),),
+        order=1, modes=("fwd", "rev"), eps=1e-3, rtol=2e-4, atol=1e-7,
+    )  # fmt: skip
+
+
+def test_jax_transforms_give_the_same_bits(jax: ModuleType, function: QuantityFunction, rows: np.ndarray) -> None:
+    f = in_jax(function)
+    expected, slopes = function(rows), function.jacobian(rows[:2])
+    assert f(rows[0]).dtype == np.float64
+    for call in (f, jax.jit(f), jax.vmap(f), jax.jit(jax.vmap(f))):
+        assert np.array_equal(call(rows), expected)
+    for jacobian in (jax.jacfwd(f), jax.jacrev(f), jax.jit(jax.jacrev(f))):
+        np.testing.assert_allclose(jacobian(rows[0]), slopes[0], rtol=1e-15)
+    np.testing.assert_allclose(jax.vmap(jax.jacrev(f))(rows[:2]), slopes, rtol=1e-15)
+    # a mapping; the gradient of a composed function has its keys
+    value, slope = jax.jit(jax.value_and_grad(lambda x: f(x)[0] ** 2))({MASS: rows[0, 1]})
+    at = np.array([function.start[0], rows[0, 1]])
+    assert value == pytest.approx(function(at)[0] ** 2, rel=1e-15)
+    assert slope == {MASS: pytest.approx(2.0 * function(at)[0] * function.jacobian(at)[0, 1], rel=1e-12)}
+
+
+def test_a_batch_of_jax_is_one_ensemble(
+    jax: ModuleType, function: QuantityFunction, rows: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shapes = []
+    plain = function._by_ensemble
+    monkeypatch.setattr(function, "_by_ensemble", lambda table: shapes.append(table.shape) or plain(table))
+    jax.vmap(in_jax(function))(rows)
+    assert shapes == [(9, 2)]
+
+
+def test_jax_refuses_what_it_cannot_do(smooth: Model, jax: ModuleType, function: QuantityFunction) -> None:
+    f = in_jax(function)
+    for call in (jax.hessian(f), jax.jacfwd(jax.jacfwd(f)), jax.jacrev(jax.jacrev(f)), jax.jit(jax.hessian(f))):
+        with pytest.raises(RequestError, match="second derivative"):
+            call(function.start)
+    with pytest.raises(RequestError, match=CLEARANCE):
+        f({"bearing.clearanc": 1e-5})
+    with pytest.raises(RequestError, match=r"\(\.\.\., 2\) is expected"):
+        jax.jit(f)(np.zeros(3))
+    wrong = np.array([function.start[0], -1.0])
+    with pytest.raises(RequestError, match="above 0"):
+        f(wrong)
+    with pytest.raises(jax.errors.JaxRuntimeError, match="above 0"):
+        jax.jit(f)(wrong)
+    lenient = in_jax(QuantityFunction(smooth, OF, (CLEARANCE, MASS), **SPAN, failed="nan"))
+    assert np.isnan(jax.jit(jax.jacrev(lenient))(wrong)).all()
+    jax.config.update("jax_enable_x64", False)
+    try:
+        with pytest.raises(RequestError, match="jax_enable_x64"):
+            f(function.start)
+    finally:
+        jax.config.update("jax_enable_x64", True)
+
+
+@pytest.mark.filterwarnings(SCRIPT)
+def test_pytorch_finds_derivatives_right(smooth: Model, torch: ModuleType) -> None:
+    function = QuantityFunction(smooth, OF, (CLEARANCE, MASS), **TIGHT)
+    f, start = in_torch(function), torch.as_tensor(function.start)
+    scaled = f(start)
+    x = torch.ones(2, dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(
+        lambda x: f(start * x) / scaled, x, eps=1e-3, rtol=2e-4, atol=1e-7, check_forward_ad=True
+    )
+
+
+def test_pytorch_gives_the_same_bits(torch: ModuleType, function: QuantityFunction, rows: np.ndarray) -> None:
+    f, x = in_torch(function), torch.as_tensor(rows)
+    assert np.array_equal(f(x), function(rows))
+    assert np.array_equal(torch.func.vmap(f)(x), function(rows))
+    slopes = function.jacobian(rows[:2])
+    np.testing.assert_allclose(torch.func.vmap(torch.func.jacrev(f))(x[:2]), slopes, rtol=1e-15)
+    mass = torch.tensor(rows[0, 1], requires_grad=True)
+    f({CLEARANCE: torch.tensor(rows[0, 0]), MASS: mass})[0].backward()
+    assert float(mass.grad) == pytest.approx(slopes[0, 0, 1], rel=1e-15)
+
+
+@pytest.mark.filterwarnings(SCRIPT)
+def test_pytorch_refuses_what_it_cannot_do(torch: ModuleType, function: QuantityFunction) -> None:
+    f, x = in_torch(function), torch.as_tensor(function.start)
+    for again in (torch.func.jacfwd, torch.func.jacrev):
+        with pytest.raises(RequestError, match="second derivative"):
+            again(torch.func.jacrev(f))(x)
+    with pytest.raises(RequestError, match=CLEARANCE):
+        f({"bearing.clearanc": x})
+    with pytest.raises(BallpassError, match=r"\(\.\.\., 2\) is expected"):
+        f(torch.zeros(3))
+
+
+def test_scipy_takes_it(smooth: Model) -> None:
+    function = QuantityFunction(smooth, "rms:inner.y", (MASS,), **TIGHT)
+    at = np.array([16.8])
+    assert function.jacobian(at) == pytest.approx(approx_fprime(at, function, 1e-2), rel=1e-3)
+
+
+@pytest.mark.parametrize("package", ["jax", "torch"])
+def test_a_missing_package_is_named_with_the_command(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, f"ballpass.{package}", raising=False)
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ModuleNotFoundError, match=rf"pip install 'ballpass\[{package}\]'"):
+        import_module(f"ballpass.{package}")
