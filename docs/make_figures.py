@@ -65,8 +65,18 @@ def draw_lives() -> None:
                 print(target.relative_to(ROOT))
 
 
+def draw_movie() -> None:
+    """The four-bar over one turn, as `ballpass animate` writes it."""
+    ballpass = Path(sys.executable).parent / "ballpass"
+    with tempfile.TemporaryDirectory() as folder:
+        words = ("--format", "gif", "--pictures", "60", "--out", folder)
+        run([ballpass, "animate", ROOT / "scenes" / "four_bar.toml", *words], cwd=ROOT, check=True)
+        shutil.copyfile(Path(folder) / "animation.gif", IMAGES / "four_bar.gif")
+
+
 def main() -> None:
     IMAGES.mkdir(exist_ok=True)
+    draw_movie()
     draw_lives()
     for scene, names in PICTURES.items():
         model = load(generate(ROOT / "scenes" / f"{scene}.toml", ROOT / "generated" / scene))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 import typer
 
 from ballpass.runtime.app.commands import options
+from ballpass.runtime.app.commands.animate import animate
 from ballpass.runtime.app.commands.asked import (
     Asked,
     faults_of_numbers,
@@ -43,6 +44,7 @@ from ballpass.runtime.app.commands.shared import (
     results_folder,
     show,
     show_json,
+    size_words,
     warn,
     warn_of_scene,
 )
@@ -190,7 +192,7 @@ def run(
             initial=start,
         )
         if solution.nbytes > LARGE:
-            size = _size(solution.nbytes)
+            size = size_words(solution.nbytes)
             note(f"{len(solution)} samples, about {size}; fewer with samples_per_cycle, none with Model.reduce.")
         growth = None
         if solution.states and model.has_stepper:
@@ -237,7 +239,7 @@ def run(
         told = render_accuracy(model, solution.accuracy)
         show_tables(told)
         show(solution.accuracy.words)
-    size = _size((folder / "solution.nc").stat().st_size)
+    size = size_words((folder / "solution.nc").stat().st_size)
     show(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")
 
 
@@ -311,7 +313,7 @@ def export(
 
 for _panel, _commands in {
     DESCRIBE: (bearings, explain),
-    SIMULATE: (dataset, stream, sweep),
+    SIMULATE: (animate, dataset, stream, sweep),
     ASK: (jacobian, life, linearize, sensitivity, spectrum, trade),
 }.items():
     for _command in _commands:
@@ -366,11 +368,6 @@ def _check_request(
             f"Allowed: fewer transient turns than turns. Simulate more (--cycles {dropped + 2:g}) or drop fewer "
             "(--transient 0)."
         )
-
-
-def _size(count: int) -> str:
-    """Bytes for people."""
-    return f"{count / 1e6:.0f} MB" if count >= 1e6 else f"{math.ceil(count / 1e3)} kB"
 
 
 def _write_results(

@@ -2,3 +2,6 @@
 
 #: Names of the figures of a run, in their order.
 NAMES = ("load_curve", "orbit", "spectra", "phase_portrait", "ball_loads", "peak_moment")
+
+#: Kinds of files of a moving picture.
+MOVING = ("html", "mp4", "gif")

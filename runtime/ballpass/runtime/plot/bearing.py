@@ -6,6 +6,7 @@ are multiplied with one factor, which the caption states.  A ball that overlaps 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,13 +17,20 @@ from matplotlib.patches import Annulus, Circle
 
 from ballpass.runtime.plot.canvas import INK, SIGNAL, arrow, write
 from ballpass.runtime.plot.record import Array, Record
+from ballpass.runtime.plot.shapes import exaggeration
 
 #: White for unloaded, dark for the highest load: the order survives greyscale.
-_LOAD_COLOURS = LinearSegmentedColormap.from_list("load", ("#ffffff", "#f4c95d", "#d1495b", "#4a0e23"))
+LOAD_COLOURS = LinearSegmentedColormap.from_list("load", ("#ffffff", "#f4c95d", "#d1495b", "#4a0e23"))
+
+RING = "#ced4da"
 
 
-def draw_bearing(axes: Axes, record: Record, sample: int) -> float:
+def draw_bearing(axes: Axes, record: Record, sample: int, samples: Sequence[int] = ()) -> float:
     """Draw the bearing at a sample of the record.
+
+    Parameters
+    ----------
+    samples : of a moving picture, whose colours and displacements have one scale; none: of this sample alone
 
     Returns
     -------
@@ -32,19 +40,20 @@ def draw_bearing(axes: Axes, record: Record, sample: int) -> float:
     ball = record.parameter("bearing.ball_diameter")
     clearance = record.parameter("bearing.clearance")
     _, forces = record.ball_force()
-    force = forces[sample]
-    offset = ring_centre(record, "inner", sample) - ring_centre(record, "outer", sample)
-    factor = _exaggeration(0.25 * ball, max(abs(clearance) / 2.0, float(np.hypot(*offset))))
+    shown = list(samples) or [sample]
+    force, offsets = forces[sample], record.centres("inner") - record.centres("outer")
+    offset, furthest = offsets[sample], float(np.max(np.hypot(*offsets[shown].T)))
+    factor = exaggeration(0.25 * ball, max(abs(clearance) / 2.0, furthest))
     inner, outer, gap = factor * offset, np.zeros(2), factor * clearance / 4.0
 
     wall = 0.42 * ball
     inner_raceway, outer_raceway = (pitch - ball) / 2.0 - gap, (pitch + ball) / 2.0 + gap
-    look: dict[str, Any] = {"facecolor": "#ced4da", "edgecolor": INK, "linewidth": 1.2}
+    look: dict[str, Any] = {"facecolor": RING, "edgecolor": INK, "linewidth": 1.2}
     axes.add_patch(Annulus((0.0, 0.0), outer_raceway + wall, wall, **look))
     axes.add_patch(Annulus((float(inner[0]), float(inner[1])), inner_raceway, wall, **look))
     axes.add_patch(Circle(tuple(inner), inner_raceway - wall, facecolor="#f8f9fa", edgecolor="none"))
 
-    highest = max(float(np.max(force)), 1e-12)
+    highest = max(float(np.max(forces[shown])), 1e-12)
     scale = Normalize(0.0, highest)
     angles = record.ball_angles(sample)
     for number, (angle, load) in enumerate(zip(angles, force, strict=True), start=1):
@@ -52,7 +61,7 @@ def draw_bearing(axes: Axes, record: Record, sample: int) -> float:
         # a ball touches both raceways where it is loaded: half-way between them
         radius = (_reach(inner, inner_raceway, direction) + _reach(outer, outer_raceway, direction)) / 2.0
         centre = radius * direction
-        colour = _LOAD_COLOURS(float(scale(max(load, 0.0))))
+        colour = LOAD_COLOURS(float(scale(max(load, 0.0))))
         axes.add_patch(Circle(tuple(centre), ball / 2.0, facecolor=colour, edgecolor="black", linewidth=0.9, zorder=3))
         bright = float(np.dot(colour[:3], (0.2126, 0.7152, 0.0722))) > 0.45
         contrast = "black" if bright else "white"
@@ -60,24 +69,17 @@ def draw_bearing(axes: Axes, record: Record, sample: int) -> float:
         if load > 0.02 * highest:
             place = (outer_raceway + wall + 0.42 * ball) * direction + outer
             write(axes, place, _newton(load), fontsize=8, color="#212529")
-    _draw_load(axes, record, sample, inner, 0.92 * (inner_raceway - wall))
+    _draw_load(axes, record, sample, shown, inner, 0.92 * (inner_raceway - wall))
     reach = outer_raceway + wall + 0.85 * ball
     axes.set_xlim(-reach, reach)
     axes.set_ylim(-reach, reach)
     axes.set_aspect("equal")
     axes.axis("off")
     assert axes.figure is not None  # the axes were made by a figure
-    colours = ScalarMappable(scale, _LOAD_COLOURS)
+    colours = ScalarMappable(scale, LOAD_COLOURS)
     bar = axes.figure.colorbar(colours, ax=axes, shrink=0.6, pad=0.01, aspect=25, panchor=False)
     bar.set_label("contact load [N]", fontsize=9)
     return factor
-
-
-def ring_centre(record: Record, ring: str, sample: int) -> Array:
-    """Centre of a ring at a sample, (2,) [m]."""
-    if ring == "outer" and not record.has("outer.x", "outer.y"):
-        return np.zeros(2)  # fixed
-    return np.array([record.values(f"{ring}.x")[sample], record.values(f"{ring}.y")[sample]])
 
 
 def _reach(centre: Array, radius: float, direction: Array) -> float:
@@ -86,23 +88,15 @@ def _reach(centre: Array, radius: float, direction: Array) -> float:
     return along + float(np.sqrt(max(radius**2 - float(np.dot(centre, centre)) + along**2, 0.0)))
 
 
-def _exaggeration(shown: float, actual: float) -> float:
-    """Largest of 1, 2, 5, 10, 20 ... that keeps `actual` [m] within `shown` [m]."""
-    if actual <= 0.0:
-        return 1.0
-    decade = 10.0 ** np.floor(np.log10(shown / actual))
-    return float(max(1.0, decade * max(digit for digit in (1.0, 2.0, 5.0) if digit * decade <= shown / actual)))
-
-
-def _draw_load(axes: Axes, record: Record, sample: int, centre: Array, length: float) -> None:
+def _draw_load(axes: Axes, record: Record, sample: int, shown: list[int], centre: Array, length: float) -> None:
     loads = record.ring_load()
     if loads is None:
         return
     load = loads[sample]
-    size = float(np.hypot(*load))
-    if size == 0.0:
+    size, greatest = float(np.hypot(*load)), float(np.max(np.hypot(*loads[shown].T)))
+    if size <= 0.02 * greatest:
         return
-    way = 0.9 * length * load / size
+    way = 0.9 * length * load / greatest
     arrow(axes, centre - way, centre + way, SIGNAL, width=3.0)
     # beside the arrow, as far as the words' half width and half height ask for
     normal = np.array([load[1], -load[0]]) / size

@@ -51,11 +51,11 @@ def _has_phases(record: Record) -> bool:
 
 
 def _has_balls(record: Record) -> bool:
-    return record.has("ball.force") or record.has("ball.elastic_force")
+    return record.has_ball_force
 
 
 def _has_moment(record: Record) -> bool:
-    return record.manifest.mechanism is not None or moment.can_draw_bearing(record)
+    return record.manifest.mechanism is not None or record.can_draw_bearing
 
 
 FIGURES = (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,27 +12,66 @@ from matplotlib.patches import Circle, Polygon
 
 from ballpass.runtime.plot.canvas import GREY, INK, SAND, SIGNAL, arrow, write
 from ballpass.runtime.plot.record import FRAME, Array, Record
+from ballpass.runtime.plot.shapes import Points, guide_direction, links, used_points
 
 #: Positions in which the paths of moving joints are traced.
 _TRACE = 72
 
-_Points = dict[tuple[str, str], Array]
+BAR = "#8fa3bf"
 
 
-def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
-    """Draw the mechanism at a sample of the record, with the paths of its joints and the forces."""
-    mechanism = record.mechanism
-    now = record.points(float(record.t[sample]), record.state(sample))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """What pictures of the mechanism at several samples share.
+
+    Attributes
+    ----------
+    trace : places of the points, over a turn where one is known, else at the samples
+    size : larger side of the box around them [m]
+    greatest : force that the longest arrow stands for [N]
+    low, high : corners of the box around places and arrows, each (2,) [m]
+    """
+
+    trace: Points
+    size: float
+    greatest: float
+    low: Array
+    high: Array
+
+
+def view(record: Record, samples: Sequence[int]) -> View:
+    """View that holds the mechanism and its arrows at all these samples of the record."""
+    poses = [record.points(float(record.t[k]), record.state(k)) for k in samples]
     length = record.cycle_length
-    times = record.t[sample] + (np.zeros(1) if length is None else np.linspace(0.0, length, _TRACE + 1))
-    poses = [record.points(float(t)) for t in times]
-    trace: _Points = {key: np.array([pose[key] for pose in poses]) for key in now}  # (times, 2) [m]
-    joined = [key for _, _, b, p, c, q in mechanism.joints for key in ((b, p), (c, q))]
-    used = list(dict.fromkeys([*joined, *((body, point) for _, body, point, _ in mechanism.forces)]))
-    everything = np.vstack([trace[key] for key in used])
-    low, high = everything.min(axis=0), everything.max(axis=0)
-    size = max(float(np.max(high - low)), 1e-9)
+    turn = (
+        poses
+        if length is None
+        else [record.points(float(record.t[samples[0]] + length * k / _TRACE)) for k in range(_TRACE + 1)]
+    )
+    trace: Points = {key: np.array([pose[key] for pose in turn]) for key in turn[0]}
+    everything = np.vstack([trace[key] for key in used_points(record.mechanism)])
+    size = max(float(np.max(np.ptp(everything, axis=0))), 1e-9)
+    forces = [_forces(record, pose, k) for pose, k in zip(poses, samples, strict=True)]
+    greatest = max((float(np.hypot(*force)) for now in forces for _, _, force, _ in now), default=0.0)
+    ends = [end[None, :] for now in forces for _, _, end, _, _ in _arrows(now, size, greatest)]
+    corners = np.vstack([everything, *ends])
+    margin = 0.16 * size
+    return View(
+        trace=trace, size=size, greatest=greatest, low=corners.min(axis=0) - margin, high=corners.max(axis=0) + margin
+    )
 
+
+def draw_mechanism(axes: Axes, record: Record, sample: int, seen: View | None = None) -> None:
+    """Draw the mechanism at a sample of the record, with the paths of its joints and the forces.
+
+    Parameters
+    ----------
+    seen : view of several samples; that of this one if None
+    """
+    mechanism = record.mechanism
+    seen = view(record, [sample]) if seen is None else seen
+    now, trace, size = record.points(float(record.t[sample]), record.state(sample)), seen.trace, seen.size
+    used = used_points(mechanism)
     for key in used:
         path = trace[key]
         if float(np.max(np.ptp(path, axis=0))) > 1e-9 * size:
@@ -38,7 +79,7 @@ def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
     busy: list[tuple[Array, Array]] = []  # a place, and a way from there along which something is drawn
     for _, kind, first, guide, second, block in mechanism.joints:
         if kind == "prismatic":
-            direction = _guide_direction(record, now, trace, (first, guide), (second, block))
+            direction = guide_direction(now, trace, (first, guide), (second, block))
             _draw_guide(axes, trace[second, block], now[second, block], direction, size, fixed=first == FRAME)
             busy += [(now[second, block], direction * size), (now[second, block], -direction * size)]
     _draw_links(axes, used, now, size)
@@ -48,32 +89,24 @@ def draw_mechanism(axes: Axes, record: Record, sample: int) -> None:
                 _draw_ground(axes, now[first, point], size)
             look: dict[str, Any] = {"facecolor": "white", "edgecolor": INK, "linewidth": 1.5, "zorder": 6}
             axes.add_patch(Circle(tuple(now[first, point]), 0.017 * size, **look))
-    arrows = _draw_forces(axes, record, now, sample, size)
+    arrows = _draw_forces(axes, _arrows(_forces(record, now, sample), size, seen.greatest), size)
     _draw_names(axes, record, now, busy + arrows, size)
-    corners = np.vstack([everything, *((at + way)[None, :] for at, way in arrows)])
-    margin = 0.16 * size
-    axes.set_xlim(corners[:, 0].min() - margin, corners[:, 0].max() + margin)
-    axes.set_ylim(corners[:, 1].min() - margin, corners[:, 1].max() + margin)
+    axes.set_xlim(seen.low[0], seen.high[0])
+    axes.set_ylim(seen.low[1], seen.high[1])
     axes.set_aspect("equal")
     axes.axis("off")
 
 
-def _draw_links(axes: Axes, used: list[tuple[str, str]], now: _Points, size: float) -> None:
+def _draw_links(axes: Axes, used: list[tuple[str, str]], now: Points, size: float) -> None:
     """Each moving body: a bar between two joints, a plate between more."""
-    for body in dict.fromkeys(name for name, _ in used if name != FRAME):
-        joints: list[Array] = []
-        for key in used:
-            if key[0] == body and all(np.hypot(*(now[key] - other)) > 1e-6 * size for other in joints):
-                joints.append(now[key])
-        corners = np.array(joints)
-        if len(joints) == 2:
+    for body, keys in links(used, now, size):
+        corners = np.array([now[key] for key in keys])
+        if len(keys) == 2:
             axes.plot(corners[:, 0], corners[:, 1], color=INK, linewidth=8, solid_capstyle="round", zorder=3)
-            axes.plot(corners[:, 0], corners[:, 1], color="#8fa3bf", linewidth=5.4, solid_capstyle="round", zorder=3)
-        elif len(joints) > 2:
-            centre = corners.mean(axis=0)
-            order = np.argsort(np.arctan2(*(corners - centre).T[::-1]))
-            look: dict[str, Any] = {"facecolor": "#8fa3bf", "edgecolor": INK, "linewidth": 1.6, "joinstyle": "round"}
-            axes.add_patch(Polygon(corners[order], zorder=3, **look))
+            axes.plot(corners[:, 0], corners[:, 1], color=BAR, linewidth=5.4, solid_capstyle="round", zorder=3)
+        elif len(keys) > 2:
+            look: dict[str, Any] = {"facecolor": BAR, "edgecolor": INK, "linewidth": 1.6, "joinstyle": "round"}
+            axes.add_patch(Polygon(corners, zorder=3, **look))
         center = now.get((body, "center_of_mass"))
         if center is not None:
             axes.plot(*center, marker="o", markersize=6, color="white", markeredgecolor=INK, zorder=4)
@@ -96,19 +129,6 @@ def _hatched_wall(axes: Axes, start: Array, end: Array, outward: Array, size: fl
     axes.plot(*np.array([start, end]).T, color=INK, linewidth=1.5, zorder=2)
 
 
-def _guide_direction(
-    record: Record, now: _Points, trace: _Points, guide: tuple[str, str], block: tuple[str, str]
-) -> Array:
-    """Unit vector along the guide.
-
-    The slider's point stays on the line through the guide's point: one to the other.  On the frame, along the path.
-    """
-    ways = (trace[block] - trace[block][0]) if guide[0] == FRAME else (now[block] - now[guide])[None, :]
-    longest = ways[int(np.argmax(np.hypot(*ways.T)))]
-    length = float(np.hypot(*longest))
-    return longest / length if length > 0.0 else np.array([1.0, 0.0])
-
-
 def _draw_guide(axes: Axes, path: Array, at: Array, direction: Array, size: float, *, fixed: bool) -> None:
     """Slider block between the two walls of its guide."""
     normal = np.array([-direction[1], direction[0]])
@@ -127,7 +147,7 @@ def _draw_guide(axes: Axes, path: Array, at: Array, direction: Array, size: floa
         _hatched_wall(axes, first + shift, last + shift, side * normal, size)
 
 
-def _draw_names(axes: Axes, record: Record, now: _Points, busy: list[tuple[Array, Array]], size: float) -> None:
+def _draw_names(axes: Axes, record: Record, now: Points, busy: list[tuple[Array, Array]], size: float) -> None:
     """Names of the joints, those at one place together, on the side where fewest links and forces leave the place."""
     mechanism = record.mechanism
     places: list[tuple[Array, list[str]]] = []
@@ -155,36 +175,49 @@ def _draw_names(axes: Axes, record: Record, now: _Points, busy: list[tuple[Array
         write(axes, place, ", ".join(names), fontsize=10, fontweight="bold", color="#212529", zorder=8)
 
 
-def _draw_forces(axes: Axes, record: Record, now: _Points, sample: int, size: float) -> list[tuple[Array, Array]]:
-    """Arrows of the reactions on the frame and of the applied forces that act, all to one scale.
+def _forces(record: Record, now: Points, sample: int) -> list[tuple[str, Array, Array, float]]:
+    """Reactions on the frame and applied forces that act: name, place [m], force [N], side of the arrow.
+
+    A reaction pulls at its place, side 1; an applied force pushes, side -1: its tip is where it acts.
+    """
+    applied = [(name, now[key], force) for name, key, force in record.applied_forces(float(record.t[sample]))]
+    forces = [("", at, force, 1.0) for at, force in _reactions(record, now, sample)]
+    return forces + [(f"{name}\n", at, force, -1.0) for name, at, force in applied]
+
+
+def _arrows(
+    forces: list[tuple[str, Array, Array, float]], size: float, greatest: float
+) -> list[tuple[str, Array, Array, Array, float]]:
+    """Arrows of forces that are seen, all to one scale: name, place [m], its other end [m], force [N], side."""
+    found = []
+    for name, at, force, side in forces:
+        strength = float(np.hypot(*force))
+        if strength > 0.02 * greatest:
+            end = at + side * (0.08 + 0.24 * strength / greatest) * size * force / strength
+            found.append((name, at, end, force, side))
+    return found
+
+
+def _draw_forces(
+    axes: Axes, arrows: list[tuple[str, Array, Array, Array, float]], size: float
+) -> list[tuple[Array, Array]]:
+    """Arrows with their forces in words.
 
     Returns
     -------
     where an arrow is: pairs of the place the force acts at and the way from there to the arrow's other end [m]
     """
-    reactions = _reactions(record, now, sample)
-    applied = [(name, now[key], force) for name, key, force in record.applied_forces(float(record.t[sample]))]
-    # a reaction pulls at its place; an applied force pushes: its tip is where it acts
-    forces = [("", at, force, 1.0) for at, force in reactions]
-    forces += [(f"{name}\n", at, force, -1.0) for name, at, force in applied]
-    greatest = max((float(np.hypot(*force)) for _, _, force, _ in forces), default=0.0)
-    drawn: list[tuple[Array, Array]] = []
-    for name, at, force, side in forces:
-        strength = float(np.hypot(*force))
-        if strength <= 0.02 * greatest:
-            continue
-        end = at + side * (0.08 + 0.24 * strength / greatest) * size * force / strength
+    for name, at, end, force, side in arrows:
         colour = SIGNAL if side > 0.0 else INK
         arrow(axes, *((at, end) if side > 0.0 else (end, at)), colour)
         right = side * force[0] >= 0.0
         place = end + np.array([0.02 * size if right else -0.02 * size, 0.0])
         look: dict[str, Any] = {"color": colour, "fontweight": "bold", "fontsize": 9.5, "zorder": 8}
-        write(axes, place, f"{name}{strength:.0f} N", ha="left" if right else "right", **look)
-        drawn.append((at, end - at))
-    return drawn
+        write(axes, place, f"{name}{np.hypot(*force):.0f} N", ha="left" if right else "right", **look)
+    return [(at, end - at) for _, at, end, _, _ in arrows]
 
 
-def _reactions(record: Record, now: _Points, sample: int) -> list[tuple[Array, Array]]:
+def _reactions(record: Record, now: Points, sample: int) -> list[tuple[Array, Array]]:
     """Places of the frame's revolute joints whose reaction is an output [m], and the forces on the frame there [N]."""
     mechanism = record.mechanism
     found: list[tuple[Array, Array]] = []

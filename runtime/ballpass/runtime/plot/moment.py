@@ -6,17 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ballpass.runtime.ask.peaks import refine_peak
-from ballpass.runtime.plot.bearing import draw_bearing, ring_centre
+from ballpass.runtime.plot.bearing import draw_bearing
 from ballpass.runtime.plot.canvas import frame, new_figure, styled
 from ballpass.runtime.plot.mechanism import draw_mechanism
 from ballpass.runtime.plot.record import Record
-
-
-def can_draw_bearing(record: Record) -> bool:
-    """Whether ring position and a ball force were asked for."""
-    if record.bearing is None or not record.has("inner.x", "inner.y"):
-        return False
-    return record.has("ball.force") or record.has("ball.elastic_force")
 
 
 @styled
@@ -26,7 +19,7 @@ def peak_moment(record: Record) -> Figure:
     The moment is that of the highest sample of the ball force; without a bearing, of the greatest drive torque.
     """
     with_mechanism = record.manifest.mechanism is not None
-    with_bearing = can_draw_bearing(record)
+    with_bearing = record.can_draw_bearing
     sample, reason = _moment(record)
     figure = new_figure(5.6, layout=None)
     text = ""
@@ -48,7 +41,7 @@ def peak_moment(record: Record) -> Figure:
         words, _ = record.ball_force()
         text += f"Bearing: balls coloured by {words}; clearance and displacement between the rings ×{factor:g}"
         if record.bearing is not None and record.bearing.outer_ring and record.has("outer.x", "outer.y"):
-            moved = 1e6 * np.hypot(*ring_centre(record, "outer", sample))
+            moved = 1e6 * np.hypot(*record.centres("outer")[sample])
             text += f", the outer ring itself has moved by {moved:.3g} µm"
         text += ". "
     when = f"At t = {record.t[sample] * 1e3:.4g} ms"
@@ -73,7 +66,7 @@ def _between_samples(record: Record) -> str:
 
 def _moment(record: Record) -> tuple[int, str]:
     """Sample to draw, and why."""
-    if can_draw_bearing(record):
+    if record.can_draw_bearing:
         _, force = record.ball_force()
         return int(np.argmax(np.max(force, axis=1))), "highest sample of the ball force"
     if record.has("drive_torque"):

@@ -141,6 +141,22 @@ class Record:
             return "elastic and damping force" if damped else "elastic force", self.values("ball.force")
         return "elastic force", self.values("ball.elastic_force")
 
+    @property
+    def has_ball_force(self) -> bool:
+        """Whether a ball force was asked for."""
+        return self.has("ball.force") or self.has("ball.elastic_force")
+
+    @property
+    def can_draw_bearing(self) -> bool:
+        """Whether ring position and a ball force were asked for."""
+        return self.bearing is not None and self.has("inner.x", "inner.y") and self.has_ball_force
+
+    def centres(self, ring: str) -> Array:
+        """Centre of a ring, "inner" or "outer", (n, 2) [m]; zero where it is fixed."""
+        if ring == "outer" and not self.has("outer.x", "outer.y"):
+            return np.zeros((self.t.size, 2))
+        return np.column_stack((self.values(f"{ring}.x"), self.values(f"{ring}.y")))
+
     def bearing_share(self) -> float:
         """Part of its joint's force that the bearing carries."""
         values, path = self.solution.parameters, "" if self.bearing is None else self.bearing.path

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import sys
 import time
@@ -139,6 +140,11 @@ def show_json(result: Any) -> None:
 def json_text(result: Any) -> str:
     """Results as JSON for people and programs."""
     return json.dumps(result, indent=2, allow_nan=False) + "\n"
+
+
+def size_words(count: int) -> str:
+    """Bytes for people."""
+    return f"{count / 1e6:.0f} MB" if count >= 1e6 else f"{math.ceil(count / 1e3)} kB"
 
 
 class Stages:

@@ -1,0 +1,66 @@
+"""``ballpass animate``: a run as a moving picture.
+
+In: a scene.  Out: an HTML page that needs nothing else, an MP4 or a GIF.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ballpass.runtime.app.commands import options
+from ballpass.runtime.app.commands.asked import read_asked, read_duration
+from ballpass.runtime.app.commands.shared import command, load_model, results_folder, show, size_words
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.plot import MOVING
+
+
+def animate(
+    scene: options.SceneFile,
+    format_: Annotated[
+        str,
+        typer.Option("--format", metavar="KIND", help="html, a page that needs no network and no server; mp4; or gif."),
+    ] = "html",
+    last: Annotated[float, typer.Option(metavar="N", help="Turns to show, the last ones of the run.")] = 1.0,
+    pictures: Annotated[
+        int | None, typer.Option(metavar="N", help="Pictures of a movie; 72 a turn if not given.")
+    ] = None,
+    set_: options.Settings = None,
+    cycles: options.Cycles = None,
+    duration: options.Duration = None,
+    transient: options.Transient = None,
+    rtol: options.Tolerance = None,
+    out: options.ResultsFolder = None,
+) -> None:
+    """Simulate a scene and write its last turn as a moving picture: linkage, bearings, forces and signals.
+
+    The page has a slider, ball forces as colours, arrows of the reactions, and signals with a cursor. Open it in a
+    browser; a place in the turn can be named behind its address: animation.html#angle=90.
+    """
+    with command(scene) as stages:
+        stages("read")
+        if format_ not in MOVING:
+            raise RequestError(f"--format: {format_!r} is no kind of animation. Allowed: {', '.join(MOVING)}.")
+        if pictures is not None and format_ == "html":
+            raise RequestError("--pictures is of movies; a page has up to 1000 positions. Omit it, or --format gif.")
+        seconds = read_duration(duration, cycles)
+        asked = read_asked(scene, set_, seconds, transient)
+        folder = results_folder(out, scene)
+        path = folder / f"animation.{format_}"
+        model = load_model(scene, stages, asked.run.method, None, rtol, overrides=asked.overrides)
+        stages("simulate")
+        solution = model.simulate(
+            cycles=cycles,
+            duration=seconds,
+            transient=transient,
+            parameters=asked.overrides,
+            rtol=rtol,
+            progress=stages.fraction,
+        )
+        stages("draw")
+        from ballpass.runtime.plot.animate import write_animation
+
+        folder.mkdir(parents=True, exist_ok=True)
+        write_animation(model, solution, path, turns=last, pictures=pictures, progress=stages.fraction)
+    show(f"{path} ({size_words(path.stat().st_size)})")

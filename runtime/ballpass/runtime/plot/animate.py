@@ -1,0 +1,83 @@
+"""Write a moving picture of a run: an HTML page, a GIF or an MP4."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.folders import replace_file
+from ballpass.runtime.plot import MOVING
+from ballpass.runtime.plot.animation import choose_frames, to_plain
+from ballpass.runtime.plot.html_page import page
+from ballpass.runtime.plot.record import Record, gather
+
+if TYPE_CHECKING:
+    from ballpass.runtime.point.point_model import PointModel
+    from ballpass.runtime.run.solution import Solution
+
+
+def animation_page(model: PointModel, solution: Solution, *, turns: float = 1.0) -> str:
+    """Text of an HTML page that moves through the last turns of a run and needs nothing but itself.
+
+    Parameters
+    ----------
+    turns : of driver or shaft, at the end of the run; without any that turns on, the page shows all of it
+
+    Raises
+    ------
+    RequestError
+        The steady part is shorter, or there is nothing to draw.
+    """
+    return page(to_plain(choose_frames(_records(model, solution), turns)))
+
+
+def write_animation(
+    model: PointModel,
+    solution: Solution,
+    path: str | Path,
+    *,
+    turns: float = 1.0,
+    pictures: int | None = None,
+    progress: Callable[[float], None] = lambda done: None,
+) -> Path:
+    """Write the last turns of a run as a page, ``.html``, or as a movie, ``.gif`` or ``.mp4``.
+
+    Parameters
+    ----------
+    path : its ending says which
+    turns : of driver or shaft, at the end of the run; without any that turns on, all of it is shown
+    pictures : of a movie, 72 a turn if None; a page has up to 1000 positions
+    progress : called with the part that is done, 0 to 1
+
+    Raises
+    ------
+    RequestError
+        Another ending; the steady part is shorter; there is nothing to draw; a movie without matplotlib, an MP4
+        without ffmpeg on PATH.
+    """
+    target = Path(path)
+    if target.suffix.removeprefix(".") not in MOVING:
+        raise RequestError(f"{target}: {target.suffix!r} is no kind of animation. Allowed: .{', .'.join(MOVING)}.")
+    if target.suffix == ".html":
+        replace_file(target, animation_page(model, solution, turns=turns).encode())
+        return target
+    need("matplotlib")
+    from ballpass.runtime.plot.movie import PICTURES, write_movie
+
+    count = round(PICTURES * turns) if pictures is None else pictures
+    if count < 2:
+        raise RequestError(f"A movie of {count} pictures does not move. Allowed: 2 or more.")
+    return write_movie(choose_frames(_records(model, solution), turns, count), target, progress=progress)
+
+
+def _records(model: PointModel, solution: Solution) -> list[Record]:
+    records = [gather(model, solution, bearing) for bearing in model.manifest.bearings or (None,)]
+    if model.manifest.mechanism is None and not any(record.can_draw_bearing for record in records):
+        raise RequestError(
+            "There is nothing to draw: the scene has no linkage, and no bearing of it has both inner.x, inner.y and "
+            "ball.force among the outputs. Name them in run.outputs of the scene."
+        )
+    return records

@@ -1,0 +1,291 @@
+"use strict";
+// Moves linkage, bearing and cursors of the page to one sample of the run: the slider's, or that of #angle=90 or #time=0.1.
+const data = JSON.parse(document.getElementById("data").textContent);
+const get = (id) => document.getElementById(id), slider = get("frame"), frames = data.time.values.map((_, k) => k);
+const last = frames.length - 1;
+const at = (signal, k) => signal.values[k] / 10 ** signal.decimals;
+const all = (signal) => frames.map((k) => at(signal, k));
+const pair = (signals, k) => [at(signals[0], k), at(signals[1], k)];
+const length = ([x, y]) => Math.hypot(x, y);
+const highest = (values) => values.reduce((most, value) => Math.max(most, value), 1e-12);
+const joined = (places) => places.map(([x, y]) => `${x.toFixed(3)},${y.toFixed(3)}`).join(" ");
+const set = (node, values) => { for (const [name, value] of Object.entries(values)) node.setAttribute(name, value); };
+
+function draw(parent, kind, attributes, text = "") {
+  const node = document.createElementNS("http://www.w3.org/2000/svg", kind);
+  set(node, attributes);
+  node.textContent = text;
+  parent.append(node);
+  return node;
+}
+
+function element(parent, kind, text = "", attributes = {}) {
+  const node = Object.assign(document.createElement(kind), { textContent: text });
+  set(node, attributes);
+  parent.append(node);
+  return node;
+}
+
+// An arrow from foot to tip in units of the picture; a short one is left out.
+function arrow(parent, colour) {
+  const group = draw(parent, "g", { stroke: colour, fill: colour, "stroke-width": 1.1 });
+  const shaft = draw(group, "line", {}), head = draw(group, "polygon", { stroke: "none" });
+  return (foot, tip) => {
+    const way = [tip[0] - foot[0], tip[1] - foot[1]], size = length(way);
+    set(group, { visibility: size > 0.8 ? "visible" : "hidden" });
+    if (size <= 0.8) return;
+    const [x, y] = way.map((part) => part / size), long = Math.min(3.6, size), wide = 0.42 * long;
+    const neck = [tip[0] - long * x, tip[1] - long * y];
+    set(shaft, { x1: foot[0], y1: foot[1], x2: neck[0], y2: neck[1] });
+    set(head, { points: joined([tip, [neck[0] - wide * y, neck[1] + wide * x], [neck[0] + wide * y, neck[1] - wide * x]]) });
+  };
+}
+
+// ------------------------------------------------------------------------------------------------------------ linkage
+function drawLinkage(parts) {
+  const picture = get("linkage").querySelector("svg"), moves = [], ink = { stroke: "var(--ink)", "stroke-width": 0.45 };
+  const unit = 52 / Math.max(parts.high[0] - parts.low[0], parts.high[1] - parts.low[1], 1e-9);
+  const place = (number, k) => pair(parts.points[number], k).map(
+    (value, axis) => (axis ? -unit : unit) * (value - (parts.low[axis] + parts.high[axis]) / 2));
+  parts.points.forEach((_, number) => draw(picture, "polyline", {
+    points: joined(frames.map((k) => place(number, k))), fill: "none", stroke: "var(--soft)", "stroke-width": 0.25, "stroke-dasharray": "1 0.8",
+  }));
+  for (const { guide, block, direction } of parts.guides) {
+    const rails = [-3.5, 3.5].map((side) => [side, draw(picture, "line", ink)]), box = draw(picture, "polygon", { fill: "var(--ring)", ...ink });
+    const way = (k) => {
+      if (direction) return [direction[0], -direction[1]];
+      const [a, b] = [place(guide, k), place(block, k)], size = length([b[0] - a[0], b[1] - a[1]]) || 1;
+      return [(b[0] - a[0]) / size, (b[1] - a[1]) / size];
+    };
+    const from = place(block, 0), along = frames.map((k) => place(block, k).reduce((sum, value, axis) => sum + (value - from[axis]) * way(0)[axis], 0));
+    const span = direction ? [-highest(along.map((value) => -value)) - 8, highest(along) + 8] : [-14, 14];
+    moves.push((k) => {
+      const here = place(block, k), [x, y] = way(k), corner = (o, a, b) => [o[0] + a * x - b * y, o[1] + a * y + b * x];
+      set(box, { points: joined([[-5, -3.2], [5, -3.2], [5, 3.2], [-5, 3.2]].map(([a, b]) => corner(here, a, b))) });
+      for (const [side, rail] of rails) {
+        const [a, b] = span.map((far) => corner(direction ? from : here, far, side));
+        set(rail, { x1: a[0], y1: a[1], x2: b[0], y2: b[1] });
+      }
+    });
+  }
+  for (const pin of parts.pins.filter((one) => one.fixed)) {
+    const [x, y] = place(pin.at, 0);
+    draw(picture, "polygon", { points: joined([[x, y], [x - 3, y + 4.5], [x + 3, y + 4.5]]), fill: "var(--ring)", ...ink });
+    draw(picture, "line", { x1: x - 5, x2: x + 5, y1: y + 4.5, y2: y + 4.5, ...ink });
+  }
+  for (const body of parts.bodies) {
+    const node = draw(picture, "polygon", { fill: "var(--bar)", stroke: "var(--bar)", "stroke-width": 2.6, "stroke-linejoin": "round" });
+    draw(node, "title", {}, body.name);
+    moves.push((k) => set(node, { points: joined(body.points.map((number) => place(number, k))) }));
+  }
+  for (const [number, r, fill] of [...parts.masses.map((one) => [one, 0.7, "var(--soft)"]), ...parts.pins.map((pin) => [pin.at, 1.1, "var(--paper)"])]) {
+    const node = draw(picture, "circle", { r, fill, ...ink });
+    moves.push((k) => { const [cx, cy] = place(number, k); set(node, { cx, cy }); });
+  }
+  const scale = 19 / highest(parts.forces.flatMap((force) => frames.map((k) => length(pair([force.x, force.y], k))))), written = [];
+  for (const force of parts.forces) {
+    const move = arrow(picture, force.pushes ? "var(--sand)" : "var(--signal)"), label = draw(picture, "text", { "font-size": 3.3, "font-weight": 600 });
+    moves.push((k) => {
+      const foot = place(force.at, k), [x, y] = pair([force.x, force.y], k), side = force.pushes ? -scale : scale;
+      const end = [foot[0] + side * x, foot[1] - side * y], size = length([x, y]), [right, down] = [side * x, -side * y].map((part) => part / (scale * size || 1));
+      move(...(force.pushes ? [end, foot] : [foot, end]));
+      if (force === parts.forces[0]) written.length = 0;
+      const free = size * scale > 2 && written.every((other) => Math.abs(other[0] - end[0]) > 16 || Math.abs(other[1] - end[1]) > 4);
+      if (free) written.push(end);
+      label.textContent = free ? `${size.toFixed(0)} N` : "";
+      set(label, { x: end[0] + 1.5 * right, y: end[1] + 1 + 2.6 * down, "text-anchor": right > 0.4 ? "start" : right < -0.4 ? "end" : "middle" });
+    });
+  }
+  for (const name of parts.names) {
+    const label = draw(picture, "text", { "font-size": 3.6, "text-anchor": "end" }, name.text);
+    moves.push((k) => { const [x, y] = place(name.at, k); set(label, { x: x - 4.6, y: y - 1.8 }); });
+  }
+  return (k) => moves.forEach((move) => move(k));
+}
+
+// ------------------------------------------------------------------------------------------------------------ bearing
+const STOPS = [[255, 255, 255], [244, 201, 93], [209, 73, 91], [74, 14, 35]];
+function colourOf(share) {
+  const scaled = 3 * Math.min(Math.max(share, 0), 1), k = Math.min(Math.floor(scaled), 2);
+  return STOPS[k].map((from, channel) => Math.round(from + (scaled - k) * (STOPS[k + 1][channel] - from)));
+}
+
+function drawBearing(bearing) {
+  const picture = get("rings").querySelector("svg"), ink = { stroke: "var(--ink)", "stroke-width": 0.4 };
+  picture.replaceChildren();
+  const unit = 41 / (0.5 * bearing.pitch + 0.92 * bearing.ball), r = 0.5 * bearing.ball * unit, wall = 0.84 * r;
+  const gap = bearing.factor * bearing.clearance / 4 * unit, inside = 0.5 * bearing.pitch * unit - r - gap, outside = inside + 2 * (r + gap);
+  const most = highest(bearing.force.flatMap(all));
+  draw(picture, "circle", { r: outside + wall, fill: "var(--ring)", ...ink });
+  draw(picture, "circle", { r: outside, fill: "var(--panel)", ...ink });
+  const inner = draw(picture, "g", {}), middle = { "text-anchor": "middle" };
+  draw(inner, "circle", { r: inside, fill: "var(--ring)", ...ink });
+  draw(inner, "circle", { r: inside - wall, fill: "var(--paper)", ...ink });
+  const balls = bearing.force.map((_, number) => [draw(picture, "circle", { r, stroke: "#101418", "stroke-width": 0.4 }),
+    draw(picture, "text", { "font-size": 3.2, ...middle }, number + 1), draw(picture, "text", { "font-size": 3, ...middle })]);
+  const push = arrow(picture, "var(--sand)");
+  const long = bearing.load && 0.8 * (inside - wall) / highest(frames.map((k) => length(pair(bearing.load, k))));
+  get("most").textContent = `${most.toFixed(0)} N`;
+  get("magnified").textContent = `Clearance and displacement between the rings \u00d7${bearing.factor}. `
+    + `Balls coloured by ${bearing.words}${bearing.load ? "; arrow: load on the inner ring." : "."}`;
+  get("settings").textContent = `Run: ${bearing.settings}.`;
+  return (k) => {
+    const moved = pair(bearing.inner, k).map((value, axis) => (axis ? -1e-6 : 1e-6) * value * bearing.factor * unit);
+    set(inner, { transform: `translate(${moved[0].toFixed(3)} ${moved[1].toFixed(3)})` });
+    balls.forEach(([ball, label, words], number) => {
+      const angle = at(bearing.ball_angle, k) * Math.PI / 180 + 2 * Math.PI * number / bearing.balls, [x, y] = [Math.cos(angle), -Math.sin(angle)];
+      const along = moved[0] * x + moved[1] * y, reach = along + Math.sqrt(Math.max(inside ** 2 - length(moved) ** 2 + along ** 2, 0));
+      const radius = (reach + outside) / 2, force = at(bearing.force[number], k), rgb = colourOf(force / most), far = outside + wall + 3.4;
+      set(ball, { cx: radius * x, cy: radius * y, fill: `rgb(${rgb})` });
+      set(label, { x: radius * x, y: radius * y + 1.1, style: `fill:${rgb[0] + 2 * rgb[1] > 300 ? "#101418" : "#ffffff"}` });
+      set(words, { x: far * x, y: far * y + 1 });
+      words.textContent = force > 0.02 * most ? force.toFixed(0) : "";
+    });
+    if (!bearing.load) return;
+    const [x, y] = pair(bearing.load, k).map((part) => part * long);
+    push([moved[0] - x, moved[1] + y], [moved[0] + x, moved[1] - y]);
+  };
+}
+
+// ------------------------------------------------------------------------------------------------------------- charts
+const across = data.turning ? all(data.angle) : all(data.time).map((t) => 1e3 * t);
+const [begin, end] = [Math.min(across[0], across[last]), Math.max(across[0], across[last])];
+
+function ticks(low, high) {
+  const raw = (high - low) / 4 || 1, power = 10 ** Math.floor(Math.log10(raw)), step = [1, 2, 5, 10].find((one) => one * power >= raw) * power;
+  return Array.from({ length: 8 }, (_, n) => Number(((Math.ceil(low / step - 1e-9) + n) * step).toPrecision(12))).filter((value) => value <= high + 1e-9 * step);
+}
+
+function drawChart(title, unit, curves) {
+  const [width, height, left, right, top, below] = [420, 190, 56, 14, 8, 40], section = element(get("charts"), "section");
+  element(section, "h2", `${title} [${unit}]`);
+  const picture = draw(section, "svg", { viewBox: `0 0 ${width} ${height}`, class: "chart", role: "img", "aria-label": title });
+  const values = curves.map((curve) => all(curve.signal)), [low, high] = [-highest(values.flat().map((one) => -one)), highest(values.flat())];
+  const X = (x) => left + (x - begin) / (end - begin || 1) * (width - left - right), Y = (y) => top + (high - y) / (high - low) * (height - top - below);
+  for (const [from, to] of data.windows) {
+    for (let turn = Math.floor(begin / 360) - 1; turn * 360 <= end; turn += 1) {
+      const [a, b] = [Math.max(from + 360 * turn, begin), Math.min(to + 360 * turn, end)];
+      if (b > a) draw(picture, "rect", { x: X(a), width: X(b) - X(a), y: top, height: height - top - below, fill: "var(--shade)" });
+    }
+  }
+  for (const y of ticks(low, high)) {
+    draw(picture, "line", { x1: left, x2: width - right, y1: Y(y), y2: Y(y), stroke: y === 0 ? "var(--soft)" : "var(--grid)" });
+    draw(picture, "text", { x: left - 5, y: Y(y) + 4, "text-anchor": "end" }, y);
+  }
+  const step = 90 * Math.ceil((end - begin) / 540), marks = data.turning ? frames.map((k) => step * (Math.ceil(begin / step - 1e-6) + k)).filter((x) => x <= end) : ticks(begin, end);
+  for (const x of marks) draw(picture, "text", { x: X(x), y: height - below + 16, "text-anchor": "middle" }, x);
+  draw(picture, "text", { x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle" }, data.turning ? `${data.driver} angle [\u00b0]` : "time [ms]");
+  curves.forEach(({ colour = "var(--ink)", wide = 1.5, dashes = "none" }, n) => draw(picture, "polyline", {
+    points: joined(values[n].map((y, k) => [X(across[k]), Y(y)])), fill: "none", stroke: colour, "stroke-width": wide, "stroke-dasharray": dashes,
+  }));
+  element(section, "p", [...curves.map((curve) => curve.name), data.windows.length && "shaded: an applied load acts"].filter(Boolean).join("; "));
+  const cursor = draw(picture, "line", { y1: top, y2: height - below, stroke: "var(--signal)", "stroke-width": 1.6 });
+  const follow = (event) => {
+    const box = picture.getBoundingClientRect(), x = (event.clientX - box.left) / box.width * width;
+    stop();
+    go(nearest((k) => Math.abs(X(across[k]) - x)));
+  };
+  picture.addEventListener("pointerdown", (event) => { picture.setPointerCapture(event.pointerId); follow(event); });
+  picture.addEventListener("pointermove", (event) => { if (event.buttons) follow(event); });
+  return (k) => set(cursor, { x1: X(across[k]), x2: X(across[k]) });
+}
+
+// ------------------------------------------------------------------------------------------------- numbers and moving
+function writeNumbers(bearing) {
+  const rows = [], both = (name, words, signals, unit) => ["x", "y"].forEach((axis, n) => rows.push([`${name}.${axis}`, `${words}, ${axis}`, signals[n], unit]));
+  if (bearing) {
+    const prefix = bearing.name && `${bearing.name}.`;
+    bearing.force.forEach((signal, number) => rows.push([`${prefix}ball.force ${number + 1}`, `force on ball ${number + 1}`, signal, "N"]));
+    both(`${prefix}inner`, "inner ring against outer", bearing.inner, "\u00b5m");
+    if (bearing.outer) both(`${prefix}outer`, "outer ring", bearing.outer, "\u00b5m");
+    if (bearing.load) both(`${prefix}load`, "load on the inner ring", bearing.load, "N");
+  }
+  if (data.torque) rows.push(["drive_torque", "drive torque", data.torque, "N\u00b7m"]);
+  for (const force of data.linkage?.forces ?? []) both(force.name, force.words, [force.x, force.y], "N");
+  get("numbers").replaceChildren();
+  return rows.map(([name, words, signal, unit]) => {
+    const row = element(get("numbers"), "div");
+    element(row, "dt", words);
+    const cell = element(row, "dd", "", { "data-quantity": name });
+    element(row, "dd", unit, { class: "unit" });
+    return (k) => { cell.textContent = at(signal, k).toFixed(Math.max(0, signal.decimals)).replace(/^-(0(\.0*)?)$/, "$1"); };
+  });
+}
+
+const nearest = (distance) => frames.reduce((best, k) => (distance(k) < distance(best) ? k : best), 0);
+let moves = [], frame = data.peak, playing = 0;
+
+function build(number) {
+  const bearing = data.bearings[number];
+  get("charts").replaceChildren();
+  moves = data.linkage ? [moveLinkage] : [];
+  if (bearing) {
+    const worst = bearing.force.map((signal) => highest(all(signal))), top = worst.indexOf(highest(worst));
+    moves.push(drawBearing(bearing), drawChart("Ball forces", "N", [...bearing.force.map((signal) => ({ signal, colour: "var(--bar)", wide: 0.8 })),
+      { signal: bearing.force[top], name: `dark: ball ${top + 1}, the most loaded; light: the others` }]));
+    moves.push(drawChart("Inner ring against outer", "\u00b5m", [{ signal: bearing.inner[0], name: "solid: x" },
+      { signal: bearing.inner[1], colour: "var(--signal)", dashes: "5 3", name: "dashed: y" }]));
+  }
+  if (data.torque) moves.push(drawChart("Drive torque", "N\u00b7m", [{ signal: data.torque }]));
+  moves.push(...writeNumbers(bearing));
+  go(frame);
+}
+
+function go(k) {
+  frame = Math.min(Math.max(k, 0), last);
+  const angle = data.angle ? `${data.driver} angle ${(((at(data.angle, frame) % 360) + 360) % 360).toFixed(1)}\u00b0, ` : "";
+  get("now").textContent = `${angle}t = ${(1e3 * at(data.time, frame)).toFixed(2)} ms`;
+  slider.value = frame;
+  set(slider, { "aria-valuetext": get("now").textContent });
+  moves.forEach((move) => move(frame));
+}
+
+function stop() {
+  cancelAnimationFrame(playing);
+  playing = 0;
+  get("play").textContent = "Play";
+}
+
+function play() {
+  if (playing) { stop(); return; }
+  get("play").textContent = "Pause";
+  const first = at(data.time, 0), whole = at(data.time, last) - first, turns = data.turning ? (end - begin) / 360 : 1;
+  let t = at(data.time, frame) - first, before = null;
+  const step = (now) => {
+    t = (t + (before === null ? 0 : whole * (now - before) / (1e3 * turns * get("pace").value))) % whole;
+    before = now;
+    let k = at(data.time, frame) - first <= t ? frame : 0;
+    while (k < last && at(data.time, k + 1) - first <= t) k += 1;
+    go(k);
+    playing = requestAnimationFrame(step);
+  };
+  playing = requestAnimationFrame(step);
+}
+
+function follow() {
+  const asked = new URLSearchParams(location.hash.slice(1)), named = data.bearings.findIndex((one) => one.name === asked.get("bearing"));
+  if (named > 0) { get("bearing").value = named; build(named); }
+  const apart = (k) => Math.abs(((at(data.angle, k) - asked.get("angle")) % 360 + 540) % 360 - 180);
+  if (asked.has("angle") && data.angle) go(nearest(apart));
+  else if (asked.has("time")) go(nearest((k) => Math.abs(at(data.time, k) - asked.get("time"))));
+}
+
+const moveLinkage = data.linkage && drawLinkage(data.linkage);
+slider.max = last;
+slider.addEventListener("input", () => { stop(); go(Number(slider.value)); });
+get("play").addEventListener("click", play);
+get("peak").addEventListener("click", () => { stop(); go(data.peak); });
+get("bearing").addEventListener("change", () => build(Number(get("bearing").value)));
+addEventListener("hashchange", () => { stop(); follow(); });
+addEventListener("keydown", (event) => {
+  const steps = { ArrowLeft: -1, ArrowRight: 1, PageDown: -50, PageUp: 50, " ": 0 }[event.key];
+  if (steps === undefined || ["BUTTON", "SELECT", "INPUT"].includes(document.activeElement.tagName)) return;
+  event.preventDefault();
+  if (steps) { stop(); go(frame + steps); } else play();
+});
+data.bearings.forEach((bearing, number) => get("bearing").append(new Option(bearing.name, number)));
+get("choose").hidden = data.bearings.length < 2;
+get("rings").hidden = !data.bearings.length;
+get("linkage").hidden = !data.linkage;
+build(0);
+follow();

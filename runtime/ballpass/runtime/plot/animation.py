@@ -1,0 +1,248 @@
+"""What a moving picture of a run shows: linkage, bearings and signals at samples of its last turns.
+
+In: records of the bearings of one run.  Out: `Frames`, and the same as plain numbers for the page of `html_page`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.plot.record import FRAME, Array, Record
+from ballpass.runtime.plot.shapes import exaggeration, guide_direction, links, used_points
+
+#: Samples of a page, at most: a turn in steps of a third of a degree.
+FRAMES = 1000
+
+#: Digits of a page's numbers behind the first one of the largest of their kind.
+DIGITS = 4
+
+#: Decimals of a page's times [s] and angles [deg].
+TIME, ANGLE = 7, 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frames:
+    """The samples that a moving picture shows.
+
+    Attributes
+    ----------
+    records : of every bearing; of a scene without bearings one
+    samples : indices into the steady part, increasing, shape (frames,)
+    turning : whether driver or shaft turns on without turning back
+    """
+
+    records: tuple[Record, ...]
+    samples: np.ndarray
+    turning: bool
+
+    @property
+    def first(self) -> Record:
+        return self.records[0]
+
+    @property
+    def peak(self) -> int:
+        """Frame of the highest ball force; without it of the greatest drive torque; else the first."""
+        for record in self.records:
+            if record.bearing is not None and record.has_ball_force:
+                return int(np.argmax(np.max(record.ball_force()[1][self.samples], axis=1)))
+        if self.first.has("drive_torque"):
+            return int(np.argmax(np.abs(self.first.values("drive_torque")[self.samples])))
+        return 0
+
+
+def choose_frames(records: Sequence[Record], turns: float = 1.0, pictures: int | None = None) -> Frames:
+    """Samples of the last turns.
+
+    Parameters
+    ----------
+    turns : of driver or shaft; where nothing turns on, all samples are taken from
+    pictures : of a movie that begins anew at its end; None: up to 1000 samples evenly, that of the highest ball force,
+        and the last one
+
+    Raises
+    ------
+    RequestError
+        The record is shorter than these turns.
+    """
+    if not turns > 0.0:
+        raise RequestError(f"{turns!r} turns were asked for. Allowed: more than 0. Give 1 for the last turn.")
+    angle = records[0].crank_angle()
+    way = np.diff(angle)
+    turning = bool(len(way) and (np.all(way > 0.0) or np.all(way < 0.0)))
+    first = 0
+    if turning:
+        back = np.abs(angle - angle[-1]) / (2.0 * math.pi)
+        if back[0] < turns * (1.0 - 1e-9):
+            raise RequestError(
+                f"The steady part of the run is {back[0]:.4g} turns long, and {turns:g} were asked for. Simulate more "
+                "turns, or show fewer."
+            )
+        first = int(np.nonzero(back >= turns * (1.0 - 1e-9))[0][-1])
+    count = len(angle) - first
+    if pictures is not None:
+        chosen = set((first + np.arange(pictures) * (count - 1) // pictures).tolist())
+    else:
+        chosen = {*range(first, len(angle), -(-(count - 1) // FRAMES)), len(angle) - 1}
+        for one in records:
+            if one.bearing is not None and one.has_ball_force:
+                chosen.add(first + int(np.argmax(np.max(one.ball_force()[1][first:], axis=1))))
+    return Frames(records=tuple(records), samples=np.array(sorted(chosen)), turning=turning)
+
+
+def to_plain(frames: Frames) -> dict[str, Any]:
+    """All numbers of a page, as JSON has them; signals as whole multiples of a step."""
+    record, samples = frames.first, frames.samples
+    manifest, angle = record.manifest, np.degrees(record.crank_angle()[samples])
+    return {
+        "title": manifest.title,
+        "driver": "crank" if manifest.mechanism is not None else "shaft",
+        "time": _signal(record.t[samples], TIME),
+        "angle": _signal(_from_first_turn(angle), ANGLE) if np.ptp(angle) > 0.0 else None,
+        "turning": frames.turning,
+        "windows": np.round(np.degrees(record.load_windows()), 4).tolist() if frames.turning else [],
+        "peak": frames.peak,
+        "torque": _columns(record.values("drive_torque")[samples, None])[0] if record.has("drive_torque") else None,
+        "linkage": _linkage(record, samples) if manifest.mechanism is not None else None,
+        "bearings": [_bearing(one, samples) for one in frames.records if one.can_draw_bearing],
+    }
+
+
+def _from_first_turn(angle: Array) -> Array:
+    """Angles [deg] less whole turns, so that the lowest is in [0, 360)."""
+    return angle - 360.0 * math.floor(float(np.min(angle)) / 360.0 + 1e-9)
+
+
+def _decimals(values: Array) -> int:
+    """Decimals that give the largest of the values five digits."""
+    greatest = float(np.max(np.abs(values), initial=0.0))
+    return DIGITS - math.floor(math.log10(greatest)) if greatest > 0.0 else 0
+
+
+def _columns(values: Array) -> list[dict[str, Any]]:
+    """Signals of one kind, shape (frames, signals), with the same decimals."""
+    return [_signal(column, _decimals(values)) for column in values.T]
+
+
+def _signal(values: Array, decimals: int) -> dict[str, Any]:
+    """Values as whole multiples of a power of ten."""
+    return {"decimals": decimals, "values": np.rint(values * 10.0**decimals).astype(int).tolist()}
+
+
+def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
+    mechanism = record.mechanism
+    poses = [record.points(float(record.t[k]), record.state(int(k))) for k in samples]
+    paths = {key: np.array([pose[key] for pose in poses]) for key in poses[0]}  # (frames, 2) [m]
+    used = used_points(mechanism)
+    corners = np.vstack([paths[key] for key in used])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    shown = [*used, *(key for key in paths if key[1] == "center_of_mass" and key not in used)]
+    guides = []
+    for _, kind, first, guide, second, block in mechanism.joints:
+        if kind == "prismatic":
+            fixed = first == FRAME
+            direction = guide_direction(poses[0], paths, (first, guide), (second, block)) if fixed else None
+            guides.append(
+                {
+                    "guide": shown.index((first, guide)),
+                    "block": shown.index((second, block)),
+                    "direction": None if direction is None else direction.tolist(),
+                }
+            )
+    names: dict[int, list[str]] = {}
+    for name, _, _, _, body, point in mechanism.joints:
+        names.setdefault(shown.index((body, point)), []).append(name)
+    return {
+        "low": low.tolist(),
+        "high": high.tolist(),
+        "points": [_columns(paths[key]) for key in shown],
+        "bodies": [
+            {"name": body, "points": [shown.index(key) for key in keys]}
+            for body, keys in links(used, poses[0], float(np.max(high - low)))
+        ],
+        "pins": [
+            {"at": shown.index((second, point)), "fixed": FRAME in (first, body)}
+            for _, kind, first, _, second, point in mechanism.joints
+            for body in (second,)
+            if kind == "revolute"
+        ],
+        "guides": guides,
+        "masses": [shown.index(key) for key in shown if key[1] == "center_of_mass"],
+        "names": [{"at": at, "text": ", ".join(words)} for at, words in names.items()],
+        "forces": [*_reactions(record, samples, shown), *_applied(record, samples, shown)],
+    }
+
+
+def _reactions(record: Record, samples: np.ndarray, shown: list[tuple[str, str]]) -> list[dict[str, Any]]:
+    """Reactions that are outputs, on the frame where it is one of both bodies, else on the joint's first body."""
+    found = []
+    for name, _, first, _, second, point in record.mechanism.joints:
+        if record.has(f"reaction.{name}.x", f"reaction.{name}.y"):
+            sign = -1.0 if second == FRAME else 1.0
+            on, by = (second, first) if second == FRAME else (first, second)
+            force = np.column_stack([record.values(f"reaction.{name}.{axis}")[samples] for axis in "xy"])
+            x, y = _columns(sign * force)
+            found.append(
+                {
+                    "name": f"reaction.{name}",
+                    "words": f"{name}: {by} on {on}",
+                    "at": shown.index((second, point)),
+                    "pushes": False,
+                    "x": x,
+                    "y": y,
+                }
+            )
+    return found
+
+
+def _applied(record: Record, samples: np.ndarray, shown: list[tuple[str, str]]) -> list[dict[str, Any]]:
+    """Applied forces, zero while they do not act."""
+    acting = [record.applied_forces(float(record.t[k])) for k in samples]
+    places = dict.fromkeys((name, place) for now in acting for name, place, _ in now)
+    found = []
+    for name, place in places:
+        force = np.array([next((f for n, _, f in now if n == name), np.zeros(2)) for now in acting])
+        x, y = _columns(force)
+        found.append(
+            {
+                "name": f"force.{name}",
+                "words": f"{name} on {place[0]}",
+                "at": shown.index(place),
+                "pushes": True,
+                "x": x,
+                "y": y,
+            }
+        )
+    return found
+
+
+def _bearing(record: Record, samples: np.ndarray) -> dict[str, Any]:
+    bearing = record.bearing
+    assert bearing is not None  # of those only
+    clearance, ball = record.parameter("bearing.clearance"), record.parameter("bearing.ball_diameter")
+    inner, outer = record.centres("inner")[samples], record.centres("outer")[samples]
+    moved = inner - outer
+    first = np.array([record.ball_angles(int(k))[0] for k in samples])
+    words, force = record.ball_force()
+    load = record.ring_load()
+    furthest = float(np.max(np.hypot(moved[:, 0], moved[:, 1])))
+    return {
+        "name": bearing.name or "",
+        "words": words,
+        "balls": bearing.balls,
+        "pitch": record.parameter("bearing.pitch_diameter"),
+        "ball": ball,
+        "clearance": clearance,
+        "factor": exaggeration(0.25 * ball, max(abs(clearance) / 2.0, furthest)),
+        "ball_angle": _signal(_from_first_turn(np.degrees(first)), ANGLE),
+        "force": _columns(force[samples]),
+        "inner": _columns(1e6 * moved),
+        "outer": _columns(1e6 * outer) if np.any(outer) else None,
+        "load": _columns(load[samples]) if load is not None else None,
+        "settings": record.settings(),
+    }

@@ -1,0 +1,136 @@
+"""What a moving picture shows, in a real browser, against the run it is made of."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ballpass.runtime import Model, Solution
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.plot.animate import animation_page, write_animation
+
+BROWSER = shutil.which("chromium")
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on PATH")
+
+
+def shown(page: Path, place: str, home: Path) -> dict[str, str]:
+    """Numbers that the page shows at a place, by quantity; fails where the browser complains."""
+    assert BROWSER is not None
+    quiet = ("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-quic")
+    done = subprocess.run(
+        [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", *quiet, "--enable-logging=stderr",
+         f"--user-data-dir={home}", "--virtual-time-budget=2000", "--dump-dom", f"file://{page}#{place}"],
+        capture_output=True, text=True, check=True, timeout=120,
+    )  # fmt: skip
+    assert "CONSOLE" not in done.stderr, done.stderr
+    found = dict(re.findall(r'<dd data-quantity="([^"]+)">([^<]*)</dd>', done.stdout))
+    (found["now"],) = re.findall(r'<output id="now"[^>]*>([^<]*)</output>', done.stdout)
+    return found
+
+
+def compare(found: dict[str, str], expected: dict[str, float]) -> None:
+    """Each number, to half of the last digit that is shown."""
+    for name, value in expected.items():
+        digits = len(found[name].partition(".")[2])
+        assert float(found[name]) == pytest.approx(value, abs=0.501 * 10.0**-digits), name
+
+
+def expected_of(solution: Solution, sample: int, prefix: str = "") -> dict[str, float]:
+    """Ball forces, ring, load, torque and reactions at a sample, as a page names them."""
+    force = solution[f"{prefix}ball.force"][sample]
+    numbers = {f"{prefix}ball.force {number}": value for number, value in enumerate(force, start=1)}
+    for axis in "xy":
+        fixed = f"{prefix}outer.{axis}" not in solution
+        outer = 0.0 if fixed else solution[f"{prefix}outer.{axis}"][sample]
+        numbers[f"{prefix}inner.{axis}"] = 1e6 * (solution[f"{prefix}inner.{axis}"][sample] - outer)
+        for name in [name for name in solution.outputs if re.fullmatch(rf"reaction\.\w+\.{axis}", name)]:
+            numbers[name] = solution[name][sample]
+    if "drive_torque" in solution:
+        numbers["drive_torque"] = solution["drive_torque"][sample]
+    return numbers
+
+
+@pytest.fixture(scope="module")
+def press(make_model: Callable[..., Model]) -> tuple[Model, Solution]:
+    model = make_model("punching_press")
+    return model, model.simulate(cycles=4)
+
+
+@needs_browser
+def test_browser_shows_the_run_at_the_angle_of_the_address(press: tuple[Model, Solution], tmp_path: Path) -> None:
+    page = write_animation(*press, tmp_path / "press.html")
+    solution = press[1]
+    found = shown(page, "angle=90", tmp_path / "a")
+    sample = len(solution) - 2001 + 500
+    assert found["now"] == f"crank angle 90.0°, t = {1e3 * solution.t[sample]:.2f} ms"
+    numbers = expected_of(solution, sample)
+    assert len(numbers) == 8 + 2 + 2 + 1
+    compare(found, numbers | {f"load.{axis}": 0.5 * solution[f"reaction.A.{axis}"][sample] for axis in "xy"})
+    assert float(found["force.punch.y"]) == 0.0
+    # without an address: the highest ball force of the turn, which no thinning of the samples misses
+    highest = np.unravel_index(np.argmax(solution["ball.force"][-2001:]), (2001, 8))
+    compare(shown(page, "", tmp_path / "b"), {f"ball.force {highest[1] + 1}": solution["ball.force"][-2001:][highest]})
+
+
+@needs_browser
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("scene", "bearing", "cycle"), [("rotor", "", 512), ("four_bar", "", 2000), ("punching_press_hinges", "pin", 2000)]
+)
+def test_browser_shows_every_kind_of_scene(
+    make_model: Callable[..., Model], tmp_path: Path, scene: str, bearing: str, cycle: int
+) -> None:
+    model = make_model(scene)
+    solution = model.simulate()
+    page = write_animation(model, solution, tmp_path / f"{scene}.html")
+    found = shown(page, f"angle=225&bearing={bearing}", tmp_path / "home")
+    compare(found, expected_of(solution, len(solution) - 1 - cycle + cycle * 5 // 8, f"{bearing}." if bearing else ""))
+
+
+def test_page_needs_nothing_but_itself_and_is_small(press: tuple[Model, Solution]) -> None:
+    text = animation_page(*press)
+    assert len(text.encode()) < 300_000
+    assert set(re.findall(r"\w+://[^\s\"'`)]*", text)) == {"http://www.w3.org/2000/svg"}  # a name, never fetched
+    assert "default-src 'none'" in text
+    assert not re.search(r"""(src|href)=(?!"data:,")|@import|url\(|fetch\(|XMLHttp|import\(""", text)
+    assert text.count("</script>") == 2
+
+
+def test_words_of_a_scene_end_no_element(make_virtual: Callable[..., Model]) -> None:
+    model = make_virtual("punching_press", ('title = "Punching machine of the paper"', 'title = "</script><b>&"'))
+    text = animation_page(model, model.simulate(cycles=1, transient=0))
+    assert text.count("</script>") == 2
+    assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in text
+
+
+def test_gif_has_as_many_pictures_as_asked_for(press: tuple[Model, Solution], tmp_path: Path) -> None:
+    with Image.open(write_animation(*press, tmp_path / "a.gif", pictures=3)) as film:
+        assert film.n_frames == 3
+        pictures = []
+        for number in range(3):
+            film.seek(number)
+            pictures.append(np.asarray(film.convert("L")))
+    assert np.any(pictures[0] != pictures[1])
+    assert np.any(pictures[1] != pictures[2])
+
+
+def test_what_cannot_be_shown_is_refused(
+    press: tuple[Model, Solution], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(RequestError, match=r"'.avi' is no kind of animation. Allowed: .html, .mp4, .gif"):
+        write_animation(*press, tmp_path / "a.avi")
+    with pytest.raises(RequestError, match="2 turns long, and 3 were asked for"):
+        write_animation(*press, tmp_path / "a.html", turns=3)
+    with pytest.raises(RequestError, match="2 or more"):
+        write_animation(*press, tmp_path / "a.gif", pictures=1)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(RequestError, match=r"ffmpeg, which is not on PATH.*--format gif or html"):
+        write_animation(*press, tmp_path / "a.mp4")
+    assert not list(tmp_path.iterdir())
