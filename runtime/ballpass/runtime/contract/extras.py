@@ -13,6 +13,7 @@ EXTRAS = {
     "dask": ("Dask", "scale"),
     "jax": ("JAX", "jax"),
     "matplotlib": ("matplotlib", "figures"),
+    "pandas": ("pandas", "labelled"),
     "scipy": ("SciPy", "analysis"),
     "torch": ("PyTorch", "torch"),
     "xarray": ("xarray", "labelled"),

@@ -41,9 +41,23 @@ def _path(record: Record, window: slice, axis: str) -> tuple[Array, Array, Array
 @styled
 def orbit(record: Record) -> Figure:
     """Path of the inner ring's centre: the last turn dark, the steady turns before it light and wide under it."""
-    last = record.last_turns(1)
     figure = new_figure(5.4, layout=None)
     axes = figure.add_subplot()
+    equal = draw_orbit(axes, record)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    scales = "Equal scales." if equal else "Each axis has a scale of its own."
+    gap = ""
+    if record.cycle_length is not None and record.turns:
+        path = orbits(record.t, record.values("inner.x"), record.values("inner.y"), cycle_length=record.cycle_length)
+        gap = f" Start and end of the last turn are {1e6 * path[-1].gap:.3g} µm apart."
+    title = record.title("Orbit of the inner ring's centre")
+    frame(figure, title, f"{scales}{gap} {record.settings()}.", left=0.9, right=2.1)
+    return figure
+
+
+def draw_orbit(axes: Axes, record: Record) -> bool:
+    """The path, with labels for a legend; whether both axes have one scale."""
+    last = record.last_turns(1)
     if last.start > 0:
         x, y = (1e6 * _path(record, slice(0, last.start + 1), axis)[1] for axis in "xy")
         # wide, to be seen where the last turn covers it
@@ -55,21 +69,13 @@ def orbit(record: Record) -> Figure:
     start: dict[str, Any] = {"color": "white", "markeredgecolor": INK, "markersize": 8}
     axes.plot(x[0], y[0], "o", label="start of the last turn", zorder=4, **start)
     axes.plot(x[-1], y[-1], "s", color=INK, markersize=4, label="end of the last turn", zorder=5)
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     wide, high = (max(float(np.ptp(record.values(f"inner.{axis}"))), 1e-15) for axis in "xy")
     equal = max(wide, high) < _SLIVER * min(wide, high)
     if equal:
         axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x of the inner ring's centre [µm]")
     axes.set_ylabel("y of the inner ring's centre [µm]")
-    scales = "Equal scales." if equal else "Each axis has a scale of its own."
-    gap = ""
-    if record.cycle_length is not None and record.turns:
-        path = orbits(record.t, record.values("inner.x"), record.values("inner.y"), cycle_length=record.cycle_length)
-        gap = f" Start and end of the last turn are {1e6 * path[-1].gap:.3g} µm apart."
-    title = record.title("Orbit of the inner ring's centre")
-    frame(figure, title, f"{scales}{gap} {record.settings()}.", left=0.9, right=2.1)
-    return figure
+    return equal
 
 
 def _highlight_windows(axes: Axes, record: Record, t: Array, x: Array, y: Array) -> None:
@@ -98,7 +104,7 @@ def spectra(record: Record) -> Figure:
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     peak = max(float(np.max(s.amplitude)) for s in lines.values())
     floor = max(peak * 1e-4, 1e-12)
-    limit = _shown_range(list(lines.values()), shaft=marks.shaft if marks else 0.0)
+    limit = shown_range(list(lines.values()), shaft=marks.shaft if marks else 0.0)
     for axes, (axis, spectrum), letter in zip(panels, lines.items(), "ab", strict=True):
         shown = (spectrum.frequency > 0.0) & (spectrum.frequency <= limit)
         axes.set_yscale("log")
@@ -132,7 +138,7 @@ def spectra(record: Record) -> Figure:
     return figure
 
 
-def _shown_range(spectra: list[AmplitudeSpectrum], *, shaft: float) -> float:
+def shown_range(spectra: list[AmplitudeSpectrum], *, shaft: float) -> float:
     """Upper end of the frequency axis [Hz].
 
     Above it lines stay below 1 % of the highest; at least 12, at most 60 harmonics of a turn are shown.

@@ -251,7 +251,7 @@ def gather(model: PointModel, solution: Solution, bearing: BearingInfo | None = 
     return Record(
         model=model,
         solution=steady,
-        bearing=bearing or model.manifest.bearing,
+        bearing=bearing or solution.manifest.bearing,
         cycle_length=length,
         turns=() if length is None else turns(steady.t, length),
     )

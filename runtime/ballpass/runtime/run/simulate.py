@@ -137,6 +137,7 @@ def simulate(
             compiled=model.compiled and method not in METHODS,
         ),
         status=Status.DONE if failure is None else failure.status,
+        model=model,
         reductions=joined(before, counted),
         steady_reductions=counted,
     )

@@ -6,7 +6,7 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.status import Status
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.accuracy import Accuracy
 from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
 from ballpass.runtime.run.reductions import Reductions
@@ -25,7 +26,10 @@ from ballpass.runtime.run.start import RunEnd
 from ballpass.runtime.show import html
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
+
+    from ballpass.runtime.plot.accessor import SolutionPlot
 
 
 #: Number of the layout of saved files.
@@ -97,6 +101,7 @@ class Solution:
         the most loaded ball for those outputs that are kept.  None for other methods than the project's own stepper,
         beside derivatives, and where no output is kept
     steady_reductions : the same from the end of the transient on
+    model : that ran, for `plot`; None for a solution that was read from a file or sent by another process
     """
 
     t: np.ndarray
@@ -112,6 +117,10 @@ class Solution:
     accuracy: Accuracy | None = None
     reductions: Reductions | None = None
     steady_reductions: Reductions | None = None
+    model: LoadedModel | None = None
+
+    def __getstate__(self) -> list[Any]:
+        return [None if item.name == "model" else getattr(self, item.name) for item in fields(self)]
 
     def __post_init__(self) -> None:
         for array in (self.t, self.x, *self.outputs.values()):
@@ -147,9 +156,7 @@ class Solution:
         )
 
     def _repr_html_(self) -> str:
-        infos = {info.name: info for info in (*self.manifest.states, *self.manifest.outputs)}
-        names = dict.fromkeys((*self.states, *self.outputs))
-        rows = [(name, *_extent(self[name]), infos[name].unit, infos[name].description) for name in names]
+        rows = [(name, *_extent(self[name]), info.unit, info.description) for name, info in self._infos().items()]
         heads = ("name", "min", "mean", "max", "unit", "description")
         words = repr(self).partition("; outputs:")[0].partition("(")[2]
         return html.block(
@@ -157,6 +164,17 @@ class Solution:
             html.paragraph(self.accuracy.words) if self.accuracy is not None else "",
             html.table(heads, rows, right=heads[1:4]),
         )
+
+    def _infos(self) -> dict[str, VariableInfo]:
+        """States, and outputs that are kept, by name."""
+        return {info.name: info for info in (*self.manifest.states, *self.manifest.outputs) if info.name in self}
+
+    @property
+    def plot(self) -> SolutionPlot:
+        """Draws this run on matplotlib's axes: ``solution.plot.orbit()``, ``.spectrum()``, ``.ball_loads()``."""
+        from ballpass.runtime.plot.accessor import SolutionPlot  # above, by name in pyproject.toml
+
+        return SolutionPlot(self)
 
     @property
     def nbytes(self) -> int:
@@ -216,6 +234,28 @@ class Solution:
         axes = ("time", *(f"{bearing.prefix}ball" for bearing in self.manifest.bearings))
         coordinates = {name: variables.pop(name) for name in axes if name in variables}
         return need("xarray").Dataset(variables, coords=coordinates, attrs=facts)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Table with the index ``time`` [s] and a column for each state and output, of each ball ``ball.force[1]``.
+
+        Units are in ``attrs["units"]``, by column.
+
+        Raises
+        ------
+        RequestError
+            pandas is not installed.
+        """
+        pandas = need("pandas")
+        columns: dict[str, np.ndarray] = {}
+        units: dict[str, str] = {}
+        for name, info in self._infos().items():
+            samples = self[name]
+            balls = {f"{name}[{k}]": column for k, column in enumerate(samples.T, start=1)} if samples.ndim > 1 else {}
+            columns |= balls or {name: samples}
+            units |= dict.fromkeys(balls or (name,), info.unit)
+        table = pandas.DataFrame(columns, index=pandas.Index(self.t, name="time"))
+        table.attrs["units"] = units
+        return table
 
     def save(self, path: str | Path) -> Path:
         """Write NetCDF-4: the old file or the new one, never half of it.  `load_solution` reads it back.

@@ -1,0 +1,204 @@
+"""``solution.plot``: a run drawn on matplotlib's axes, one's own or new ones, for notebooks and scripts.
+
+In: a solution.  Out: the axes that were drawn on.  Figures with titles and captions are those of `gallery`.
+"""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from ballpass.runtime.ask.spectrum import Window, amplitude_spectrum
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.parameters import unknown_name
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from matplotlib.axes import Axes
+
+    from ballpass.runtime.plot.record import Record
+    from ballpass.runtime.point.point_model import PointModel
+    from ballpass.runtime.run.solution import Solution
+
+#: Lengths and velocities of a bearing are read in smaller units than SI: factor and unit.
+_READ_IN = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
+
+#: Most lines of a legend, and names on an axis.
+_LEGEND, _NAMED = 12, 3
+
+
+class SolutionPlot:
+    """Draws a solution: ``solution.plot.orbit()``; call it for time series, ``solution.plot("inner.x")``.
+
+    What is drawn is the steady part of the run.  Each method takes ``ax``, matplotlib axes to draw on, and returns
+    them; without, it draws on new axes.  Of several bearings ``bearing`` names one; the default is the first.
+    """
+
+    def __init__(self, solution: Solution) -> None:
+        self._solution = solution
+
+    def __repr__(self) -> str:
+        return "solution.plot: orbit, spectrum, ball_loads, outputs"
+
+    def __call__(self, *names: str, ax: Axes | None = None) -> Axes:
+        """As `outputs`."""
+        return self.outputs(*names, ax=ax)
+
+    def outputs(self, *names: str, ax: Axes | None = None) -> Axes:
+        """Outputs and states over time, all of one unit; displacements in µm, their rates in mm/s.
+
+        Parameters
+        ----------
+        names : default: the displacements of the inner ring, or the first output where there is no bearing
+
+        Raises
+        ------
+        RequestError
+            An unknown name, or names of different units.
+        """
+        steady = self._solution.steady()
+        chosen = names or self._displacements() or tuple(steady.outputs)[:1]
+        units = dict.fromkeys(self._unit(name) for name in chosen)
+        if len(units) != 1:
+            raise RequestError(
+                f"plot: the units of {', '.join(chosen) or 'no output'} are {', '.join(units) or 'none'}. Allowed: "
+                "outputs of one unit. Draw others on axes of their own."
+            )
+        (unit,) = units
+        factor, shown = _READ_IN.get(unit, (1.0, unit))
+        with _axes(ax) as axes:
+            for name in chosen:
+                lines = axes.plot(steady.t, factor * steady[name], linewidth=1.0)
+                count = len(lines)
+                for number, line in enumerate(lines, start=1):
+                    line.set_label(name if count == 1 else f"{name}, ball {number}")
+            axes.set_xlabel("time [s]")
+            axes.set_ylabel(f"{', '.join(chosen) if len(chosen) <= _NAMED else 'outputs'} [{shown}]")
+            if 1 < len(axes.get_lines()) <= _LEGEND:
+                axes.legend(fontsize="small")
+        return axes
+
+    def orbit(self, *, bearing: str | None = None, ax: Axes | None = None) -> Axes:
+        """Path of the inner ring's centre: the last turn dark, the steady turns before it light.
+
+        Raises
+        ------
+        RequestError
+            The run has no displacements of the ring.
+        """
+        from ballpass.runtime.plot.motion import draw_orbit  # with matplotlib
+
+        record = self._record(bearing, "inner.x", "inner.y")
+        with _axes(ax) as axes:
+            draw_orbit(axes, record)
+        return axes
+
+    def spectrum(self, name: str | None = None, *, window: Window = "hann", ax: Axes | None = None) -> Axes:
+        """Amplitude spectrum of an output or state, whole turns of the steady part, on a logarithmic scale.
+
+        Parameters
+        ----------
+        name : default: the displacement of the inner ring along x
+        window : see `ballpass.runtime.ask.spectrum`
+
+        Raises
+        ------
+        RequestError
+            An unknown name, an output of each ball, or samples at unequal steps.
+        """
+        from ballpass.runtime.plot.motion import shown_range
+
+        steady = self._solution.steady()
+        chosen = name or next(iter(self._displacements()), None)
+        if chosen is None or steady[chosen].ndim > 1:
+            raise RequestError(
+                f"plot.spectrum: {chosen or 'no name'} was given. Allowed: an output or state with one value at a "
+                "time: solution.plot.spectrum('drive_torque')."
+            )
+        factor, shown = _READ_IN.get(self._unit(chosen), (1.0, self._unit(chosen)))
+        found = amplitude_spectrum(steady.t, factor * steady[chosen], cycle_length=steady.period, window=window)
+        with _axes(ax) as axes:
+            axes.semilogy(found.frequency[1:], found.amplitude[1:], linewidth=1.0, label=chosen)
+            axes.set_xlim(0.0, shown_range([found], shaft=0.0 if steady.period is None else 1.0 / steady.period))
+            axes.set_xlabel("frequency [Hz]")
+            axes.set_ylabel(f"amplitude of {chosen} [{shown}]")
+        return axes
+
+    def ball_loads(self, *, turns: int = 2, bearing: str | None = None, ax: Axes | None = None) -> Axes:
+        """Contact load of every ball over the last turns, a strip for each ball, all at one scale.
+
+        Parameters
+        ----------
+        turns : how many; the whole record where nothing turns
+
+        Raises
+        ------
+        RequestError
+            The run has no forces of the balls.
+        """
+        record = self._record(bearing)
+        if not (record.has("ball.force") or record.has("ball.elastic_force")):
+            raise RequestError(_lacks("ball.force or ball.elastic_force"))
+        window = record.last_turns(turns)
+        force = record.ball_force()[1][window]
+        along, label = record.t[window] * 1e3, "time [ms]"
+        if record.turns:
+            along = np.degrees(record.crank_angle()[window])
+            along = along - 360.0 * np.floor(min(along[0], along[-1]) / 360.0 + 1e-9)
+            label = "crank angle [°]" if record.manifest.mechanism is not None else "angle of the shaft [°]"
+        top = max(float(np.max(force)), 1e-12)
+        balls = force.shape[1]
+        with _axes(ax) as axes:
+            for ball in range(balls):
+                foot = balls - ball  # ball 1 above
+                height = foot + 0.9 * force[:, ball] / top
+                axes.fill_between(along, foot, height, linewidth=0.0, alpha=0.35, color="C0")
+                axes.plot(along, height, linewidth=0.8, color="C0")
+            axes.set_yticks(range(balls, 0, -1), [f"ball {ball}" for ball in range(1, balls + 1)])
+            axes.set_xlim(float(along.min()), float(along.max()))
+            axes.set_xlabel(label)
+            axes.set_ylabel(f"contact load, highest {top:.4g} N")
+        return axes
+
+    def _record(self, bearing: str | None, *names: str) -> Record:
+        """What figures know of the run, of one bearing whose outputs these are."""
+        from ballpass.runtime.plot.record import gather
+
+        known = {info.name: info for info in self._solution.manifest.bearings}
+        if bearing is not None and bearing not in known:
+            raise RequestError(unknown_name("bearing", bearing, known))
+        model = cast("PointModel", self._solution.model)  # no figure of samples alone asks it
+        record = gather(model, self._solution, None if bearing is None else known[bearing])
+        if not record.has(*names):
+            raise RequestError(_lacks(", ".join(names)))
+        return record
+
+    def _displacements(self) -> tuple[str, ...]:
+        names = [f"{bearing.prefix}inner.{axis}" for bearing in self._solution.manifest.bearings[:1] for axis in "xy"]
+        return tuple(name for name in names if name in self._solution)
+
+    def _unit(self, name: str) -> str:
+        self._solution[name]  # for its error
+        infos = (*self._solution.manifest.outputs, *self._solution.manifest.states)
+        return next(info.unit for info in infos if info.name == name).replace("*", "·")
+
+
+def _lacks(names: str) -> str:
+    return f"plot: the run has no {names}: name them in run.outputs of the scene, or in simulate(outputs=...)."
+
+
+@contextmanager
+def _axes(given: Axes | None) -> Iterator[Axes]:
+    """The axes given, in their own style; else new ones of pyplot, which notebooks show, in the figures' style."""
+    if given is not None:
+        yield given
+        return
+    pyplot = need("matplotlib.pyplot")
+    from ballpass.runtime.plot.canvas import settings
+
+    with settings():
+        yield pyplot.subplots(layout="constrained")[1]
