@@ -49,6 +49,7 @@ bench: $(BENCH_VENV)/.ready
 
 extremes: $(VENV)/.ready-dev $(VENV)/.ready-compiler
 	$(BIN)/python -m pytest -n 2 -m extreme tests/extremes --extremes-page docs/extremes.md
+	$(BIN)/python -m pytest -n 2 -m extreme --ignore tests/extremes tests
 
 $(BENCH_VENV)/.ready: pyproject.toml requirements.txt benchmarks/requirements.txt scripts/setup.sh
 	@VENV=$(BENCH_VENV) scripts/setup.sh

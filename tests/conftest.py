@@ -52,7 +52,7 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _quick_compiler(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Half of the suite's time would go into gcc -O3: without the long tests, which run what users run, -O1 does."""
+    """Half of the suite's time would go into gcc -O3: without the long tests, which run what users run, -Og does."""
     real = shutil.which("cc")
     if real is None or "CC" in os.environ or request.config.option.markexpr != "not long":
         yield
@@ -61,7 +61,7 @@ def _quick_compiler(request: pytest.FixtureRequest, tmp_path_factory: pytest.Tem
     script = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "cc"
     with FileLock(f"{script}.lock"):
         if not script.exists():
-            script.write_text(f'#!/bin/sh\nexec {real} "$@" -O1\n', encoding="utf-8")
+            script.write_text(f'#!/bin/sh\nexec {real} "$@" -Og\n', encoding="utf-8")
             script.chmod(0o755)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CC", str(script))

@@ -105,7 +105,7 @@ def test_sensitivities_by_knots_are_those_of_differences(shaper: Model) -> None:
         assert np.max(np.abs(found - difference) / largest) < 1e-3
 
 
-@pytest.mark.parametrize("kinks", ["located", "stepped-over"])
+@pytest.mark.parametrize("kinks", ["located", pytest.param("stepped-over", marks=pytest.mark.long)])
 def test_members_of_an_ensemble_are_single_runs(shaper: Model, kinks: str) -> None:
     table = {
         f"{TABLE}angle.3": np.radians([125.0, 130.0, 140.0]),

@@ -55,7 +55,7 @@ def test_random_machines_move_as_in_absolute_coordinates_and_lose_nothing(seed: 
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", COMPILED)
+@pytest.mark.parametrize("seed", [pytest.param(COMPILED[0], marks=pytest.mark.extreme), *COMPILED[1:]])
 def test_random_machines_run_alike_by_every_family_of_methods(seed: int, tmp_path: Path) -> None:
     """Explicit and linearly implicit, and as SciPy integrates the equations."""
     scene = random_machine(seed)

@@ -127,7 +127,7 @@ def test_the_drive_gives_what_a_stop_on_a_turning_wall_takes_and_the_stop_never_
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["punching_press", "punching_press_two_way"])
+@pytest.mark.parametrize("name", ["punching_press", pytest.param("punching_press_two_way", marks=pytest.mark.extreme)])
 def test_a_press_that_closes_on_a_stop_gains_from_steps_that_end_there(
     make_model: Callable[..., Model], name: str
 ) -> None:

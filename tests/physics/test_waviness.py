@@ -140,6 +140,7 @@ def test_stepper_lanes_and_virtual_machine_agree(moving: Model) -> None:
 METHODS = ("stepper-dp54", "stepper-rodas5p", "cvodes")
 
 
+@pytest.mark.long
 def test_derivatives_by_amplitude_and_phase_are_those_of_differences(moving: Model) -> None:
     names = [name for name in moving.parameters if "waviness" in name or "deviation" in name]
     assert len(names) == 7

@@ -189,6 +189,7 @@ def test_quantities_do_not_depend_on_the_samples(make_model: Callable[..., Model
     assert report.verdicts[Verdict.VERIFIED] == 2
 
 
+@pytest.mark.long
 def test_a_slow_press_is_seen_as_closely_as_a_fast_one(make_model: Callable[..., Model]) -> None:
     """10 rpm: the vibrations of a stroke take a thousandth of a turn; other code says 5635.85 N and 5.966e7 N/m."""
     model = make_model("punching_press_tangent")
@@ -266,6 +267,7 @@ def test_laws_whose_force_jumps_are_refused_with_what_is_allowed(make_model: Cal
 
 
 @pytest.mark.long
+@pytest.mark.extreme
 def test_a_smoothed_contact_makes_a_gated_law_differentiable(make_model: Callable[..., Model]) -> None:
     """Contacts open and close in this run: with Hertz's own onset the force would jump there."""
     smooth = ("[bearing.contact]\n", '[bearing.contact]\nsmoothing = "0.05 um"\n')

@@ -105,7 +105,8 @@ def test_lanes_take_the_steps_of_single_runs(make_model: ModelMaker, law: str, r
     assert result.statistics.rejected == pytest.approx(sum(single.rejected for single in singles), rel=0.05)
 
 
-@pytest.mark.parametrize("method", [pytest.param("auto", marks=pytest.mark.long), "stepper-dp54"])
+@pytest.mark.long
+@pytest.mark.parametrize("method", [pytest.param("auto", marks=pytest.mark.extreme), "stepper-dp54"])
 def test_members_that_locate_kinks_are_single_runs_that_do(make_model: ModelMaker, method: str) -> None:
     """The same bits, one member at a time; without being told, members locate kinks where single runs do."""
     model, columns = press(make_model, "one-sided-gated"), table(3)

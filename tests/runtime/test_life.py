@@ -57,6 +57,7 @@ def test_readings_are_those_of_fine_samples(make_model: Callable[..., Model], sc
         assert float(found[name][0]) == pytest.approx(expected, rel=allowed), name
 
 
+@pytest.mark.long
 def test_lanes_single_runs_and_quadrature_give_one_life(make_model: Callable[..., Model]) -> None:
     model = make_model("punching_press")
     clearances = [8e-6, 10e-6, 12e-6]
@@ -75,6 +76,7 @@ def test_lanes_single_runs_and_quadrature_give_one_life(make_model: Callable[...
 
 
 @pytest.mark.long
+@pytest.mark.extreme
 def test_the_bearing_of_several_is_named(make_model: Callable[..., Model]) -> None:
     model = make_model("punching_press_hinges")
     names = ["main.life_sectors", "big_end.life_sectors"]  # the pin swings

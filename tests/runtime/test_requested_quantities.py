@@ -38,6 +38,7 @@ def test_work_along_a_run_is_the_change_of_the_kinetic_energy(make_model: Callab
 
 
 @pytest.mark.long
+@pytest.mark.extreme
 def test_derivatives_of_pressure_are_a_third_of_those_of_the_force(make_model: Callable[..., Model]) -> None:
     """p = const Q^(1/3), the constant of the geometry alone; and they are verified, for that geometry as well."""
     asked = '"ball.inner_pressure", "point.slider.C.ay", "force.punch.power", '

@@ -100,7 +100,7 @@ def test_the_manifest_lists_them_and_their_coordinates(pair: Model) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("smooth_first", [False, True])
+@pytest.mark.parametrize("smooth_first", [False, pytest.param(True, marks=pytest.mark.extreme)])
 def test_kinks_are_located_beside_a_bearing_that_has_none(
     scene_text: Callable[..., str], alone: dict[str, Model], tmp_path: Path, smooth_first: bool
 ) -> None:
@@ -137,6 +137,7 @@ def test_messages_name_the_bearing_they_speak_of(pair: Model) -> None:
     assert "ball 1 of right" in place.words
 
 
+@pytest.mark.long
 def test_a_static_quantity_is_of_the_bearing_it_names(pair: Model, alone: dict[str, Model]) -> None:
     kinds = ("deflection", "peak_ball_force")
     for name, model in alone.items():
@@ -151,6 +152,7 @@ def test_a_static_quantity_is_of_the_bearing_it_names(pair: Model, alone: dict[s
         pair.sensitivity("static_deflection@240deg", "bearings.left.clearance", check=False)
 
 
+@pytest.mark.long
 def test_a_peak_is_asked_for_as_the_summary_names_it(pair: Model) -> None:
     run = {"cycles": 0.05, "transient": 0}
     names = ["left.peak_ball_force", "peak_left_ball_force"]

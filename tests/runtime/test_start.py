@@ -34,7 +34,7 @@ DRIVEN = ("[mechanism.frame.points]", MOTOR)
         ("punching_press_two_way", ()),
         pytest.param("varying_compliance", (), marks=pytest.mark.long),
         pytest.param("punching_press_hinges", (), marks=pytest.mark.long),
-        pytest.param("punching_press_hinges", (DRIVEN,), marks=pytest.mark.long),
+        pytest.param("punching_press_hinges", (DRIVEN,), marks=[pytest.mark.long, pytest.mark.extreme]),
     ],
 )
 def test_a_run_goes_on_as_one_run_through(
