@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from ballpass.derive import derive, equations, lower
+from ballpass.derive import derive, equations
+from ballpass.derive.lower.functions import lower
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
 from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum

@@ -6,8 +6,10 @@ import io
 import pickle
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -93,6 +95,17 @@ def test_what_cannot_be_drawn_is_told(rotor: Model, solution: Solution) -> None:
     ):
         with pytest.raises(RequestError, match=words):
             draw()
+
+
+def test_an_animation_in_a_notebook_is_the_page_that_it_writes(solution: Solution, tmp_path: Path) -> None:
+    animation = solution.plot.animate(turns=2)
+    (frame,) = ET.fromstring(f"<p>{animation._repr_html_()}</p>")
+    assert frame.get("sandbox") == "allow-scripts"  # the notebook's own page is out of its reach
+    written = animation.save(tmp_path / "two.html").read_text(encoding="utf-8")
+    assert " ".join(written.split()) == " ".join((frame.get("srcdoc") or "").split())  # XML reads line ends as blanks
+    assert len(repr(animation)) < 100
+    with pytest.raises(RequestError, match="without its model"):
+        replace(solution, model=None).plot.animate()
 
 
 def test_importing_the_runtime_brings_no_matplotlib() -> None:

@@ -6,6 +6,7 @@ In: a solution.  Out: the axes that were drawn on.  Figures with titles and capt
 from __future__ import annotations
 
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -14,6 +15,8 @@ from ballpass.runtime.ask.spectrum import Window, amplitude_spectrum
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.plot.animate import animation_page, write_animation
+from ballpass.runtime.show import html
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,7 +45,7 @@ class SolutionPlot:
         self._solution = solution
 
     def __repr__(self) -> str:
-        return "solution.plot: orbit, spectrum, ball_loads, outputs"
+        return "solution.plot: orbit, spectrum, ball_loads, outputs, animate"
 
     def __call__(self, *names: str, ax: Axes | None = None) -> Axes:
         """As `outputs`."""
@@ -164,6 +167,26 @@ class SolutionPlot:
             axes.set_ylabel(f"contact load, highest {top:.4g} N")
         return axes
 
+    def animate(self, *, turns: float = 1.0) -> Animation:
+        """The last turns in motion: linkage, bearings, forces and signals, with a slider; see `Animation`.
+
+        Parameters
+        ----------
+        turns : of driver or shaft; without any that turns on, all of the run is shown
+
+        Raises
+        ------
+        RequestError
+            The steady part is shorter, there is nothing to draw, or the solution was read from a file, without the
+            model that places links.
+        """
+        if self._solution.model is None:
+            raise RequestError(
+                "plot.animate: this solution was read from a file or sent by another process, without its model. Give "
+                "it back: dataclasses.replace(solution, model=ballpass.runtime.load(folder)).plot.animate()."
+            )
+        return Animation(cast("PointModel", self._solution.model), self._solution, turns)
+
     def _record(self, bearing: str | None, *names: str) -> Record:
         """What figures know of the run, of one bearing whose outputs these are."""
         from ballpass.runtime.plot.record import gather
@@ -185,6 +208,24 @@ class SolutionPlot:
         self._solution[name]  # for its error
         infos = (*self._solution.manifest.outputs, *self._solution.manifest.states)
         return next(info.unit for info in infos if info.name == name).replace("*", "·")
+
+
+class Animation:
+    """A run in motion.  A notebook shows the page that `save` writes, with its slider, in a frame of its own."""
+
+    def __init__(self, model: PointModel, solution: Solution, turns: float) -> None:
+        self._run, self._turns = (model, solution), turns
+        self._page = animation_page(model, solution, turns=turns)
+
+    def __repr__(self) -> str:
+        return f"Animation({self._run[1].manifest.scene}, {self._turns:g} turns; save(path) writes it)"
+
+    def _repr_html_(self) -> str:
+        return html.framed_page(self._page)
+
+    def save(self, path: str | Path, *, pictures: int | None = None) -> Path:
+        """Write a page, ``.html``, or a movie of so many pictures, ``.gif`` or ``.mp4``; see `write_animation`."""
+        return write_animation(*self._run, path, turns=self._turns, pictures=pictures)
 
 
 def _lacks(names: str) -> str:

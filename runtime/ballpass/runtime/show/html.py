@@ -1,4 +1,4 @@
-"""HTML of objects in notebooks: one look, no script, everything escaped.
+"""HTML of objects in notebooks: one look, no script but that of framed pages, everything escaped.
 
 In: heads and rows of text, or the tables of a terminal.  Out: HTML that stands alone, light on dark as dark on light.
 """
@@ -36,6 +36,17 @@ _CLASSES = {"green": "good", "bold red": "bad", "yellow": "doubt"}
 def block(*parts: str) -> str:
     """Parts, HTML already, as one output of a notebook."""
     return f'<div class="ballpass"><style>{_STYLE}</style>{"".join(parts)}</div>'
+
+
+def framed_page(page: str, height: int = 720) -> str:
+    """A whole page with its own script, in a frame that shares nothing with the notebook.
+
+    Parameters
+    ----------
+    height : of the frame [pixels]
+    """
+    style = f"width: 100%; height: {height}px; border: 0;"
+    return f'<iframe sandbox="allow-scripts" srcdoc="{escape(page)}" style="{style}"></iframe>'
 
 
 def title(words: str, note: str = "") -> str:
