@@ -57,6 +57,14 @@ class System:
     `mass * d(velocities)/dt = forcing`; both empty without a bearing.  `linear_forms` are the definitions of their
     entries, where bearings and linkage move each other.  `quantities` is all that the model can report
     without request, and what the scene names beyond; `outputs` is what the scene asks for.
+
+    Examples
+    --------
+    >>> system = derive(read_scene("scenes/rotor.toml"))
+    >>> [state.name for state in system.states]
+    ['inner.x', 'inner.y', 'inner.vx', 'inner.vy']
+    >>> system.mass.shape  # SymPy
+    (2, 2)
     """
 
     scene: Scene
@@ -131,6 +139,12 @@ def derive(scene: Scene) -> System:
     SceneError
         Where the linkage's topology is wrong, its numbers lock it within a turn, or an output is unknown: all faults
         that can be told together, with their lines; `LinkageError` where all are of the linkage.
+
+    Examples
+    --------
+    >>> system = derive(read_scene("scenes/rotor.toml"))
+    >>> system.forcing.shape  # of the equations of motion
+    (2, 1)
     """
     errors: list[SceneError] = []
     mechanism = scene.mechanism

@@ -60,6 +60,14 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
         No such folder, a manifest that is wrong or of another schema, edited files.
     CompileError
         The compiler failed.
+
+    Examples
+    --------
+    >>> model = load("generated/punching_press")
+    >>> model.states[:3]
+    ('inner.x', 'inner.y', 'outer.x')
+    >>> model.parameters["bearing.clearance"]  # [m]
+    1e-05
     """
     # absolute: functions may be read after the process has moved elsewhere
     place = Path(folder).absolute()
@@ -82,6 +90,13 @@ class Model(PointModel):
     ----------
     manifest : what the model consists of
     library : the compiled library, None when CasADi's virtual machine runs the functions
+
+    Examples
+    --------
+    >>> model = load("generated/punching_press")
+    >>> solution = model.simulate(cycles=2, parameters={"bearing.clearance": 8e-6})
+    >>> solution["ball.force"].shape  # [N]: samples, balls
+    (4001, 8)
     """
 
     def __init__(
@@ -174,6 +189,14 @@ class Model(PointModel):
             The computation failed; ``.partial`` holds what was computed.
         TargetMissed
             No way keeps the error that was asked for.
+
+        Examples
+        --------
+        >>> solution = model.simulate(cycles=1, samples_per_cycle=360)
+        >>> solution["inner.y"].shape  # [m]
+        (361,)
+        >>> model.simulate(duration=0.05, sample_rate=10e3, outputs=[]).t[:3]  # [s]
+        array([0.    , 0.0001, 0.0002])
         """
         numbers = self._runnable(parameters)
         request = Request(
@@ -226,6 +249,14 @@ class Model(PointModel):
             A wrong request, or a file that cannot be written.
         IntegrationError
             The computation failed; no file is written.
+
+        Examples
+        --------
+        >>> statistics = model.stream("press.nc", sample_rate=20e3, cycles=4, outputs=["inner.y"])
+        >>> statistics.method
+        'stepper'
+        >>> load_solution("press.nc")["inner.y"].shape  # [m]
+        (9601,)
         """
         numbers = self._runnable(parameters)
         request = Request(
@@ -273,6 +304,14 @@ class Model(PointModel):
             A wrong request, an unknown parameter, or a damping law whose force jumps.
         IntegrationError
             The computation failed.
+
+        Examples
+        --------
+        >>> slopes = model.sensitivities(["bearing.clearance", "mechanism.driver.speed"], cycles=0.5)
+        >>> slopes.x.shape  # samples, states, parameters
+        (1001, 8, 2)
+        >>> slopes["inner.y", "bearing.clearance"].shape  # [m/m]
+        (1001,)
         """
         numbers = self._runnable(parameters)
         request = Request(
@@ -326,6 +365,13 @@ class Model(PointModel):
             A wrong request, unknown names, or a law whose force jumps.
         SimulationError
             The computation failed.
+
+        Examples
+        --------
+        >>> report = model.sensitivity("rms:inner.y", "bearing.clearance", cycles=0.5, transient=0)
+        >>> pair = report["rms:inner.y", "bearing.clearance"]
+        >>> f"{pair.derivative:.2f} {pair.unit}, {pair.check.verdict.value}"
+        '0.48 m/m, verified'
         """
         from ballpass.runtime.certify.sensitivity_query import (  # SciPy takes longer to read than a run
             answer,
@@ -375,6 +421,12 @@ class Model(PointModel):
             A wrong request, or a linkage that cannot be assembled.
         SimulationError
             The computation failed.
+
+        Examples
+        --------
+        >>> found = model.reduce(cycles=20, transient=2)["ball.force"]
+        >>> round(found.maximum, -1), round(found.rms, -1)  # [N]
+        (4400.0, 690.0)
         """
         numbers = self._runnable(parameters)
         request = Request(
@@ -415,6 +467,14 @@ class Model(PointModel):
             A wrong request, a linkage that cannot be assembled, or a model in which nothing turns.
         SimulationError
             The computation failed.
+
+        Examples
+        --------
+        >>> found = model.settle(transient=2)
+        >>> found.settled
+        True
+        >>> round(found.reductions["ball.force"].maximum, -1)  # [N]
+        4400.0
         """
         numbers = self._runnable(parameters)
         request = Request(
@@ -452,6 +512,12 @@ class Model(PointModel):
             A wrong request, a linkage that cannot be assembled, or a scene without bearing.
         SimulationError
             The computation failed.
+
+        Examples
+        --------
+        >>> (bearing,) = model.life(cycles=4, transient=2).bearings
+        >>> f"{bearing.static_safety:.1f}, {bearing.lives['sectors'] / 1e6:.0f} million turns"
+        '0.9, 225 million turns'
         """
         from ballpass.runtime.ask.life_report import life_report
 
@@ -516,6 +582,13 @@ class Model(PointModel):
         ------
         RequestError
             A wrong request: unknown names, columns of unequal length, values that are no finite numbers.
+
+        Examples
+        --------
+        >>> clearances = {"bearing.clearance": np.linspace(5e-6, 20e-6, 4)}  # [m]
+        >>> many = model.simulate_many(clearances, ["peak_ball_force", "rms:inner.y"], cycles=3, transient=2)
+        >>> many["peak_ball_force"].round(-1)  # [N]
+        array([4230., 4390., 4550., 4690.])
         """
 
         def run(
@@ -563,6 +636,12 @@ class Model(PointModel):
             A wrong request, a linkage that cannot be assembled, or no compiler for the stepper.
         SimulationError
             The computation failed.
+
+        Examples
+        --------
+        >>> found = model.growth(cycles=4, transient=2)
+        >>> found.uncertain, found.worst < 1e-3
+        ((), True)
         """
         numbers = self._runnable(parameters)
         request = Request(
@@ -590,10 +669,24 @@ class Model(PointModel):
         ------
         RequestError
             No such output, no samples, or another `kind`.
+
+        Examples
+        --------
+        >>> solution = model.simulate(cycles=1, samples_per_cycle=90)
+        >>> peak = model.refine_peak(solution, "ball.force")
+        >>> round(peak.value), round(peak.sampled), peak.ball  # [N], [N], counted from 1
+        (4403, 3079, 1)
         """
         numbers = self.numbers(solution.parameters)
         return refine_peak(self, numbers, solution, name, kind=kind)
 
     def explain(self, parameters: Mapping[str, float] | None = None) -> Explanation:
-        """Breakpoints, smoothness and time scales, and the method they speak for."""
+        """Breakpoints, smoothness and time scales, and the method they speak for.
+
+        Examples
+        --------
+        >>> explanation = model.explain()
+        >>> explanation.method, len(explanation.breakpoints)
+        ('stepper', 2)
+        """
         return explain(self, parameters)

@@ -40,7 +40,14 @@ class _Printer:
 
 
 def equations(system: System) -> str:
-    """Markdown with every derived equation of the scene: parameters, linkage, Eq. (1), contact, equations of motion."""
+    """Markdown with every derived equation of the scene: parameters, linkage, Eq. (1), contact, equations of motion.
+
+    Examples
+    --------
+    >>> page = equations(derive(read_scene("scenes/rotor.toml")))
+    >>> page.splitlines()[2]
+    '# Derived equations: rotor'
+    """
     tex = _Printer(system)
     parts = [
         HEADER,

@@ -85,6 +85,12 @@ def generate(
         The scene is wrong.  Nothing is written then.
     RequestError
         The folder holds files, but none that this function wrote.  Nothing is written then.
+
+    Examples
+    --------
+    >>> folder = generate("scenes/punching_press.toml")  # done: it is fresh
+    >>> load(folder).outputs[-1]
+    'drive_torque'
     """
     say = progress or (lambda _: None)
     if not force and fresh_manifest(scene, out) is not None:
@@ -113,6 +119,11 @@ def check(scene: str | Path | Scene, out: str | Path | None = None) -> Check:
     """Derive a scene afresh and compare with the folder, byte for byte; writes nothing to it.
 
     A file that is not there, as in a clean checkout, is compared by the digest that the folder's manifest gives it.
+
+    Examples
+    --------
+    >>> check("scenes/rotor.toml", "generated/rotor").stale[:2]  # nothing was generated yet
+    ('EQUATIONS.md', 'ensemble_kernels.h')
     """
     from ballpass.derive.emit.folder import write_folder
 

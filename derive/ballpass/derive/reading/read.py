@@ -75,6 +75,12 @@ def read_scene(
     ------
     SceneError
         With all faults of the file.
+
+    Examples
+    --------
+    >>> scene = read_scene("scenes/rotor.toml")
+    >>> scene.name, scene.bearing.balls
+    ('rotor', 8)
     """
     file = Path(path)
     try:

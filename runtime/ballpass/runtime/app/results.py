@@ -28,7 +28,14 @@ FILES = "files"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
-    """What ``ballpass run`` wrote: the solution, and the summary as it stands in ``summary.json``."""
+    """What ``ballpass run`` wrote: the solution, and the summary as it stands in ``summary.json``.
+
+    Examples
+    --------
+    >>> results = load_results("results/punching_press")
+    >>> results.solution["ball.force"].shape[1]  # balls
+    8
+    """
 
     solution: Solution
     summary: Mapping[str, Any]
@@ -72,6 +79,12 @@ def load_results(folder: str | Path) -> Results:
     ------
     RequestError
         There are no results, or files of different runs.
+
+    Examples
+    --------
+    >>> results = load_results("results/punching_press")  # of `ballpass run`
+    >>> results.summary["method"], round(results.summary["peak_ball_force"]["total"], -1)  # [N]
+    ('stepper', 4390.0)
     """
     return read_whole(Path(folder), lambda: _load(Path(folder)), RequestError)
 

@@ -59,6 +59,12 @@ class Peak:
         ``stepper-dop853`` in eighths); what begins and ends between two of them, as a brief contact, is not seen.
         ``dense samples``: on a grid of its own, for the output follows from time alone.  ``samples``: nowhere else;
         more samples may show more
+
+    Examples
+    --------
+    >>> peak = model.refine_peak(model.simulate(cycles=1, samples_per_cycle=90), "ball.force")
+    >>> peak.value > peak.sampled, peak.searched
+    (True, 'every step')
     """
 
     value: float

@@ -125,6 +125,12 @@ class QuantityFunction:
             Another shape, or parameters that cannot be simulated.
         SimulationError
             A run failed.
+
+        Examples
+        --------
+        >>> f = QuantityFunction(model, "rms:inner.y", ["bearing.clearance"], cycles=1, transient=0)
+        >>> f([[5e-6], [10e-6]]).shape  # [m]
+        (2,)
         """
         rows, able, batch = self._rows(x)
         found = np.full((len(rows), len(self.of)), np.nan)
@@ -151,6 +157,12 @@ class QuantityFunction:
             As for values; or a law whose force jumps.
         SimulationError
             A run failed, or its motion is chaotic.
+
+        Examples
+        --------
+        >>> f = QuantityFunction(model, "rms:inner.y", ["bearing.clearance"], cycles=1, transient=0)
+        >>> f.jacobian([5e-6]).shape  # [m/m]
+        (1,)
         """
         self.check_differentiable()
         rows, able, batch = self._rows(x)

@@ -99,6 +99,14 @@ class SensitivityReport:
     pairs : quantity by quantity, parameters in order
     grazing : where the trajectory grazes a kink
     settings : cycles, transient, method, tolerances, steps
+
+    Examples
+    --------
+    >>> report = model.sensitivity("rms:inner.y", "bearing.outer_ring.*", cycles=0.5, transient=0, check=False)
+    >>> report.parameters
+    ('bearing.outer_ring.mass', 'bearing.outer_ring.stiffness', 'bearing.outer_ring.damping')
+    >>> report["rms:inner.y", "bearing.outer_ring.mass"].unit
+    'm/kg'
     """
 
     scene: str
@@ -124,7 +132,14 @@ class SensitivityReport:
         return html.block(html.from_terminal(render_report(self)))
 
     def __getitem__(self, key: tuple[str, str]) -> Sensitivity:
-        """The pair of a quantity and a parameter."""
+        """The pair of a quantity and a parameter.
+
+        Examples
+        --------
+        >>> report = model.sensitivity("rms:inner.y", "bearing.clearance", cycles=0.5, transient=0, check=False)
+        >>> f"{report['rms:inner.y', 'bearing.clearance'].dimensionless:.3f} % per %"
+        '0.617 % per %'
+        """
         quantity, parameter = key
         names = [item.name for item in self.quantities]
         if quantity not in names:
@@ -137,6 +152,13 @@ class SensitivityReport:
         """Pairs of one quantity, ranked by the size of the dimensionless derivative.
 
         Behind them those that have none, for parameter or quantity is zero, ranked by the change per `scale`.
+
+        Examples
+        --------
+        >>> lengths = ["mechanism.bodies.crank.points.B", "mechanism.bodies.rod.points.C", "bearing.clearance"]
+        >>> report = model.sensitivity("rms:inner.y", lengths, cycles=0.5, transient=0, check=False)
+        >>> [pair.parameter for pair in report.of("rms:inner.y")]
+        ['bearing.clearance', 'mechanism.bodies.crank.points.B', 'mechanism.bodies.rod.points.C']
         """
         pairs = [self[quantity, name] for name in self.parameters]
         return tuple(sorted(pairs, key=_rank))
@@ -152,7 +174,14 @@ class SensitivityReport:
         return tuple(pair for pair in self.pairs if pair.check.verdict is Verdict.DISAGREES)
 
     def to_json(self) -> dict[str, Any]:
-        """The report as JSON-ready mapping; numbers that are not finite are null."""
+        """The report as JSON-ready mapping; numbers that are not finite are null.
+
+        Examples
+        --------
+        >>> report = model.sensitivity("rms:inner.y", "bearing.clearance", cycles=0.5, transient=0, check=False)
+        >>> sorted(report.to_json())
+        ['grazing', 'quantities', 'scene', 'sensitivities', 'settings', 'verdicts']
+        """
         return {
             "scene": self.scene,
             "settings": dict(self.settings),

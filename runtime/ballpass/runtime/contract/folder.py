@@ -60,6 +60,11 @@ def read_manifest(folder: str | Path, *, verify: bool = True) -> Manifest:
     ------
     ArtefactError
         There is no such folder or file, or its content is wrong (see `Manifest.from_json`).
+
+    Examples
+    --------
+    >>> read_manifest("generated/punching_press").scene
+    'punching_press'
     """
     path = Path(folder) / FILE_NAME
     try:

@@ -274,7 +274,15 @@ class MechanismInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Manifest(ShortRepr):
-    """Everything `runtime` knows of a model."""
+    """Everything `runtime` knows of a model.
+
+    Examples
+    --------
+    >>> model.manifest.scene, len(model.manifest.parameters), model.manifest.run.cycles
+    ('punching_press', 41, 4.0)
+    >>> [info.unit for info in model.manifest.states[:5]]
+    ['m', 'm', 'm', 'm', 'm/s']
+    """
 
     schema: int = SCHEMA
     scene: str
@@ -323,7 +331,13 @@ class Manifest(ShortRepr):
         return tuple(edge for k in self.borders for window in self.inputs[k].windows for edge in window)
 
     def function(self, name: str) -> FunctionInfo:
-        """Signature of a generated function; KeyError where there is none of that name."""
+        """Signature of a generated function; KeyError where there is none of that name.
+
+        Examples
+        --------
+        >>> model.manifest.function("rhs").inputs
+        (('t', 1), ('x', 8), ('u', 4), ('p', 41), ('c', 40))
+        """
         for info in self.functions:
             if info.name == name:
                 return info
@@ -333,6 +347,11 @@ class Manifest(ShortRepr):
         """Deterministic text: the fields in the order of the records, one per line, ending in a newline.
 
         The last key is the digest of the text without it: who edits a number there by hand is told.
+
+        Examples
+        --------
+        >>> Manifest.from_json(model.manifest.to_json()) == model.manifest
+        True
         """
         document = asdict(self)
         return _text(document | {DIGEST: digest_of(document)})
@@ -351,6 +370,11 @@ class Manifest(ShortRepr):
         ------
         ArtefactError
             Not JSON, another schema, edited, or not the records of this version.
+
+        Examples
+        --------
+        >>> Manifest.from_json(model.manifest.to_json()).scene
+        'punching_press'
         """
         again = "Write the folder again with `ballpass derive`"
         try:

@@ -23,7 +23,13 @@ _HEADS = ("name", "value", "unit", "description")
 
 
 class Parameters(Mapping[str, float]):
-    """Run-time parameters: name to value in SI; ``print`` shows a table with units and descriptions."""
+    """Run-time parameters: name to value in SI; ``print`` shows a table with units and descriptions.
+
+    Examples
+    --------
+    >>> "bearing.clearance" in model.parameters, model.parameters["bearing.clearance"]  # [m]
+    (True, 1e-05)
+    """
 
     __slots__ = ("_infos", "_values")
 
@@ -44,7 +50,14 @@ class Parameters(Mapping[str, float]):
         return len(self._values)
 
     def info(self, name: str) -> ParameterInfo:
-        """Unit, description, symbol and default of a parameter."""
+        """Unit, description, symbol and default of a parameter.
+
+        Examples
+        --------
+        >>> info = model.parameters.info("bearing.clearance")
+        >>> info.unit, info.default
+        ('m', 1e-05)
+        """
         self[name]
         return self._infos[name]
 

@@ -6,7 +6,13 @@ from enum import Enum
 
 
 class Status(Enum):
-    """How a simulation ended."""
+    """How a simulation ended.
+
+    Examples
+    --------
+    >>> model.simulate(cycles=1).status.name
+    'DONE'
+    """
 
     DONE = "The simulation reached its end."
     NOT_FINITE = (

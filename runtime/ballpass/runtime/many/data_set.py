@@ -73,6 +73,12 @@ class SignalClass:
     model : what is simulated
     members : how many
     parameters : by name, a distribution or the number that all have; others keep the scene's [SI]
+
+    Examples
+    --------
+    >>> wide = Distribution(name="uniform", arguments={"loc": 5e-6, "scale": 15e-6})  # [m]
+    >>> SignalClass(label="press", model=model, members=8, parameters={"bearing.clearance": wide}).members
+    8
     """
 
     label: str
@@ -90,6 +96,13 @@ class DataSetReport(ShortRepr):
     path : the Zarr folder, or the NetCDF file
     members : how many there are, and how many of them were `made` by this call
     failures : members without a signal, in order, also of earlier calls
+
+    Examples
+    --------
+    >>> press = SignalClass(label="press", model=model, members=2, parameters={})
+    >>> signals = Signals(outputs=("inner.y",), sample_rate=10e3, duration=0.05)
+    >>> make_data_set("two.nc", [press], signals, seed=1).path.name
+    'two.nc'
     """
 
     path: Path
@@ -152,6 +165,15 @@ def make_data_set(
         A wrong request; another data set, or something else, is there already; Zarr or Dask is not installed.
     SimulationError
         A cluster gave up.  What was finished is kept: a second call goes on.
+
+    Examples
+    --------
+    >>> slow = Distribution(name="uniform", arguments={"loc": 30.0, "scale": 20.0})  # [rad/s]
+    >>> press = SignalClass(label="press", model=model, members=3, parameters={"mechanism.driver.speed": slow})
+    >>> signals = Signals(outputs=("inner.y",), sample_rate=10e3, duration=0.05)
+    >>> report = make_data_set("presses.nc", [press], signals, seed=1)
+    >>> report.members, report.made, report.failures
+    (3, 3, ())
     """
     need("zarr")
     _check(classes, signals, seed, chunk)

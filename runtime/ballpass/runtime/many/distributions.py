@@ -33,6 +33,12 @@ class Distribution:
     ------
     RequestError
         SciPy has no such distribution, it does not take these arguments, or their values are outside its domain.
+
+    Examples
+    --------
+    >>> speed = Distribution(name="norm", arguments={"loc": 50.0, "scale": 2.0})
+    >>> speed.values(np.array([0.5, 0.975])).round(1)
+    array([50. , 53.9])
     """
 
     name: str
@@ -64,7 +70,13 @@ class Distribution:
         return _continuous(self.name)(**self.arguments)
 
     def values(self, quantiles: np.ndarray) -> np.ndarray:
-        """Values whose share of smaller ones is `quantiles`, of its shape."""
+        """Values whose share of smaller ones is `quantiles`, of its shape.
+
+        Examples
+        --------
+        >>> Distribution(name="uniform", arguments={"loc": 5.0, "scale": 10.0}).values(np.array([0.0, 0.5]))
+        array([ 5., 10.])
+        """
         return np.asarray(self._frozen().ppf(quantiles), dtype=float)
 
 

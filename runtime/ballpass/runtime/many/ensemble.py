@@ -57,6 +57,12 @@ class EnsembleStatistics:
     threads : at work
     rtol : relative tolerance [1]
     wall_time : [s]
+
+    Examples
+    --------
+    >>> statistics = model.simulate_many({"bearing.clearance": [5e-6, 10e-6]}, "rms:inner.y", cycles=3).statistics
+    >>> statistics.lanes, statistics.kinks
+    (8, 'stepped-over')
     """
 
     steps: int
@@ -86,6 +92,15 @@ class EnsembleResult(Mapping[str, np.ndarray]):
     manifest : of the model
     uncertain : where growth was asked for: by observable, members whose digits the tolerance does not bear, each of
         shape (members,)
+
+    Examples
+    --------
+    >>> table = {"mechanism.bodies.slider.mass": [16.0, 17.0, -1.0]}  # [kg]
+    >>> many = model.simulate_many(table, "peak_ball_force", cycles=3)
+    >>> many["peak_ball_force"].round(-1)  # [N]
+    array([4400., 4390.,   nan])
+    >>> many.failures[0].status
+    'REFUSED'
     """
 
     observables: Mapping[str, np.ndarray]
@@ -123,7 +138,15 @@ class EnsembleResult(Mapping[str, np.ndarray]):
         return len(self.observables)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Dataset with the dimension ``member``; the varied parameters are coordinates along it, with units."""
+        """Dataset with the dimension ``member``; the varied parameters are coordinates along it, with units.
+
+        Examples
+        --------
+        >>> many = model.simulate_many({"bearing.clearance": [5e-6, 10e-6]}, "rms:inner.y", cycles=3)
+        >>> data = many.to_xarray()
+        >>> dict(data.sizes), data["rms:inner.y"].units, data["bearing.clearance"].units
+        ({'member': 2}, 'm', 'm')
+        """
         facts = self.attributes()
         coordinates: dict[str, Any] = {"member": np.arange(len(next(iter(self.parameters.values()))))}
         coordinates |= {name: ("member", values, facts[name]) for name, values in self.parameters.items()}

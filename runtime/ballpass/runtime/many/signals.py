@@ -45,6 +45,12 @@ class Signals:
     ------
     RequestError
         A number out of range; all faults at once.
+
+    Examples
+    --------
+    >>> signals = Signals(outputs=("inner.y",), sample_rate=20e3, duration=0.1, snr=30.0)  # [Hz], [s], [dB]
+    >>> signals.samples
+    2000
     """
 
     outputs: tuple[str, ...]

@@ -39,6 +39,13 @@ class SolutionPlot:
 
     What is drawn is the steady part of the run.  Each method takes ``ax``, matplotlib axes to draw on, and returns
     them; without, it draws on new axes.  Of several bearings ``bearing`` names one; the default is the first.
+
+    Examples
+    --------
+    >>> solution = model.simulate(cycles=3, transient=1)
+    >>> axes = solution.plot("inner.y")
+    >>> axes.get_xlabel()
+    'time [s]'
     """
 
     def __init__(self, solution: Solution) -> None:
@@ -62,6 +69,12 @@ class SolutionPlot:
         ------
         RequestError
             An unknown name, or names of different units.
+
+        Examples
+        --------
+        >>> axes = model.simulate(cycles=3).plot.outputs("inner.y", "outer.y")
+        >>> axes.get_xlabel()
+        'time [s]'
         """
         steady = self._solution.steady()
         chosen = names or self._displacements() or tuple(steady.outputs)[:1]
@@ -92,6 +105,10 @@ class SolutionPlot:
         ------
         RequestError
             The run has no displacements of the ring.
+
+        Examples
+        --------
+        >>> axes = model.simulate(cycles=3, transient=1).plot.orbit()  # of matplotlib
         """
         from ballpass.runtime.plot.motion import draw_orbit  # with matplotlib
 
@@ -112,6 +129,12 @@ class SolutionPlot:
         ------
         RequestError
             An unknown name, an output of each ball, or samples at unequal steps.
+
+        Examples
+        --------
+        >>> axes = model.simulate(cycles=3, transient=1).plot.spectrum("inner.y")
+        >>> axes.get_xlabel()
+        'frequency [Hz]'
         """
         from ballpass.runtime.plot.motion import shown_range
 
@@ -142,6 +165,10 @@ class SolutionPlot:
         ------
         RequestError
             The run has no forces of the balls.
+
+        Examples
+        --------
+        >>> axes = model.simulate(cycles=3, transient=1).plot.ball_loads()
         """
         record = self._record(bearing)
         if not (record.has("ball.force") or record.has("ball.elastic_force")):
@@ -179,6 +206,12 @@ class SolutionPlot:
         RequestError
             The steady part is shorter, there is nothing to draw, or the solution was read from a file, without the
             model that places links.
+
+        Examples
+        --------
+        >>> moving = model.simulate(cycles=3, transient=1).plot.animate(turns=0.5)
+        >>> moving.save("press.html").name
+        'press.html'
         """
         if self._solution.model is None:
             raise RequestError(

@@ -66,6 +66,12 @@ class StaticEquilibrium:
     free_directions : directions without stiffness, shape (number, coordinates); empty where the equilibrium is unique
     iterations : Newton steps taken
     residual : largest net force left [N]
+
+    Examples
+    --------
+    >>> rest = model.static_equilibrium(crank_angle=4.2)  # [rad]
+    >>> rest.ball_force.shape, f"{rest.peak_ball_force:.0f} N"
+    ((8,), '2385 N')
     """
 
     coordinates: tuple[str, ...]
@@ -97,7 +103,13 @@ class StaticEquilibrium:
         return html.block(html.from_terminal(_render(self)))
 
     def __getitem__(self, name: str) -> float:
-        """Position by name [m]."""
+        """Position by name [m].
+
+        Examples
+        --------
+        >>> f"{model.static_equilibrium(crank_angle=4.2)['inner.y'] * 1e6:.1f} um"
+        '132.2 um'
+        """
         if name not in self.coordinates:
             raise RequestError(
                 f"There is no position {name!r} in this equilibrium. There are: {', '.join(self.coordinates)}."
@@ -125,6 +137,12 @@ class StaticEquilibrium:
         ------
         RequestError
             Unknown names, a state in `wrt`, or a ring that is free to move.
+
+        Examples
+        --------
+        >>> rest = model.static_equilibrium(crank_angle=4.2)
+        >>> rest.derivative("positions", "bearing.clearance").round(2)  # [m/m]
+        array([-0.02,  0.59,  0.  ,  0.  ])
         """
         names = [wrt] if isinstance(wrt, str) else list(wrt)
         for name in names:

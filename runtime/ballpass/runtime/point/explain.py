@@ -90,6 +90,14 @@ class Explanation(ShortRepr):
     unsupported : instants without equilibrium, whose rates are not known
     method, reason : what ``auto`` takes, and why
     unusual : sentences about numbers outside of their usual ranges
+
+    Examples
+    --------
+    >>> explanation = model.explain()
+    >>> f"{explanation.turn:.2f} s, {explanation.method}"
+    '0.12 s, stepper'
+    >>> [f"{item.time:.3f} s" for item in explanation.breakpoints]
+    ['0.079 s', '0.089 s']
     """
 
     states: tuple[str, ...]

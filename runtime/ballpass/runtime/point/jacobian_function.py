@@ -63,6 +63,12 @@ class JacobianFunction:
     values : entries of the last call, in the order of `sparsity`; overwritten by the next call
     x : memory of the state, shape (states,)
     evaluate : the compiled code alone, for whoever writes `x` and reads the memory himself
+
+    Examples
+    --------
+    >>> J = model.jacobian_function("ball.force", "states")
+    >>> J(model.initial()).shape, J.rows[0], J.columns[0], J.row_units[0]
+    ((64,), 'ball.force[1]', 'inner.x', 'N')
     """
 
     def __repr__(self) -> str:
@@ -144,12 +150,27 @@ class JacobianFunction:
             memory[:] = values[name] if name in ARGUMENTS else directions.of(name[1:]).reshape(-1, order="F")
 
     def move(self, t: float, parameters: dict[str, float] | None = None) -> None:
-        """Go to another time [s] and other parameters; the state stays."""
+        """Go to another time [s] and other parameters; the state stays.
+
+        Examples
+        --------
+        >>> J = model.jacobian_function("rhs", "states")
+        >>> J.move(0.08, {"bearing.clearance": 8e-6})  # [s], [m]
+        >>> J(model.initial()).shape
+        (36,)
+        """
         numbers = self._model.numbers(parameters)
         self._place(numbers, checked_time(t), directions_of(self._model, numbers, self._wrt, t))
 
     def __call__(self, x: Array | Sequence[float]) -> Array:
-        """Entries at a state, in the order of `sparsity`; the same memory each time: copy what is to be kept."""
+        """Entries at a state, in the order of `sparsity`; the same memory each time: copy what is to be kept.
+
+        Examples
+        --------
+        >>> J = model.jacobian_function("rhs", "states")
+        >>> J(model.initial()).shape == J.sparsity.rows.shape
+        True
+        """
         self.x[:] = x
         self.evaluate()  # straight-line code: it has no failure to report
         if self._result is not None:
@@ -158,13 +179,29 @@ class JacobianFunction:
         return self.values
 
     def to_dense(self) -> Array:
-        """Matrix of the last call, shape (rows, columns)."""
+        """Matrix of the last call, shape (rows, columns).
+
+        Examples
+        --------
+        >>> J = model.jacobian_function("rhs", "states")
+        >>> entries = J(model.initial())
+        >>> J.to_dense().shape
+        (8, 8)
+        """
         dense = np.zeros(self.sparsity.shape)
         dense[self.sparsity.rows, self.sparsity.columns] = self.values
         return dense
 
     def to_scipy(self) -> csc_array:
-        """Matrix of the last call as ``scipy.sparse.csc_array``."""
+        """Matrix of the last call as ``scipy.sparse.csc_array``.
+
+        Examples
+        --------
+        >>> J = model.jacobian_function("rhs", "states")
+        >>> entries = J(model.initial())
+        >>> J.to_scipy().nnz == len(entries)
+        True
+        """
         pattern = self.sparsity
         return need("scipy.sparse").csc_array((self.values.copy(), pattern.rows, pattern.starts), shape=pattern.shape)
 

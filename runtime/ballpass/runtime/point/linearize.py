@@ -50,6 +50,12 @@ class Mode:
     damped_frequency : Im(eigenvalue) / (2 pi) [Hz]; 0 for a decay without vibration
     damping_ratio : -Re(eigenvalue) over its absolute value [1]; NaN for a rigid mode
     shape : complex displacement of each coordinate, the largest 1, shape (coordinates,)
+
+    Examples
+    --------
+    >>> mode = model.linearize(crank_angle=4.2).modes[0]
+    >>> round(mode.natural_frequency), round(mode.damping_ratio, 3), mode.shape.shape  # [Hz], [1]
+    (1064, 0.038, (4,))
     """
 
     eigenvalue: complex
@@ -80,6 +86,12 @@ class Linearization:
     at_equilibrium : whether the state is the static equilibrium of that instant
     unbalanced : accelerations left at the state, largest [m/s^2]
     notes : what does not hold without reserve, for people
+
+    Examples
+    --------
+    >>> small = model.linearize(crank_angle=4.2)  # [rad]
+    >>> small.stiffness.shape, small.natural_frequencies.round()  # [N/m], [Hz]
+    ((4, 4), array([1064., 1108., 2923., 4180.]))
     """
 
     coordinates: tuple[str, ...]
@@ -121,7 +133,13 @@ class Linearization:
         return np.array([m.damping_ratio for m in self.modes])
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers and lists for JSON; complex numbers as pairs, what is not defined as null."""
+        """Plain numbers and lists for JSON; complex numbers as pairs, what is not defined as null.
+
+        Examples
+        --------
+        >>> model.linearize(crank_angle=4.2).to_dict()["stiffness"]["unit"]
+        'N/m'
+        """
         return {
             "time": {"value": self.time, "unit": "s"},
             "at_equilibrium": self.at_equilibrium,

@@ -36,6 +36,14 @@ class PointModel(LoadedModel):
         -----
         UnusualWarning
             A number is allowed, but outside of its usual range (`Manifest.usual`).
+
+        Examples
+        --------
+        >>> numbers = model.numbers({"bearing.clearance": 8e-6})
+        >>> numbers.p.shape, numbers.c.shape
+        ((41,), (40,))
+        >>> numbers.values["bearing.clearance"]  # [m]
+        8e-06
         """
         numbers = super().numbers(parameters)
         looked_at = numbers.p.tobytes()
@@ -45,26 +53,56 @@ class PointModel(LoadedModel):
         return numbers
 
     def constants(self, parameters: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Derived constants (stiffness, cage ratio, ...) by name, for the defaults with `parameters` put in."""
+        """Derived constants (stiffness, cage ratio, ...) by name, for the defaults with `parameters` put in.
+
+        Examples
+        --------
+        >>> f"{model.constants()['bearing.k_b']:.3g}"  # [N/m^1.5]
+        '8.64e+09'
+        """
         values = self.numbers(parameters).values
         return {info.name: values[info.name] for info in self.manifest.constants}
 
     def period(self, parameters: Mapping[str, float] | None = None) -> float:
-        """Time of one turn of driver or shaft [s]; infinite when nothing turns."""
+        """Time of one turn of driver or shaft [s]; infinite when nothing turns.
+
+        Examples
+        --------
+        >>> f"{model.period():.4g} s"
+        '0.12 s'
+        """
         return clock.period(self.manifest, self.numbers(parameters).values)
 
     def breakpoints(self, t0: float, t1: float, parameters: Mapping[str, float] | None = None) -> np.ndarray:
-        """Times in the open interval (t0, t1) at which a load switches or a table has a knot, increasing [s]."""
+        """Times in the open interval (t0, t1) at which a load switches or a table has a knot, increasing [s].
+
+        Examples
+        --------
+        >>> model.breakpoints(0.0, model.period()).round(4)  # [s]: the punch presses between two crank angles
+        array([0.079, 0.089])
+        """
         if not (math.isfinite(t0) and math.isfinite(t1) and t0 < t1):
             raise RequestError(f"breakpoints: finite times t0 < t1 are expected, not {t0!r} and {t1!r}.")
         return clock.breakpoints(self.manifest.inputs, self.numbers(parameters).values, float(t0), float(t1))
 
     def inputs_at(self, t: float, parameters: Mapping[str, float] | None = None) -> np.ndarray:
-        """Inputs ``u`` at time `t`, for functions that are then called with ``t = 0``; shape (inputs,)."""
+        """Inputs ``u`` at time `t`, for functions that are then called with ``t = 0``; shape (inputs,).
+
+        Examples
+        --------
+        >>> model.inputs_at(0.01).shape
+        (4,)
+        """
         return clock.inputs_at(self.manifest.inputs, self.numbers(parameters).values, checked_time(t))
 
     def initial(self, parameters: Mapping[str, float] | None = None) -> np.ndarray:
-        """State at the start, shape (states,)."""
+        """State at the start, shape (states,).
+
+        Examples
+        --------
+        >>> model.initial().shape, model.states[0]
+        ((8,), 'inner.x')
+        """
         values = self.numbers(parameters).values
         return np.array([values[name] for name in self.manifest.initial], dtype=float)
 
@@ -93,11 +131,26 @@ class PointModel(LoadedModel):
         RequestError
             Unknown names, a state of another shape, or a linkage that cannot be assembled at `t`, as in all that is
             asked at one instant.  It may lock at others: `check_assembly` looks at a turn.
+
+        Examples
+        --------
+        >>> there = model.evaluate(0.07, outputs=["drive_torque", "ball.force"])
+        >>> round(there["drive_torque"], 1), there["ball.force"].shape  # [N m], [N]
+        (-1.8, (8,))
         """
         return evaluate_point(self, self.numbers(parameters), t, x, outputs)
 
     def check_assembly(self, parameters: Mapping[str, float] | None = None) -> None:
-        """Raise `RequestError`, naming joint and crank angle, when the linkage locks somewhere in a turn."""
+        """Raise `RequestError`, naming joint and crank angle, when the linkage locks somewhere in a turn.
+
+        Examples
+        --------
+        >>> model.check_assembly()
+        >>> model.check_assembly({"mechanism.bodies.crank.points.B": 0.5})
+        Traceback (most recent call last):
+            ...
+        RequestError: The linkage cannot be assembled at joint 'C', worst at crank angle 0.00 deg ...
+        """
         check_assembly(self, self.numbers(parameters))
 
     def jacobian(
@@ -136,6 +189,14 @@ class PointModel(LoadedModel):
         ------
         RequestError
             Unknown names, with the nearest ones, or a linkage that cannot be assembled at `t`.
+
+        Examples
+        --------
+        >>> rest = model.static_equilibrium(crank_angle=4.2)
+        >>> model.jacobian("rhs", "states", t=rest.time, x=rest.x).shape
+        (8, 8)
+        >>> model.jacobian("ball.force", "bearing.clearance", t=rest.time, x=rest.x).shape  # [N/m]
+        (8,)
         """
         return jacobian(self, self.numbers(parameters), of, wrt, t=t, x=x)
 
@@ -150,6 +211,12 @@ class PointModel(LoadedModel):
         """The same, sparse and prepared for many states: ``J = model.jacobian_function("ball.force"); J(x)``.
 
         Where balls rest on the corner of a one-sided law it gives the slope of the parting side, without a word.
+
+        Examples
+        --------
+        >>> J = model.jacobian_function("ball.force", "states")
+        >>> J(model.initial()).shape, J.to_dense().shape  # entries; balls, states
+        ((64,), (8, 8))
         """
         return JacobianFunction(self, self.numbers(parameters), of, wrt, t=t)
 
@@ -168,6 +235,12 @@ class PointModel(LoadedModel):
         ------
         RequestError
             Unknown names, or laws without a bounded second derivative: Hertz's at contact onset.
+
+        Examples
+        --------
+        >>> bend = model.hessian("drive_torque", ("crank_angle", "crank_angle"), t=0.01)
+        >>> f"{bend:.3g} N m/rad^2"
+        '2.19 N m/rad^2'
         """
         return hessian(self, self.numbers(parameters), of, wrt, t=t, x=x)
 
@@ -199,6 +272,12 @@ class PointModel(LoadedModel):
             No bearing, an unloaded ring in a clearance, or a linkage that cannot be assembled at that instant.
         SimulationError
             Nothing holds the rings.
+
+        Examples
+        --------
+        >>> rest = model.static_equilibrium(crank_angle=4.2)  # [rad]
+        >>> f"{1e6 * rest['inner.y']:.1f} um, {rest.peak_ball_force:.0f} N"
+        '132.2 um, 2385 N'
         """
         from ballpass.runtime.point.equilibrium import instant, static_equilibrium  # with SciPy
 
@@ -231,6 +310,12 @@ class PointModel(LoadedModel):
         ------
         RequestError
             As for `static_equilibrium`.
+
+        Examples
+        --------
+        >>> small = model.linearize(crank_angle=4.2)  # [rad]
+        >>> small.natural_frequencies.round()  # [Hz]
+        array([1064., 1108., 2923., 4180.])
         """
         from ballpass.runtime.point.equilibrium import instant, static_equilibrium
         from ballpass.runtime.point.linearize import linearize  # with SciPy

@@ -42,6 +42,12 @@ class Reduction:
     maximum_ball, minimum_ball : the ball, counted from 1; None for a state
     mean : over time
     rms : plain root mean square over time, with the mean in it
+
+    Examples
+    --------
+    >>> force = model.reduce(cycles=3, transient=2)["ball.force"]
+    >>> round(force.maximum, -1), round(force.mean, -1)  # [N]
+    (4390.0, 270.0)
     """
 
     maximum: float
@@ -75,6 +81,14 @@ class Reductions(ShortRepr, Mapping[str, Reduction]):
     end : state at the end, by name
     steps, rejected : of the whole run
     cycle_length : time of a turn, None when nothing turns [s]
+
+    Examples
+    --------
+    >>> found = model.reduce(cycles=3, transient=2)
+    >>> round(1e6 * found["inner.y"].range, 1)  # [um]
+    362.9
+    >>> f"{found.duration / model.period():.1f} turns behind the transient"
+    '1.0 turns behind the transient'
     """
 
     channels: Mapping[str, Reduction]

@@ -32,6 +32,12 @@ class Sensitivities(ShortRepr):
     solution : the run itself
     names : parameters, in the order of the last axis
     x : derivative of each state at fixed time, shape (samples, states, parameters) [state's unit / parameter's unit]
+
+    Examples
+    --------
+    >>> slopes = model.sensitivities("bearing.clearance", cycles=0.5)
+    >>> slopes.names, slopes.x.shape  # samples, states, parameters
+    (('bearing.clearance',), (1001, 8, 1))
     """
 
     solution: Solution
@@ -39,7 +45,13 @@ class Sensitivities(ShortRepr):
     x: np.ndarray
 
     def __getitem__(self, key: tuple[str, str]) -> np.ndarray:
-        """Derivative of a state by a parameter, ``s["inner.y", "bearing.clearance"]``, shape (samples,)."""
+        """Derivative of a state by a parameter, ``s["inner.y", "bearing.clearance"]``, shape (samples,).
+
+        Examples
+        --------
+        >>> model.sensitivities("bearing.clearance", cycles=0.5)["inner.y", "bearing.clearance"].shape  # [m/m]
+        (1001,)
+        """
         state, parameter = key
         states = self.solution.states
         if state not in states:

@@ -60,6 +60,12 @@ class Statistics:
     initial : state at its start; None where an earlier version wrote the solution
     begin : time at its start, above 0 where it goes on from another run [s]
     duration : length of the run, which may end behind the last sample [s]; None as for `initial`
+
+    Examples
+    --------
+    >>> statistics = model.simulate(cycles=1).statistics
+    >>> statistics.method, statistics.rtol, statistics.segments
+    ('stepper', 1e-06, 3)
     """
 
     method: str
@@ -102,6 +108,14 @@ class Solution:
         beside derivatives, and where no output is kept
     steady_reductions : the same from the end of the transient on
     model : that ran, for `plot`; None for a solution that was read from a file or sent by another process
+
+    Examples
+    --------
+    >>> solution = model.simulate(cycles=2, transient=1)
+    >>> len(solution), solution["inner.y"].shape, solution["ball.force"].shape  # [m], [N]
+    (4001, (4001,), (4001, 8))
+    >>> round(solution.reductions["ball.force"].maximum, -1)  # [N], of every step
+    4400.0
     """
 
     t: np.ndarray
@@ -171,7 +185,12 @@ class Solution:
 
     @property
     def plot(self) -> SolutionPlot:
-        """Draws this run on matplotlib's axes: ``solution.plot.orbit()``, ``.spectrum()``, ``.ball_loads()``."""
+        """Draws this run on matplotlib's axes: ``solution.plot.orbit()``, ``.spectrum()``, ``.ball_loads()``.
+
+        Examples
+        --------
+        >>> axes = model.simulate(cycles=3, transient=1).plot.orbit()  # of matplotlib
+        """
         from ballpass.runtime.plot.accessor import SolutionPlot  # above, by name in pyproject.toml
 
         return SolutionPlot(self)
@@ -193,6 +212,12 @@ class Solution:
         ------
         RequestError
             Nothing turns, or the simulation ended within the transient cycles.
+
+        Examples
+        --------
+        >>> steady = model.simulate(cycles=3, transient=2).steady()
+        >>> f"{steady.t[0] / model.period():.1f} turns"
+        '2.0 turns'
         """
         if self.transient_cycles == 0.0:
             return self
@@ -229,7 +254,14 @@ class Solution:
         return None if mechanism is not None and mechanism.angle else self.cycle_length
 
     def to_xarray(self) -> xarray.Dataset:
-        """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions."""
+        """Dataset with dimensions ``time`` and ``ball`` (counted from 1), units and descriptions.
+
+        Examples
+        --------
+        >>> data = model.simulate(cycles=1).to_xarray()
+        >>> data["ball.force"].sel(ball=3).attrs["units"]
+        'N'
+        """
         variables, facts = contents(self)
         axes = ("time", *(f"{bearing.prefix}ball" for bearing in self.manifest.bearings))
         coordinates = {name: variables.pop(name) for name in axes if name in variables}
@@ -244,6 +276,12 @@ class Solution:
         ------
         RequestError
             pandas is not installed.
+
+        Examples
+        --------
+        >>> table = model.simulate(cycles=1).to_pandas()
+        >>> f"{table['inner.y'].abs().idxmax():.3f} s"
+        '0.079 s'
         """
         pandas = need("pandas")
         columns: dict[str, np.ndarray] = {}
@@ -264,6 +302,12 @@ class Solution:
         ------
         RequestError
             The folder does not exist or cannot be written, or the disk is full.
+
+        Examples
+        --------
+        >>> path = model.simulate(cycles=1).save("press.nc")
+        >>> load_solution(path)["inner.y"].shape  # [m]
+        (2001,)
         """
         target = Path(path)
         content = netcdf_bytes(*contents(self))
@@ -291,6 +335,12 @@ def load_solution(path: str | Path) -> Solution:
     ------
     RequestError
         There is no such file, it is none of ours, or it was cut short or edited.
+
+    Examples
+    --------
+    >>> path = model.simulate(cycles=1).save("press.nc")
+    >>> load_solution(path).manifest.title
+    'Punching machine of the paper'
     """
     try:
         content = Path(path).read_bytes()

@@ -33,6 +33,13 @@ class RunEnd(ShortRepr):
     x : state then, shape (states,)
     states : names of the states
     parameters : of the run, by name
+
+    Examples
+    --------
+    >>> first = model.simulate(cycles=1)
+    >>> rest = model.simulate(cycles=2, initial=first.end)  # goes on
+    >>> f"{rest.t[0] / model.period():.1f} turns"
+    '1.0 turns'
     """
 
     time: float

@@ -1,0 +1,96 @@
+"""Everything public has an example in its docstring, and the examples run and print what they show.
+
+They see the press of the paper as `model`, its generated folder and results where commands would write them, NumPy as
+`np`, and all public names.
+"""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import ballpass.derive
+import ballpass.runtime
+from ballpass.runtime import Model
+from ballpass.runtime.app.cli import app
+from ballpass.runtime.plot.accessor import SolutionPlot
+
+ROOT = Path(__file__).resolve().parent.parent
+#: Names by `__all__`, but for errors and warnings, and what is reached by an attribute.
+PUBLIC = {
+    name: found
+    for package in (ballpass.runtime, ballpass.derive)
+    for name in package.__all__
+    if not (inspect.isclass(found := getattr(package, name)) and issubclass(found, BaseException))
+} | {"SolutionPlot": SolutionPlot}
+#: What other modules call, though its name has no underscore.
+INTERNAL = {
+    "EnsembleResult.attributes",
+    "Parameters.table_html",
+    "QuantityFunction.arguments",
+    "QuantityFunction.check_differentiable",
+    "QuantityFunction.check_shape",
+    "QuantityFunction.refuse_second",
+    "Reductions.from_facts",
+    "SolutionPlot.__call__",
+}
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE | doctest.IGNORE_EXCEPTION_DETAIL
+
+
+def documented() -> Iterator[tuple[str, Any]]:
+    """Public functions and classes, and methods of the classes, also those of their bases: each once."""
+    for name, found in PUBLIC.items():
+        yield name, found
+        for base in found.__mro__ if inspect.isclass(found) else ():
+            if base.__module__.startswith("ballpass.") and not base.__module__.startswith("ballpass.runtime.native."):
+                for method, value in vars(base).items():
+                    value = getattr(value, "__func__", value)
+                    public = not method.startswith("_") or method == "__call__"
+                    if public and inspect.isfunction(value) and f"{name}.{method}" not in INTERNAL:
+                        yield f"{name}.{method}", value
+
+
+@pytest.fixture(scope="module")
+def names(make_model: Callable[..., Model], tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
+    folder = tmp_path_factory.mktemp("examples")
+    (folder / "scenes").symlink_to(ROOT / "scenes")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        model = make_model("punching_press")
+        done = CliRunner().invoke(app, ["run", "scenes/punching_press.toml", "--no-figures"])
+        assert done.exit_code == 0, done.output
+        yield {"np": np, "model": model, **PUBLIC}
+
+
+@pytest.fixture
+def run(names: dict[str, Any]) -> Iterator[Callable[[str, Any], None]]:
+    """Runs the examples of one docstring."""
+
+    def run_examples(name: str, found: Any) -> None:
+        runner, told = doctest.DocTestRunner(optionflags=FLAGS, verbose=False), []
+        for test in doctest.DocTestFinder(recurse=False).find(found, name, globs=dict(names)):
+            runner.run(test, out=told.append)
+        assert runner.summarize(verbose=False).attempted, f"{name}: its docstring has no example (>>>)"
+        assert not runner.failures, "".join(told)
+
+    yield run_examples
+    plt.close("all")
+
+
+@pytest.mark.parametrize(("name", "found"), [pytest.param(*item, id=item[0]) for item in documented()])
+def test_public_names_have_examples_that_run(run: Callable[[str, Any], None], name: str, found: Any) -> None:
+    run(name, found)
+
+
+@pytest.mark.parametrize("package", ["jax", "torch"])
+def test_examples_of_wrappers_run(run: Callable[[str, Any], None], package: str) -> None:
+    pytest.importorskip(package, reason=f"not installed: pip install ballpass[{package}]")
+    run(f"ballpass.{package}.wrap", getattr(__import__(f"ballpass.{package}"), package).wrap)
