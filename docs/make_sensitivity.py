@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ballpass.derive import generate
 from ballpass.runtime import Model, load
 from ballpass.runtime.certify.sensitivity_report import SensitivityReport
-from ballpass.runtime.plot.canvas import FIRST, GREY, SECOND, caption, new_figure, save, styled
+from ballpass.runtime.plot.style import FIRST, GREY, SECOND, caption, new_figure, save, styled
 from ballpass.runtime.plot.tornado import tornado
 
 DOCS = Path(__file__).resolve().parent

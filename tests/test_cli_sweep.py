@@ -20,7 +20,7 @@ from ballpass.runtime import load
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.app.commands.ranges import MOST, read_ranges
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot.canvas import GREY
+from ballpass.runtime.plot.style import GREY
 from ballpass.runtime.plot.sweep import LUMINANCE, VariedAxis, draw_sweep
 
 ROOT = Path(__file__).resolve().parent.parent

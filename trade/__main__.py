@@ -18,7 +18,7 @@ from ballpass.runtime import load
 from ballpass.runtime.app.commands.shared import Stages
 from ballpass.runtime.certify.trade import measure_trade
 from ballpass.runtime.certify.trade_report import Trade, percent, table, words
-from ballpass.runtime.plot.canvas import save
+from ballpass.runtime.plot.style import save
 from ballpass.runtime.plot.trade import draw_trade
 from trade.promise import ROOT, SCENES, markdown
 

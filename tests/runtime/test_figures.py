@@ -21,11 +21,11 @@ from matplotlib.text import Annotation, Text
 
 from ballpass.runtime import Model, Solution
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot import NAMES
-from ballpass.runtime.plot.canvas import INK, PALE, SAND, SIGNAL
+from ballpass.runtime.plot import CAPTIONS, NAMES
 from ballpass.runtime.plot.gallery import FIGURES, draw, draw_all
 from ballpass.runtime.plot.mechanism import draw_mechanism
 from ballpass.runtime.plot.record import gather
+from ballpass.runtime.plot.style import INK, PALE, SAND, SIGNAL, caption_of, save, write_figures
 
 Run = tuple[Model, Solution]
 
@@ -55,12 +55,14 @@ def linkage_alone(make_model: Callable[..., Model], scene_text: Callable[..., st
 
 
 def texts(figure: Figure) -> str:
-    return " ".join(item.get_text() for item in figure.findobj(Text)).replace("\n", " ").replace("\u00a0", " ")
+    """Words of a figure and its caption."""
+    written = [item.get_text() for item in figure.findobj(Text)]
+    return " ".join([*written, caption_of(figure)]).replace("\n", " ").replace("\u00a0", " ")
 
 
 def test_figures_are_the_same_bytes_whatever_the_user_s_settings(press: Run, tmp_path: Path) -> None:
     first = draw_all(*press, tmp_path / "a")
-    assert [path.name for path in first] == [f"{name}.png" for name in NAMES]
+    assert [path.name for path in first] == [*(f"{name}.png" for name in NAMES), CAPTIONS]
     with matplotlib.rc_context({"font.size": 30.0, "axes.grid": False, "lines.linewidth": 9.0, "savefig.dpi": 37.0}):
         before = dict(matplotlib.rcParams)
         second = draw_all(*press, tmp_path / "b")
@@ -68,13 +70,36 @@ def test_figures_are_the_same_bytes_whatever_the_user_s_settings(press: Run, tmp
     for one, other in zip(first, second, strict=True):
         data = one.read_bytes()
         assert data == other.read_bytes()
-        assert struct.unpack(">I", data[16:20]) == (1200,)  # width in the PNG header
-        assert b"Software" not in data
-        assert b"tIME" not in data
+        if one.suffix == ".png":
+            assert struct.unpack(">I", data[16:20]) == (1200,)  # width in the PNG header
+            assert b"Software" not in data
+            assert b"tIME" not in data
+
+
+@pytest.mark.parametrize(("kind", "head"), [("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_vector_figures_are_the_same_bytes_each_time(press: Run, tmp_path: Path, kind: str, head: bytes) -> None:
+    files = [save(draw("load_curve", *press), tmp_path / f"{name}.{kind}").read_bytes() for name in "ab"]
+    assert files[0] == files[1]
+    assert files[0].startswith(head)
+    assert b"Date>" not in files[0]
+    assert b"CreationDate" not in files[0]
+
+
+def test_captions_stand_beside_the_pictures(press: Run, tmp_path: Path) -> None:
+    figure = draw("orbit", *press)
+    assert "method" in caption_of(figure)
+    assert caption_of(figure) not in " ".join(item.get_text() for item in figure.findobj(Text))
+    written = write_figures([("orbit", figure)], tmp_path, ("svg", "png"), CAPTIONS)
+    assert [path.name for path in written] == ["orbit.svg", "orbit.png", CAPTIONS]
+    assert written[-1].read_text(encoding="utf-8").splitlines() == [
+        "![Orbit of the inner ring's centre](orbit.svg)",
+        "",
+        f"**Orbit of the inner ring's centre.** {caption_of(figure)}",
+    ]
 
 
 def test_a_scene_without_mechanism_gets_the_bearing_s_figures(shaft: Run, tmp_path: Path) -> None:
-    assert [path.stem for path in draw_all(*shaft, tmp_path)] == [*NAMES[1:]]
+    assert [path.stem for path in draw_all(*shaft, tmp_path)][:-1] == [*NAMES[1:]]
 
 
 @pytest.mark.long
@@ -88,7 +113,7 @@ def test_every_bearing_gets_its_figures(
     assert outputs is not None
     model = make_model("varying_compliance", (bearing, both), (outputs[0], 'outputs = ["*.inner.*", "*.ball.force"]'))
     run = model, model.simulate(cycles=2, transient=1, parameters={"bearings.b.clearance": 5e-6})
-    assert [path.stem for path in draw_all(*run, tmp_path)] == [f"{k}_{name}" for name in "ab" for k in NAMES[1:]]
+    assert [path.stem for path in draw_all(*run, tmp_path)][:-1] == [f"{k}_{name}" for name in "ab" for k in NAMES[1:]]
     second = gather(*run, model.manifest.bearings[1])
     np.testing.assert_array_equal(second.values("inner.x"), run[1].steady()["b.inner.x"])
     for kind in FIGURES[1:]:
@@ -98,7 +123,7 @@ def test_every_bearing_gets_its_figures(
 
 
 def test_a_scene_without_bearing_gets_reactions_and_mechanism(linkage_alone: Run, tmp_path: Path) -> None:
-    assert [path.stem for path in draw_all(*linkage_alone, tmp_path)] == ["load_curve", "peak_moment"]
+    assert [path.stem for path in draw_all(*linkage_alone, tmp_path)][:-1] == ["load_curve", "peak_moment"]
     figure = draw("load_curve", *linkage_alone)
     assert [axes.get_title(loc="left") for axes in figure.axes[:2]] == [
         "x at A: crank on frame",

@@ -15,7 +15,7 @@ from ballpass.runtime import Model, RequestError
 from ballpass.runtime.certify.trade import measure_trade, perturbed
 from ballpass.runtime.certify.trade_report import Measured, Trade, percent, table, to_plain, words
 from ballpass.runtime.certify.whole_run import Way
-from ballpass.runtime.plot.canvas import save
+from ballpass.runtime.plot.style import save
 from ballpass.runtime.plot.trade import draw_trade
 
 PEAK, SWING = "peak_ball_force", "range_inner_x"

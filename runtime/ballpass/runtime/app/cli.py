@@ -19,6 +19,7 @@ from ballpass.runtime.app.commands.asked import (
     faults_of_numbers,
     read_asked,
     read_duration,
+    read_formats,
     read_quantity,
     read_turns,
 )
@@ -57,6 +58,8 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.version import __version__
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.locating import Kinks
     from ballpass.runtime.run.solution import Solution
@@ -153,6 +156,7 @@ def run(
     out: options.ResultsFolder = None,
     json_: options.Json = False,
     figures: options.Figures = True,
+    format_: options.FigureFormats = None,
 ) -> None:
     """Simulate a scene; write solution, summary and figures.
 
@@ -165,6 +169,7 @@ def run(
         from ballpass.runtime.run.tables import show_tables
 
         stages("read")
+        formats = read_formats(format_)
         settles = read_turns(turns, duration if cycles is None else cycles)
         seconds = read_duration(duration, cycles)
         asked = read_asked(scene, set_, seconds, transient)
@@ -227,7 +232,7 @@ def run(
         turned = add_turns(summary, longer, instead=settles) if longer is not None else ""
         if solution.accuracy is not None:
             summary["accuracy"] = solution.accuracy.plain()
-        summary, files = _write_results(model, solution, summary, folder, stages, figures=figures)
+        summary, files = _write_results(model, solution, summary, folder, stages, formats=formats if figures else ())
     if json_:
         show_json(summary)
         return
@@ -371,25 +376,31 @@ def _check_request(
 
 
 def _write_results(
-    model: Model, solution: Solution, summary: dict[str, Any], folder: Path, stages: Stages, *, figures: bool
+    model: Model, solution: Solution, summary: dict[str, Any], folder: Path, stages: Stages, *, formats: Sequence[str]
 ) -> tuple[dict[str, Any], list[str]]:
     """Write solution, summary and figures in the place of those of an earlier run.
+
+    Parameters
+    ----------
+    formats : of the figures; none are drawn without any
 
     Returns
     -------
     The summary, and the names of the files.
     """
     from ballpass.runtime.app.results import SOLUTION, write_results
+    from ballpass.runtime.plot import CAPTIONS, FORMATS
     from ballpass.runtime.plot import NAMES as FIGURES
 
     def write(made: Path) -> dict[str, Any]:
         solution.save(made / SOLUTION)
-        if figures:
+        if formats:
             from ballpass.runtime.plot.gallery import draw_all
 
             stages("draw")
-            draw_all(model, solution, made)
+            draw_all(model, solution, made, formats)
         return summary
 
     endings = ["", *(f"_{bearing.name}" for bearing in model.manifest.bearings if bearing.name)]
-    return write_results(folder, write, figures=[f"{name}{ending}.png" for name in FIGURES for ending in endings])
+    names = [f"{name}{ending}.{kind}" for name in FIGURES for ending in endings for kind in FORMATS]
+    return write_results(folder, write, figures=[*names, CAPTIONS])

@@ -5,3 +5,7 @@ NAMES = ("load_curve", "orbit", "spectra", "phase_portrait", "ball_loads", "peak
 
 #: Kinds of files of a moving picture.
 MOVING = ("html", "mp4", "gif")
+
+#: Kinds of files of a figure, and name of the page with the captions of a run's figures.
+FORMATS = ("png", "svg", "pdf")
+CAPTIONS = "figures.md"

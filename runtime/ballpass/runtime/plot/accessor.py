@@ -272,7 +272,7 @@ def _axes(given: Axes | None) -> Iterator[Axes]:
         yield given
         return
     pyplot = need("matplotlib.pyplot")
-    from ballpass.runtime.plot.canvas import settings
+    from ballpass.runtime.plot.style import settings
 
     with settings():
         yield pyplot.subplots(layout="constrained")[1]

@@ -15,9 +15,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.patches import Annulus, Circle
 
-from ballpass.runtime.plot.canvas import INK, SIGNAL, arrow, write
 from ballpass.runtime.plot.record import Array, Record
 from ballpass.runtime.plot.shapes import exaggeration
+from ballpass.runtime.plot.style import INK, SIGNAL, arrow, write
 
 #: White for unloaded, dark for the highest load: the order survives greyscale.
 LOAD_COLOURS = LinearSegmentedColormap.from_list("load", ("#ffffff", "#f4c95d", "#d1495b", "#4a0e23"))

@@ -1,11 +1,11 @@
 """Which figures exist, what each needs, and writing them.
 
-In: a model and its `Solution`.  Out: PNG files, the same bytes for the same run.
+In: a model and its `Solution`.  Out: files, the same bytes for the same run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot import loads, moment, motion
-from ballpass.runtime.plot.canvas import save
+from ballpass.runtime.plot import CAPTIONS, loads, moment, motion
 from ballpass.runtime.plot.record import Record, gather
+from ballpass.runtime.plot.style import write_figures
 
 if TYPE_CHECKING:
     from ballpass.runtime.point.point_model import PointModel
@@ -89,21 +89,26 @@ def draw(name: str, model: PointModel, solution: Solution) -> Figure:
     return kind.draw(record)
 
 
-def draw_all(model: PointModel, solution: Solution, folder: Path) -> list[Path]:
-    """Write every figure for which the outputs exist, as PNG, into `folder`.
+def draw_all(model: PointModel, solution: Solution, folder: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
+    """Write every figure for which the outputs exist into `folder`, and their captions into ``figures.md``.
 
     Left out are figures whose outputs were not asked for, and, for a steady part shorter than a turn, load curve and
     spectra.  Of several bearings each has its figures, with its name in theirs.
 
+    Parameters
+    ----------
+    formats : kinds of files, of png, svg and pdf
+
     Returns
     -------
-    files written, in the order of `FIGURES`
+    files written, in the order of `FIGURES`; the captions last
     """
+
+    def figures() -> Iterator[tuple[str, Figure]]:
+        for bearing in model.manifest.bearings or (None,):
+            record = gather(model, solution, bearing)
+            ending = f"_{bearing.name}" if bearing is not None and bearing.name else ""
+            yield from ((f"{kind.name}{ending}", kind.draw(record)) for kind in FIGURES if kind.possible(record))
+
     folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for bearing in model.manifest.bearings or (None,):
-        record = gather(model, solution, bearing)
-        ending = f"_{bearing.name}" if bearing is not None and bearing.name else ""
-        kinds = (kind for kind in FIGURES if kind.possible(record))
-        written += [save(kind.draw(record), folder / f"{kind.name}{ending}.png") for kind in kinds]
-    return written
+    return write_figures(figures(), folder, formats, CAPTIONS)

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ballpass.runtime.ask.life_records import BearingStrength
-from ballpass.runtime.plot.canvas import FIRST, INK, PALE, SAND, SECOND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.plot.style import FIRST, INK, PALE, SAND, SECOND, SIGNAL, caption, new_figure, styled
 from ballpass.runtime.plot.sweep import LUMINANCE
 from ballpass.runtime.ratings.life import MILLION
 

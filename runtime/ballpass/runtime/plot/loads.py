@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ballpass.runtime.plot.canvas import (
+from ballpass.runtime.plot.record import Array, Record
+from ballpass.runtime.plot.style import (
     FIRST,
     GREY,
     INK,
@@ -17,7 +18,6 @@ from ballpass.runtime.plot.canvas import (
     shade_windows,
     styled,
 )
-from ballpass.runtime.plot.record import Array, Record
 
 
 def reaction_joints(record: Record) -> tuple[str, ...]:

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
-from ballpass.runtime.plot.canvas import GREY, INK, SAND, SIGNAL, arrow, write
 from ballpass.runtime.plot.record import FRAME, Array, Record
 from ballpass.runtime.plot.shapes import Points, guide_direction, links, used_points
+from ballpass.runtime.plot.style import GREY, INK, SAND, SIGNAL, arrow, write
 
 #: Positions in which the paths of moving joints are traced.
 _TRACE = 72

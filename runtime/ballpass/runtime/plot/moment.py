@@ -7,9 +7,9 @@ from matplotlib.figure import Figure
 
 from ballpass.runtime.ask.peaks import refine_peak
 from ballpass.runtime.plot.bearing import draw_bearing
-from ballpass.runtime.plot.canvas import frame, new_figure, styled
 from ballpass.runtime.plot.mechanism import draw_mechanism
 from ballpass.runtime.plot.record import Record
+from ballpass.runtime.plot.style import frame, new_figure, styled
 
 
 @styled

@@ -12,8 +12,8 @@ from matplotlib.ticker import StrMethodFormatter
 
 from ballpass.runtime.ask.observables import hermite, orbits, stroboscopic_points
 from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
-from ballpass.runtime.plot.canvas import GREY, INK, SAND, SIGNAL, frame, legend_above, new_figure, styled
 from ballpass.runtime.plot.record import Array, Record
+from ballpass.runtime.plot.style import GREY, INK, SAND, SIGNAL, frame, legend_above, new_figure, styled
 
 #: Points drawn between two samples where velocities are known: a resonance has but ten samples a period.
 _FINER = 8

@@ -19,9 +19,9 @@ from PIL import Image
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.animation import Frames
 from ballpass.runtime.plot.bearing import LOAD_COLOURS, RING, draw_bearing
-from ballpass.runtime.plot.canvas import INK, SAND, SIGNAL, new_figure, settings, shade_windows
 from ballpass.runtime.plot.mechanism import BAR, View, draw_mechanism, view
 from ballpass.runtime.plot.record import Record
+from ballpass.runtime.plot.style import INK, SAND, SIGNAL, new_figure, settings, shade_windows
 
 #: Pictures of a movie, and of these a second.
 PICTURES, RATE = 72, 12

@@ -19,7 +19,7 @@ from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator, NullFormatter, StrMethodFormatter
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot.canvas import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
 
 #: From dark to light, with equal steps of luminance: places are those of the palette's own luminances.
 LUMINANCE = LinearSegmentedColormap.from_list("luminance", [(0.0, INK), (0.43, SIGNAL), (0.82, SAND), (1.0, PALE)])

@@ -7,6 +7,7 @@ per cent the quantity changes when the parameter grows by one.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -16,7 +17,7 @@ from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.certify.grazing import merge_grazing
 from ballpass.runtime.certify.sensitivity_report import Sensitivity, SensitivityReport
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot.canvas import GREY, INK, PALE, SAND, caption, new_figure, save, styled
+from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, caption, new_figure, styled, write_figures
 
 #: Bars of a chart.
 BARS = 15
@@ -82,14 +83,16 @@ def tornado(report: SensitivityReport, quantity: str) -> Figure:
     return figure
 
 
-def draw_tornados(report: SensitivityReport, folder: Path) -> list[Path]:
-    """Write a chart for each quantity that has bars; their paths."""
-    written = []
+def draw_tornados(report: SensitivityReport, folder: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
+    """Write a chart for each quantity that has bars, and captions; their paths."""
+    return write_figures(_charts(report), folder, formats, "sensitivity.md")
+
+
+def _charts(report: SensitivityReport) -> Iterator[tuple[str, Figure]]:
     for item in report.quantities:
         if _bars(report, item.name):
             plain = "".join(letter if letter.isalnum() else "_" for letter in item.name).strip("_")
-            written.append(save(tornado(report, item.name), folder / f"tornado_{plain}.png"))
-    return written
+            yield f"tornado_{plain}", tornado(report, item.name)
 
 
 def _bars(report: SensitivityReport, quantity: str) -> list[Sensitivity]:

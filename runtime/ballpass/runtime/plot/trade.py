@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from ballpass.runtime.certify.trade_report import Measured, Trade
-from ballpass.runtime.plot.canvas import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
 from ballpass.runtime.run.locating import LOCATED
 
 #: Marker and colour of each method; shapes tell them apart in grey as well, and open ones locate kinks.

@@ -12,7 +12,7 @@ from matplotlib.ticker import StrMethodFormatter
 
 from ballpass.runtime.ask.characteristic import CharacteristicLine
 from ballpass.runtime.ask.vibration import Spectrogram
-from ballpass.runtime.plot.canvas import GREY, INK, SAND, SIGNAL, frame, new_figure, styled
+from ballpass.runtime.plot.style import GREY, INK, SAND, SIGNAL, frame, new_figure, styled
 
 #: Multiples of a characteristic frequency that are marked.
 MARKED = 5

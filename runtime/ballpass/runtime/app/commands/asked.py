@@ -228,6 +228,22 @@ def read_turns(text: str | None, length: float | str | None) -> bool:
     return True
 
 
+def read_formats(given: list[str] | None) -> tuple[str, ...]:
+    """Kinds of the figures, of ``--format``.
+
+    Raises
+    ------
+    RequestError
+        There is no such kind.
+    """
+    from ballpass.runtime.plot import FORMATS
+
+    for kind in given or ():
+        if kind not in FORMATS:
+            raise RequestError(f"--format: {kind!r} is no kind of figure. Allowed: {', '.join(FORMATS)}.")
+    return tuple(dict.fromkeys(given)) if given else FORMATS[:1]
+
+
 def read_duration(text: str | None, cycles: float | None) -> float | None:
     """The time of ``--duration "0.5 s"`` [s].
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import read_asked
+from ballpass.runtime.app.commands.asked import read_asked, read_formats
 from ballpass.runtime.app.commands.shared import (
     can_draw,
     check_folder,
@@ -22,6 +22,8 @@ from ballpass.runtime.app.commands.shared import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ballpass.runtime.ask.life_records import BearingStrength, LifeReport
     from ballpass.runtime.contract import BearingInfo
     from ballpass.runtime.model import Model
@@ -41,6 +43,7 @@ def life(
         Path | None, typer.Option(metavar="DIR", help="Folder for report and figures; none are written if not given.")
     ] = None,
     json_: options.Json = False,
+    format_: options.FigureFormats = None,
 ) -> None:
     """Judge the bearings of a scene: static safety, peak pressure, rating life by three readings, wear.
 
@@ -49,6 +52,7 @@ def life(
     """
     with command(scene) as stages:
         stages("read")
+        formats = read_formats(format_)
         overrides = read_asked(scene, set_, transient=transient).overrides
         if out is not None:
             check_folder(out)
@@ -61,7 +65,7 @@ def life(
         if out is not None:
             stages("draw")
             out.mkdir(parents=True, exist_ok=True)
-            written = [out / "life.json", *(draw_life(model, report, overrides, out) if can_draw() else ())]
+            written = [out / "life.json", *(draw_life(model, report, overrides, out, formats) if can_draw() else ())]
             written[0].write_text(json_text(report.to_json()), encoding="utf-8")
         for words in (*report.unsettled, *_swinging(report)):
             warn(words)
@@ -79,37 +83,41 @@ def _swinging(report: LifeReport) -> list[str]:
     return list(dict.fromkeys(words))
 
 
-def draw_life(model: Model, report: LifeReport, overrides: Mapping[str, float], folder: Path) -> list[Path]:
+def draw_life(
+    model: Model, report: LifeReport, overrides: Mapping[str, float], folder: Path, formats: Sequence[str] = ("png",)
+) -> list[Path]:
     """Write figures of every bearing in the first state of the duty cycle in which something turns; their paths."""
+    from ballpass.runtime.plot.style import write_figures
+
+    return write_figures(_figures(model, report, overrides), folder, formats, "life.md")
+
+
+def _figures(model: Model, report: LifeReport, overrides: Mapping[str, float]) -> Iterator[tuple[str, Figure]]:
     from ballpass.runtime.plot import life as figures
-    from ballpass.runtime.plot.canvas import save
 
     state = next((state for state in report.states if state.bearings), None)
     if state is None:
-        return []
+        return
     title = f"{report.title}, {state.name}" if state.name else report.title
     duty = {info.name: dict(info.parameters) for info in model.manifest.duty}
     numbers = {**overrides, **duty.get(state.name, {})}
-    written = []
     for info, bearing in zip(model.manifest.bearings, state.bearings, strict=True):
         ending = f"_{bearing.name}" if bearing.name else ""
         if bearing.inner.damage:
-            written.append(save(figures.damage(title, bearing), folder / f"damage{ending}.png"))
-            written.append(_clearance(model, info, bearing, numbers, title, folder / f"life_of_clearance{ending}.png"))
+            yield f"damage{ending}", figures.damage(title, bearing)
+            yield f"life_of_clearance{ending}", _clearance(model, info, bearing, numbers, title)
         if state.turns is not None:
-            written.append(_pressure(model, info, bearing, numbers, title, folder / f"pressure{ending}.png"))
-    return written
+            yield f"pressure{ending}", _pressure(model, info, bearing, numbers, title)
 
 
 def _pressure(
-    model: Model, info: BearingInfo, bearing: BearingStrength, overrides: Mapping[str, float], title: str, path: Path
-) -> Path:
+    model: Model, info: BearingInfo, bearing: BearingStrength, overrides: Mapping[str, float], title: str
+) -> Figure:
     """The ring with the higher pressure, over a turn behind the transient."""
     import numpy as np
 
     from ballpass.runtime.ask.wear import load_samples
     from ballpass.runtime.plot import life as figures
-    from ballpass.runtime.plot.canvas import save
     from ballpass.runtime.ratings.of_bearing import contacts_of
     from ballpass.runtime.run.request import Request
 
@@ -119,17 +127,16 @@ def _pressure(
     ring, contact = ("inner", inner) if bearing.inner.peak_pressure > bearing.outer.peak_pressure else ("outer", outer)
     crank = np.unwrap(samples.crank)
     found = contact.peak_pressure(samples.force)
-    return save(figures.pressure(title, bearing, crank, found, ring), path)
+    return figures.pressure(title, bearing, crank, found, ring)
 
 
 def _clearance(
-    model: Model, info: BearingInfo, bearing: BearingStrength, overrides: Mapping[str, float], title: str, path: Path
-) -> Path:
+    model: Model, info: BearingInfo, bearing: BearingStrength, overrides: Mapping[str, float], title: str
+) -> Figure:
     """Life over the bearing's group of clearance and half its width on both sides; else up to twice the clearance."""
     import numpy as np
 
     from ballpass.runtime.plot import life as figures
-    from ballpass.runtime.plot.canvas import save
     from ballpass.runtime.ratings.readings import READINGS
 
     name = f"{info.path}.clearance"
@@ -146,4 +153,4 @@ def _clearance(
     asked = {reading: f"{info.prefix}life_{reading}" for reading in READINGS}
     found = model.simulate_many(table, list(asked.values()), cycles=transient + TURNS)
     lives = {reading: found[observable] for reading, observable in asked.items()}
-    return save(figures.life_of_clearance(title, bearing, clearances, lives, present, group, TURNS), path)
+    return figures.life_of_clearance(title, bearing, clearances, lives, present, group, TURNS)

@@ -53,6 +53,11 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON
 
 Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")]
 
+FigureFormats = Annotated[
+    list[str] | None,
+    typer.Option("--format", metavar="KIND", help="Kind of the figures: png (default), svg or pdf. May be repeated."),
+]
+
 Scheduler = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="Let the workers of this scheduler of Dask do it: tcp://192.168.0.10:8786."),

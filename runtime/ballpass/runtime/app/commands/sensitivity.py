@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import read_asked
+from ballpass.runtime.app.commands.asked import read_asked, read_formats
 from ballpass.runtime.app.commands.shared import (
     can_draw,
     check_folder,
@@ -61,6 +61,7 @@ def sensitivity(
         Path | None, typer.Option(metavar="DIR", help="Folder for report and charts; none are written if not given.")
     ] = None,
     json_: options.Json = False,
+    format_: options.FigureFormats = None,
 ) -> None:
     """Differentiate quantities of interest by parameters, and check every derivative by a second route.
 
@@ -68,6 +69,7 @@ def sensitivity(
     """
     with command(scene) as stages:
         stages("read")
+        formats = read_formats(format_)
         overrides = read_asked(scene, set_).overrides
         if out is not None:
             check_folder(out)
@@ -102,7 +104,7 @@ def sensitivity(
             if can_draw():
                 from ballpass.runtime.plot.tornado import draw_tornados
 
-                written += draw_tornados(report, out)
+                written += draw_tornados(report, out, formats)
     if json_:
         show_json(report.to_json())
     else:

@@ -13,7 +13,7 @@ import numpy as np
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import read_asked, read_duration, read_quantity
+from ballpass.runtime.app.commands.asked import read_asked, read_duration, read_formats, read_quantity
 from ballpass.runtime.app.commands.shared import (
     Stages,
     can_draw,
@@ -28,6 +28,8 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.run.tables import show_tables, simple_table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ballpass.runtime.ask.characteristic import CharacteristicLine
     from ballpass.runtime.run.solution import Solution
 
@@ -79,13 +81,14 @@ def spectrum(
     out: options.ResultsFolder = None,
     json_: options.Json = False,
     figures: options.Figures = True,
+    format_: options.FigureFormats = None,
 ) -> None:
     """The highest lines of a signal of the steady motion, and what each is: BPFO, BPFI, 2 BSF, FTF, the shaft."""
     with command(scene) as stages:
         band = _read_band(envelope)
         _check(scaling, top, orders=orders, spectrogram=spectrogram)
         folder = out if out is not None else Path("results") / name_of(scene)
-        figures = figures and can_draw()
+        figures, formats = figures and can_draw(), read_formats(format_)
         if figures:
             check_folder(folder)
         if scene.suffix == ".nc":
@@ -127,10 +130,14 @@ def spectrum(
             }
             for k in peaks
         ]
-        file = None
+        files: list[Path] = []
         if figures:
             stages("draw")
-            file = _draw(steady, found, marks, of, signal, unit, band, scaling, window, folder, as_map=spectrogram)
+            from ballpass.runtime.plot.style import write_figures
+
+            drawn = _draw(steady, found, marks, of, signal, unit, band, scaling, window, as_map=spectrogram)
+            folder.mkdir(parents=True, exist_ok=True)
+            files = write_figures([drawn], folder, formats, f"{drawn[0]}.md")
     if json_:
         show_json(
             {
@@ -143,13 +150,13 @@ def spectrum(
                 "statistics": asdict(statistics),
                 "characteristic": [asdict(mark) for mark in marks],
                 "lines": rows,
-                "figure": str(file) if file else None,
+                "figure": str(files[0]) if files else None,
             }
         )
         return
     _show(rows, found, marks, statistics, of, unit, orders=orders)
-    if file is not None:
-        show(f"figure: {file}")
+    if files:
+        show(f"figure: {', '.join(map(str, files[:-1]))}")
 
 
 def _check(scaling: str, top: int, *, orders: bool, spectrogram: bool) -> None:
@@ -278,16 +285,13 @@ def _draw(
     band: tuple[float, float] | None,
     scaling: str,
     window: str,
-    folder: Path,
     *,
     as_map: bool,
-) -> Path:
-    from ballpass.runtime.plot.canvas import save
+) -> tuple[str, Figure]:
     from ballpass.runtime.plot.vibration import draw_lines, draw_spectrogram
 
     what = f"Envelope of {of}, {band[0]:g} to {band[1]:g} Hz" if band else of
     title = f"{solution.manifest.title}: {what}"
-    folder.mkdir(parents=True, exist_ok=True)
     if as_map:
         from ballpass.runtime.ask.characteristic import characteristic_lines
         from ballpass.runtime.ask.vibration import envelope, spectrogram
@@ -301,7 +305,7 @@ def _draw(
         if orders:
             speed = np.abs(np.interp(shown.time, solution.t, np.gradient(_angle(solution), solution.t))) / (2.0 * np.pi)
         figure = draw_spectrogram(shown, orders, speed, title=title, unit=unit)
-        return save(figure, folder / "spectrogram.png")
+        return "spectrogram", figure
     heads = {"order": "order of the shaft [1]", "Hz": "frequency [Hz]"}
     figure = draw_lines(
         found.position,
@@ -312,7 +316,7 @@ def _draw(
         up=f"{scaling} [{found.unit}]",
         text=f"{window} window, lines {found.resolution:.3g}{' Hz' if found.over == 'Hz' else ''} apart.",
     )
-    return save(figure, folder / "spectrum.png")
+    return "spectrum", figure
 
 
 def _show(

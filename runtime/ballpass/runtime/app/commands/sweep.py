@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import faults_of_numbers, read_duration, read_with_settings
+from ballpass.runtime.app.commands.asked import faults_of_numbers, read_duration, read_formats, read_with_settings
 from ballpass.runtime.app.commands.shared import (
     can_draw,
     checked_kinks,
@@ -90,6 +90,7 @@ def sweep(
     out: options.ResultsFolder = None,
     json_: options.Json = False,
     figures: options.Figures = True,
+    format_: options.FigureFormats = None,
 ) -> None:
     """Run a scene for all values of one or more of its numbers; write table, grid and figures.
 
@@ -121,7 +122,7 @@ def sweep(
             )
         at_kinks = checked_kinks(kinks, method or read.run.method)
         folder = results_folder(out, scene)
-        figures = figures and can_draw()
+        figures, formats = figures and can_draw(), read_formats(format_)
         varied = grid(ranges)
         count = math.prod(len(one.values) for one in ranges)
         fixed = {path: np.full(count, value) for path, value in overrides.items()}
@@ -148,7 +149,7 @@ def sweep(
             raise RequestError(f"--vary: none of the {count} members can be simulated. The first: {refused[0].message}")
         stages("write")
         swept = Sweep(result=result, ranges=ranges, fixed=overrides)
-        files = swept.write(folder, figures=figures)
+        files = swept.write(folder, formats if figures else ())
     if figures and len(ranges) > 2:
         note(f"no figure: a figure shows one or two varied parameters, and {len(ranges)} vary. Numbers are in {TABLE}.")
     if growth is None and count > TWINS:
@@ -158,8 +159,8 @@ def sweep(
     else:
         table = swept.all_members() if count <= ROWS else swept.extremes()
         show_tables(table)
-        drawn = sum(name.endswith(".png") for name in files)
-        told = [name for name in files if not name.endswith(".png")]
+        pictures = [name for name in files if name.startswith("sweep_")]
+        drawn, told = len(pictures), [name for name in files if name not in pictures]
         told += [f"{drawn} figure{'s' if drawn > 1 else ''}"] if drawn else []
         show(f"{count} members, {len(result.failures)} without results. In {folder}: {', '.join(told)}")
     for failure in result.failures[:NAMED]:

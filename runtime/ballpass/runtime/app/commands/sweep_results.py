@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,14 +19,17 @@ from ballpass.runtime.app.commands.ranges import Range
 from ballpass.runtime.app.commands.shared import json_text
 from ballpass.runtime.app.summary import TABLE_UNITS
 from ballpass.runtime.contract.folders import replace_files
+from ballpass.runtime.plot import FORMATS
 from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
 from ballpass.runtime.run.tables import simple_table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ballpass.runtime.many.ensemble import EnsembleResult
 
 #: Files of a sweep, beside a figure for each quantity.
-TABLE, GRID, REPORT = "sweep.csv", "sweep.nc", "sweep.json"
+TABLE, GRID, REPORT, CAPTIONS = "sweep.csv", "sweep.nc", "sweep.json", "sweep.md"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,20 +138,23 @@ class Sweep:
             "statistics": asdict(result.statistics),
         }
 
-    def write(self, folder: Path, *, figures: bool) -> list[str]:
-        """Write all files, and take figures of an earlier sweep away.  Returns their names."""
+    def write(self, folder: Path, formats: Sequence[str]) -> list[str]:
+        """Write all files, figures of these formats, and take those of an earlier sweep away.  Returns their names."""
 
         def write_all(made: Path) -> list[str]:
             self._write_table(made / TABLE)
             (made / GRID).write_bytes(self.grid())
             (made / REPORT).write_text(json_text(self.report()), encoding="utf-8")
-            if figures and len(self.ranges) <= 2:
-                self._draw(made)
+            if formats and len(self.ranges) <= 2:
+                from ballpass.runtime.plot.style import write_figures
+
+                write_figures(self._figures(), made, formats, CAPTIONS)
             return sorted(path.name for path in made.iterdir())
 
-        return replace_files(
-            folder, write_all, last=REPORT, owned=lambda: [path.name for path in folder.glob("sweep_*.png")]
-        )
+        def owned() -> list[str]:
+            return [path.name for kind in FORMATS for path in folder.glob(f"sweep_*.{kind}")] + [CAPTIONS]
+
+        return replace_files(folder, write_all, last=REPORT, owned=owned)
 
     def _write_table(self, path: Path) -> None:
         """A line for each member, SI; no number where a member has no result."""
@@ -165,8 +171,7 @@ class Sweep:
                 cells = [repr(value) if math.isfinite(value) else "" for value in values]
                 lines.writerow([member, *map(repr, self.point(member)), *cells, *ends.get(member, ("DONE", ""))])
 
-    def _draw(self, folder: Path) -> None:
-        from ballpass.runtime.plot.canvas import save
+    def _figures(self) -> Iterator[tuple[str, Figure]]:
         from ballpass.runtime.plot.sweep import VariedAxis, draw_sweep
 
         axes = [
@@ -178,7 +183,7 @@ class Sweep:
             values, unit = self.shown(name)
             if np.any(np.isfinite(values)):
                 figure = draw_sweep(self.result.manifest.title, axes, name, unit, values, text)
-                save(figure, folder / f"sweep_{re.sub(r'[^a-z0-9]+', '_', name)}.png")
+                yield f"sweep_{re.sub(r'[^a-z0-9]+', '_', name)}", figure
 
     def _cell(self, quantity: str, value: float, member: int) -> str:
         """A number with the digits that it has."""

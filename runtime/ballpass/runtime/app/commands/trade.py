@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import read_asked
+from ballpass.runtime.app.commands.asked import read_asked, read_formats
 from ballpass.runtime.app.commands.shared import Stages, can_draw, command, load_model, results_folder, show, show_json
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.run.tables import show_tables, simple_table
@@ -48,6 +49,7 @@ def trade(
     out: options.ResultsFolder = None,
     json_: options.Json = False,
     figures: options.Figures = True,
+    format_: options.FigureFormats = None,
 ) -> None:
     """Measure error against time on a scene: of methods and tolerances, or of a simpler model (--against)."""
     from ballpass.runtime.certify.simplification import measure_simplification
@@ -58,7 +60,7 @@ def trade(
         stages("read")
         overrides = read_asked(scene, set_).overrides
         folder = results_folder(out, scene)
-        figures = figures and can_draw()
+        figures, formats = figures and can_draw(), read_formats(format_)
         model = load_model(scene, stages, "stepper", overrides=overrides)
         count = MEMBERS if members is None else members
         if against is not None:
@@ -71,7 +73,7 @@ def trade(
             return
         stages("measuring")
         measured = measure_trade(model, of, parameters=overrides, members=count, progress=stages.fraction)
-        files = _draw(measured, folder, stages) if figures else []
+        files = _draw(measured, folder, formats, stages) if figures else []
     if json_:
         show_json(to_plain(measured))
         return
@@ -137,15 +139,14 @@ def read_error(text: str | None, of: list[str] | None, method: str | None, rtol:
     return value
 
 
-def _draw(measured: Trade, folder: Path, stages: Stages) -> list[str]:
-    from ballpass.runtime.plot.canvas import save
+def _draw(measured: Trade, folder: Path, formats: Sequence[str], stages: Stages) -> list[str]:
+    from ballpass.runtime.plot.style import write_figures
     from ballpass.runtime.plot.trade import draw_trade
 
     stages("draw")
     folder.mkdir(parents=True, exist_ok=True)
-    names = []
-    for quantity in measured.quantities:
-        name = f"trade_{re.sub(r'[^a-z0-9]+', '_', quantity)}.png"
-        save(draw_trade(measured, quantity), folder / name)
-        names.append(name)
-    return names
+    named = (
+        (f"trade_{re.sub(r'[^a-z0-9]+', '_', quantity)}", draw_trade(measured, quantity))
+        for quantity in measured.quantities
+    )
+    return [path.name for path in write_figures(named, folder, formats, "trade.md")]

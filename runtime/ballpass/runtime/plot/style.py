@@ -1,4 +1,4 @@
-"""Paper and pencils: figure size, palette, captions, files.
+"""The style of every figure: size, palette, letters, captions, files.
 
 The palette is ordered by luminance and every line has its own style, so that the figures survive a greyscale print.
 Nothing here touches pyplot or leaves matplotlib's settings changed.
@@ -6,8 +6,7 @@ Nothing here touches pyplot or leaves matplotlib's settings changed.
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
@@ -52,9 +51,16 @@ _SETTINGS: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 9,
     "hatch.linewidth": 0.7,
+    "axes.labelpad": 6.0,
+    "svg.hashsalt": "ballpass",
 }
 
-_CAPTION: dict[str, Any] = {"fontsize": 8, "color": "#495057"}
+#: Kinds of files, and what each is told so that its bytes depend on the drawing alone: no date, no version.
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
 
 P = ParamSpec("P")
 
@@ -90,9 +96,9 @@ def new_figure(height: float, *, layout: Literal["constrained"] | None = "constr
 
 
 def frame(
-    figure: Figure, title: str, text: str, *, left: float = 0.75, right: float = 0.2, below: float = 0.6, **gaps: float
+    figure: Figure, title: str, text: str, *, left: float = 0.82, right: float = 0.2, below: float = 0.6, **gaps: float
 ) -> None:
-    """Title above, caption below and the axes between them, by margins [inch].
+    """Title above and the axes below it, by margins [inch]; the caption as `caption_of` gives it.
 
     Parameters
     ----------
@@ -100,23 +106,26 @@ def frame(
     gaps : ``wspace`` and ``hspace`` between axes, in parts of their size
     """
     width, height = figure.get_size_inches()
-    lines = textwrap.wrap(text, 124, break_on_hyphens=False)
     figure.suptitle(title, x=0.1 / width, y=1.0 - 0.1 / height, ha="left", va="top", fontsize=12, fontweight="bold")
-    figure.supxlabel("\n".join(lines), x=0.1 / width, y=0.08 / height, ha="left", va="bottom", **_CAPTION)
+    figure.set_label(text)
     figure.subplots_adjust(
         left=left / width,
         right=1.0 - right / width,
-        bottom=(below + 0.14 * len(lines)) / height,
+        bottom=below / height,
         top=1.0 - (0.4 + 0.21 * len(title.splitlines())) / height,
         **gaps,
     )
 
 
 def caption(figure: Figure, title: str, text: str) -> None:
-    """Title above, caption below, both inside the layout."""
+    """Title above, inside the layout; the caption as `caption_of` gives it."""
     figure.suptitle(title, x=0.012, ha="left", fontsize=12, fontweight="bold")
-    wrapped = "\n".join(textwrap.wrap(text, 124, break_on_hyphens=False))
-    figure.supxlabel(wrapped, x=0.012, ha="left", **_CAPTION)
+    figure.set_label(text)
+
+
+def caption_of(figure: Figure) -> str:
+    """What stands below the figure where it is printed; it is no part of the picture."""
+    return str(figure.get_label())
 
 
 def shade_windows(axes: Axes, windows: Iterable[tuple[float, float]], turns: Iterable[int]) -> None:
@@ -143,7 +152,35 @@ def write(axes: Axes, at: NDArray[np.float64], words: str, **look: Any) -> None:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a PNG whose bytes depend on the drawing alone: no date, no version of the software."""
+    """Write a file whose kind is that of its ending, PNG, SVG or PDF, and whose bytes depend on the drawing alone."""
+    kind = path.suffix.removeprefix(".")
     with settings():
-        figure.savefig(path, format="png", dpi=DPI, metadata={"Software": None})
+        figure.savefig(path, format=kind, dpi=DPI, metadata=_METADATA[kind])
     return path
+
+
+def write_figures(
+    figures: Iterable[tuple[str, Figure]], folder: Path, formats: Sequence[str], captions: str
+) -> list[Path]:
+    """Write figures, and their captions as a page of Markdown.
+
+    Parameters
+    ----------
+    figures : names of their files, without ending, and figures
+    formats : png, svg, pdf
+    captions : name of the page
+
+    Returns
+    -------
+    files written, the page last; none without figures
+    """
+    written, lines = [], []
+    for name, figure in figures:
+        written += [save(figure, folder / f"{name}.{kind}") for kind in formats]
+        title = " ".join(figure.get_suptitle().split())
+        lines += [f"![{title}]({name}.{formats[0]})", "", f"**{title}.** {caption_of(figure)}".rstrip(), ""]
+    if written:
+        page = folder / captions
+        page.write_text("\n".join(lines), encoding="utf-8")
+        written.append(page)
+    return written
