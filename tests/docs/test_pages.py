@@ -32,6 +32,7 @@ NOT_RUN = {
     r"make (demo|test|extremes|bench|docs|lint|trade)\b": "targets of the Makefile, which .ci/run makes",
     r"\. \.venv/bin/activate": "the environment is that of the tests",
     r"\S*pip install": "installs",
+    r"(python -m pip|pipx) (install|download)|python -m build|rattler-build": "installs; tests/test_package.py does it",
     r"CC=clang ": "another compiler",
     r"dask (scheduler|worker)": "they do not end",
     r".* --scheduler tcp:": "needs them",

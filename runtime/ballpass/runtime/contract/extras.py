@@ -41,8 +41,10 @@ def need(module: str) -> Any:
 def missing(package: str) -> str:
     """What to say where a package of `EXTRAS` is not installed."""
     name, extra = EXTRAS[package]
-    distribution = "ballpass" if can_derive() else "ballpass-runtime"
-    return f"This needs {name}, which is not installed: pip install '{distribution}[{extra}]'."
+    target = f"'ballpass-runtime[{extra}]'"
+    if can_derive():  # ballpass brings figures and analysis
+        target = package if extra in ("figures", "analysis") else f"'ballpass[{extra}]'"
+    return f"This needs {name}, which is not installed: pip install {target}."
 
 
 def is_installed(package: str) -> bool:

@@ -25,6 +25,7 @@ from ballpass.runtime.app.commands.shared import (
     show_json,
 )
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.run.tables import show_tables, simple_table
 
 if TYPE_CHECKING:
@@ -87,6 +88,7 @@ def spectrum(
     with command(scene) as stages:
         band = _read_band(envelope)
         _check(scaling, top, orders=orders, spectrogram=spectrogram)
+        need("scipy")  # before anything is simulated
         folder = out if out is not None else Path("results") / name_of(scene)
         figures, formats = figures and can_draw(), read_formats(format_)
         if figures:
