@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -30,6 +31,7 @@ from ballpass.runtime.run.settle import MOST, Settled, settle
 from ballpass.runtime.run.simulate import method_names, simulate
 from ballpass.runtime.run.start import RunEnd, Start
 from ballpass.runtime.run.stream import stream_run
+from ballpass.runtime.show.progress import Progress, shown, shown_steps
 
 #: State at the start: given, "equilibrium", or the end of a run that another goes on from; None takes the scene's.
 Initial = Sequence[float] | np.ndarray | RunEnd | Literal["equilibrium"] | None
@@ -73,7 +75,8 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     place = Path(folder).absolute()
     manifest = read_artefact(folder, verify=verify)
     try:
-        library = compile_model(place, manifest, compiler)
+        with shown("compiling"):
+            library = compile_model(place, manifest, compiler)
     except ArtefactError:  # another process has written the folder anew since the manifest was read
         manifest = read_artefact(folder, verify=verify)
         library = compile_model(place, manifest, compiler)
@@ -148,7 +151,7 @@ class Model(PointModel):
         initial: Initial = None,
         transient: float | None = None,
         kinks: Kinks | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Progress = None,
         error: float | None = None,
         of: str | Sequence[str] | None = None,
     ) -> Solution:
@@ -175,7 +178,8 @@ class Model(PointModel):
         kinks : ``stepped-over`` leaves kinks of the laws to error control; with ``located`` steps of the project's own
             stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 3e-7
             (1e-6 where a law jumps), else stepped over
-        progress : called with the finished fraction
+        progress : called with the finished fraction.  Default: a bar on a terminal or in a notebook, from the first
+            second on; False for none.  With BALLPASS_PROGRESS=0 in the environment there is one only for True
         error : relative error wanted instead of `method` and `rtol`: the tool chooses them, estimates the error of
             this run and tightens until the estimate is within it; ``Solution.accuracy`` tells (see
             `ballpass.runtime.certify.error_target`)
@@ -211,12 +215,13 @@ class Model(PointModel):
             initial=self._start(numbers, initial),
             transient_cycles=transient,
             kinks=kinks,
-            progress=progress,
         )
         refuse_with_error(kinks, error)
-        if error is None:
-            return simulate(self, numbers, request)
-        return simulate_to_error(self, numbers, request, error, of)
+        with shown("simulating", progress) as tell:
+            request = replace(request, progress=tell)
+            if error is None:
+                return simulate(self, numbers, request)
+            return simulate_to_error(self, numbers, request, error, of)
 
     def stream(
         self,
@@ -232,7 +237,7 @@ class Model(PointModel):
         initial: Initial = None,
         transient: float | None = None,
         kinks: Kinks | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Progress = None,
     ) -> Statistics:
         """Simulate into a file, in memory that does not grow with the run (see `ballpass.runtime.run.stream`).
 
@@ -269,9 +274,9 @@ class Model(PointModel):
             initial=self._start(numbers, initial),
             transient_cycles=transient,
             kinks=kinks,
-            progress=progress,
         )
-        return stream_run(self, numbers, request, Path(path))
+        with shown("simulating", progress) as tell:
+            return stream_run(self, numbers, replace(request, progress=tell), Path(path))
 
     def sensitivities(
         self,
@@ -285,7 +290,7 @@ class Model(PointModel):
         sensitivity_rtol: float | None = None,
         samples_per_cycle: int | None = None,
         kinks: Literal["stepped-over"] | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Progress = None,
     ) -> Sensitivities:
         """Simulate from t = 0 with the derivatives of the states by parameters, exact for the discrete solution.
 
@@ -322,9 +327,10 @@ class Model(PointModel):
             sensitivity_rtol=sensitivity_rtol,
             samples_per_cycle=samples_per_cycle,
             kinks=kinks,
-            progress=progress,
         )
-        return sensitivities(self, numbers, request, [wrt] if isinstance(wrt, str) else list(wrt))
+        names = [wrt] if isinstance(wrt, str) else list(wrt)
+        with shown("differentiating", progress) as tell:
+            return sensitivities(self, numbers, replace(request, progress=tell), names)
 
     def sensitivity(
         self,
@@ -342,7 +348,7 @@ class Model(PointModel):
         samples_per_cycle: int | None = None,
         kinks: Literal["stepped-over"] | None = None,
         agreement: float | None = None,
-        progress: Callable[[str, float], None] | None = None,
+        progress: Callable[[str, float], None] | bool | None = None,
     ) -> SensitivityReport:
         """Derivatives of quantities of interest by parameters, each with a certificate (see `certificate`).
 
@@ -357,7 +363,7 @@ class Model(PointModel):
         samples_per_cycle : nodes of quadratures in a turn that there are at least; there are more where signals need it
         kinks : ``stepped-over`` at any tolerance, as for `sensitivities`
         agreement : relative disagreement of both routes that is allowed
-        progress : called with words and a finished fraction
+        progress : called with words and a finished fraction; else as for `simulate`
 
         Raises
         ------
@@ -392,9 +398,11 @@ class Model(PointModel):
             sensitivity_rtol=sensitivity_rtol,
             samples_per_cycle=samples_per_cycle,
             agreement=agreement,
-            progress=progress,
+            progress=None,
         )
-        return answer(self, self._runnable(parameters), query)
+        numbers = self._runnable(parameters)
+        with shown_steps("differentiating", progress) as tell:
+            return answer(self, numbers, replace(query, progress=tell))
 
     def reduce(
         self,
@@ -407,7 +415,7 @@ class Model(PointModel):
         rtol: float | None = None,
         initial: Initial = None,
         kinks: Kinks | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Progress = None,
     ) -> Reductions:
         """Extremes with their times, mean and rms of a run behind its transient, without a stored trajectory.
 
@@ -437,9 +445,9 @@ class Model(PointModel):
             initial=self._start(numbers, initial),
             transient_cycles=transient,
             kinks=kinks,
-            progress=progress,
         )
-        return reduce_run(self, numbers, request)
+        with shown("simulating", progress) as tell:
+            return reduce_run(self, numbers, replace(request, progress=tell))
 
     def settle(
         self,
@@ -451,7 +459,7 @@ class Model(PointModel):
         initial: Initial = None,
         kinks: Kinks | None = None,
         most: int = MOST,
-        progress: Callable[[float], None] | None = None,
+        progress: Progress = None,
     ) -> Settled:
         """Reduce a run of as many turns as its extremes and rms take to settle (see `ballpass.runtime.run.settle`).
 
@@ -483,9 +491,9 @@ class Model(PointModel):
             initial=self._start(numbers, initial),
             transient_cycles=transient,
             kinks=kinks,
-            progress=progress,
         )
-        return settle(self, numbers, request, most)
+        with shown("simulating until settled", progress) as tell:
+            return settle(self, numbers, replace(request, progress=tell), most)
 
     def life(
         self,
@@ -496,7 +504,7 @@ class Model(PointModel):
         rtol: float | None = None,
         method: str | None = None,
         initial: Initial = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Progress = None,
     ) -> LifeReport:
         """Strength, rating life and wear of every bearing, over the scene's duty cycle where it has one.
 
@@ -528,9 +536,9 @@ class Model(PointModel):
             rtol=rtol,
             method=method,
             initial=self._start(numbers, initial),
-            progress=progress,
         )
-        return life_report(self, dict(parameters or {}), request)
+        with shown("simulating for life", progress) as tell:
+            return life_report(self, dict(parameters or {}), replace(request, progress=tell))
 
     def simulate_many(
         self,
@@ -547,7 +555,7 @@ class Model(PointModel):
         lanes: bool = True,
         growth: bool = False,
         client: Any = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Progress = None,
     ) -> EnsembleResult:
         """Simulate many parameter sets, keeping only observables.
 
@@ -576,7 +584,7 @@ class Model(PointModel):
             says which numbers have no digits (see `growth`)
         client : of `dask.distributed`; its workers simulate parts of the table, in lanes, with the same bits where they
             have the same processor and compiler.  ``threads`` are then those of the cluster
-        progress : called with the finished fraction
+        progress : as for `simulate`
 
         Raises
         ------
@@ -610,11 +618,12 @@ class Model(PointModel):
                 method=method,
                 kinks=kinks,
                 lanes=lanes,
-                progress=progress,
+                progress=tell,
                 **where,
             )
 
-        return simulate_members(self, parameters, observables, run) if growth else run(parameters, observables)
+        with shown("simulating members", progress) as tell:
+            return simulate_members(self, parameters, observables, run) if growth else run(parameters, observables)
 
     def growth(
         self,
@@ -625,6 +634,7 @@ class Model(PointModel):
         parameters: Mapping[str, float] | None = None,
         rtol: float | None = None,
         initial: Initial = None,
+        progress: bool | None = None,
     ) -> Growth:
         """What a start moved by the tolerance changes in the extremes of a run (see `ballpass.runtime.certify.growth`).
 
@@ -651,7 +661,8 @@ class Model(PointModel):
             initial=self._start(numbers, initial),
             transient_cycles=transient,
         )
-        return find_growth(self, numbers, request)
+        with shown("simulating from two starts", progress):
+            return find_growth(self, numbers, request)
 
     def refine_peak(self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max") -> Peak:
         """Peak of an output of a run of this model, between its samples too (see `ballpass.runtime.ask.peaks`).

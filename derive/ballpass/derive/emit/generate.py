@@ -27,6 +27,7 @@ from ballpass.derive.emit.signature import (
 from ballpass.runtime import contract as mf
 from ballpass.runtime.contract.errors import ArtefactError, RequestError
 from ballpass.runtime.contract.folders import locked, replace_files
+from ballpass.runtime.show.progress import shown
 
 if TYPE_CHECKING:
     from ballpass.derive.lower.functions import Functions
@@ -102,16 +103,17 @@ def generate(
         _refresh(folder, present, read, source)
         return folder
     _refuse_foreign(folder)
-    system, functions = _derive_and_lower(read, say)
-    say("emit")
-    from ballpass.derive.emit.folder import write_folder
+    with shown("deriving equations, writing C"):
+        system, functions = _derive_and_lower(read, say)
+        say("emit")
+        from ballpass.derive.emit.folder import write_folder
 
-    replace_files(
-        folder,
-        lambda made: write_folder(made, system, functions, source),
-        last=mf.FILE_NAME,
-        owned=lambda: _written(folder),
-    )
+        replace_files(
+            folder,
+            lambda made: write_folder(made, system, functions, source),
+            last=mf.FILE_NAME,
+            owned=lambda: _written(folder),
+        )
     return folder
 
 

@@ -9,7 +9,7 @@ those of the scene's own tolerance, taken in turns.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -22,6 +22,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour
 from ballpass.runtime.run.request import Request
+from ballpass.runtime.show.progress import Progress, shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,7 +107,7 @@ def measure_simplification(
     parameters: Mapping[str, float] | None = None,
     members: int = MEMBERS,
     spread: float = SPREAD,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> Simplification:
     """Measure errors and time of a simpler model.
 
@@ -116,7 +117,7 @@ def measure_simplification(
     simpler : of the same machine; parameters of one name are the same in both, others keep their defaults
     of : quantities, ``peak_ball_force``, ``rms:inner.y``, ...  Default: those of `measure_trade` that both have
     parameters : overrides of parameters that both have, SI; the members lie around them
-    progress : called with the finished fraction
+    progress : as for `Model.simulate`
 
     Raises
     ------
@@ -145,21 +146,22 @@ def measure_simplification(
     values = np.empty((2, members, len(names)))
     doubt, times = np.empty_like(values), np.empty((2, members))
     cycles = 1.0
-    for member, drawn in enumerate(perturbed(model, dict(user.parameters), members, spread)):
-        varied = {name: drawn[name] for name in shared}
-        numbers = (
-            neighbour(model, user, {**user.parameters, **varied}),
-            neighbour(simpler, base, {**base.parameters, **varied}),
-        )
-        runs = [prepare(model, numbers[0], Request())]
-        cycles = runs[0].cycles
-        length = Request(duration=runs[0].duration, transient_cycles=runs[0].start / runs[0].turn)
-        runs.append(prepare(simpler, numbers[1], length))
-        for k, run in enumerate(runs):
-            values[k, member], doubt[k, member] = reference(run, observables[k])
-            times[k, member] = run.integrate(observables[k], way).seconds / cycles
-        if progress is not None:
-            progress((member + 1) / members)
+    with shown("measuring", progress) as tell:
+        for member, drawn in enumerate(perturbed(model, dict(user.parameters), members, spread)):
+            varied = {name: drawn[name] for name in shared}
+            numbers = (
+                neighbour(model, user, {**user.parameters, **varied}),
+                neighbour(simpler, base, {**base.parameters, **varied}),
+            )
+            runs = [prepare(model, numbers[0], Request())]
+            cycles = runs[0].cycles
+            length = Request(duration=runs[0].duration, transient_cycles=runs[0].start / runs[0].turn)
+            runs.append(prepare(simpler, numbers[1], length))
+            for k, run in enumerate(runs):
+                values[k, member], doubt[k, member] = reference(run, observables[k])
+                times[k, member] = run.integrate(observables[k], way).seconds / cycles
+            if tell is not None:
+                tell((member + 1) / members)
     with np.errstate(divide="ignore", invalid="ignore"):
         changes = values[1] / values[0] - 1.0
     both = np.median(values, axis=1)

@@ -12,7 +12,7 @@ integration alone, of the processor where the system tells; medians are reported
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour
 from ballpass.runtime.run.locating import LOCATED, has_kinks
 from ballpass.runtime.run.request import Request
+from ballpass.runtime.show.progress import Progress, shown
 
 #: The reference and the second opinion on it.
 REFERENCE = Way(method="stepper-rodas5p", rtol=1e-12, kinks=LOCATED)
@@ -109,7 +110,7 @@ def measure_trade(
     members: int = MEMBERS,
     spread: float = SPREAD,
     ways: Sequence[Way] | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> Trade:
     """Measure errors and times.
 
@@ -119,7 +120,7 @@ def measure_trade(
         ring's motion
     parameters : overrides of parameters, SI; the members lie around them
     ways : default: `ways_of` the model
-    progress : called with the finished fraction
+    progress : as for `Model.simulate`
 
     Raises
     ------
@@ -144,20 +145,21 @@ def measure_trade(
     turns = 1.0
     user = model.numbers(parameters)
     around = dict(user.parameters)
-    for member, numbers in enumerate(perturbed(model, around, members, spread)):
-        run = prepare(model, neighbour(model, user, numbers), Request())
-        turns = run.cycles
-        true[member], doubt[member] = reference(run, observables)
-        for k in order.permutation(len(ways)):
-            try:
-                done = run.integrate(observables, ways[k])
-            except SimulationError:
-                continue  # infinitely wrong: quantiles of the method "higher" keep that
-            with np.errstate(divide="ignore", invalid="ignore"):
-                errors[k, member] = np.abs(done.values / true[member] - 1.0)
-            times[k, member] = done.seconds / turns
-        if progress is not None:
-            progress((member + 1) / members)
+    with shown("measuring", progress) as tell:
+        for member, numbers in enumerate(perturbed(model, around, members, spread)):
+            run = prepare(model, neighbour(model, user, numbers), Request())
+            turns = run.cycles
+            true[member], doubt[member] = reference(run, observables)
+            for k in order.permutation(len(ways)):
+                try:
+                    done = run.integrate(observables, ways[k])
+                except SimulationError:
+                    continue  # infinitely wrong: quantiles of the method "higher" keep that
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    errors[k, member] = np.abs(done.values / true[member] - 1.0)
+                times[k, member] = done.seconds / turns
+            if tell is not None:
+                tell((member + 1) / members)
     known = np.quantile(doubt, PROMISED, axis=0)
     return Trade(
         scene=model.manifest.scene,

@@ -48,6 +48,7 @@ from ballpass.runtime.many.distributions import Distribution, draw
 from ballpass.runtime.many.signals import Made, Member, Signals, check_outputs, make_signals
 from ballpass.runtime.many.spall_entries import entry_times
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.show.progress import Progress, shown
 from ballpass.runtime.show.short import ShortRepr
 
 #: Bytes of the samples of one output in a chunk, about.
@@ -141,7 +142,7 @@ def make_data_set(
     title: str = "",
     client: Any = None,
     chunk: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> DataSetReport:
     """Make a data set, or what is missing of it.
 
@@ -157,7 +158,7 @@ def make_data_set(
     title : of the data set
     client : of `dask.distributed`, whose workers make the signals.  Default: this process
     chunk : members made and stored together.  Default: about 4 MB of samples
-    progress : called with the finished fraction
+    progress : as for `Model.simulate`
 
     Raises
     ------
@@ -195,8 +196,8 @@ def make_data_set(
             refuse_changed(store, dict(group.attrs), spec)
         else:
             group = create_store(store, _axes(classes, signals, table, spec, size))
-        with marked(store) as place:
-            made = _fill(place, classes, signals, seed, table, size, client, progress)
+        with marked(store) as place, shown("making signals", progress) as tell:
+            made = _fill(place, classes, signals, seed, table, size, client, tell)
         failures = read_failures(group)
         if netcdf:
             write_netcdf(group, target)

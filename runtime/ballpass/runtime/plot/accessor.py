@@ -274,5 +274,6 @@ def _axes(given: Axes | None) -> Iterator[Axes]:
     pyplot = need("matplotlib.pyplot")
     from ballpass.runtime.plot.style import settings
 
+    figure = pyplot.figure(layout="constrained")  # outside: a notebook's backend, loaded here, changes settings
     with settings():
-        yield pyplot.subplots(layout="constrained")[1]
+        yield figure.add_subplot()

@@ -15,10 +15,11 @@ _STYLE = """
 .ballpass .scroll { overflow-x: auto; max-width: 100%; }
 .ballpass .formula { display: block; overflow-y: hidden; }
 .ballpass table { border-collapse: collapse; margin: 0.3em 0 0.6em; }
-.ballpass th, .ballpass td { padding: 0.15em 0.8em 0.15em 0; text-align: left; vertical-align: top; border: 0; }
-.ballpass thead th { border-bottom: 1px solid rgba(128, 128, 128, 0.6); font-weight: 600; vertical-align: bottom; }
-.ballpass .number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-.ballpass td:last-child:not(.number) { min-width: 9em; }
+.ballpass table th, .ballpass table td { text-align: left !important; vertical-align: top; border: 0; }
+.ballpass table th, .ballpass table td { padding: 0.15em 0.8em 0.15em 0; }
+.ballpass table thead th { border-bottom: 1px solid rgba(128, 128, 128, 0.6); vertical-align: bottom; }
+.ballpass table .number { text-align: right !important; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.ballpass table td:last-child:not(.number) { min-width: 16em; }
 .ballpass .title { font-weight: 600; }
 .ballpass .note { opacity: 0.75; }
 .ballpass p { margin: 0.2em 0; }

@@ -26,6 +26,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from ballpass.runtime.app.interrupted import say_interrupted
 from ballpass.runtime.contract.errors import BallpassError, RequestError
 from ballpass.runtime.contract.extras import can_derive, is_installed, missing
+from ballpass.runtime.show.progress import silent
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract import Manifest
@@ -70,7 +71,7 @@ def command(scene: Path | None = None) -> Iterator[Stages]:
     scene : named in faults that a later stage than reading finds; None for a command without one
     """
     try:
-        with warnings.catch_warnings(), Stages() as stages:
+        with warnings.catch_warnings(), silent(), Stages() as stages:
             said: set[str] = set()
 
             def once(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -1,0 +1,139 @@
+"""Progress of long calls: a bar where somebody looks, nothing elsewhere, and calls that end as before."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ballpass.runtime import Model
+from ballpass.runtime.show import progress
+from ballpass.runtime.show.progress import shown, shown_steps, silent
+
+SCRIPT = """
+import sys, time
+from ballpass.runtime.show import progress
+progress.PATIENCE, progress.REFRESH = 0.02, 0.02
+with progress.shown("simulating") as tell:
+    print("told" if tell else "silent", flush=True)
+    for k in range(int(sys.argv[1])):
+        time.sleep(0.02)
+        if tell:
+            tell((k + 1) / 20)
+print("done")
+"""
+
+
+def on_terminal(count: int, interrupt: bool = False, **environment: str) -> tuple[int, str, str]:
+    """Exit code, stdout, and what a terminal was sent as stderr."""
+    ours, theirs = pty.openpty()
+    how: dict[str, Any] = {"env": {**os.environ, "TERM": "xterm", **environment}, "text": True}
+    child = subprocess.Popen([sys.executable, "-c", SCRIPT, str(count)], stdout=subprocess.PIPE, stderr=theirs, **how)
+    os.close(theirs)
+    said: list[bytes] = []
+
+    def read() -> None:
+        try:
+            while part := os.read(ours, 4096):
+                said.append(part)
+                if interrupt and b"25%" in b"".join(said):
+                    child.send_signal(signal.SIGINT)
+        except OSError:  # the other side is closed
+            pass
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    out, _ = child.communicate(timeout=60)
+    reader.join()
+    os.close(ours)
+    return child.returncode, out, b"".join(said).decode()
+
+
+def test_a_terminal_shows_a_bar_that_goes_away() -> None:
+    code, out, said = on_terminal(20)
+    assert (code, out.split()) == (0, ["told", "done"])
+    assert "simulating" in said
+    percents = [int(number) for number in re.findall(r"(\d+)%", said)]
+    assert percents == sorted(percents)
+    assert len(set(percents)) > 3
+    assert said.rstrip().endswith("\x1b[2K")  # the line is erased
+
+
+def test_an_interrupt_ends_a_call_with_a_bar() -> None:
+    begin = time.perf_counter()
+    code, out, said = on_terminal(100_000, interrupt=True)
+    assert code in (-signal.SIGINT, 130)
+    assert "done" not in out
+    assert said.count("KeyboardInterrupt") == 1
+    assert time.perf_counter() - begin < 30
+
+
+def test_a_bar_can_be_turned_off_and_short_calls_show_none() -> None:
+    assert on_terminal(3, BALLPASS_PROGRESS="0")[1:] == ("silent\ndone\n", "")
+    assert on_terminal(0)[1:] == ("told\ndone\n", "")
+
+
+def test_pipes_and_logs_get_nothing() -> None:
+    child = subprocess.run([sys.executable, "-c", SCRIPT, "5"], capture_output=True, text=True, check=True)
+    assert (child.stdout, child.stderr) == ("silent\ndone\n", "")
+
+
+def test_one_bar_shows_at_a_time() -> None:
+    with shown("outer", True) as outer, shown("inner", True) as inner:
+        assert outer is not None
+        assert inner is None
+    with silent(), shown("within a program", True) as tell:
+        assert tell is None
+    with shown("again", True) as tell:
+        assert tell is not None
+    seen: list[float] = []
+    with shown("told by a caller", seen.append) as tell:
+        assert tell is not None
+        tell(0.5)
+    with shown("asked for none", False) as tell:
+        assert tell is None
+    assert seen == [0.5]
+
+
+def test_a_notebook_gets_a_bar_that_leaves_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown_there: list[dict[str, str]] = []
+
+    def display(content: dict[str, str], *, raw: bool, display_id: bool = False) -> Any:
+        shown_there.append(content)
+        return SimpleNamespace(update=display)
+
+    ipython, module = ModuleType("IPython"), ModuleType("IPython.display")
+    ipython.get_ipython = lambda: SimpleNamespace(kernel=None)  # type: ignore[attr-defined]
+    module.display = display  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "IPython", ipython)
+    monkeypatch.setitem(sys.modules, "IPython.display", module)
+    monkeypatch.setattr(progress, "PATIENCE", 0.01)
+    monkeypatch.setattr(progress, "REFRESH", 0.01)
+    monkeypatch.delenv("BALLPASS_PROGRESS", raising=False)
+    with shown_steps("first") as tell:
+        assert tell is not None
+        time.sleep(0.1)
+        tell("<second>", 0.25)
+        time.sleep(0.1)
+    assert shown_there[0]["text/plain"] == "first: 0 s"
+    assert '<progress max="1">' in shown_there[0]["text/html"]
+    assert any('value="0.2500"' in content["text/html"] for content in shown_there)
+    assert shown_there[-1] == {"text/plain": "<second>: 0 s", "text/html": "<small>&lt;second&gt;: 0 s</small>"}
+
+
+def test_a_bar_changes_no_bit(rotor: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    runs = [rotor.simulate(cycles=25, progress=shown_or_not) for shown_or_not in (False, True)]
+    np.testing.assert_array_equal(runs[0].x, runs[1].x)
