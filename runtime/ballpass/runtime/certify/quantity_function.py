@@ -110,6 +110,10 @@ class QuantityFunction:
         self._others = [k for k in range(len(self.of)) if k not in self._reduced]
         self._study(slopes=True).window(numbers)  # a wrong length is told now
 
+    def __repr__(self) -> str:
+        of, wrt = (f"{', '.join(names[:3])}{', ...' if len(names) > 3 else ''}" for names in (self.of, self.wrt))
+        return f"QuantityFunction({self._model.manifest.scene}: {of} by {wrt})"
+
     def __call__(self, x: ArrayLike) -> Array:
         """Values of the quantities, SI, shape (..., quantities), or (...) for one name.
 
