@@ -15,6 +15,7 @@ from subprocess import run
 from ballpass.derive import generate
 from ballpass.runtime import load
 from ballpass.runtime.app.commands.life import draw_life
+from ballpass.runtime.app.figure_run import run_for_figures
 from ballpass.runtime.plot.gallery import draw_all
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -80,8 +81,10 @@ def main() -> None:
     draw_lives()
     for scene, names in PICTURES.items():
         model = load(generate(ROOT / "scenes" / f"{scene}.toml", ROOT / "generated" / scene))
+        found = model.simulate()
+        longer = run_for_figures(model, found)
         with tempfile.TemporaryDirectory() as folder:
-            drawn = {path.stem: path for path in draw_all(model, model.simulate(), Path(folder))}
+            drawn = {path.stem: path for path in draw_all(model, found, Path(folder), longer=longer)}
             for name in names:
                 target = IMAGES / f"{scene}_{name}.png"
                 shutil.copyfile(drawn[name], target)

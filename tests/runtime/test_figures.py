@@ -20,10 +20,12 @@ from matplotlib.patches import Circle
 from matplotlib.text import Annotation, Text
 
 from ballpass.runtime import Model, Solution
+from ballpass.runtime.app.figure_run import run_for_figures
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot import CAPTIONS, NAMES
 from ballpass.runtime.plot.gallery import FIGURES, draw, draw_all
 from ballpass.runtime.plot.mechanism import draw_mechanism
+from ballpass.runtime.plot.motion import phase_portrait, spectra
 from ballpass.runtime.plot.record import gather
 from ballpass.runtime.plot.style import INK, PALE, SAND, SIGNAL, caption_of, save, write_figures
 
@@ -201,6 +203,31 @@ def test_spectrum_lines_equal_fourier_integrals_of_the_run(press: Run) -> None:
     assert "within one line; telling them apart takes 20 turns" in text
 
 
+def test_a_run_of_many_turns_separates_ball_pass_from_the_third_harmonic(press: Run) -> None:
+    longer = run_for_figures(*press)
+    assert longer is not None
+    record = gather(*press, longer=longer)
+    closer = spectra(record).axes[2].get_lines()[0].get_xydata()  # along x
+    harmonic, ball_pass = 3.0 / 0.12, 8.0 * (1.0 - 7.9375 / 33.5) / 2.0 / 0.12
+    tops = [float(np.max(closer[np.abs(closer[:, 0] - frequency) < 0.1, 1])) for frequency in (harmonic, ball_pass)]
+    between = closer[(closer[:, 0] > harmonic) & (closer[:, 0] < ball_pass), 1]
+    assert np.min(between) < 0.1 * min(tops)
+    # once a turn behind all that was dropped, and the end of the last one
+    points = phase_portrait(record).axes[1].get_lines()[0].get_xydata()
+    turn = round(0.12 / (longer.t[1] - longer.t[0]))
+    assert len(points) == 101
+    expected = np.column_stack((1e6 * longer["inner.x"], 1e3 * longer["inner.vx"]))[20 * turn :: turn]
+    assert points == pytest.approx(expected, abs=1e-6)
+
+
+def test_second_orbit_is_relative_to_the_outer_ring(press: Run) -> None:
+    panel = draw("orbit", *press).axes[1]
+    last = next(line for line in panel.get_lines() if line.get_label() == "last turn").get_xydata()
+    solution = press[1].steady()
+    moved = [solution[f"inner.{axis}"] - solution[f"outer.{axis}"] for axis in "xy"]
+    assert last[::8] == pytest.approx(1e6 * np.column_stack(moved)[-2001:])
+
+
 def test_phase_portrait_marks_the_state_at_each_turn(press: Run) -> None:
     figure = draw("phase_portrait", *press)
     points = next(line for line in figure.axes[0].get_lines() if line.get_marker() == "o").get_xydata()
@@ -212,8 +239,15 @@ def test_phase_portrait_marks_the_state_at_each_turn(press: Run) -> None:
 def test_every_ball_has_its_strip(press: Run) -> None:
     figure = draw("ball_loads", *press)
     solution = press[1].steady()
-    assert len(figure.axes) == 8
-    for number, axes in enumerate(figure.axes):
+    assert len(figure.axes) == 16
+    peak = np.max(solution["ball.force"])
+    for number, (axes, closer) in enumerate(zip(figure.axes[::2], figure.axes[1::2], strict=True)):
+        # beside it a closer look, in which the highest force stands
+        low, high = closer.get_xlim()
+        curve = closer.get_lines()[0].get_xydata()
+        inside = solution["ball.force"][(curve[:, 0] >= low) & (curve[:, 0] <= high)]
+        assert high - low == pytest.approx(45.0, rel=0.1)
+        assert np.max(inside) == peak
         curve = axes.get_lines()[0].get_xydata()
         assert curve[:, 1] == pytest.approx(solution["ball.force"][:, number])
         assert (curve[0, 0], curve[-1, 0]) == pytest.approx((0.0, 720.0), abs=1e-6)

@@ -395,10 +395,11 @@ def _write_results(
     def write(made: Path) -> dict[str, Any]:
         solution.save(made / SOLUTION)
         if formats:
+            from ballpass.runtime.app.figure_run import run_for_figures
             from ballpass.runtime.plot.gallery import draw_all
 
             stages("draw")
-            draw_all(model, solution, made, formats)
+            draw_all(model, solution, made, formats, run_for_figures(model, solution))
         return summary
 
     endings = ["", *(f"_{bearing.name}" for bearing in model.manifest.bearings if bearing.name)]

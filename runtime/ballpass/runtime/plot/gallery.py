@@ -89,7 +89,13 @@ def draw(name: str, model: PointModel, solution: Solution) -> Figure:
     return kind.draw(record)
 
 
-def draw_all(model: PointModel, solution: Solution, folder: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
+def draw_all(
+    model: PointModel,
+    solution: Solution,
+    folder: Path,
+    formats: Sequence[str] = ("png",),
+    longer: Solution | None = None,
+) -> list[Path]:
     """Write every figure for which the outputs exist into `folder`, and their captions into ``figures.md``.
 
     Left out are figures whose outputs were not asked for, and, for a steady part shorter than a turn, load curve and
@@ -98,6 +104,7 @@ def draw_all(model: PointModel, solution: Solution, folder: Path, formats: Seque
     Parameters
     ----------
     formats : kinds of files, of png, svg and pdf
+    longer : a run of more turns, for spectra and stroboscopic points
 
     Returns
     -------
@@ -106,7 +113,7 @@ def draw_all(model: PointModel, solution: Solution, folder: Path, formats: Seque
 
     def figures() -> Iterator[tuple[str, Figure]]:
         for bearing in model.manifest.bearings or (None,):
-            record = gather(model, solution, bearing)
+            record = gather(model, solution, bearing, longer)
             ending = f"_{bearing.name}" if bearing is not None and bearing.name else ""
             yield from ((f"{kind.name}{ending}", kind.draw(record)) for kind in FIGURES if kind.possible(record))
 

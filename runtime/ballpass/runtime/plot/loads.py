@@ -19,6 +19,9 @@ from ballpass.runtime.plot.style import (
     styled,
 )
 
+#: Part of the turns that the closer look at ball loads shows, and part of the time below which high loads are rare.
+CLOSER, RARE = 1.0 / 16.0, 0.2
+
 
 def reaction_joints(record: Record) -> tuple[str, ...]:
     """Joints to show in the load curve: the bearing's, without a bearing all whose reaction was asked for."""
@@ -133,28 +136,45 @@ def ball_loads(record: Record) -> Figure:
     top = max(float(np.max(force)), 1e-12)
     bottom = min(float(np.min(force)), 0.0)
     figure = new_figure(1.5 + max(0.5 * balls, 2.0), layout=None)
-    strips = figure.subplots(balls, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    for number, axes in enumerate(strips, start=1):
+    moment, closer = _around_peak(along, force)
+    ratios = (2.2, 1.0) if closer else (1.0,)
+    grid = figure.subplots(balls, len(ratios), sharex="col", sharey=True, squeeze=False, width_ratios=ratios)
+    for number, axes in ((number, axes) for number, row in enumerate(grid, start=1) for axes in row):
         axes.fill_between(along, 0.0, force[:, number - 1], color=INK, alpha=0.35, linewidth=0)
         axes.plot(along, force[:, number - 1], color=INK, linewidth=0.9)
         shade_windows(axes, windows, range(-1, int(along.max() // 360.0) + 1))
         axes.set_ylim(min(1.1 * bottom, 0.0), 1.1 * top)
         axes.locator_params(axis="y", nbins=2)
-        axes.text(1.01, 0.4, f"ball {number}", transform=axes.transAxes, fontsize=9, va="center")
-    strips[-1].set_xlim(float(along.min()), float(along.max()))
+    for number, axes in enumerate(grid[:, -1], start=1):
+        axes.text(1.02, 0.4, f"ball {number}", transform=axes.transAxes, fontsize=9, va="center")
+    first = grid[-1, 0]
+    first.set_xlim(float(along.min()), float(along.max()))
     if record.turns:
-        degree = 90.0 * max(1.0, np.ceil((along.max() - along.min()) / 1080.0))
-        strips[-1].set_xticks(np.arange(np.ceil(along.min() / degree) * degree, along.max() + 1e-6, degree))
-    strips[-1].set_xlabel(label)
+        degree = 90.0 * max(1.0, np.ceil((along.max() - along.min()) / (1080.0 if not closer else 540.0)))
+        first.set_xticks(np.arange(np.ceil(along.min() / degree) * degree, along.max() + 1e-6, degree))
+    first.set_xlabel(label)
+    if closer:
+        grid[-1, 1].set_xlim(*moment)
+        grid[-1, 1].set_xlabel(label)
     figure.supylabel("contact load [N]", fontsize=9.5)
     shown = "last two turns" if len(record.turns) >= 2 else "last turn" if record.turns else "the whole record"
     shaded = " Shaded: an applied load acts." if windows else ""
+    right = " Right: around the highest load." if closer else ""
     frame(
         figure,
         record.title("Contact load of every ball"),
-        f"{words.capitalize()}, {shown}; all strips at one scale, highest sample {top:.4g} N.{shaded} "
+        f"{words.capitalize()}, {shown}; all strips at one scale, highest sample {top:.4g} N.{right}{shaded} "
         f"{record.settings()}.",
         right=0.8,
         hspace=0.15,
+        wspace=0.06,
     )
     return figure
+
+
+def _around_peak(along: Array, force: Array) -> tuple[tuple[float, float], bool]:
+    """Part of the axis around the highest load, and whether high loads are so rare that it shows more."""
+    highest = np.max(force, axis=1)
+    peak, span = float(along[int(np.argmax(highest))]), float(np.ptp(along)) * CLOSER
+    rare = float(np.mean(highest > 0.5 * np.max(highest))) < RARE
+    return (max(peak - 0.25 * span, float(along.min())), min(peak + 0.75 * span, float(along.max()))), rare

@@ -13,7 +13,7 @@ from matplotlib.ticker import StrMethodFormatter
 from ballpass.runtime.ask.observables import hermite, orbits, stroboscopic_points
 from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum
 from ballpass.runtime.plot.record import Array, Record
-from ballpass.runtime.plot.style import GREY, INK, SAND, SIGNAL, frame, legend_above, new_figure, styled
+from ballpass.runtime.plot.style import FIRST, GREY, INK, SAND, SECOND, SIGNAL, frame, legend_above, new_figure, styled
 
 #: Points drawn between two samples where velocities are known: a resonance has but ten samples a period.
 _FINER = 8
@@ -25,56 +25,88 @@ _BALL_PASS: dict[str, Any] = {"color": SIGNAL, "linestyle": (0, (6, 2)), "linewi
 #: Ratio of the extents from which equal scales would leave a sliver.
 _SLIVER = 4.0
 
+#: Lines of a spectrum that are drawn as such; more make a curve.
+_STEMS = 400
 
-def _path(record: Record, window: slice, axis: str) -> tuple[Array, Array, Array]:
+
+def _path(record: Record, window: slice, axis: str, *, relative: bool = False) -> tuple[Array, Array, Array]:
     """Times [s], positions [m] and velocities [m/s] of the inner ring, between samples by the Hermite cubic.
 
     Without the velocity among the outputs: the samples, and no velocities.
+
+    Parameters
+    ----------
+    relative : to the outer ring
     """
     t, x = record.t[window], record.values(f"inner.{axis}")[window]
-    if not record.has(f"inner.v{axis}"):
+    if relative:
+        x = x - record.values(f"outer.{axis}")[window]
+    speeds = [f"{ring}.v{axis}" for ring in ("inner", *(["outer"] if relative else []))]
+    if not record.has(*speeds):
         return t, x, np.zeros(0)
+    v = record.values(speeds[0])[window] - (record.values(speeds[1])[window] if relative else 0.0)
     fine = np.append((t[:-1, None] + np.diff(t)[:, None] * np.arange(_FINER) / _FINER).ravel(), t[-1])
-    return fine, *hermite(t, x, record.values(f"inner.v{axis}")[window], fine)
+    return fine, *hermite(t, x, v, fine)
 
 
 @styled
 def orbit(record: Record) -> Figure:
-    """Path of the inner ring's centre: the last turn dark, the steady turns before it light and wide under it."""
-    figure = new_figure(5.4, layout=None)
-    axes = figure.add_subplot()
-    equal = draw_orbit(axes, record)
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    scales = "Equal scales." if equal else "Each axis has a scale of its own."
-    gap = ""
+    """Path of the inner ring's centre: the last turn dark, the steady turns before it light and wide under it.
+
+    With an elastic outer ring beside it the path relative to that ring, which is what the balls feel.
+    """
+    both = record.has("outer.x", "outer.y")
+    figure = new_figure(5.0, layout=None)
+    panels = figure.subplots(1, 2 if both else 1, squeeze=False)[0]
+    equal = [draw_orbit(axes, record, relative=k == 1) for k, axes in enumerate(panels)]
+    text = "Equal scales." if all(equal) else "Each axis has a scale of its own."
+    if both:
+        for axes, title in zip(panels, ("in the frame's axes", "relative to the outer ring"), strict=True):
+            axes.set_title(title)
+        text += " The second path is what the balls feel; dotted: half the diametral clearance around the outer ring."
     if record.cycle_length is not None and record.turns:
         path = orbits(record.t, record.values("inner.x"), record.values("inner.y"), cycle_length=record.cycle_length)
-        gap = f" Start and end of the last turn are {1e6 * path[-1].gap:.3g} µm apart."
+        text += f" Start and end of the last turn are {1e6 * path[-1].gap:.3g} µm apart."
     title = record.title("Orbit of the inner ring's centre")
-    frame(figure, title, f"{scales}{gap} {record.settings()}.", left=0.9, right=2.1)
+    if both:
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="lower center", ncols=3)
+        frame(figure, title, f"{text} {record.settings()}.", left=0.9, below=1.2, wspace=0.3)
+    else:
+        panels[0].legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        frame(figure, title, f"{text} {record.settings()}.", left=0.9, right=2.1)
     return figure
 
 
-def draw_orbit(axes: Axes, record: Record) -> bool:
-    """The path, with labels for a legend; whether both axes have one scale."""
+def draw_orbit(axes: Axes, record: Record, *, relative: bool = False) -> bool:
+    """The path, with labels for a legend; whether both axes have one scale.
+
+    Parameters
+    ----------
+    relative : to the outer ring, with a circle of the clearance
+    """
     last = record.last_turns(1)
     if last.start > 0:
-        x, y = (1e6 * _path(record, slice(0, last.start + 1), axis)[1] for axis in "xy")
+        x, y = (1e6 * _path(record, slice(0, last.start + 1), axis, relative=relative)[1] for axis in "xy")
         # wide, to be seen where the last turn covers it
         axes.plot(x, y, color=SAND, linewidth=2.4, label="steady turns before it")
-    (t, x, _), (_, y, _) = (_path(record, last, axis) for axis in "xy")
+    (t, x, _), (_, y, _) = (_path(record, last, axis, relative=relative) for axis in "xy")
     x, y = 1e6 * x, 1e6 * y
     axes.plot(x, y, color=INK, linewidth=1.1, label="last turn" if record.turns else "path")
     _highlight_windows(axes, record, t, x, y)
     start: dict[str, Any] = {"color": "white", "markeredgecolor": INK, "markersize": 8}
     axes.plot(x[0], y[0], "o", label="start of the last turn", zorder=4, **start)
     axes.plot(x[-1], y[-1], "s", color=INK, markersize=4, label="end of the last turn", zorder=5)
-    wide, high = (max(float(np.ptp(record.values(f"inner.{axis}"))), 1e-15) for axis in "xy")
+    wide, high = (max(float(np.ptp(values)), 1e-9) for values in (x, y))
     equal = max(wide, high) < _SLIVER * min(wide, high)
     if equal:
         axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel("x of the inner ring's centre [µm]")
-    axes.set_ylabel("y of the inner ring's centre [µm]")
+    if relative:
+        around, radius = np.linspace(0.0, 2.0 * np.pi, 181), 5e5 * record.parameter("bearing.clearance")
+        if radius > 0.0:
+            axes.plot(radius * np.cos(around), radius * np.sin(around), color=GREY, linestyle=(0, (1, 1.5)), zorder=1)
+    against = " against the outer one" if relative else "'s centre"
+    axes.set_xlabel(f"x of the inner ring{against} [µm]")
+    axes.set_ylabel(f"y of the inner ring{against} [µm]")
     return equal
 
 
@@ -90,52 +122,95 @@ def _highlight_windows(axes: Axes, record: Record, t: Array, x: Array, y: Array)
 
 @styled
 def spectra(record: Record) -> Figure:
-    """Displacement amplitude spectra along x and y, with crank harmonics and ball-pass frequency marked."""
-    length = record.cycle_length
-    # a mechanism repeats each turn: its harmonics fall on lines.  Without one a window keeps the leakage low
-    window: Window = "boxcar" if record.manifest.mechanism is not None else "hann"
+    """Displacement amplitude spectra along x and y, with crank harmonics and ball-pass frequency marked.
+
+    With a run of many turns at hand a third panel shows ball pass beside the nearest harmonic of the crank.
+    """
+    source = record.longer or record
+    # few turns of a mechanism: its harmonics fall on lines.  Else a window keeps the leakage low
+    exact = record.manifest.mechanism is not None and record.longer is None
+    window: Window = "boxcar" if exact else "hann"
     lines = {
-        axis: amplitude_spectrum(record.t, record.values(f"inner.{axis}") * 1e6, cycle_length=length, window=window)
+        axis: amplitude_spectrum(
+            source.t, source.values(f"inner.{axis}") * 1e6, cycle_length=record.cycle_length, window=window
+        )
         for axis in "xy"
     }
     marks = record.frequencies()
-    frequencies = (marks.shaft, marks.ball_pass_outer) if marks is not None and marks.shaft > 0.0 else ()
-    figure = new_figure(5.6, layout=None)
-    panels = figure.subplots(2, 1, sharex=True, sharey=True)
+    shaft, ball_pass = (marks.shaft, marks.ball_pass_outer) if marks is not None else (0.0, 0.0)
     peak = max(float(np.max(s.amplitude)) for s in lines.values())
     floor = max(peak * 1e-4, 1e-12)
-    limit = shown_range(list(lines.values()), shaft=marks.shaft if marks else 0.0)
-    for axes, (axis, spectrum), letter in zip(panels, lines.items(), "ab", strict=True):
+    limit = shown_range(list(lines.values()), shaft=shaft)
+    apart = _apart(ball_pass, shaft) if shaft > 0.0 else 0.0
+    closer = record.longer is not None and apart > 2.0 * lines["x"].resolution
+    figure = new_figure(7.4 if closer else 5.6, layout=None)
+    panels = figure.subplots(3 if closer else 2, 1)
+    for axes, (axis, spectrum), letter in zip(panels, lines.items(), "ab", strict=False):
+        _mark(axes, limit, shaft, ball_pass)
         shown = (spectrum.frequency > 0.0) & (spectrum.frequency <= limit)
+        tops = np.maximum(spectrum.amplitude[shown], floor)
+        if np.count_nonzero(shown) > _STEMS:
+            axes.plot(spectrum.frequency[shown], tops, color=INK, linewidth=0.9)
+        else:
+            axes.vlines(spectrum.frequency[shown], floor, tops, color=INK, linewidth=1.2)
+            dots = shown & (spectrum.amplitude > floor)
+            axes.plot(spectrum.frequency[dots], spectrum.amplitude[dots], "o", color=INK, markersize=2.6)
+        axes.set_title(f"{letter}) {axis} direction")
+        axes.set_xlim(0.0, limit)
+    crank = "crank" if record.manifest.mechanism is not None else "shaft"
+    if closer:
+        _draw_closer(panels[2], lines, shaft, ball_pass, crank, floor)
+    for axes in panels:
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))  # not by mathtext, which is slow
         axes.minorticks_off()
         axes.set_ylim(floor, 4.0 * peak)
-        for frequency, look in zip(frequencies, (_HARMONICS, _BALL_PASS), strict=False):
-            every = frequency * np.arange(1, int(limit / frequency) + 1)
-            axes.vlines(every, 0.0, 1.0, transform=axes.get_xaxis_transform(), zorder=0.5, **look)
-        tops = np.maximum(spectrum.amplitude[shown], floor)
-        axes.vlines(spectrum.frequency[shown], floor, tops, color=INK, linewidth=1.2)
-        dots = shown & (spectrum.amplitude > floor)
-        axes.plot(spectrum.frequency[dots], spectrum.amplitude[dots], "o", color=INK, markersize=2.6)
         axes.grid(visible=False, axis="x")
-        axes.set_title(f"{letter}) {axis} direction")
         axes.set_ylabel("amplitude [µm]")
-    panels[-1].set_xlim(0.0, limit)
+    if not closer:
+        panels[0].tick_params(labelbottom=False)
     panels[-1].set_xlabel("frequency [Hz]")
     spectrum = lines["x"]
     whole = f"{spectrum.cycles} whole turn{'s' if spectrum.cycles != 1 else ''}"
     cycles = "the whole record" if spectrum.cycles is None else whole
     weighting = "no window" if window == "boxcar" else "Hann window"
     text = f"Amplitude, mean removed, {cycles}, {weighting}, lines {spectrum.resolution:.3g} Hz apart."
-    if frequencies:
-        shaft, ball_pass = frequencies
-        crank = "crank" if record.manifest.mechanism is not None else "shaft"
+    if shaft > 0.0:
         words = f"{crank} harmonics, {shaft:.4g} Hz", f"ball pass (BPFO) and multiples, {ball_pass:.4g} Hz"
         legend_above(figure, [Line2D([], [], **look | {"linewidth": 1.4}) for look in (_HARMONICS, _BALL_PASS)], words)
         text += _unresolved(ball_pass, shaft, spectrum.resolution, crank)
-    frame(figure, record.title("Displacement spectra"), f"{text} {record.settings()}.", hspace=0.25)
+    title = record.title("Displacement spectra")
+    frame(figure, title, f"{text} {source.settings()}.", hspace=0.45 if closer else 0.25)
     return figure
+
+
+def _mark(axes: Axes, limit: float, shaft: float, ball_pass: float) -> None:
+    for frequency, look in ((shaft, _HARMONICS), (ball_pass, _BALL_PASS)):
+        if shaft > 0.0 and frequency > 0.0:
+            every = frequency * np.arange(1, int(limit / frequency) + 1)
+            axes.vlines(every, 0.0, 1.0, transform=axes.get_xaxis_transform(), zorder=0.5, **look)
+
+
+def _draw_closer(
+    axes: Axes, lines: dict[str, AmplitudeSpectrum], shaft: float, ball_pass: float, crank: str, floor: float
+) -> None:
+    """Ball pass and the nearest harmonic, x solid, y dashed."""
+    order = round(ball_pass / shaft)
+    low, high = sorted((order * shaft, ball_pass))
+    margin = max(3.0 * (high - low), 10.0 * lines["x"].resolution)
+    low, high = low - margin, high + margin
+    _mark(axes, high, shaft, ball_pass)
+    for (axis, spectrum), look in zip(lines.items(), (FIRST, SECOND), strict=True):
+        shown = (spectrum.frequency >= low) & (spectrum.frequency <= high)
+        tops = np.maximum(spectrum.amplitude[shown], floor)
+        axes.plot(spectrum.frequency[shown], tops, marker="." if axis == "x" else "+", label=axis, **look)
+    axes.set_xlim(low, high)
+    axes.set_title(f"c) ball pass beside harmonic {order} of the {crank}: x solid, y dashed")
+
+
+def _apart(ball_pass: float, shaft: float) -> float:
+    """Distance of ball pass from the nearest harmonic [Hz]."""
+    return abs(ball_pass - max(round(ball_pass / shaft), 1) * shaft)
 
 
 def shown_range(spectra: list[AmplitudeSpectrum], *, shaft: float) -> float:
@@ -153,8 +228,7 @@ def shown_range(spectra: list[AmplitudeSpectrum], *, shaft: float) -> float:
 
 def _unresolved(ball_pass: float, shaft: float, resolution: float, crank: str) -> str:
     """A warning where the record is too short to tell ball pass and its nearest crank harmonic apart."""
-    order = max(round(ball_pass / shaft), 1)
-    distance = abs(ball_pass - order * shaft)
+    order, distance = max(round(ball_pass / shaft), 1), _apart(ball_pass, shaft)
     if distance >= resolution:
         return ""
     needed = f"; telling them apart takes {int(np.ceil(shaft / distance))} turns" if distance > 1e-6 * shaft else ""
@@ -163,26 +237,48 @@ def _unresolved(ball_pass: float, shaft: float, resolution: float, crank: str) -
 
 @styled
 def phase_portrait(record: Record) -> Figure:
-    """Velocity over displacement along x, with the stroboscopic point of each turn."""
+    """Velocity over displacement along x, with the stroboscopic point of each turn; many points also by themselves."""
     _, x, v = _path(record, slice(0, record.t.size), "x")
     figure = new_figure(5.2, layout=None)
-    axes = figure.add_subplot()
-    axes.plot(1e6 * x, 1e3 * v, color=INK, linewidth=0.8, alpha=0.85, label="steady turns" if record.turns else "path")
     text = "There is no period: no stroboscopic points."
+    many = record.longer is not None and record.cycle_length is not None
+    panels = figure.subplots(1, 2 if many else 1, squeeze=False, width_ratios=(1.7, 1.0) if many else None)[0]
+    axes = panels[0]
+    axes.plot(1e6 * x, 1e3 * v, color=INK, linewidth=0.8, alpha=0.85, label="steady turns" if record.turns else "path")
     if record.cycle_length is not None:
+        source = record.longer or record
         points = stroboscopic_points(
-            record.t, record.values("inner.x"), record.values("inner.vx"), cycle_length=record.cycle_length
+            source.t, source.values("inner.x"), source.values("inner.vx"), cycle_length=record.cycle_length
         )
-        look: dict[str, Any] = {"color": SAND, "markeredgecolor": "black", "markeredgewidth": 0.9, "markersize": 7.5}
-        label = "stroboscopic points, once a turn"
-        axes.plot(1e6 * points.position, 1e3 * points.velocity, "o", label=label, zorder=5, **look)
+        look: dict[str, Any] = {"color": SAND, "markeredgecolor": "black", "markeredgewidth": 0.7, "linestyle": "none"}
+        for panel in panels:
+            size = 7.5 if not many else 4.0
+            panel.plot(
+                1e6 * points.position,
+                1e3 * points.velocity,
+                marker="o",
+                markersize=size,
+                label="stroboscopic points, once a turn",
+                zorder=5,
+                **look,
+            )
         count, mechanism = points.time.size, record.manifest.mechanism
         angle = np.degrees(record.parameter(mechanism.start_angle)) if mechanism else 0.0
         what = "crank" if mechanism else "shaft"
         text = f"{count} stroboscopic point{'' if count == 1 else 's'}, at {what} angle {angle % 360.0:g}°."
+        if many:
+            panels[1].set_title("stroboscopic points alone")
+            panels[1].ticklabel_format(useOffset=False)
+            panels[1].locator_params(axis="x", nbins=4)
+            dropped = source.solution.transient_cycles
+            text += f" They are those of a longer run, {dropped:g} turns dropped; right: on scales of their own."
     axes.axhline(0.0, color=GREY, linewidth=0.6)
-    axes.set_xlabel("x of the inner ring's centre [µm]")
+    for panel in panels:
+        panel.set_xlabel("x of the inner ring's centre [µm]")
     axes.set_ylabel("velocity along x [mm/s]")
-    legend_above(figure)
-    frame(figure, record.title("Phase portrait along x"), f"{text} {record.settings()}.", left=0.9)
+    axes.ticklabel_format(useOffset=False)
+    handles, labels = axes.get_legend_handles_labels()
+    legend_above(figure, handles, labels)
+    title = record.title("Phase portrait along x")
+    frame(figure, title, f"{text} {record.settings()}.", left=0.9, **({"wspace": 0.25} if many else {}))
     return figure

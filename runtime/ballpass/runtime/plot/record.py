@@ -38,6 +38,7 @@ class Record:
     bearing : the one that the figures are of; None where the scene has none
     cycle_length : one turn of driver or shaft [s]; None when nothing turns
     turns : whole turns of the steady part, oldest first; empty without them
+    longer : of a run of more turns, for spectra and stroboscopic points; None where there is none
     """
 
     model: PointModel
@@ -45,6 +46,7 @@ class Record:
     bearing: BearingInfo | None
     cycle_length: float | None
     turns: tuple[slice, ...]
+    longer: Record | None = None
 
     @property
     def manifest(self) -> Manifest:
@@ -244,8 +246,15 @@ def _unit(angle: float) -> Array:
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def gather(model: PointModel, solution: Solution, bearing: BearingInfo | None = None) -> Record:
-    """The steady part of `solution`, with its turns, for figures of a bearing; the first one if none is given."""
+def gather(
+    model: PointModel, solution: Solution, bearing: BearingInfo | None = None, longer: Solution | None = None
+) -> Record:
+    """The steady part of `solution`, with its turns, for figures of a bearing; the first one if none is given.
+
+    Parameters
+    ----------
+    longer : a run of more turns, for the figures that need them
+    """
     steady = solution.steady()
     length = steady.period
     return Record(
@@ -254,4 +263,5 @@ def gather(model: PointModel, solution: Solution, bearing: BearingInfo | None = 
         bearing=bearing or solution.manifest.bearing,
         cycle_length=length,
         turns=() if length is None else turns(steady.t, length),
+        longer=None if longer is None else gather(model, longer, bearing),
     )

@@ -1,0 +1,67 @@
+"""A run of many turns for figures that need them: stroboscopic points, and spectra that tell near lines apart.
+
+In: a model and a run of it.  Out: the run that goes on behind it, or None where it is long enough or
+costs too much.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, cast
+
+from ballpass.runtime.ask.characteristic import frequencies_of
+
+if TYPE_CHECKING:
+    from ballpass.runtime.model import Model
+    from ballpass.runtime.run.locating import Kinks
+    from ballpass.runtime.run.solution import Solution
+
+#: Turns that figures show at least, and that are dropped before them.
+TURNS, SETTLE = 100, 20
+
+#: Lines of the spectrum between ball pass and the nearest harmonic of the shaft, with room for the window's width; most
+#: turns that may cost.
+APART, MOST = 5.0, 400
+
+#: Steps that the turns may take: some tenths of a second.  A count, not a time: figures are the same on every machine.
+STEPS = 300_000
+
+
+def run_for_figures(model: Model, solution: Solution) -> Solution | None:
+    """Positions and velocities of all rings over as many further turns as figures need.
+
+    Parameters
+    ----------
+    solution : a run of the model by the project's own stepper; others are not continued
+
+    Raises
+    ------
+    SimulationError
+        The further turns failed.
+    """
+    length, statistics = solution.period, solution.statistics
+    if length is None or not statistics.steps or solution.steady_reductions is None or not len(solution):
+        return None
+    done = (solution.t[-1] - statistics.begin) / length
+    numbers = {**solution.parameters, **solution.constants}
+    turns = TURNS
+    for bearing in solution.manifest.bearings:
+        found = frequencies_of(bearing, numbers)
+        order = found.ball_pass_outer / found.shaft if found is not None and found.shaft > 0.0 else 0.0
+        near = abs(order - round(order))
+        if near * MOST > APART:
+            turns = max(turns, math.ceil(APART / near))
+    if done >= turns or (turns + SETTLE) * statistics.steps > STEPS * done:
+        return None
+    rings = tuple(f"{b.prefix}{ring}." for b in solution.manifest.bearings for ring in ("inner", "outer"))
+    wanted = [name for name in solution.outputs if name.startswith(rings) and name.endswith(("x", "y"))]
+    return model.simulate(
+        SETTLE + turns,
+        parameters=solution.parameters,
+        method=statistics.method,
+        rtol=statistics.rtol,
+        kinks=cast("Kinks | None", statistics.kinks),
+        outputs=[name for name in wanted if name not in solution.states],
+        initial=solution.end,
+        transient=solution.t[-1] / length + SETTLE,
+    )
