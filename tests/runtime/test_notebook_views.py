@@ -126,6 +126,23 @@ def test_reports_give_html_that_parses_and_escapes(
     check_html(reports[name], words, with_title=with_title)
 
 
+@pytest.mark.long
+def test_reports_are_pandas_tables(reports: dict[str, Any]) -> None:
+    life, trade = reports["LifeReport"], reports["Trade"]
+    many, derivatives = reports["EnsembleResult"], reports["SensitivityReport"]
+    lives = life.to_pandas()
+    assert lives.loc[("", "", "sectors"), "life"] == life.bearings[0].lives["sectors"]
+    assert lives.index[lives["governs"]].tolist() == [("", "", life.bearings[0].governing)]
+    ways = trade.to_pandas()
+    assert ways["time"].min() == min(one.time for one in trade.measured)
+    assert ways[trade.quantities[0]].tolist() == [one.promised[trade.quantities[0]] for one in trade.measured]
+    assert many.to_pandas().loc[1].tolist() == [8e-6, many["peak_ball_force"][1]]
+    assert many.to_pandas().attrs["units"] == {CLEARANCE: "m", "peak_ball_force": "N"}
+    (row,) = derivatives.to_pandas().itertuples()
+    assert row.Index == ("peak_ball_force", CLEARANCE)
+    assert (row.derivative, row.verdict) == (derivatives.pairs[0].derivative, "verified")
+
+
 def test_equations_are_mathml_with_every_formula_of_the_page(shown: dict[str, Any]) -> None:
     """No `$` is left for a notebook to typeset, which some do with a script of the network and some not at all."""
     page = ET.fromstring(shown["System"]._repr_html_())

@@ -11,12 +11,16 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.ratings.life import MILLION, hours
 from ballpass.runtime.ratings.wear import COEFFICIENTS
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
+
+if TYPE_CHECKING:
+    import pandas
 
 #: Beside the reading that gives the shortest life.
 GOVERNS = "  <- governs"
@@ -203,6 +207,34 @@ class LifeReport:
             plain["governing"] = life.governing
         found["wear_coefficients"] = list(COEFFICIENTS)
         return found
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Table indexed by ``state``, ``bearing`` and ``reading``: lives in turns and hours, loads, SI.
+
+        A bearing without rating life has a row of its own, without a reading.
+
+        Raises
+        ------
+        RequestError
+            pandas is not installed.
+        """
+        rows = [
+            {
+                "state": state.name,
+                "bearing": bearing.name,
+                "reading": reading,
+                "life": turns,
+                "hours": bearing.hours(turns),
+                "governs": reading != "" and reading == bearing.governing,
+                "peak_force": bearing.peak_force,
+                "static_safety": bearing.static_safety,
+                "peak_pressure": max(bearing.inner.peak_pressure, bearing.outer.peak_pressure),
+            }
+            for state in self.states
+            for bearing in state.bearings
+            for reading, turns in (bearing.lives or {"": math.nan}).items()
+        ]
+        return need("pandas").DataFrame(rows).set_index(["state", "bearing", "reading"])
 
     def __str__(self) -> str:
         return "\n".join(line for part in self._parts() for line in _text(part))

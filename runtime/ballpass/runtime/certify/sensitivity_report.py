@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Group
 from rich.markup import escape
@@ -18,9 +18,13 @@ from rich.text import Text
 from ballpass.runtime.certify.certificate import Check, Verdict
 from ballpass.runtime.certify.grazing import Grazing, describe, merge_grazing
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.run.tables import printed, simple_table
 from ballpass.runtime.show import html
+
+if TYPE_CHECKING:
+    import pandas
 
 #: Grazing places that are listed; the JSON has all.
 LISTED = 3
@@ -172,6 +176,30 @@ class SensitivityReport:
     def disagreements(self) -> tuple[Sensitivity, ...]:
         """Pairs whose two routes disagree."""
         return tuple(pair for pair in self.pairs if pair.check.verdict is Verdict.DISAGREES)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Table with a row for each pair, indexed by ``quantity`` and ``parameter``: numbers, units and verdicts.
+
+        Raises
+        ------
+        RequestError
+            pandas is not installed.
+        """
+        rows = [
+            {
+                "quantity": pair.quantity,
+                "parameter": pair.parameter,
+                "value": pair.value,
+                "parameter_value": pair.parameter_value,
+                "derivative": pair.derivative,
+                "unit": pair.unit,
+                "dimensionless": pair.dimensionless,
+                "uncertainty": pair.uncertainty,
+                "verdict": pair.check.verdict.value,
+            }
+            for pair in self.pairs
+        ]
+        return need("pandas").DataFrame(rows).set_index(["quantity", "parameter"])
 
     def to_json(self) -> dict[str, Any]:
         """The report as JSON-ready mapping; numbers that are not finite are null.

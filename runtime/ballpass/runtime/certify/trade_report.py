@@ -8,12 +8,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.certify.whole_run import Way
+from ballpass.runtime.contract.extras import need
 from ballpass.runtime.run.locating import LOCATED
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
+
+if TYPE_CHECKING:
+    import pandas
 
 #: Errors that people ask for [1].
 TARGETS = (0.1, 0.01, 0.001, 0.0001)
@@ -88,6 +92,20 @@ class Trade:
     def error(self, one: Measured, quantity: str | None = None) -> float:
         """95 % point of a quantity's error; of the worst quantity where none is named."""
         return max(one.promised.values()) if quantity is None else one.promised[quantity]
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Table with a row for each way: method, tolerance, kinks, time of a cycle [s], failures, 95 % errors.
+
+        Raises
+        ------
+        RequestError
+            pandas is not installed.
+        """
+        rows = [
+            {**asdict(one.way), "time": one.time, "failures": one.failures, "error": self.error(one), **one.promised}
+            for one in self.measured
+        ]
+        return need("pandas").DataFrame(rows)
 
     def front(self, quantity: str | None = None) -> tuple[Measured, ...]:
         """Ways that no other beats in both error and time, from cheap to accurate."""

@@ -39,6 +39,7 @@ from ballpass.runtime.run.tables import printed, simple_table
 from ballpass.runtime.show import html
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 
@@ -152,6 +153,18 @@ class EnsembleResult(Mapping[str, np.ndarray]):
         coordinates |= {name: ("member", values, facts[name]) for name, values in self.parameters.items()}
         variables = {name: ("member", values, facts[name]) for name, values in self.observables.items()}
         return need("xarray").Dataset(variables, coords=coordinates, attrs={"title": self.manifest.title})
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Table with the index ``member``: varied parameters, then observables; units in ``attrs["units"]``.
+
+        Raises
+        ------
+        RequestError
+            pandas is not installed.
+        """
+        table = need("pandas").DataFrame({**self.parameters, **self.observables}).rename_axis("member")
+        table.attrs["units"] = {name: facts["units"] for name, facts in self.attributes().items()}
+        return table
 
     def attributes(self) -> dict[str, dict[str, str]]:
         """``units`` and ``long_name`` of varied parameters and observables, by name."""
