@@ -67,7 +67,7 @@ for _ in range(60):
 
 found = signal.start * np.exp(logarithms)
 for name, fitted, given in zip(signal.wrt, found, true, strict=True):
-    print(f"{name}: {fitted / given:.3f} of what it is")
+    print(f"{name}: {fitted / given:.3f} of the true value")
 
 # %%
 # What is left of the misfit is the noise.
@@ -79,3 +79,4 @@ right.plot(angles, 1e6 * signal(signal.start), "--", label="scene")
 right.plot(angles, 1e6 * signal(found), label="fitted")
 right.set(xlabel="crank angle [°]", ylabel="inner ring, y [µm]")
 right.legend()
+plt.show()
