@@ -53,6 +53,8 @@ myst_heading_anchors = 3
 
 # words of signatures that name several things, as two classes Statistics: a link to either would do
 suppress_warnings = ["ref.python"]
+nitpicky = True
+nitpick_ignore_regex = [("py:.*", ".*")]  # types of other packages, and of modules without a page
 default_role = "code"  # single backquotes in docstrings are names
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"

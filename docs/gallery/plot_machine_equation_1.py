@@ -17,7 +17,8 @@ from ballpass.runtime import load
 
 system = derive(read_scene("../../scenes/punching_press.toml"))
 equations = system.reactions
-print(len(equations.unknowns), "unknowns:", *equations.unknowns)
+print(len(equations.unknowns), "unknowns:", *equations.unknowns[:5])
+print(*equations.unknowns[5:])
 
 # %%
 # Each row is a balance of a body. Most entries are zero, which is why a closed-form

@@ -15,7 +15,8 @@ from ballpass.derive import generate
 from ballpass.runtime import RequestError, load
 
 model = load(generate("../../scenes/four_bar.toml"))
-print(model.parameters.info("mechanism.bodies.crank.points.B"))
+info = model.parameters.info("mechanism.bodies.crank.points.B")
+print(info.description, info.default, info.unit)
 
 # %%
 # With the crank's length go the forces at its bearing.
@@ -42,4 +43,4 @@ plt.show()
 try:
     model.simulate(cycles=1, parameters={"mechanism.bodies.crank.points.B": 0.08})
 except RequestError as refused:
-    print(str(refused).splitlines()[0])
+    print(str(refused).partition(" (")[0])

@@ -27,7 +27,7 @@ for name, model in models.items():
     along = model.linearize().mass[1, 1] / (2 if name == "two-way" else 1)
     print(
         f"{name}: highest ball force {peak:.0f} N,",
-        f"moving mass along the guide {along:.2f} kg for each bearing",
+        f"moving mass {along:.2f} kg for each bearing",
     )
 
 # %%

@@ -33,7 +33,7 @@ printed = subprocess.run(
     check=True,
 ).stdout
 table = np.genfromtxt(printed.splitlines(), delimiter=",", names=True, deletechars="")
-print(len(table), "rows of", ", ".join(table.dtype.names))
+print(len(table), "rows of", len(table.dtype.names), "columns")
 
 # %%
 # Both give the same motion.

@@ -25,7 +25,9 @@ names = [
     "mechanism.bodies.crank.points.B",
 ]
 report = model.sensitivity("peak_ball_force", names)
-print(report)
+for pair in report.of("peak_ball_force"):
+    verdict = pair.check.verdict.value
+    print(f"{pair.parameter:36} {pair.dimensionless:+.4f} %/%  {verdict}")
 
 # %%
 # Ranked as a tornado chart. Bars to the left are numbers that lower the force as they

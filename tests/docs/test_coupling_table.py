@@ -35,3 +35,9 @@ def test_rows_are_what_runs_give(tmp_path: Path, k: int) -> None:
     found = row(*list(cases())[k], tmp_path)
     assert found.split("|")[:3] == LINES[k].split("|")[:3]
     assert numbers(found) == pytest.approx(numbers(LINES[k]), rel=2e-3)
+
+
+def test_how_low_the_one_way_model_is_follows_from_the_table() -> None:
+    low = [100 * (1 - one_way / two_way) for one_way, two_way in (numbers(line)[:2] for line in LINES)]
+    page = (PAGE.parent / "two_way.md").read_text(encoding="utf-8")
+    assert f"{min(low):.0f} to {max(low):.0f} % low" in page

@@ -1,7 +1,9 @@
 """Every command and every Python block of README and the documentation runs, page by page, and prints what it shows.
 
-The blocks of a page run in its order in a folder with copies of the shipped scenes.  A comment behind an expression
-that begins with a number is what the expression gives, to the printed digits; "refused" is a refusal.
+The blocks of a page run in its order in a folder with copies of the shipped scenes.  Lines under a command are what it
+prints; where one begins with "error:", what it says on stderr as it fails.  A comment that begins with a number or a
+truth value is what the expression before it gives, to the printed digits; "shape (3,)" is its shape, and "refused" a
+refusal.  Gallery pages print their numbers themselves, while the site is built.
 """
 
 from __future__ import annotations
@@ -12,20 +14,24 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 
 from ballpass.derive import generate
+from ballpass.derive.scene.units import looked_up_size
 from ballpass.runtime import BallpassError, load
+from ballpass.runtime.contract.units import unit_size
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
     path.relative_to(ROOT).as_posix()
     for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
-    if "_build" not in path.parts and "adr" not in path.parts
+    if not {"_build", "adr", "auto_gallery", "gallery"} & set(path.parts)
 ]
 #: Commands that are not run here, and why.
 NOT_RUN = {
@@ -33,12 +39,21 @@ NOT_RUN = {
     r"\. \.venv/bin/activate": "the environment is that of the tests",
     r"\S*pip install": "installs",
     r"(python -m pip|pipx) (install|download)|python -m build|rattler-build": "installs; tests/test_package.py does it",
-    r"CC=clang ": "another compiler",
     r"dask (scheduler|worker)": "they do not end",
     r".* --scheduler tcp:": "needs them",
     r"ballpass trade ": "measures for minutes; tests/test_cli_trade.py runs it",
+    r".* --of life_sectors --cycles 6 ": "takes minutes; tests/docs/test_life_table.py holds its numbers",
 }
 BLOCK = re.compile(r"^( *)```(console|python)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
+#: Columns of code that a page of 1280 pixels shows beside its contents.
+COLUMNS = 90
+FENCE = re.compile(r"^ *```([^`\n]*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
+#: Beginnings of blocks that are neither run nor read, and why.
+NOT_READ = {
+    '"6 mm"': "quantities, which a test below reads",
+    "bearing.clearance\n": "names, which a test below looks up",
+    "        y (up)": "a drawing",
+}
 
 Block = tuple[str, str, int]
 
@@ -73,9 +88,12 @@ def run_console(text: str, folder: Path) -> None:
             ("bash", "-c", command.replace(".venv/bin/", "")),
             cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, check=False, timeout=600,
         )  # fmt: skip
-        assert done.returncode == 0, f"{command}\n{done.stderr[-2000:]}"
+        fails = any(line.startswith("error: ") for line in shown)
+        assert (done.returncode == 2) is fails, f"{command}\n{done.stderr[-2000:]}"
+        assert fails or done.returncode == 0, f"{command}\n{done.stderr[-2000:]}"
+        printed = done.stderr if fails else done.stdout
         for line in shown:
-            assert line in done.stdout, f"{command}\nprints\n{done.stdout[-2000:]}"
+            assert line in printed, f"{command}\nprints\n{printed[-2000:]}"
 
 
 def run_python(text: str, names: dict[str, Any]) -> None:
@@ -91,6 +109,10 @@ def run_python(text: str, names: dict[str, Any]) -> None:
                 eval(source, names)
             continue
         value = eval(source, names)
+        if comment.startswith(("True", "False")):
+            assert str(value) == re.match(r"\w+", comment)[0], f"{source} gives {value}"
+        if comment.startswith("shape "):
+            assert str(np.shape(value)) in comment, f"{source} has the shape {np.shape(value)}"
         printed = re.match(r"-?\d[\d.]*(e-?\d+)?(?= |$)", comment)
         if printed:
             digits = len(printed[0].partition("e")[0].replace(".", "").lstrip("-0"))
@@ -113,7 +135,7 @@ def test_blocks_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.Mon
         try:
             if kind == "console":
                 run_console(text, tmp_path)
-            elif "compiler=" not in text:
+            else:
                 run_python(text, names)
         except Exception as fault:
             fault.add_note(f"{page}, block at line {line}")
@@ -146,3 +168,32 @@ def test_python_blocks_import_names_that_there_are() -> None:
                 for node in ast.walk(ast.parse(text)):
                     if isinstance(node, ast.ImportFrom):
                         exec(ast.unparse(node), {})
+
+
+def test_blocks_are_of_kinds_that_are_run_or_read() -> None:
+    for page in PAGES:
+        for kind, text in FENCE.findall((ROOT / page).read_text(encoding="utf-8")):
+            if kind == "toml":
+                tomllib.loads(text)
+            elif kind not in ("console", "python") and not kind.startswith("{"):
+                assert any(text.startswith(begin) for begin in NOT_READ), f"{page}: nobody checks\n{text}"
+
+
+def test_code_of_pages_fits_its_column() -> None:
+    for page in PAGES:
+        if page == "README.md":
+            continue
+        for kind, text, at in blocks(page):
+            lines = text.splitlines()
+            for before, line in zip(["", *lines], lines, strict=False):
+                printed = kind == "console" and text.startswith("$ ") and not (line[:2] == "$ " or before[-1:] == "\\")
+                assert printed or len(line) <= COLUMNS, f"{page}:{at}: {line}"
+
+
+def test_quantities_and_names_of_the_page_on_units_are_read_and_known() -> None:
+    page = (ROOT / "docs/howto/units.md").read_text(encoding="utf-8")
+    quantities, names = (text for kind, text in FENCE.findall(page) if kind == "text")
+    for text in re.findall(r'"(.+?)"', quantities):
+        number, _, unit = text.partition(" ")
+        assert float(number) * unit_size(unit, looked_up_size).rounded > 0.0
+    assert not set(names.split()) - set(load("generated/punching_press").parameters)
