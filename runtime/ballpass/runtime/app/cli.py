@@ -295,25 +295,45 @@ def export(
     c: Annotated[
         bool, typer.Option("--c", help="A C99 program with the model, the stepper, a Makefile and a main.")
     ] = False,
+    fmu: Annotated[
+        bool, typer.Option("--fmu", help="An FMU 3.0 for co-simulation, compiled for this machine.")
+    ] = False,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input", metavar="NAME", help="A load, force or torque that is an input of the FMU; repeatable."
+        ),
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder to write; export/<scene> if not given.")
+        Path | None,
+        typer.Option(metavar="PATH", help="Folder or FMU to write; export/<scene>, export/<scene>.fmu if not given."),
     ] = None,
 ) -> None:
-    """Write a scene as a program that runs without Python: make, and it prints the motion as CSV."""
+    """Write a scene as a program in C or as an FMU, which run without Python."""
     with command(scene) as stages:
-        if not c:
-            raise RequestError("export: no format was given. Allowed: --c, a program in C99.")
+        if c == fmu:
+            given = "both formats were" if c else "no format was"
+            raise RequestError(f"export: {given} given. Allowed: --c, a program in C99, or --fmu, an FMU 3.0.")
+        if inputs and not fmu:
+            raise RequestError("export: --input is for --fmu. Values of the C program are set by its interface.")
         stages("read")
-        folder = out if out is not None else Path("export") / name_of(scene)
-        check_folder(folder)
+        target = out if out is not None else Path("export") / (f"{name_of(scene)}.fmu" if fmu else name_of(scene))
+        check_folder(target.parent if fmu else target)
+        if fmu and target.is_dir():
+            raise RequestError(f"--out {target}: this is a folder. Name the FMU to write, as in export/press.fmu.")
         manifest = read_own(scene, stages, read_artefact, lambda manifest: manifest)
         stages("export")
-        # here, for it brings CasADi
-        from ballpass.runtime.export.c_program import export_c
+        # here, for they bring CasADi
+        if fmu:
+            from ballpass.runtime.export.fmu import export_fmu
 
-        export_c(generated_folder(scene), folder, manifest=manifest)
+            export_fmu(generated_folder(scene), target, inputs=inputs or (), manifest=manifest)
+        else:
+            from ballpass.runtime.export.c_program import export_c
+
+            export_c(generated_folder(scene), target, manifest=manifest)
         warn_of_scene(manifest)
-    typer.echo(str(folder))
+    typer.echo(str(target))
 
 
 for _panel, _commands in {

@@ -102,10 +102,17 @@ static int knots_before(const schedule_input *input, const double *values, doubl
     return before;
 }
 
-/* Value at t, or slope, of the piece that holds at `inside`.  A table over an angle is periodic: its last knot joins the first. */
-static double table(const schedule_input *input, const double *values, double t, double inside)
+/* Piece of a table that holds at a time: places of its knots and heights, twice one where it is flat; where the piece begins and ends; the
+   argument that belongs to t. */
+typedef struct {
+    int left, right, low, high;
+    double begin, end, at;
+} table_piece;
+
+/* A table over an angle is periodic: its last knot joins the first. */
+static table_piece piece_of_table(const schedule_input *input, const double *values, double t, double inside)
 {
-    const int slope_only = input->kind == SCHEDULE_TABLE_RATE, over_angle = input->rate >= 0;
+    const int over_angle = input->rate >= 0;
     double argument = inside, at = t;
     if (over_angle) {
         const double first = values[input->times[0]], rate = values[input->rate];
@@ -115,11 +122,43 @@ static double table(const schedule_input *input, const double *values, double t,
         at = argument + rate * (t - inside);
     }
     const int k = knots_before(input, values, argument), last = k == input->knots;
-    if (!over_angle && (k == 0 || last)) return slope_only ? 0.0 : values[input->heights[k == 0 ? 0 : k - 1]];
-    const double left = values[input->times[k - 1]], right = last ? values[input->times[0]] + TURN : values[input->times[k]];
-    const double low = values[input->heights[k - 1]], high = values[input->heights[last ? 0 : k]];
-    const double slope = (high - low) / (right - left);
-    return slope_only ? slope : low + slope * (at - left);
+    int left = k - 1, right = last ? 0 : k;
+    if (!over_angle && (k == 0 || last)) left = right = k == 0 ? 0 : k - 1;
+    const double end = values[input->times[right]];
+    return (table_piece){input->times[left], input->times[right], input->heights[left], input->heights[right], values[input->times[left]],
+                         last && over_angle ? end + TURN : end, at};
+}
+
+/* Value at t, or slope, of the piece that holds at `inside`. */
+static double table(const schedule_input *input, const double *values, double t, double inside)
+{
+    const table_piece piece = piece_of_table(input, values, t, inside);
+    const int slope_only = input->kind == SCHEDULE_TABLE_RATE;
+    if (piece.low == piece.high) return slope_only ? 0.0 : values[piece.low];
+    const double slope = (values[piece.high] - values[piece.low]) / (piece.end - piece.begin);
+    return slope_only ? slope : values[piece.low] + slope * (piece.at - piece.begin);
+}
+
+/* Its derivative along a direction of the values. */
+static double table_tangent(const schedule_input *input, const double *values, const double *moved, double t, double inside)
+{
+    const table_piece piece = piece_of_table(input, values, t, inside);
+    const int slope_only = input->kind == SCHEDULE_TABLE_RATE;
+    if (piece.low == piece.high) return slope_only ? 0.0 : moved[piece.low];
+    const double length = piece.end - piece.begin, slope = (values[piece.high] - values[piece.low]) / length;
+    const double slope_moved = (moved[piece.high] - moved[piece.low] - slope * (moved[piece.right] - moved[piece.left])) / length;
+    const double at_moved = input->rate >= 0 ? moved[input->offset] + moved[input->rate] * t : 0.0;
+    return slope_only ? slope_moved : moved[piece.low] + slope_moved * (piece.at - piece.begin) + slope * (at_moved - moved[piece.left]);
+}
+
+void schedule_tangents(const schedule_input *inputs, int count, const double *values, const double *moved, double t, double inside, double *ud)
+{
+    for (int i = 0; i < count; i++) {
+        const schedule_input *input = &inputs[i];
+        ud[i] = 0.0;
+        if (input->kind == SCHEDULE_PHASE) ud[i] = moved[input->offset] + moved[input->rate] * t;
+        else if (input->kind == SCHEDULE_TABLE || input->kind == SCHEDULE_TABLE_RATE) ud[i] = table_tangent(input, values, moved, t, inside);
+    }
 }
 
 void schedule_inputs(const schedule_input *inputs, int count, const double *values, double t, double inside, double *u)

@@ -52,6 +52,9 @@ int schedule_moments(const schedule_input *inputs, int count, const double *valu
 /* Inputs for a segment that starts at t; `inside` is a time within it, for which gates and slopes hold. */
 void schedule_inputs(const schedule_input *inputs, int count, const double *values, double t, double inside, double *u);
 
+/* Derivatives of these inputs along a direction of the values, at fixed times; gates have none. */
+void schedule_tangents(const schedule_input *inputs, int count, const double *values, const double *moved, double t, double inside, double *ud);
+
 /* The first table whose knots do not increase, or not within a turn of their angle; -1 where all are right. */
 int schedule_fault(const schedule_input *inputs, int count, const double *values);
 

@@ -38,6 +38,9 @@ from ballpass.runtime.run.locating import has_kinks
 #: What of the compiler's flags makes a shared library, or is overruled.
 _LIBRARY_ONLY = ("-O1", "-fPIC", "-shared")
 
+#: Flags of a library for any processor of a kind.
+LIBRARY_FLAGS = (*FLAGS[:1], *(flag for flag in BASE_FLAGS if flag != "-O1"), *FLAGS[1:], "-fvisibility=hidden")
+
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 
 #: Includes for what a program that only simulates does not do.
@@ -66,13 +69,8 @@ def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None =
     """
     place, target = Path(folder).absolute(), Path(out)
     manifest = read_artefact(place) if manifest is None else manifest
-    if not manifest.states:
-        raise RequestError(
-            f"{manifest.scene}: the model has no states, so there is nothing to integrate in C. Its functions are in "
-            f"{place / 'model.c'}. A scene with a bearing can be exported."
-        )
     # in CasADi's virtual machine: nothing has to be compiled to write C
-    texts = _texts(LoadedModel(place, manifest, None), place)
+    texts = program_texts(LoadedModel(place, manifest, None))
     check_files(place, manifest)  # another process may have written there meanwhile
     target.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".writing-", dir=target) as name:
@@ -84,9 +82,14 @@ def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None =
     return target
 
 
-def _texts(model: LoadedModel, folder: Path) -> dict[str, str]:
-    """Content of the exported files by name."""
-    manifest = model.manifest
+def program_texts(model: LoadedModel) -> dict[str, str]:
+    """Content of the exported files by name; errors as for `export_c`."""
+    manifest, folder = model.manifest, model.folder
+    if not manifest.states:
+        raise RequestError(
+            f"{manifest.scene}: the model has no states, so there is nothing to integrate in C. Its functions are in "
+            f"{folder / 'model.c'}. A scene with a bearing can be exported."
+        )
     texts = {
         "scene.h": scene_header(manifest),
         "scene.c": scene_source(manifest),

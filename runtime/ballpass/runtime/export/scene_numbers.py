@@ -182,7 +182,7 @@ def constants_source(model: LoadedModel) -> str:
         body = "{\n    (void)p;\n    (void)c;\n}"
         return f'{NOTE}\n#include "scene.h"\n\nvoid scene_constants(const double *p, double *c)\n{body}\n'
     given = (("const double *p", "p"),)
-    return _behind("The derived constants", model.symbolic("constants"), "scene_constants", given, "c")
+    return behind("The derived constants", model.symbolic("constants"), "scene_constants", given, "c")
 
 
 def outputs_source(model: LoadedModel) -> str:
@@ -192,7 +192,7 @@ def outputs_source(model: LoadedModel) -> str:
         body = "{\n    (void)t;\n    (void)x;\n    (void)u;\n    (void)p;\n    (void)c;\n    (void)y;\n}"
         given = "double t, const double *x, const double *u, const double *p, const double *c, double *y"
         return f'{NOTE}\n#include "scene.h"\n\nvoid scene_outputs({given})\n{body}\n'
-    return _behind("The outputs", outputs_function(model), "scene_outputs", MOMENT, "y")
+    return behind("The outputs", outputs_function(model), "scene_outputs", MOMENT, "y")
 
 
 def outputs_function(model: LoadedModel) -> casadi.Function:
@@ -207,7 +207,7 @@ def outputs_function(model: LoadedModel) -> casadi.Function:
 def margins_source(model: LoadedModel) -> str:
     """C of ``assembly``, in the same way."""
     given = (("double t", "&t"), ("const double *u", "u"), ("const double *p", "p"), ("const double *c", "c"))
-    return _behind("The linkage's margins", model.symbolic("assembly"), "scene_margins", given, "margins")
+    return behind("The linkage's margins", model.symbolic("assembly"), "scene_margins", given, "margins")
 
 
 #: What functions of a moment are given: declarations, and the addresses of the numbers.
@@ -220,19 +220,21 @@ MOMENT = (
 )
 
 
-def _behind(what: str, function: casadi.Function, name: str, given: Sequence[tuple[str, str]], result: str) -> str:
+def behind(what: str, function: casadi.Function, name: str, given: Sequence[tuple[str, str]], result: str) -> str:
     """C of a function as CasADi writes it, behind a function `name` with the project's signature.
 
     Parameters
     ----------
-    given : declarations of what the function is given, and their addresses
+    given : declarations of what the function is given, named as the arguments of CasADi's function, and their addresses
     result : name of the array for what it returns
     """
     generator = casadi.CodeGenerator(f"{function.name()}.c", {"with_header": False, "with_export": False})
     generator.add(function)
     # C has no arrays of length zero
     sizes = [max(size, 1) for size in (function.sz_arg(), function.sz_res(), function.sz_iw(), function.sz_w())]
-    arguments = "\n".join(f"    arguments[{k}] = {address};" for k, (_, address) in enumerate(given))
+    addresses = {declaration.rpartition(" ")[2].lstrip("*"): address for declaration, address in given}
+    # a function that does not depend on time has no such argument
+    arguments = "\n".join(f"    arguments[{k}] = {addresses[name]};" for k, name in enumerate(function.name_in()))
     return filled(
         STANDALONE / "casadi_function.c.in",
         WHAT=what,

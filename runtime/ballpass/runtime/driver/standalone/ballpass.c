@@ -317,6 +317,8 @@ int ballpass_check_bounds(ballpass *s)
     return told(s, BALLPASS_REFUSED);
 }
 
+void ballpass_stop(ballpass *s) { s->run.started = 0; }
+
 void ballpass_put(ballpass *s, int place, double value) { s->run.values[place] = value; }
 
 /* Values; derived constants; tables; the linkage. */
@@ -482,12 +484,19 @@ static long segment_here(const ballpass *s)
     return i;
 }
 
-double ballpass_moment(const ballpass *s, double *u)
+double ballpass_segment(const ballpass *s, double *middle)
 {
     const long i = segment_here(s);
-    const double start = s->edges[i];
+    *middle = 0.5 * (s->edges[i] + s->edges[i + 1]);
+    return s->edges[i];
+}
+
+double ballpass_moment(const ballpass *s, double *u)
+{
+    double middle;
+    const double start = ballpass_segment(s, &middle);
     u[0] = 0.0;
-    schedule_inputs(scene_inputs, SCENE_INPUTS, s->run.values, start, 0.5 * (start + s->edges[i + 1]), u);
+    schedule_inputs(scene_inputs, SCENE_INPUTS, s->run.values, start, middle, u);
     return s->run.time - start;
 }
 

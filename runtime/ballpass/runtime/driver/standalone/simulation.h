@@ -16,6 +16,12 @@ const double *ballpass_states(const ballpass *simulation);
 double ballpass_time(const ballpass *simulation);
 int ballpass_started(const ballpass *simulation);
 
+/* Ends the run: any parameter may be set again. */
+void ballpass_stop(ballpass *simulation);
+
+/* Begin of the segment at the time reached, and its middle [s]. */
+double ballpass_segment(const ballpass *simulation, double *middle);
+
 /* Inputs u that hold at the time reached; returns the time since the one they belong to [s]. */
 double ballpass_moment(const ballpass *simulation, double *u);
 

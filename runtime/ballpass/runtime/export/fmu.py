@@ -1,0 +1,252 @@
+"""From a generated folder to an FMU 3.0 for co-simulation, which runs without Python.
+
+In: a generated folder, names of parameters that become inputs.  Out: a file ``.fmu``: the library compiled for this
+machine, its sources, ``modelDescription.xml`` (`ballpass.runtime.export.model_description`), a page and the licences.
+
+The FMU is the exported program (`ballpass.runtime.export.c_program`) as a library, with ``driver/fmi/fmi.c`` over its
+interface ``ballpass.h``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import html
+import os
+import platform
+import re
+import sys
+import tempfile
+import uuid
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from xml.etree import ElementTree as Xml
+
+import casadi
+
+from ballpass.runtime.contract import DRIVER_ACCELERATION, Manifest, read_artefact
+from ballpass.runtime.contract.errors import CompileError, RequestError
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts
+from ballpass.runtime.export.model_description import build_description, model_description
+from ballpass.runtime.export.scene_numbers import (
+    MOMENT,
+    NOTE,
+    behind,
+    computed_outputs,
+    outputs_function,
+    varying,
+)
+from ballpass.runtime.native.compilers import find_compiler, run_compiler
+from ballpass.runtime.native.driver_library import DRIVER
+from ballpass.runtime.native.loaded_model import LoadedModel
+
+#: C of the interface, the standard's headers, and the licence of both.
+FMI = DRIVER / "fmi"
+
+#: Of the program: what an FMU does not need.
+_PROGRAM_ONLY = ("main.c", "example.c", "Makefile", "README.md")
+
+#: Time that files of the archive carry, so that the same scene gives the same bytes.
+_DATE = (1980, 1, 1, 0, 0, 0)
+
+
+def export_fmu(
+    folder: str | Path, out: str | Path, *, inputs: Sequence[str] = (), manifest: Manifest | None = None
+) -> Path:
+    """Write the FMU of a generated folder.
+
+    Parameters
+    ----------
+    folder : what `ballpass derive` wrote
+    out : file to write; replaced if it is there
+    inputs : parameters that become inputs, or what their names begin with: ``"mechanism.forces.punch"``
+    manifest : of the folder, where it was read before: the numbers are its own then
+
+    Returns
+    -------
+    The file written.
+
+    Raises
+    ------
+    ArtefactError, RequestError
+        As for `ballpass.runtime.export.c_program.export_c`; a name that cannot be an input.
+    CompileError
+        There is no compiler, or it failed.
+    """
+    place, target = Path(folder).absolute(), Path(out)
+    manifest = read_artefact(place) if manifest is None else manifest
+    chosen = input_names(manifest, inputs)
+    model = LoadedModel(place, manifest, None)
+    sources = {name: text for name, text in program_texts(model).items() if name not in _PROGRAM_ONLY}
+    sources |= _interface(model)
+    token = _token(manifest, chosen, sources)
+    sources["fmu.h"] = _fmu_header(manifest, token)
+    identifier = model_identifier(manifest)
+    files = {
+        "modelDescription.xml": _xml(model_description(manifest, identifier, token, chosen)),
+        "sources/buildDescription.xml": _xml(build_description(identifier, sources)),
+        **{f"sources/{name}": text.encode() for name, text in sources.items()},
+        "documentation/index.html": _page(manifest, chosen).encode(),
+        "documentation/licenses/license.txt": (FMI / "license.txt").read_bytes(),
+        f"binaries/{platform_tuple()}/{identifier}{_SUFFIX}": _compiled(sources, identifier),
+    }
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".writing-", dir=target.parent) as name:
+        made = Path(name) / target.name
+        with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+            for path in sorted(files):
+                archive.writestr(zipfile.ZipInfo(path, _DATE), files[path], zipfile.ZIP_DEFLATED)
+        os.replace(made, target)
+    return target
+
+
+def input_names(manifest: Manifest, asked: Sequence[str]) -> tuple[str, ...]:
+    """Parameters that become inputs, in the scene's order.
+
+    Raises
+    ------
+    RequestError
+        A name that is none, or of a number that cannot change in a run.
+    """
+    able, chosen = varying(manifest), set[str]()
+    for name in asked:
+        found = [known for known in able if known == name or known.startswith(f"{name}.")]
+        if found:
+            chosen.update(found)
+        elif any(info.name == name or info.name.startswith(f"{name}.") for info in manifest.parameters):
+            why = "it does not change in a run; set it as a parameter before"
+            if name in ("mechanism.driver", "mechanism.driver.speed"):
+                why = (
+                    "it is the speed at t = 0 alone; a torque drives"
+                    if manifest.mechanism is not None and manifest.mechanism.angle
+                    else "a driver at constant speed has no acceleration that a change of it would need; drive it by a "
+                    'torque, [mechanism.driver.torque] law = "constant", and make that an input'
+                )
+            allowed = f"Allowed: {', '.join(able)}." if able else "This scene has no number that can be an input."
+            raise RequestError(f"input {name!r}: {why}. {allowed}")
+        else:
+            raise RequestError(unknown_name("input", name, able))
+    return tuple(name for name in able if name in chosen)
+
+
+def model_identifier(manifest: Manifest) -> str:
+    """The scene's name as a C identifier."""
+    name = re.sub(r"\W", "_", manifest.scene, flags=re.ASCII)
+    return f"_{name}" if name[:1].isdigit() else name or "scene"
+
+
+def platform_tuple() -> str:
+    """Folder of the binaries for this machine, as the standard names it."""
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
+    return f"{machine}-{ {'Linux': 'linux', 'Darwin': 'darwin', 'Windows': 'windows'}[platform.system()] }"
+
+
+_SUFFIX = {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
+
+
+def _interface(model: LoadedModel) -> dict[str, str]:
+    """Sources of the interface: those that are the same for all scenes, and derivatives of this one."""
+    texts = {path.name: path.read_text(encoding="utf-8") for path in sorted(FMI.glob("*.[ch]"))}
+    constants, moved = _tangents(model)
+    along = tuple((f"const double *d{name}", f"d{name}") for name in "txupc")
+    own = (("const double *p", "p"), ("const double *dp", "dp"))
+    if model.manifest.constants:
+        text = behind("Derivatives of the derived constants", constants, "scene_constants_tangent", own, "dc")
+    else:
+        unused = "".join(f"    (void){name};\n" for name in ("p", "dp", "dc"))
+        given = "const double *p, const double *dp, double *dc"
+        text = f"{NOTE}\nvoid scene_constants_tangent({given})\n{{\n{unused}}}\n"
+    return texts | {
+        "rates.c": behind("The states' derivatives", model.symbolic("rhs"), "scene_rates", MOMENT, "rates"),
+        "constants_tangent.c": text,
+        "tangent.c": behind("Derivatives of rates and outputs", moved, "scene_tangent", MOMENT + along, "moved"),
+    }
+
+
+def _tangents(model: LoadedModel) -> tuple[casadi.Function, casadi.Function]:
+    """Directional derivatives of the derived constants over p, and of rates and outputs over t, x, u, p, c."""
+    manifest = model.manifest
+    sizes = {"t": 1, "x": len(manifest.states), "u": len(manifest.inputs)}
+    sizes |= {"p": len(manifest.parameters), "c": len(manifest.constants)}
+    moment = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
+    functions = [model.symbolic("rhs"), *([outputs_function(model)] if computed_outputs(manifest) else ())]
+    results = [function(*(moment[name] for name in function.name_in())) for function in functions]
+    constants = model.symbolic("constants")(moment["p"])
+    return _tangent("constants_tangent", {"p": moment["p"]}, constants), _tangent(
+        "tangent", moment, casadi.vertcat(*(casadi.densify(result) for result in results))
+    )
+
+
+def _tangent(name: str, arguments: Mapping[str, casadi.SX], value: casadi.SX) -> casadi.Function:
+    directions = {f"d{name}": casadi.SX.sym(f"d{name}", argument.numel()) for name, argument in arguments.items()}
+    moved = casadi.jtimes(value, casadi.vertcat(*arguments.values()), casadi.vertcat(*directions.values()))
+    both = {**arguments, **directions}
+    return casadi.Function(name, [*both.values()], [casadi.cse(casadi.densify(moved))], [*both], ["moved"])
+
+
+def _token(manifest: Manifest, inputs: Sequence[str], sources: Mapping[str, str]) -> str:
+    digest = hashlib.sha256(repr((manifest.signature, inputs, sorted(sources.items()))).encode()).hexdigest()
+    return f"{{{uuid.UUID(digest[:32])}}}"
+
+
+def _fmu_header(manifest: Manifest, token: str) -> str:
+    first, ends = 0, []
+    for info in computed_outputs(manifest):
+        first += info.size
+        ends.append(first)
+    # the state of a driver whose speed is given over time belongs to t = 0
+    given = any(item.name == DRIVER_ACCELERATION for item in manifest.inputs)
+    return (
+        f"{NOTE}\n#ifndef FMU_H\n#define FMU_H\n\n"
+        f'#define FMU_TOKEN "{token}"\n\n'
+        f"enum {{ FMU_OUTPUTS = {len(ends)}, FMU_STARTS_AT_ZERO = {int(given)} }};\n\n"
+        "/* Where the numbers of each output begin, and those of the last end. */\n"
+        f"static const int fmu_outputs[] = {{{', '.join(map(str, (0, *ends)))}}};\n\n#endif\n"
+    )
+
+
+def _compiled(sources: Mapping[str, str], identifier: str) -> bytes:
+    """The shared library, for any processor of this machine's kind."""
+    compiler = find_compiler()
+    if compiler is None:
+        raise CompileError(
+            "An FMU holds compiled code, and no C compiler was found ($CC, cc, gcc, clang, ziglang). Install gcc or "
+            "clang, or a compiler from PyPI: `pip install ziglang`."
+        )
+    names = sorted(name for name in sources if name.endswith(".c"))
+    own = ("-Wl,-Bsymbolic",) if sys.platform == "linux" else ()
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        for name, text in sources.items():
+            (place / name).write_text(text, encoding="utf-8", newline="\n")
+        made = f"{identifier}{_SUFFIX}"
+        command = (*compiler.command, *LIBRARY_FLAGS, *names, *own, "-o", made, "-lm")
+        run_compiler(command, place, " ".join(command))
+        return (place / made).read_bytes()
+
+
+def _xml(root: Xml.Element) -> bytes:
+    Xml.indent(root)
+    return bytes(Xml.tostring(root, encoding="UTF-8", xml_declaration=True)) + b"\n"
+
+
+def _page(manifest: Manifest, inputs: Sequence[str]) -> str:
+    """What the FMU is, for people."""
+
+    def rows(names: Sequence[tuple[str, str, str]]) -> str:
+        cells = ("".join(f"<td>{html.escape(text)}</td>" for text in row) for row in names)
+        return "<table>\n" + "".join(f"<tr>{row}</tr>\n" for row in cells) + "</table>"
+
+    parameters = [(info.name, info.unit, info.description) for info in manifest.parameters]
+    outputs = [(info.name, info.unit, info.description) for info in manifest.outputs]
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{html.escape(manifest.title)}</title>'
+        f"</head>\n<body>\n<h1>{html.escape(manifest.title)}</h1>\n"
+        "<p>Co-simulation by FMI 3.0, written by ballpass. All numbers are SI. Steps are chosen by an error control "
+        "relative to the magnitudes of the run from start to stop time: give both, and the tolerance. How often "
+        "the importer steps does not change the motion, unless an input changes; inputs hold until the next step.</p>\n"
+        f"<h2>Inputs</h2>\n{rows([row for row in parameters if row[0] in inputs])}\n"
+        f"<h2>Outputs</h2>\n{rows(outputs)}\n"
+        f"<h2>Parameters</h2>\n{rows([row for row in parameters if row[0] not in inputs])}\n</body>\n</html>\n"
+    )

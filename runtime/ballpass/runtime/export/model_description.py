@@ -1,0 +1,197 @@
+"""What an FMU says of itself: ``modelDescription.xml`` and ``buildDescription.xml`` of FMI 3.0.
+
+In: a manifest, the names of its inputs.  Out: trees of XML.  Value references are those of ``driver/fmi/fmi.c``: 0 is
+the time; then parameters, states, derivatives of states, outputs that are no states, in the scene's order.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+import re
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from xml.etree import ElementTree as Xml
+
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.export.c_program import LIBRARY_FLAGS
+from ballpass.runtime.export.scene_numbers import computed_outputs, varying
+
+#: Units as products of powers of the base units.
+_UNITS = {
+    **{name: {name: 1} for name in ("m", "kg", "s", "rad")},
+    "1": {},
+    "Hz": {"s": -1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "J": {"kg": 1, "m": 2, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3},
+}
+
+#: A name of the standard's structured naming convention.
+_STRUCTURED = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
+
+
+def model_description(manifest: Manifest, identifier: str, token: str, inputs: Sequence[str]) -> Xml.Element:
+    """Tree of ``modelDescription.xml``.
+
+    Parameters
+    ----------
+    identifier : C identifier that names the library
+    token : instantiation token
+    inputs : parameters that are inputs
+    """
+    parameters = {info.name: info for info in manifest.parameters}
+    names = [*parameters, *(info.name for info in manifest.outputs), *(info.name for info in manifest.states)]
+    structured = all(_STRUCTURED.fullmatch(name) for name in names)
+    root = Xml.Element(
+        "fmiModelDescription",
+        fmiVersion="3.0",
+        modelName=manifest.title or manifest.scene,
+        instantiationToken=token,
+        description=f"Scene {manifest.scene}",
+        generationTool=f"ballpass {_version()}",
+        variableNamingConvention="structured" if structured else "flat",
+    )
+    Xml.SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=identifier,
+        canGetAndSetFMUState="true",
+        canSerializeFMUState="true",
+        canHandleVariableCommunicationStepSize="true",
+        providesDirectionalDerivatives="true",
+        maxOutputDerivativeOrder="1",
+        mightReturnEarlyFromDoStep="true",
+        providesIntermediateUpdate="false",
+        hasEventMode="false",
+    )
+    _units(root, manifest)
+    categories = Xml.SubElement(root, "LogCategories")
+    Xml.SubElement(categories, "Category", name="logStatusError", description="Why a call has failed")
+    duration, step = _experiment(manifest, {name: info.default for name, info in parameters.items()})
+    rtol = repr(manifest.run.rtol)
+    Xml.SubElement(
+        root, "DefaultExperiment", startTime="0", stopTime=repr(duration), tolerance=rtol, stepSize=repr(step)
+    )
+    _variables(root, manifest, inputs)
+    return root
+
+
+def _version() -> str:
+    return importlib.metadata.version("ballpass")
+
+
+def _units(root: Xml.Element, manifest: Manifest) -> None:
+    variables = (*manifest.states, *manifest.outputs)
+    names = {*(info.unit for info in manifest.parameters), *(info.unit for info in variables)}
+    names |= {_rate_unit(info.unit) for info in manifest.states}
+    place = Xml.SubElement(root, "UnitDefinitions")
+    for name in sorted({*names, "s"} - {"", "1"}):
+        unit = Xml.SubElement(place, "Unit", name=name)
+        powers = base_powers(name)
+        if powers is not None:
+            Xml.SubElement(unit, "BaseUnit", {base: str(power) for base, power in powers.items() if power})
+
+
+def base_powers(unit: str) -> dict[str, int] | None:
+    """Powers of the base units in a unit such as ``N*s/m``; None where one is no whole number."""
+    powers: dict[str, Fraction] = {}
+    for sign, factor, power in re.findall(r"(^|[*/])\(?([A-Za-z1]+)(?:\^(-?[\d.]+))?", unit):
+        if factor not in _UNITS:
+            return None
+        times = Fraction(power or "1") * (-1 if sign == "/" else 1)
+        for base, exponent in _UNITS[factor].items():
+            powers[base] = powers.get(base, Fraction(0)) + exponent * times
+    if "(" in unit or any(power.denominator != 1 for power in powers.values()):
+        return None
+    return {base: int(power) for base, power in powers.items()}
+
+
+def _rate_unit(unit: str) -> str:
+    """Unit of the derivative of a state."""
+    return f"{unit}^2" if unit.endswith("/s") else f"{unit}/s"
+
+
+def _experiment(manifest: Manifest, values: dict[str, float]) -> tuple[float, float]:
+    """Length of the scene's run, and time between its samples [s]."""
+    run, speed = manifest.run, None
+    if manifest.mechanism is not None:
+        speed = values.get(manifest.mechanism.speed)
+    elif manifest.bearing is not None:
+        speed = values.get(manifest.bearing.ring_speed)
+    turn = 2.0 * math.pi / abs(speed) if speed else math.inf
+    duration = run.duration if run.cycles is None else run.cycles * turn
+    if duration is None or not math.isfinite(duration):
+        return 1.0, 1.0 / run.samples_per_cycle
+    return duration, (turn if math.isfinite(turn) else duration) / run.samples_per_cycle
+
+
+def _variables(root: Xml.Element, manifest: Manifest, inputs: Sequence[str]) -> None:
+    """Variables, and which of them are outputs, derivatives, and unknown at the start."""
+    place, structure = Xml.SubElement(root, "ModelVariables"), Xml.SubElement(root, "ModelStructure")
+    reference = 0
+
+    def add(name: str, unit: str, description: str, **attributes: str) -> Xml.Element:
+        nonlocal reference
+        given = {"name": name, "valueReference": str(reference), "description": description, **attributes}
+        if unit not in ("", "1"):
+            given["unit"] = unit
+        reference += 1
+        return Xml.SubElement(place, "Float64", {key: value for key, value in given.items() if value})
+
+    add("time", "s", "Time", causality="independent", variability="continuous")
+    changing = varying(manifest)
+    for info in manifest.parameters:
+        start = repr(info.default)
+        if info.name in inputs:
+            add(info.name, info.unit, info.description, causality="input", variability="continuous", start=start)
+        else:
+            tunable = "tunable" if info.name in changing else "fixed"
+            bounds = {"min": info.least, "max": info.most}
+            limits = {key: repr(value) for key, value in bounds.items() if value is not None}
+            add(
+                *(info.name, info.unit, info.description),
+                **{"causality": "parameter", "variability": tunable, "start": start, **limits},
+            )
+    calculated = {"variability": "continuous", "initial": "calculated"}
+    outputs, unknown, rates = [], [], []
+    wanted = {info.name for info in manifest.outputs}
+    first_state = reference
+    for state in manifest.states:
+        causality = "output" if state.name in wanted else "local"
+        if state.name in wanted:
+            outputs.append(reference)
+        unknown.append(reference)
+        add(state.name, state.unit, state.description, causality=causality, **calculated)
+    for k, state in enumerate(manifest.states):
+        rates.append(reference)
+        unit, description = _rate_unit(state.unit), f"Derivative of {state.name}"
+        add(f"der({state.name})", unit, description, causality="local", **calculated, derivative=str(first_state + k))
+    for output in computed_outputs(manifest):
+        outputs.append(reference)
+        unknown.append(reference)
+        variable = add(output.name, output.unit, output.description, causality="output", **calculated)
+        if output.size > 1:
+            Xml.SubElement(variable, "Dimension", start=str(output.size))
+    for kind, references in (("Output", outputs), ("ContinuousStateDerivative", rates)):
+        _references(structure, kind, references)
+    _references(structure, "InitialUnknown", sorted([*unknown, *rates]))
+
+
+def _references(structure: Xml.Element, kind: str, references: Iterable[int]) -> None:
+    for reference in references:
+        Xml.SubElement(structure, kind, valueReference=str(reference))
+
+
+def build_description(identifier: str, sources: Iterable[str]) -> Xml.Element:
+    """Tree of ``sources/buildDescription.xml``."""
+    root = Xml.Element("fmiBuildDescription", fmiVersion="3.0")
+    build = Xml.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
+    flags = " ".join(flag for flag in LIBRARY_FLAGS if flag not in ("-fPIC", "-shared", "-std=c99"))
+    files = Xml.SubElement(build, "SourceFileSet", language="C99", compiler="gcc", compilerOptions=flags)
+    for name in sorted(sources):
+        if name.endswith(".c"):
+            Xml.SubElement(files, "SourceFile", name=name)
+    Xml.SubElement(build, "Library", name="m")
+    return root
