@@ -184,6 +184,14 @@ class SensitivityReport:
         ------
         RequestError
             pandas is not installed.
+
+        Examples
+        --------
+        >>> report = model.sensitivity("rms:inner.y", "bearing.clearance", cycles=0.5, transient=0, check=False)
+        >>> report.to_pandas().shape
+        (1, 7)
+        >>> list(report.to_pandas().columns[:4])
+        ['value', 'parameter_value', 'derivative', 'unit']
         """
         rows = [
             {

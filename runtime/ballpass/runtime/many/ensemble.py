@@ -161,6 +161,12 @@ class EnsembleResult(Mapping[str, np.ndarray]):
         ------
         RequestError
             pandas is not installed.
+
+        Examples
+        --------
+        >>> many = model.simulate_many({"bearing.clearance": [5e-6, 10e-6]}, "rms:inner.y", cycles=3)
+        >>> many.to_pandas().shape, many.to_pandas().attrs["units"]
+        ((2, 2), {'bearing.clearance': 'm', 'rms:inner.y': 'm'})
         """
         table = need("pandas").DataFrame({**self.parameters, **self.observables}).rename_axis("member")
         table.attrs["units"] = {name: facts["units"] for name, facts in self.attributes().items()}
