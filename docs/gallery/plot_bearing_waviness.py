@@ -1,6 +1,6 @@
 """
-Which waves are heard
-=====================
+Which waves move the ring
+=========================
 
 Waves on the inner raceway of a bearing with Z balls move the ring as a whole only where
 their number is k Z ± 1. Other numbers of waves cancel around the balls.
@@ -40,12 +40,12 @@ motion = 1e9 * np.asarray(found["range:inner.y"]) / 2
 
 # %%
 # Eight balls: 7 and 9.
-heard = [
+moving = [
     n
     for n, amplitude in zip(orders, motion, strict=True)
     if amplitude > 0.1 * motion.max()
 ]
-print("heard:", *heard)
+print("these move the ring:", *moving)
 
 figure, axes = plt.subplots(figsize=(8, 3.4), layout="constrained")
 axes.bar(orders, motion)
@@ -53,6 +53,6 @@ axes.set_xticks(orders)
 axes.set(
     xlabel="waves on the inner raceway",
     ylabel="motion of the ring [nm]",
-    title="Eight balls hear 7 and 9 waves",
+    title="Seven and nine waves move a ring on eight balls",
 )
 plt.show()

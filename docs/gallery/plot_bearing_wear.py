@@ -1,6 +1,6 @@
 """
-Where the raceways suffer
-=========================
+Damage and wear of the raceways
+===============================
 
 The punch acts at one crank angle, so that one place of the inner ring meets it in every
 turn. The outer ring stands still and takes the load at its top, where the crank pushes
