@@ -91,6 +91,7 @@ def test_what_cannot_be_drawn_is_told(rotor: Model, solution: Solution) -> None:
         (lambda: solution.plot("inner.z"), "inner.z"),
         (lambda: solution.plot.spectrum("ball.force"), "one value at a time"),
         (lambda: solution.plot.orbit(bearing="left"), "left"),
+        (lambda: solution.plot.orbit(relative=True), r"no inner.x, inner.y, outer.x"),
         (bare.plot.ball_loads, "simulate"),
     ):
         with pytest.raises(RequestError, match=words):

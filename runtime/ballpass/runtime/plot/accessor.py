@@ -98,13 +98,17 @@ class SolutionPlot:
                 axes.legend(fontsize="small")
         return axes
 
-    def orbit(self, *, bearing: str | None = None, ax: Axes | None = None) -> Axes:
+    def orbit(self, *, relative: bool = False, bearing: str | None = None, ax: Axes | None = None) -> Axes:
         """Path of the inner ring's centre: the last turn dark, the steady turns before it light.
+
+        Parameters
+        ----------
+        relative : to an elastic outer ring, which is what the balls feel; a circle shows half the clearance
 
         Raises
         ------
         RequestError
-            The run has no displacements of the ring.
+            The run has no displacements of the rings.
 
         Examples
         --------
@@ -112,9 +116,10 @@ class SolutionPlot:
         """
         from ballpass.runtime.plot.motion import draw_orbit  # with matplotlib
 
-        record = self._record(bearing, "inner.x", "inner.y")
+        rings = ("inner", "outer") if relative else ("inner",)
+        record = self._record(bearing, *(f"{ring}.{axis}" for ring in rings for axis in "xy"))
         with _axes(ax) as axes:
-            draw_orbit(axes, record)
+            draw_orbit(axes, record, relative=relative)
         return axes
 
     def spectrum(self, name: str | None = None, *, window: Window = "hann", ax: Axes | None = None) -> Axes:
