@@ -55,6 +55,7 @@ NAMED: dict[str, dict[str, str]] = {
         "3 to 12 turns behind the transient": "a number of the campaign",
         '"1 % on peak_ball_force: ... ms a cycle (stepper-rodas4, rtol 0.01)"': "the form of a sentence",
     },
+    "docs/howto/fmu.md": {"co-simulation by FMI 3,": "the standard's version"},
     "docs/howto/animate.md": {
         "about 260 kB": "a size",
         "up to 1000 a turn": "a limit of the code",

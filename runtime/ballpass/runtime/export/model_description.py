@@ -6,7 +6,6 @@ the time; then parameters, states, derivatives of states, outputs that are no st
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -14,6 +13,7 @@ from fractions import Fraction
 from xml.etree import ElementTree as Xml
 
 from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS
 from ballpass.runtime.export.scene_numbers import computed_outputs, varying
 
@@ -50,7 +50,7 @@ def model_description(manifest: Manifest, identifier: str, token: str, inputs: S
         modelName=manifest.title or manifest.scene,
         instantiationToken=token,
         description=f"Scene {manifest.scene}",
-        generationTool=f"ballpass {_version()}",
+        generationTool=f"ballpass {__version__}",
         variableNamingConvention="structured" if structured else "flat",
     )
     Xml.SubElement(
@@ -76,10 +76,6 @@ def model_description(manifest: Manifest, identifier: str, token: str, inputs: S
     )
     _variables(root, manifest, inputs)
     return root
-
-
-def _version() -> str:
-    return importlib.metadata.version("ballpass")
 
 
 def _units(root: Xml.Element, manifest: Manifest) -> None:
