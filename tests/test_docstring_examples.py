@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import doctest
 import inspect
+import re
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +23,27 @@ import ballpass.derive
 import ballpass.runtime
 from ballpass.runtime import Model
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.plot.accessor import SolutionPlot
 
 ROOT = Path(__file__).resolve().parent.parent
-#: Names by `__all__`, but for errors and warnings, and what is reached by an attribute.
+REFERENCE = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+#: Of packages that not every installation has.
+WRAPPERS = ("ballpass.jax", "ballpass.torch")
+#: Names by `__all__`, but for errors and warnings; and names of the reference.
 PUBLIC = {
     name: found
     for package in (ballpass.runtime, ballpass.derive)
     for name in package.__all__
     if not (inspect.isclass(found := getattr(package, name)) and issubclass(found, BaseException))
-} | {"SolutionPlot": SolutionPlot}
+}
+PUBLIC |= {
+    name: getattr(import_module(module), name)
+    for module, name in re.findall(
+        r"auto(?:function|class):: (ballpass\.(?:derive|runtime)\S*)\.(\w+)$", REFERENCE, re.M
+    )
+}
 #: What other modules call, though its name has no underscore.
 INTERNAL = {
+    "Accuracy.plain",
     "EnsembleResult.attributes",
     "Parameters.table_html",
     "QuantityFunction.arguments",
@@ -67,7 +78,7 @@ def names(make_model: Callable[..., Model], tmp_path_factory: pytest.TempPathFac
         model = make_model("punching_press")
         done = CliRunner().invoke(app, ["run", "scenes/punching_press.toml", "--no-figures"])
         assert done.exit_code == 0, done.output
-        yield {"np": np, "model": model, **PUBLIC}
+        yield {"Path": Path, "np": np, "model": model, **PUBLIC}
 
 
 @pytest.fixture
@@ -90,7 +101,8 @@ def test_public_names_have_examples_that_run(run: Callable[[str, Any], None], na
     run(name, found)
 
 
-@pytest.mark.parametrize("package", ["jax", "torch"])
-def test_examples_of_wrappers_run(run: Callable[[str, Any], None], package: str) -> None:
+@pytest.mark.parametrize("wrapper", WRAPPERS)
+def test_examples_of_wrappers_run(run: Callable[[str, Any], None], wrapper: str) -> None:
+    package = wrapper.rpartition(".")[2]
     pytest.importorskip(package, reason=f"not installed: pip install ballpass[{package}]")
-    run(f"ballpass.{package}.wrap", getattr(__import__(f"ballpass.{package}"), package).wrap)
+    run(f"{wrapper}.wrap", import_module(wrapper).wrap)

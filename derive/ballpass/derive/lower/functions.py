@@ -75,6 +75,12 @@ def lower(
     ----------
     derivatives : whether `Functions.jacobians` are wanted
     extra : further functions, name -> output name -> expression over the system's symbols (used to check derivations)
+
+    Examples
+    --------
+    >>> functions = lower(derive(read_scene("scenes/rotor.toml")))
+    >>> functions["rhs"].name_in()  # of CasADi
+    ['t', 'x', 'u', 'p', 'c']
     """
     return _Lowering(system).functions(extra or {}, derivatives=derivatives)
 

@@ -42,6 +42,12 @@ class RingStrength(ShortRepr):
     worst_angle : place of the most damage [rad]
     wear : depth a second at the deepest place, for the least and the most of `COEFFICIENTS` [m/s]
     wear_angle, wear_across : that place, around the ring [rad] and from the middle of the groove [m]
+
+    Examples
+    --------
+    >>> (bearing,) = model.life(cycles=4, transient=2).bearings
+    >>> f"{bearing.inner.peak_pressure / 1e9:.1f} GPa", f"{bearing.inner.major_axis * 1e3:.1f} mm"
+    ('4.3 GPa', '2.2 mm')
     """
 
     peak_pressure: float
@@ -76,6 +82,12 @@ class BearingStrength(ShortRepr):
     lives : L_10r of ISO 16281 by reading [turns]; empty where there is none
     viscosity_ratio, contamination : κ and e_C [1], None where the scene does not give them
     factor, modified_life : a_ISO [1] and L_nmr [turns] of the governing reading, likewise
+
+    Examples
+    --------
+    >>> (bearing,) = model.life(cycles=4, transient=2).bearings
+    >>> bearing.governing, f"{bearing.static_safety:.1f}", sorted(bearing.lives)
+    ('sectors', '0.9', ['mean', 'miner', 'sectors'])
     """
 
     name: str
@@ -112,7 +124,14 @@ class BearingStrength(ShortRepr):
         return self.lives[self.governing] if self.lives else None
 
     def hours(self, turns: float) -> float:
-        """Hours that so many turns take."""
+        """Hours that so many turns take.
+
+        Examples
+        --------
+        >>> (bearing,) = model.life(cycles=4, transient=2).bearings
+        >>> f"{bearing.hours(1e6):.0f} h for a million turns"
+        '33 h for a million turns'
+        """
         return float(hours(turns, abs(self.speed)))
 
 
@@ -128,6 +147,12 @@ class StateStrength(ShortRepr):
     change : of the life or peak that the second half of them moved most, relative to itself [1]
     settled : whether that counts as none
     samples : steady samples that wear and the equivalent load of ISO 281 are means of
+
+    Examples
+    --------
+    >>> (state,) = model.life(cycles=4, transient=2).states  # no duty cycle
+    >>> state.share, state.turns
+    (1.0, 2.0)
     """
 
     name: str
@@ -150,6 +175,15 @@ class DutyLife(ShortRepr):
     modified_hours, modified_turns : of L_nmr; None where a state has none
     damage : share of each state, by the governing reading [1]
     why_no_life : reason why there is none; empty where there is one
+
+    Examples
+    --------
+    >>> idle = {"mechanism": {"forces": {"punch": {"force": {"y": "0 N"}}}}}
+    >>> duty = {"punching": {"share": 0.6}, "idling": {"share": 0.4, "set": idle}}
+    >>> folder = generate(read_scene("scenes/punching_press.toml", changes={"duty": duty}), "generated/duty")
+    >>> (life,) = load(folder).life(cycles=4, transient=2).duty
+    >>> {name: f"{share:.0%}" for name, share in life.damage.items()}
+    {'punching': '100%', 'idling': '0%'}
     """
 
     name: str
@@ -175,6 +209,12 @@ class LifeReport:
     scene, title : of the model
     states : of the duty cycle, one for a scene without
     duty : life of each bearing over the cycle; empty for a scene without
+
+    Examples
+    --------
+    >>> report = model.life(cycles=4, transient=2)
+    >>> report.scene, [f"{bearing.life / 1e6:.0f} million turns" for bearing in report.bearings]
+    ('punching_press', ['225 million turns'])
     """
 
     scene: str
@@ -197,7 +237,13 @@ class LifeReport:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data, SI; what is infinite becomes None."""
+        """Plain data, SI; what is infinite becomes None.
+
+        Examples
+        --------
+        >>> sorted(model.life(cycles=4, transient=2).to_json())
+        ['duty', 'scene', 'states', 'title', 'wear_coefficients']
+        """
         found: dict[str, Any] = _finite(asdict(self))
         for state, plain in zip(self.states, found["states"], strict=True):
             for bearing, entry in zip(state.bearings, plain["bearings"], strict=True):
@@ -217,6 +263,12 @@ class LifeReport:
         ------
         RequestError
             pandas is not installed.
+
+        Examples
+        --------
+        >>> table = model.life(cycles=4, transient=2).to_pandas()
+        >>> list(table.index.names), list(table.columns[:3])
+        (['state', 'bearing', 'reading'], ['life', 'hours', 'governs'])
         """
         rows = [
             {

@@ -141,6 +141,12 @@ def checked_jacobian(
     ------
     RequestError
         Unknown names.
+
+    Examples
+    --------
+    >>> found = checked_jacobian(model, model.numbers(), "drive_torque", "mechanism.driver.speed", t=0.01, x=None)
+    >>> f"{found.value.item():.3g}", found.checks[0][0].verdict.value
+    ('-0.0425', 'verified')
     """
     parts = rows_of(model, of)
     directions = directions_of(model, numbers, wrt, t)

@@ -215,8 +215,6 @@ class SolutionPlot:
         Examples
         --------
         >>> moving = model.simulate(cycles=3, transient=1).plot.animate(turns=0.5)
-        >>> moving.save("press.html").name
-        'press.html'
         """
         if self._solution.model is None:
             raise RequestError(
@@ -249,7 +247,13 @@ class SolutionPlot:
 
 
 class Animation:
-    """A run in motion.  A notebook shows the page that `save` writes, with its slider, in a frame of its own."""
+    """A run in motion.  A notebook shows the page that `save` writes, with its slider, in a frame of its own.
+
+    Examples
+    --------
+    >>> model.simulate(cycles=3, transient=1).plot.animate(turns=0.5)
+    Animation(punching_press, 0.5 turns; save(path) writes it)
+    """
 
     def __init__(self, model: PointModel, solution: Solution, turns: float) -> None:
         self._run, self._turns = (model, solution), turns
@@ -262,7 +266,14 @@ class Animation:
         return html.framed_page(self._page)
 
     def save(self, path: str | Path, *, pictures: int | None = None) -> Path:
-        """Write a page, ``.html``, or a movie of so many pictures, ``.gif`` or ``.mp4``; see `write_animation`."""
+        """Write a page, ``.html``, or a movie of so many pictures, ``.gif`` or ``.mp4``; see `write_animation`.
+
+        Examples
+        --------
+        >>> moving = model.simulate(cycles=3, transient=1).plot.animate(turns=0.5)
+        >>> moving.save("press.html").name
+        'press.html'
+        """
         return write_animation(*self._run, path, turns=self._turns, pictures=pictures)
 
 

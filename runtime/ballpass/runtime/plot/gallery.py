@@ -75,6 +75,10 @@ def draw(name: str, model: PointModel, solution: Solution) -> Figure:
     ------
     RequestError
         There is no such figure, or the run lacks the outputs or the whole turn it needs.
+
+    Examples
+    --------
+    >>> figure = draw("orbit", model, model.simulate(cycles=3))  # of matplotlib
     """
     kinds = {kind.name: kind for kind in FIGURES}
     if name not in kinds:
@@ -109,6 +113,12 @@ def draw_all(
     Returns
     -------
     files written, in the order of `FIGURES`; the captions last
+
+    Examples
+    --------
+    >>> written = draw_all(model, model.simulate(cycles=3, outputs=["inner.x", "inner.y"]), Path("figures"))
+    >>> written[-1].name
+    'figures.md'
     """
 
     def figures() -> Iterator[tuple[str, Figure]]:

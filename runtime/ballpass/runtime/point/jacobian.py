@@ -269,6 +269,14 @@ def output_tangents(
     ------
     RequestError
         Unknown names, no direction given, shapes that do not fit.
+
+    Examples
+    --------
+    >>> times, states = np.zeros(3), np.zeros((3, 8))
+    >>> directions = np.zeros((3, 8, 2))  # two of them
+    >>> u = model.inputs_at(0.0)
+    >>> output_tangents(model, model.numbers(), "ball.force", t=times, x=states, u=u, dx=directions).shape
+    (3, 8, 2)
     """
     count, given = len(t), [d for d in (dx, du, dp, dc, dt) if d is not None]
     if not given:

@@ -38,6 +38,12 @@ class Sparsity:
     shape : rows and columns of the matrix
     starts : shape (columns + 1,)
     rows : row of each entry, shape (entries,)
+
+    Examples
+    --------
+    >>> pattern = model.jacobian_function("rhs", "states").sparsity
+    >>> pattern.shape, len(pattern.rows), len(pattern.starts)
+    ((8, 8), 36, 9)
     """
 
     shape: tuple[int, int]

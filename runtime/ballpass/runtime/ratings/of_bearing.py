@@ -18,7 +18,14 @@ from ballpass.runtime.ratings.life import ball_ratings
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ratings:
-    """C_r, C_0r, C_u, and Q_ci, Q_ce of a ball at inner and outer ring [N]; `given` names those the scene gives."""
+    """C_r, C_0r, C_u, and Q_ci, Q_ce of a ball at inner and outer ring [N]; `given` names those the scene gives.
+
+    Examples
+    --------
+    >>> ratings = ratings_of(model.manifest.bearings[0], model.numbers().values)
+    >>> f"{ratings.static / 1e3:.2f} kN", ratings.given
+    ('6.59 kN', ())
+    """
 
     dynamic: Any
     static: Any
@@ -37,6 +44,11 @@ def ratings_of(bearing: BearingInfo, values: Mapping[str, Any]) -> Ratings:
     Parameters
     ----------
     values : parameters by name [SI]
+
+    Examples
+    --------
+    >>> f"{ratings_of(model.manifest.bearings[0], model.numbers().values).dynamic / 1e3:.2f} kN"
+    '12.79 kN'
     """
     ball, pitch = values[f"{bearing.path}.ball_diameter"], values[f"{bearing.path}.pitch_diameter"]
     inner, outer = _grooves(bearing, values)

@@ -25,6 +25,12 @@ class Accuracy(ShortRepr):
     tried : words for the ways that were integrated before and did not meet the target, with their estimates
     time : of the chosen integration [s]
     check_time : of all others [s]
+
+    Examples
+    --------
+    >>> accuracy = model.simulate(cycles=3, error=1e-2).accuracy
+    >>> accuracy.estimate < accuracy.target, accuracy.of
+    (True, ('peak_ball_force', 'rms_inner_x', 'rms_inner_y', 'range_inner_x', 'range_inner_y'))
     """
 
     target: float
