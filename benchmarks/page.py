@@ -8,10 +8,10 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from ballpass.runtime.plot.style import MANY, new_figure, save, styled
 from benchmarks.work_precision import LEVELS, curve, time_at
 
 Result = Mapping[str, Any]
-MARKERS = "osv^<>Dx*"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -50,7 +50,7 @@ def _work_precision(result: Result, images: Path) -> list[str]:
     lines = ["## Work and precision"]
     for key, case in result.items():
         curves = {label: curve(contender) for label, contender in case["contenders"].items()}
-        _figure(images / f"bench_{key}.png", case, curves)
+        save(_figure(case, curves), images / f"bench_{key}.png")
         base = [time_at(curves["stepper"], level) for level in LEVELS]
         rows = []
         for label, points in curves.items():
@@ -79,24 +79,24 @@ def _work_precision(result: Result, images: Path) -> list[str]:
     return lines
 
 
-def _figure(path: Path, case: Result, curves: Mapping[str, Sequence[tuple[float, float]]]) -> None:
+@styled
+def _figure(case: Result, curves: Mapping[str, Sequence[tuple[float, float]]]) -> Figure:
     """Time against error; of each library the best of its methods at every error."""
-    figure = Figure(figsize=(8.0, 4.6), dpi=150, layout="constrained")
+    figure = new_figure(4.6)
     axes = figure.subplots()
     groups = dict.fromkeys(contender["group"] for contender in case["contenders"].values())
-    for marker, group in zip(MARKERS, groups, strict=False):
+    for look, group in zip(MANY, groups, strict=False):
         some = [curves[label] for label, contender in case["contenders"].items() if contender["group"] == group]
         errors = sorted({error for points in some for error, _ in points}, reverse=True)
         best = [min(t for t in (time_at(points, e) for points in some) if t is not None) for e in errors]
         width = 2.4 if group == "ballpass" else 1.2
-        axes.loglog(errors, [1e3 * t for t in best], marker=marker, markersize=4, linewidth=width, label=group)
+        axes.loglog(errors, [1e3 * t for t in best], markersize=4, linewidth=width, label=group, **look)
     axes.set(
         xlabel="largest relative error of motion, peak force and rms", ylabel="time of a cycle [ms]", xlim=(1e-1, 1e-9)
     )
     axes.set_title(f"One cycle of the press, damping {case['words']}")
-    axes.grid(alpha=0.3)
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.savefig(path, metadata={"Software": None})
+    return figure
 
 
 def _coupling(result: Result, _: Path) -> list[str]:

@@ -231,14 +231,14 @@ def test_colours_of_a_map_grow_in_luminance_by_equal_steps() -> None:
 
 def test_a_map_without_change_or_with_gaps_is_drawn_and_one_without_values_refused() -> None:
     axes = [
-        VariedAxis(path="a", unit="um", values=np.array([1.0, 2.0, 4.0]), logarithmic=True),
-        VariedAxis(path="b", unit="N", values=np.array([5.0, 3.0]), logarithmic=False),
+        VariedAxis(path="a", words="first", unit="um", values=np.array([1.0, 2.0, 4.0]), logarithmic=True),
+        VariedAxis(path="b", words="second", unit="N", values=np.array([5.0, 3.0]), logarithmic=False),
     ]
     values = np.arange(6.0).reshape(3, 2)
     values[1, 1] = np.nan
-    figure = draw_sweep("t", axes, "q", "N", values, "")
+    figure = draw_sweep("t", axes, "q", "quantity", "N", values, "")
     crosses = [line for line in figure.axes[0].lines if line.get_color() == GREY]
     assert [tuple(line.get_xydata()[0]) for line in crosses] == [(2.0, 3.0)]
-    draw_sweep("t", axes, "q", "N", np.ones((3, 2)), "").canvas.draw()
+    draw_sweep("t", axes, "q", "quantity", "N", np.ones((3, 2)), "").canvas.draw()
     with pytest.raises(RequestError, match="nothing to draw"):
-        draw_sweep("t", axes, "q", "N", np.full((3, 2), np.nan), "")
+        draw_sweep("t", axes, "q", "quantity", "N", np.full((3, 2), np.nan), "")

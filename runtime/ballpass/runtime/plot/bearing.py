@@ -71,8 +71,10 @@ def draw_bearing(axes: Axes, record: Record, sample: int, samples: Sequence[int]
             write(axes, place, _newton(load), fontsize=8, color="#212529")
     _draw_load(axes, record, sample, shown, inner, 0.92 * (inner_raceway - wall))
     reach = outer_raceway + wall + 0.85 * ball
+    factor_words = f"clearance and displacement between the rings ×{factor:g}"
+    write(axes, np.array([0.0, -1.04 * reach]), factor_words, fontsize=8, color="#495057", va="top")
     axes.set_xlim(-reach, reach)
-    axes.set_ylim(-reach, reach)
+    axes.set_ylim(-1.12 * reach, reach)
     axes.set_aspect("equal")
     axes.axis("off")
     assert axes.figure is not None  # the axes were made by a figure

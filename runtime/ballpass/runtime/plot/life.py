@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from numpy.typing import NDArray
 
 from ballpass.runtime.ask.life_records import BearingStrength
@@ -20,11 +20,11 @@ from ballpass.runtime.ratings.life import MILLION
 
 Array = NDArray[np.float64]
 
-#: Lines of the readings.
+#: Names and lines of the readings.
 _LOOKS = {
-    "mean": FIRST,
-    "miner": SECOND,
-    "sectors": {"color": SAND, "linestyle": "-", "linewidth": 2.4},
+    "mean": FIRST | {"label": "means over time"},
+    "miner": SECOND | {"label": "damage added up (Miner)"},
+    "sectors": {"color": SAND, "linestyle": "-", "linewidth": 2.4, "label": "every place of the raceways"},
 }
 
 
@@ -40,6 +40,7 @@ def damage(title: str, bearing: BearingStrength) -> Figure:
         panel.bar(width * np.arange(len(share)), share, width=width, color=colour, edgecolor="white", linewidth=0.3)
         panel.set_title(f"{name}: {share.sum():.0f} % of the damage", loc="center", pad=12)
         panel.yaxis.set_major_locator(MaxNLocator(4))
+        panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
         panel.tick_params(labelsize=8)
     words = (
         f"Share of each of {len(bearing.inner.damage)} places in the damage of both raceways [%], by the third power "
@@ -68,7 +69,7 @@ def pressure(title: str, bearing: BearingStrength, crank: Array, found: Array, r
         edges, np.arange(balls + 1) + 0.5, found.T / 1e6, cmap=LUMINANCE.reversed(), rasterized=True
     )
     figure.colorbar(mesh, ax=panel, label="peak pressure [MPa]")
-    panel.set(xlabel="angle of driver or shaft [deg]", ylabel="ball", yticks=range(1, balls + 1))
+    panel.set(xlabel="angle of driver or shaft [°]", ylabel="ball", yticks=range(1, balls + 1))
     panel.grid(visible=False)
     words = (
         f"Peak pressure between each ball and the {ring} ring in the first turn behind the transient; dark is high. "
@@ -106,9 +107,9 @@ def life_of_clearance(
         name, least, most = group
         panel.axvspan(1e6 * least, 1e6 * most, color=PALE, linewidth=0, zorder=0, label=f"clearance {name}")
     for name, values in lives.items():
-        panel.plot(1e6 * clearances, values / MILLION, label=name, **_LOOKS[name])
+        panel.plot(1e6 * clearances, values / MILLION, **_LOOKS[name])
     panel.axvline(1e6 * present, color="#6c757d", linewidth=1.0, linestyle=":")
-    panel.set(xlabel="diametral clearance in operation [µm]", ylabel="L_10r [million turns]")
+    panel.set(xlabel="diametral clearance in operation [µm]", ylabel="rating life $L_{10r}$ [million turns]")
     panel.set_ylim(bottom=0.0)
     panel.legend(loc="best")
     shaded = f" Shaded: group {group[0]} in operation." if group is not None else ""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -44,15 +45,17 @@ def write_movie(
     record = frames.first
     shown = frames.samples.tolist()
     seen = view(record, shown) if record.manifest.mechanism is not None else None
-    with settings():
+    with settings(), TemporaryDirectory(dir=path.parent) as home:
         figure = new_figure(5.8, layout=None)
         FigureCanvasAgg(figure)  # the writers draw with the figure's canvas
-        with writer.saving(figure, str(path), dpi):
+        made = Path(home) / path.name
+        with writer.saving(figure, str(made), dpi):
             for number, sample in enumerate(shown):
                 figure.clear()
                 _draw(figure, record, sample, shown, seen, turning=frames.turning)
                 writer.grab_frame()
                 progress((number + 1) / len(shown))
+        made.replace(path)
     return path
 
 
@@ -62,6 +65,8 @@ class _GifWriter(PillowWriter):
     _frames: list[Image.Image]
 
     def finish(self) -> None:
+        if not self._frames:
+            return  # interrupted before the first one
         palette = Image.new("P", (1, 1))
         palette.putpalette(_palette())
         self._frames = [
@@ -97,10 +102,8 @@ def _draw(figure: Figure, record: Record, sample: int, shown: list[int], seen: V
     upper: Any = [grid[0, 0], grid[0, 1]] if seen is not None and record.can_draw_bearing else [grid[0, :]]
     if seen is not None:
         draw_mechanism(figure.add_subplot(upper[0]), record, sample, seen)
-    words = ""
     if record.can_draw_bearing:
-        factor = draw_bearing(figure.add_subplot(upper[-1]), record, sample, shown)
-        words = f", displacement between the rings ×{factor:g}"
+        draw_bearing(figure.add_subplot(upper[-1]), record, sample, shown)
     axes = figure.add_subplot(grid[1, :])
     degrees = np.degrees(record.crank_angle())
     turned = degrees - 360.0 * np.floor(min(degrees[shown[0]], degrees[shown[-1]]) / 360.0 + 1e-9)
@@ -122,5 +125,5 @@ def _draw(figure: Figure, record: Record, sample: int, shown: list[int], seen: V
     axes.axvline(across[sample], color=SIGNAL, linewidth=1.8)
     now = f"{driver} angle {degrees[sample] % 360.0:.0f}°" if turning else f"t = {1e3 * record.t[sample]:.4g} ms"
     figure.suptitle(record.title(record.manifest.title), x=0.02, y=0.985, ha="left", fontsize=12, fontweight="bold")
-    figure.text(0.98, 0.945, f"{now}{words}", ha="right", va="top", fontsize=9)
+    figure.text(0.98, 0.945, now, ha="right", va="top", fontsize=9)
     figure.subplots_adjust(left=0.11, right=0.97, bottom=0.1, top=0.9, hspace=0.06, wspace=0.05)

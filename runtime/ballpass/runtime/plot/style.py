@@ -6,6 +6,7 @@ Nothing here touches pyplot or leaves matplotlib's settings changed.
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
@@ -52,6 +53,8 @@ _SETTINGS: dict[Any, Any] = {
     "legend.fontsize": 9,
     "hatch.linewidth": 0.7,
     "axes.labelpad": 6.0,
+    "figure.constrained_layout.w_pad": 0.12,
+    "figure.constrained_layout.h_pad": 0.08,
     "svg.hashsalt": "ballpass",
 }
 
@@ -61,6 +64,16 @@ _METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None, "Creator": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
+
+#: Lines of many things on one axes: colours from dark to light, each with a marker and dashes of its own.
+MANY: tuple[dict[str, Any], ...] = tuple(
+    {"color": colour, "marker": marker, "linestyle": dashes}
+    for (colour, dashes), marker in zip(
+        [(colour, dashes) for dashes in ("-", (0, (5, 2))) for colour in (INK, SIGNAL, "#5b8e7d", SAND, GREY)],
+        "osv^<>Dx*P",
+        strict=True,
+    )
+)
 
 P = ParamSpec("P")
 
@@ -126,6 +139,19 @@ def caption(figure: Figure, title: str, text: str) -> None:
 def caption_of(figure: Figure) -> str:
     """What stands below the figure where it is printed; it is no part of the picture."""
     return str(figure.get_label())
+
+
+def label(words: str, unit: str) -> str:
+    """Words and unit of an axis, in lines that fit beside it."""
+    return "\n".join(textwrap.wrap(f"{words} [{unit_words(unit)}]", 44, break_on_hyphens=False))
+
+
+def unit_words(unit: str) -> str:
+    """A unit as it is printed: m/s², N·m, µm."""
+    unit = {"um": "µm", "deg": "°"}.get(unit, unit)
+    for plain, sign in (("*", "·"), ("^2", "²"), ("^3", "³")):
+        unit = unit.replace(plain, sign)
+    return unit
 
 
 def shade_windows(axes: Axes, windows: Iterable[tuple[float, float]], turns: Iterable[int]) -> None:

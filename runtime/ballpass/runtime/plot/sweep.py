@@ -19,7 +19,7 @@ from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import MaxNLocator, NullFormatter, StrMethodFormatter
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, label, new_figure, styled
 
 #: From dark to light, with equal steps of luminance: places are those of the palette's own luminances.
 LUMINANCE = LinearSegmentedColormap.from_list("luminance", [(0.0, INK), (0.43, SIGNAL), (0.82, SAND), (1.0, PALE)])
@@ -38,30 +38,33 @@ class VariedAxis:
     Attributes
     ----------
     path : of the parameter
+    words : what it is
     unit : of the values
     values : increasing or decreasing, shape (points,) [`unit`]
     logarithmic : whether they are spaced so; they are above zero then
     """
 
     path: str
+    words: str
     unit: str
     values: np.ndarray
     logarithmic: bool
 
     @property
     def label(self) -> str:
-        return f"{self.path} [{self.unit}]"
+        return label(self.words, self.unit)
 
 
 @styled
 def draw_sweep(
-    title: str, axes: Sequence[VariedAxis], quantity: str, unit: str, values: np.ndarray, text: str
+    title: str, axes: Sequence[VariedAxis], quantity: str, words: str, unit: str, values: np.ndarray, text: str
 ) -> Figure:
     """Figure of one quantity.
 
     Parameters
     ----------
     title : of the scene
+    quantity, words : its name, and what it is
     axes : one or two varied parameters
     values : of the quantity, shape (points,) or (points of the first, points of the second), NaN where there is none
         [`unit`]
@@ -80,13 +83,14 @@ def draw_sweep(
     panel = figure.add_subplot()
     if len(axes) == 1:
         _line(panel, axes[0], values)
-        panel.set_ylabel(f"{quantity} [{unit}]")
+        panel.set_ylabel(label(words, unit))
     else:
         mesh = _map(panel, axes[0], axes[1], values)
-        figure.colorbar(mesh, ax=panel, label=f"{quantity} [{unit}]", format=StrMethodFormatter("{x:g}"))
+        figure.colorbar(mesh, ax=panel, label=label(words, unit), format=StrMethodFormatter("{x:g}"))
     missing = int(np.count_nonzero(~np.isfinite(values)))
     lost = f" Crosses mark {missing} of {values.size} without a result." if missing else ""
-    caption(figure, f"{title}: {quantity}", f"{values.size} parameter sets. {text}{lost}")
+    varied = " and ".join(one.path for one in axes)
+    caption(figure, f"{title}: {quantity}", f"{values.size} parameter sets over {varied}. {text}{lost}")
     return figure
 
 

@@ -76,7 +76,7 @@ def draw_lines(
     if looks:
         axes.legend(*zip(*looks, strict=True), ncols=min(len(looks), 5), **_ABOVE)
         text += f" Marked: characteristic frequencies and multiples up to {MARKED}."
-    frame(figure, title, text, left=0.9)
+    frame(figure, title, text, left=1.1)
     return figure
 
 

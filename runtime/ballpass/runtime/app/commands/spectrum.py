@@ -290,9 +290,13 @@ def _draw(
     *,
     as_map: bool,
 ) -> tuple[str, Figure]:
+    from ballpass.runtime.plot.style import label, unit_words
     from ballpass.runtime.plot.vibration import draw_lines, draw_spectrogram
 
-    what = f"Envelope of {of}, {band[0]:g} to {band[1]:g} Hz" if band else of
+    infos = (*solution.manifest.states, *solution.manifest.outputs)
+    described = next((info.description for info in infos if info.name == of), of)
+    words = described[:1].lower() + described[1:]
+    what = f"envelope of {of}, {band[0]:g} to {band[1]:g} Hz" if band else of
     title = f"{solution.manifest.title}: {what}"
     if as_map:
         from ballpass.runtime.ask.characteristic import characteristic_lines
@@ -306,7 +310,7 @@ def _draw(
         speed = np.zeros(len(shown.time))
         if orders:
             speed = np.abs(np.interp(shown.time, solution.t, np.gradient(_angle(solution), solution.t))) / (2.0 * np.pi)
-        figure = draw_spectrogram(shown, orders, speed, title=title, unit=unit)
+        figure = draw_spectrogram(shown, orders, speed, title=title, unit=unit_words(unit))
         return "spectrogram", figure
     heads = {"order": "order of the shaft [1]", "Hz": "frequency [Hz]"}
     figure = draw_lines(
@@ -315,7 +319,7 @@ def _draw(
         marks,
         title=title,
         across=heads[found.over],
-        up=f"{scaling} [{found.unit}]",
+        up=label(f"{scaling} of {'the envelope of ' if band else ''}{words}", found.unit),
         text=f"{window} window, lines {found.resolution:.3g}{' Hz' if found.over == 'Hz' else ''} apart.",
     )
     return "spectrum", figure

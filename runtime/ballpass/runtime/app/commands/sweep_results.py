@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 #: Files of a sweep, beside a figure for each quantity.
 TABLE, GRID, REPORT, CAPTIONS = "sweep.csv", "sweep.nc", "sweep.json", "sweep.md"
 
+#: Kinds of quantities as figures call them.
+KINDS = {"max": "highest", "min": "lowest", "peak_time": "time of the highest", "peak_ball": "ball of the highest"}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
@@ -175,15 +178,28 @@ class Sweep:
         from ballpass.runtime.plot.sweep import VariedAxis, draw_sweep
 
         axes = [
-            VariedAxis(path=one.path, unit=one.shown_unit, values=one.shown, logarithmic=one.logarithmic)
+            VariedAxis(
+                path=one.path,
+                words=self._attributes[one.path]["long_name"],
+                unit=one.shown_unit,
+                values=one.shown,
+                logarithmic=one.logarithmic,
+            )
             for one in self.ranges
         ]
         text = f"rtol {self.result.statistics.rtol:g}."
         for name in self.result.observables:
             values, unit = self.shown(name)
             if np.any(np.isfinite(values)):
-                figure = draw_sweep(self.result.manifest.title, axes, name, unit, values, text)
+                figure = draw_sweep(self.result.manifest.title, axes, name, self._words(name), unit, values, text)
                 yield f"sweep_{re.sub(r'[^a-z0-9]+', '_', name)}", figure
+
+    def _words(self, quantity: str) -> str:
+        """What a quantity is: "Position of the centre of the inner ring along y, rms"."""
+        kind, _, channel = self._attributes[quantity]["long_name"].partition(" of ")
+        manifest = self.result.manifest
+        described = {info.name: info.description for info in (*manifest.states, *manifest.outputs)}
+        return f"{described[channel]}, {KINDS.get(kind, kind)}" if channel in described else quantity
 
     def _cell(self, quantity: str, value: float, member: int) -> str:
         """A number with the digits that it has."""
