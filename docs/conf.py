@@ -59,6 +59,7 @@ default_role = "code"  # single backquotes in docstrings are names
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
+autodoc_mock_imports = ["torch"]  # 750 MB for one docstring
 napoleon_numpy_docstring = True
 napoleon_google_docstring = False
 napoleon_use_ivar = True  # attributes of records as a list, not as objects that autodoc lists again
