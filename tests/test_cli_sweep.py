@@ -80,6 +80,20 @@ def test_a_grid_holds_what_single_runs_reduce_to(grid: Path, site: Path) -> None
         assert found["rms:inner.y"].item() == pytest.approx(alone["inner.y"].rms, rel=1e-5)
 
 
+def test_a_generated_folder_gives_the_numbers_of_its_scene_and_says_its_faults(
+    site: Path, sweep: Callable[..., Result]
+) -> None:
+    ranges = ("--vary", f"{LOAD}=100 N:400 N:3:log", "--set", f"{CLEARANCE}=1 um")
+    for source, out in ((SCENE, "by_scene"), (site / "generated" / "varying_compliance", "by_folder")):
+        done = sweep(source, *ranges, "--of", QUANTITIES[0], *SHORT, "--no-figures", "--out", out)
+        assert done.exit_code == 0, done.output
+    assert (site / "by_folder" / "sweep.csv").read_bytes() == (site / "by_scene" / "sweep.csv").read_bytes()
+    wrong = ("bearing.clearence=1 um:2 um:3", f"{CLEARANCE}=1 N:2 N:3", f"{LOAD}=1 N:2 N")
+    done = sweep(site / "generated" / "varying_compliance", *(word for one in wrong for word in ("--vary", one)))
+    assert done.exit_code == 2
+    assert [part in done.stderr for part in ("bearing.clearance", "a length", "no range")] == [True] * 3
+
+
 def test_table_grid_and_report_hold_the_same_numbers_with_units(grid: Path) -> None:
     dataset = xarray.load_dataset(grid / "sweep.nc", engine="h5netcdf")
     report = json.loads((grid / "sweep.json").read_text(encoding="utf-8"))

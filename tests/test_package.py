@@ -129,6 +129,11 @@ def test_wheels_run_from_elsewhere_first_the_runtime_alone_then_the_whole(
     ballpass("run", model.folder, "--cycles", "3", "--transient", "2", "--set", "bearing.clearance=12 um")
     ran = load_solution(work / "results" / model.folder.name / "solution.nc")
     assert np.array_equal(ran.x, model.simulate(cycles=3, transient=2, parameters={"bearing.clearance": 12e-6}).x)
+    vary = ("--vary", "bearing.clearance=5 um:20 um:3", "--of", "peak_ball_force")
+    swept = json.loads(ballpass("sweep", model.folder, *vary, "--cycles", "3", "--transient", "2", "--json"))
+    table = {"bearing.clearance": swept["varied"][0]["values"]}
+    peaks = model.simulate_many(table, ["peak_ball_force"], cycles=3, transient=2)["peak_ball_force"]
+    assert swept["quantities"]["peak_ball_force"]["values"] == peaks.tolist()
     refused = call(programs / "ballpass", "run", ROOT / "scenes" / "rotor.toml")
     assert (refused.returncode, "pip install ballpass" in refused.stderr) == (2, True)
 

@@ -106,12 +106,12 @@ def _overrides_of(manifest: Manifest, settings: list[str]) -> dict[str, float]:
             raise RequestError(f"--set {text}: {unknown_name('parameter', path, units)}")
         if path in found:
             raise RequestError(f"--set {path}: the number is set twice. Allowed: one value. Leave one --set away.")
-        found[path] = _quantity(f"--set {path}", value, units[path])
+        found[path] = read_value(f"--set {path}", value, units[path])
     resolve_parameters(manifest, found)
     return found
 
 
-def _quantity(option: str, text: str, unit: str) -> float:
+def read_value(option: str, text: str, unit: str) -> float:
     """What an option gives [unit]; with the units that pint knows where it is there."""
     from ballpass.runtime.contract.units import QuantityError, parse_quantity
 
@@ -202,7 +202,7 @@ def read_quantity(option: str, text: str | None, unit: str) -> float | None:
     """A finite quantity of an option [unit], None where it was not given."""
     if text is None:
         return None
-    value = _quantity(option, text, unit)
+    value = read_value(option, text, unit)
     if not math.isfinite(value):
         raise RequestError(f"{option}: {text!r} is no finite quantity.")
     return value

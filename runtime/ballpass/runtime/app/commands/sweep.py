@@ -7,12 +7,18 @@ what ran (JSON).
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import faults_of_numbers, read_duration, read_formats, read_with_settings
+from ballpass.runtime.app.commands.asked import (
+    faults_of_numbers,
+    read_asked,
+    read_duration,
+    read_formats,
+    read_with_settings,
+)
 from ballpass.runtime.app.commands.shared import (
     can_draw,
     checked_kinks,
@@ -26,8 +32,13 @@ from ballpass.runtime.app.commands.shared import (
     warn,
 )
 from ballpass.runtime.app.interrupted import say_interrupted
+from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.run.tables import show_tables
+
+if TYPE_CHECKING:
+    from ballpass.derive import Scene
+    from ballpass.runtime.contract import Manifest
 
 #: Members that the terminal shows one by one; of more, the extremes.
 ROWS = 24
@@ -40,7 +51,7 @@ TWINS = 1000
 
 
 def sweep(
-    scene: options.SceneFile,
+    scene: options.SceneOrFolder,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -113,21 +124,27 @@ def sweep(
             )
         if faults:
             raise RequestError("\n".join(faults))
-        read, asked, overrides = read_with_settings(scene, set_, seconds, transient)
-        ranges = read_ranges(asked, vary or [], overrides)
-        if asked.bearing is None:
+        source: Scene | Manifest
+        if scene.is_dir():
+            source, overrides = read_manifest(scene), read_asked(scene, set_, seconds, transient).overrides
+            usual = source.run.method
+        else:
+            read, source, overrides = read_with_settings(scene, set_, seconds, transient)
+            usual = read.run.method
+        ranges = read_ranges(source, vary or [], overrides)
+        if source.bearing is None:
             raise RequestError(
                 "This scene has no bearing: nothing is integrated, and there are no quantities of an ensemble. Add a "
                 "[bearing], or loop over `Model.simulate` in Python."
             )
-        at_kinks = checked_kinks(kinks, method or read.run.method)
+        at_kinks = checked_kinks(kinks, method or usual)
         folder = results_folder(out, scene)
         figures, formats = figures and can_draw(), read_formats(format_)
         varied = grid(ranges)
         count = math.prod(len(one.values) for one in ranges)
         fixed = {path: np.full(count, value) for path, value in overrides.items()}
         with connected(scheduler, workers) as client:
-            model = load_model(scene, stages, method or read.run.method, at_kinks, rtol, overrides=overrides)
+            model = load_model(scene, stages, method or usual, at_kinks, rtol, overrides=overrides)
             _ = model.ensemble_driver  # compiled here, where it is announced
             stages("simulate")
             result = model.simulate_many(
