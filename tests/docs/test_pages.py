@@ -113,6 +113,8 @@ def run_python(text: str, names: dict[str, Any]) -> None:
             assert str(value) == re.match(r"\w+", comment)[0], f"{source} gives {value}"
         if comment.startswith("shape "):
             assert str(np.shape(value)) in comment, f"{source} has the shape {np.shape(value)}"
+        if re.match(r"\(\d+,", comment):
+            assert str(value) == comment, f"{source} gives {value}"
         printed = re.match(r"-?\d[\d.]*(e-?\d+)?(?= |$)", comment)
         if printed:
             digits = len(printed[0].partition("e")[0].replace(".", "").lstrip("-0"))

@@ -105,7 +105,7 @@ NAMED: dict[str, dict[str, str]] = {
 FENCE = re.compile(r"^ *```.*?^ *```$", re.MULTILINE | re.DOTALL)
 #: What is no result: code, formulas, links, names of equations, figures, standards, bearings and versions.
 APART = re.compile(
-    r"`[^`]*`|\$[^$]*\$|\]\([^)]*\)|Eqs?\. \([^)]*\)|Fig\. \d+|item \d+|ISO [\d-]+|\b6\d\d\d\b|Python 3\.\d+"
+    r"`[^`]*`|\$[^$]*\$|\]\([^)]*\)|Eqs?\. \([^)]*\)|Fig\. \d+|item \d+|ISO [\d-]+|\b6\d\d\d\b|Python 3\.\d+|FMI \d\.\d"
 )
 NUMBER = re.compile(r"(?<![\w.])\d+(?: \d{3})*(?:\.\d+)?(?:e-?\d+)?")
 
