@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Group
+from rich.markup import escape
+from rich.table import Table
 
 from ballpass.derive import derive, equations
 from ballpass.derive.lower.functions import lower
@@ -18,6 +24,9 @@ from ballpass.runtime.ask.vibration import diagnosis, spectrogram
 from ballpass.runtime.certify.trade import measure_trade
 from ballpass.runtime.certify.whole_run import Way
 from ballpass.runtime.many.signals import Signals
+from ballpass.runtime.show import html
+
+ROOT = Path(__file__).resolve().parents[2]
 
 #: What must not reach a page as it is.
 ATTACK = '<script>alert("&")</script>'
@@ -25,6 +34,9 @@ ATTACK = '<script>alert("&")</script>'
 WAYS = (Way(method="stepper", rtol=1e-5), Way(method="stepper-rodas4", rtol=1e-3))
 
 CLEARANCE = "bearing.clearance"
+
+#: Symbols of parameters that are letters with an index.
+SYMBOL = re.compile(r"[A-Za-z]_\{?[a-z]+\}?")
 
 
 def titled(model: Model) -> Model:
@@ -83,6 +95,7 @@ def check_html(item: Any, words: str, *, with_title: bool) -> None:
 def test_reprs_are_short(shown: dict[str, Any]) -> None:
     """The system of the press once printed 84 124 characters."""
     check_reprs(shown)
+    assert "frequency=array(" in repr(shown["AmplitudeSpectrum"])
 
 
 @pytest.mark.long
@@ -143,6 +156,24 @@ def test_reports_are_pandas_tables(reports: dict[str, Any]) -> None:
     assert (row.derivative, row.verdict) == (derivatives.pairs[0].derivative, "verified")
 
 
+def test_every_word_of_a_view_is_escaped() -> None:
+    words = f"{ATTACK}\"'[bold]"
+    printed = Table(title=escape(words), caption=escape(words))
+    printed.add_column(escape(words), justify="right")
+    printed.add_row(f"[green]{escape(words)}[/] {escape(words)}")
+    page = ET.fromstring(
+        html.block(
+            html.title(words, words),
+            html.folded(words, html.table([words], [[words]], right=[words])),
+            html.from_terminal(Group(printed, escape(words))),
+            html.framed_page(words),
+        )
+    )
+    text = "".join(page.itertext()) + (next(page.iter("iframe")).get("srcdoc") or "")
+    assert text.count(words) == 12
+    assert [item.text for item in page.iter("span") if item.get("class") == "good"] == [words]
+
+
 def test_equations_are_mathml_with_every_formula_of_the_page(shown: dict[str, Any]) -> None:
     """No `$` is left for a notebook to typeset, which some do with a script of the network and some not at all."""
     page = ET.fromstring(shown["System"]._repr_html_())
@@ -153,6 +184,31 @@ def test_equations_are_mathml_with_every_formula_of_the_page(shown: dict[str, An
     markdown = equations(shown["System"])
     displayed = markdown.count("$$") // 2
     assert len(maths) == displayed + (markdown.count("$") - 4 * displayed) // 2
+    shown_symbols = {"".join(item.itertext()) for item in maths}
+    # D_{pw} is set as a D with the index pw
+    symbols = {re.sub("[_{}]", "", p.latex) for p in shown["System"].parameters if SYMBOL.fullmatch(p.latex)}
+    assert {"Dw", "Dpw", "Pd", "kb", "mei"} <= symbols
+    assert symbols <= shown_symbols
     head = next(item for item in page.iter("details") if "open" in item.attrib)
     assert head[0].text == "Equations of motion, Eq. (2)"
     assert len([item for item in head.iter() if item.tag.endswith("}math")]) == 2  # along x and y
+
+
+@pytest.mark.long
+def test_the_blocks_of_the_page_on_notebooks_run_in_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a kernel of Jupyter, with its backend of matplotlib, which shows a picture for each cell that draws."""
+    nbclient = pytest.importorskip("nbclient", reason="not installed: pip install nbclient ipykernel")
+    nbformat = pytest.importorskip("nbformat", reason="not installed: pip install nbclient ipykernel")
+    page = (ROOT / "docs/howto/notebooks.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    cells = ["import numpy as np", *blocks, "solution.plot.animate()", "derive(scene)"]
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
+    shutil.copytree(ROOT / "scenes", tmp_path / "scenes")
+    monkeypatch.delenv("MPLBACKEND", raising=False)
+    nbclient.NotebookClient(notebook, resources={"metadata": {"path": str(tmp_path)}}, timeout=300).execute()
+    given = [[output.data for output in cell.outputs if "data" in output] for cell in notebook.cells]
+    pictures = [sum("image/png" in data for data in cell) for cell in given]
+    assert pictures[1:5] == [0, 4, 1, 1]  # the model, new axes, axes given, a figure
+    assert "41 parameters" in given[1][-1]["text/html"]
+    assert "srcdoc" in given[-2][-1]["text/html"]
+    assert "<math" in given[-1][-1]["text/html"]
