@@ -17,7 +17,7 @@ from ballpass.runtime.plot import MOVING
 
 
 def animate(
-    scene: options.SceneFile,
+    scene: options.SceneOrFolder,
     format_: Annotated[
         str,
         typer.Option("--format", metavar="KIND", help="html, a page that needs no network and no server; mp4; or gif."),

@@ -42,12 +42,12 @@ _NEVER = (
 def explain(scene: options.SceneFile, set_: options.Settings = None, json_: options.Json = False) -> None:
     """Say what a scene models and which of its lines asked for it, what it does not, the cost of each part, and the
     time scales that decide about the method. Simulates nothing."""
-    from ballpass.derive.features import cost
-
     with command(scene) as stages:
         stages("read")
         read, _, overrides = read_with_settings(scene, set_)
         model = load_model(scene, stages, "erk", overrides=overrides)
+        from ballpass.derive.features import cost
+
         stages("counting operations")
         counted = cost(read)
         stages("looking at time scales")
