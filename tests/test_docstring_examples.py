@@ -53,6 +53,8 @@ INTERNAL = {
     "Reductions.from_facts",
     "SolutionPlot.__call__",
 }
+#: Code of a page at 1280 pixels, and what is code.
+COLUMNS, EXAMPLE = 90, re.compile(r" *(>>>|\.\.\.) ")
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE | doctest.IGNORE_EXCEPTION_DETAIL
 
 
@@ -88,6 +90,8 @@ def run(names: dict[str, Any]) -> Iterator[Callable[[str, Any], None]]:
     def run_examples(name: str, found: Any) -> None:
         runner, told = doctest.DocTestRunner(optionflags=FLAGS, verbose=False), []
         for test in doctest.DocTestFinder(recurse=False).find(found, name, globs=dict(names)):
+            for line in (test.docstring or "").splitlines():
+                assert not EXAMPLE.match(line) or len(line.strip()) <= COLUMNS, f"{name}: {line.strip()}"
             runner.run(test, out=told.append)
         assert runner.summarize(verbose=False).attempted, f"{name}: its docstring has no example (>>>)"
         assert not runner.failures, "".join(told)

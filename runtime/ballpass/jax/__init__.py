@@ -45,7 +45,8 @@ def wrap(function: QuantityFunction) -> Callable[[ArrayLike | Mapping[str, Array
     --------
     >>> import jax, ballpass.jax
     >>> jax.config.update("jax_enable_x64", True)
-    >>> f = ballpass.jax.wrap(QuantityFunction(model, "rms:inner.y", ["bearing.clearance"], cycles=1, transient=0))
+    >>> function = QuantityFunction(model, "rms:inner.y", ["bearing.clearance"], cycles=3)
+    >>> f = ballpass.jax.wrap(function)
     >>> slope = jax.grad(f)({"bearing.clearance": 8e-6})  # [m/m]
     >>> list(slope), slope["bearing.clearance"].dtype
     (['bearing.clearance'], dtype('float64'))

@@ -39,7 +39,8 @@ def wrap(function: QuantityFunction) -> Callable[[torch.Tensor | Mapping[str, to
     Examples
     --------
     >>> import torch, ballpass.torch
-    >>> f = ballpass.torch.wrap(QuantityFunction(model, "rms:inner.y", ["bearing.clearance"], cycles=1, transient=0))
+    >>> function = QuantityFunction(model, "rms:inner.y", ["bearing.clearance"], cycles=3)
+    >>> f = ballpass.torch.wrap(function)
     >>> x = torch.tensor([8e-6], dtype=torch.float64, requires_grad=True)
     >>> f(x).backward()
     >>> x.grad.shape  # [m/m]

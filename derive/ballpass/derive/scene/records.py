@@ -316,7 +316,7 @@ class Scene:
         Examples
         --------
         >>> faster = read_scene("scenes/rotor.toml", changes={"shaft": {"speed": "4000 rpm"}})
-        >>> faster.structure() == read_scene("scenes/rotor.toml").structure()  # numbers change no code
+        >>> faster.structure() == read_scene("scenes/rotor.toml").structure()  # the same code
         True
         """
         return (

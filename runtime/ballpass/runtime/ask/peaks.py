@@ -62,7 +62,8 @@ class Peak:
 
     Examples
     --------
-    >>> peak = model.refine_peak(model.simulate(cycles=1, samples_per_cycle=90), "ball.force")
+    >>> solution = model.simulate(cycles=1, samples_per_cycle=90)
+    >>> peak = model.refine_peak(solution, "ball.force")
     >>> peak.value > peak.sampled, peak.searched
     (True, 'every step')
     """

@@ -144,7 +144,8 @@ def checked_jacobian(
 
     Examples
     --------
-    >>> found = checked_jacobian(model, model.numbers(), "drive_torque", "mechanism.driver.speed", t=0.01, x=None)
+    >>> speed, numbers = "mechanism.driver.speed", model.numbers()
+    >>> found = checked_jacobian(model, numbers, "drive_torque", speed, t=0.01, x=None)
     >>> f"{found.value.item():.3g}", found.checks[0][0].verdict.value
     ('-0.0425', 'verified')
     """

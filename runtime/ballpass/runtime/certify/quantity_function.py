@@ -66,7 +66,8 @@ class QuantityFunction:
     Examples
     --------
     >>> from ballpass.runtime import QuantityFunction
-    >>> f = QuantityFunction(model, ["peak_ball_force", "rms:inner.y"], ["bearing.clearance"], cycles=1, transient=0)
+    >>> of, wrt = ["peak_ball_force", "rms:inner.y"], ["bearing.clearance"]
+    >>> f = QuantityFunction(model, of, wrt, cycles=3)
     >>> f(f.start).shape, f([[5e-6], [10e-6]]).shape
     ((2,), (2, 2))
     >>> f.jacobian(f.start).shape  # [N/m], [m/m]
@@ -132,7 +133,7 @@ class QuantityFunction:
 
         Examples
         --------
-        >>> f = QuantityFunction(model, "rms:inner.y", ["bearing.clearance"], cycles=1, transient=0)
+        >>> f = QuantityFunction(model, "rms:inner.y", ["bearing.clearance"], cycles=3)
         >>> f([[5e-6], [10e-6]]).shape  # [m]
         (2,)
         """
@@ -164,7 +165,7 @@ class QuantityFunction:
 
         Examples
         --------
-        >>> f = QuantityFunction(model, "rms:inner.y", ["bearing.clearance"], cycles=1, transient=0)
+        >>> f = QuantityFunction(model, "rms:inner.y", ["bearing.clearance"], cycles=3)
         >>> f.jacobian([5e-6]).shape  # [m/m]
         (1,)
         """

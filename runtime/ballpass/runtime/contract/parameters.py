@@ -27,8 +27,8 @@ class Parameters(Mapping[str, float]):
 
     Examples
     --------
-    >>> "bearing.clearance" in model.parameters, model.parameters["bearing.clearance"]  # [m]
-    (True, 1e-05)
+    >>> model.parameters["bearing.clearance"], len(model.parameters)  # [m]
+    (1e-05, 41)
     """
 
     __slots__ = ("_infos", "_values")

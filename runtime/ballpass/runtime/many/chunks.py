@@ -51,7 +51,8 @@ class MemberFailure:
 
     Examples
     --------
-    >>> many = model.simulate_many({"mechanism.bodies.slider.mass": [16.0, -1.0]}, "rms:inner.y", cycles=3)
+    >>> table = {"mechanism.bodies.slider.mass": [16.0, -1.0]}  # [kg]
+    >>> many = model.simulate_many(table, "rms:inner.y", cycles=3)
     >>> many.failures[0].member, many.failures[0].message
     (1, 'mechanism.bodies.slider.mass: allowed is a number above 0 [kg], not -1.')
     """

@@ -78,7 +78,8 @@ class SignalClass:
     Examples
     --------
     >>> wide = Distribution(name="uniform", arguments={"loc": 5e-6, "scale": 15e-6})  # [m]
-    >>> SignalClass(label="press", model=model, members=8, parameters={"bearing.clearance": wide}).members
+    >>> vary = {"bearing.clearance": wide}
+    >>> SignalClass(label="press", model=model, members=8, parameters=vary).members
     8
     """
 
@@ -169,8 +170,9 @@ def make_data_set(
 
     Examples
     --------
-    >>> slow = Distribution(name="uniform", arguments={"loc": 30.0, "scale": 20.0})  # [rad/s]
-    >>> press = SignalClass(label="press", model=model, members=3, parameters={"mechanism.driver.speed": slow})
+    >>> slow = Distribution(name="uniform", arguments={"loc": 30.0, "scale": 20.0})
+    >>> vary = {"mechanism.driver.speed": slow}  # [rad/s]
+    >>> press = SignalClass(label="press", model=model, members=3, parameters=vary)
     >>> signals = Signals(outputs=("inner.y",), sample_rate=10e3, duration=0.05)
     >>> report = make_data_set("presses.nc", [press], signals, seed=1)
     >>> report.members, report.made, report.failures

@@ -74,7 +74,8 @@ class Distribution:
 
         Examples
         --------
-        >>> Distribution(name="uniform", arguments={"loc": 5.0, "scale": 10.0}).values(np.array([0.0, 0.5]))
+        >>> clearance = Distribution(name="uniform", arguments={"loc": 5.0, "scale": 10.0})
+        >>> clearance.values(np.array([0.0, 0.5]))
         array([ 5., 10.])
         """
         return np.asarray(self._frozen().ppf(quantiles), dtype=float)

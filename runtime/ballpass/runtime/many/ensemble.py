@@ -61,7 +61,8 @@ class EnsembleStatistics:
 
     Examples
     --------
-    >>> statistics = model.simulate_many({"bearing.clearance": [5e-6, 10e-6]}, "rms:inner.y", cycles=3).statistics
+    >>> table = {"bearing.clearance": [5e-6, 10e-6]}  # [m]
+    >>> statistics = model.simulate_many(table, "rms:inner.y", cycles=3).statistics
     >>> statistics.lanes, statistics.kinks
     (8, 'stepped-over')
     """
@@ -143,7 +144,8 @@ class EnsembleResult(Mapping[str, np.ndarray]):
 
         Examples
         --------
-        >>> many = model.simulate_many({"bearing.clearance": [5e-6, 10e-6]}, "rms:inner.y", cycles=3)
+        >>> table = {"bearing.clearance": [5e-6, 10e-6]}  # [m]
+        >>> many = model.simulate_many(table, "rms:inner.y", cycles=3)
         >>> data = many.to_xarray()
         >>> dict(data.sizes), data["rms:inner.y"].units, data["bearing.clearance"].units
         ({'member': 2}, 'm', 'm')
@@ -164,7 +166,8 @@ class EnsembleResult(Mapping[str, np.ndarray]):
 
         Examples
         --------
-        >>> many = model.simulate_many({"bearing.clearance": [5e-6, 10e-6]}, "rms:inner.y", cycles=3)
+        >>> table = {"bearing.clearance": [5e-6, 10e-6]}  # [m]
+        >>> many = model.simulate_many(table, "rms:inner.y", cycles=3)
         >>> many.to_pandas().shape, many.to_pandas().attrs["units"]
         ((2, 2), {'bearing.clearance': 'm', 'rms:inner.y': 'm'})
         """

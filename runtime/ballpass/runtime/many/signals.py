@@ -48,7 +48,7 @@ class Signals:
 
     Examples
     --------
-    >>> signals = Signals(outputs=("inner.y",), sample_rate=20e3, duration=0.1, snr=30.0)  # [Hz], [s], [dB]
+    >>> signals = Signals(outputs=("inner.y",), sample_rate=20e3, duration=0.1, snr=30.0)
     >>> signals.samples
     2000
     """

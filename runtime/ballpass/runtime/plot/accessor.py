@@ -214,7 +214,7 @@ class SolutionPlot:
 
         Examples
         --------
-        >>> moving = model.simulate(cycles=3, transient=1).plot.animate(turns=0.5)
+        >>> moving = model.simulate(cycles=3, transient=1).plot.animate(turns=0.1)
         """
         if self._solution.model is None:
             raise RequestError(
@@ -251,8 +251,8 @@ class Animation:
 
     Examples
     --------
-    >>> model.simulate(cycles=3, transient=1).plot.animate(turns=0.5)
-    Animation(punching_press, 0.5 turns; save(path) writes it)
+    >>> model.simulate(cycles=3, transient=1).plot.animate(turns=0.1)
+    Animation(punching_press, 0.1 turns; save(path) writes it)
     """
 
     def __init__(self, model: PointModel, solution: Solution, turns: float) -> None:
@@ -270,7 +270,7 @@ class Animation:
 
         Examples
         --------
-        >>> moving = model.simulate(cycles=3, transient=1).plot.animate(turns=0.5)
+        >>> moving = model.simulate(cycles=3, transient=1).plot.animate(turns=0.1)
         >>> moving.save("press.html").name
         'press.html'
         """

@@ -116,7 +116,8 @@ def draw_all(
 
     Examples
     --------
-    >>> written = draw_all(model, model.simulate(cycles=3, outputs=["inner.x", "inner.y"]), Path("figures"))
+    >>> solution = model.simulate(cycles=3, outputs=["inner.x", "inner.y"])
+    >>> written = draw_all(model, solution, Path("figures"))
     >>> written[-1].name
     'figures.md'
     """

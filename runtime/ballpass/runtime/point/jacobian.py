@@ -274,8 +274,11 @@ def output_tangents(
     --------
     >>> times, states = np.zeros(3), np.zeros((3, 8))
     >>> directions = np.zeros((3, 8, 2))  # two of them
-    >>> u = model.inputs_at(0.0)
-    >>> output_tangents(model, model.numbers(), "ball.force", t=times, x=states, u=u, dx=directions).shape
+    >>> numbers, u = model.numbers(), model.inputs_at(0.0)
+    >>> force = output_tangents(
+    ...     model, numbers, "ball.force", t=times, x=states, u=u, dx=directions
+    ... )
+    >>> force.shape  # [N]: samples, balls, directions
     (3, 8, 2)
     """
     count, given = len(t), [d for d in (dx, du, dp, dc, dt) if d is not None]

@@ -54,8 +54,8 @@ class Mode:
     Examples
     --------
     >>> mode = model.linearize(crank_angle=4.2).modes[0]
-    >>> round(mode.natural_frequency), round(mode.damping_ratio, 3), mode.shape.shape  # [Hz], [1]
-    (1064, 0.038, (4,))
+    >>> round(mode.natural_frequency), round(mode.damping_ratio, 3)  # [Hz], [1]
+    (1064, 0.038)
     """
 
     eigenvalue: complex

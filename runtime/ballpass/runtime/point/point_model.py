@@ -78,7 +78,7 @@ class PointModel(LoadedModel):
 
         Examples
         --------
-        >>> model.breakpoints(0.0, model.period()).round(4)  # [s]: the punch presses between two crank angles
+        >>> model.breakpoints(0.0, model.period()).round(4)  # [s]: the punch's window
         array([0.079, 0.089])
         """
         if not (math.isfinite(t0) and math.isfinite(t1) and t0 < t1):
@@ -195,7 +195,8 @@ class PointModel(LoadedModel):
         >>> rest = model.static_equilibrium(crank_angle=4.2)
         >>> model.jacobian("rhs", "states", t=rest.time, x=rest.x).shape
         (8, 8)
-        >>> model.jacobian("ball.force", "bearing.clearance", t=rest.time, x=rest.x).shape  # [N/m]
+        >>> slope = model.jacobian("ball.force", "bearing.clearance", t=rest.time, x=rest.x)
+        >>> slope.shape  # [N/m]
         (8,)
         """
         return jacobian(self, self.numbers(parameters), of, wrt, t=t, x=x)

@@ -47,7 +47,8 @@ def ratings_of(bearing: BearingInfo, values: Mapping[str, Any]) -> Ratings:
 
     Examples
     --------
-    >>> f"{ratings_of(model.manifest.bearings[0], model.numbers().values).dynamic / 1e3:.2f} kN"
+    >>> ratings = ratings_of(model.manifest.bearings[0], model.numbers().values)
+    >>> f"{ratings.dynamic / 1e3:.2f} kN"
     '12.79 kN'
     """
     ball, pitch = values[f"{bearing.path}.ball_diameter"], values[f"{bearing.path}.pitch_diameter"]

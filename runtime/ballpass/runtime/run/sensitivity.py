@@ -49,7 +49,8 @@ class Sensitivities(ShortRepr):
 
         Examples
         --------
-        >>> model.sensitivities("bearing.clearance", cycles=0.5)["inner.y", "bearing.clearance"].shape  # [m/m]
+        >>> slopes = model.sensitivities("bearing.clearance", cycles=0.5)
+        >>> slopes["inner.y", "bearing.clearance"].shape  # [m/m]
         (1001,)
         """
         state, parameter = key
