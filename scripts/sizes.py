@@ -22,7 +22,7 @@ STEPS = {
     "ballpass-runtime[analysis]": "and spectra, natural modes",
     "ballpass-runtime[figures]": "and figures",
     "ballpass": "scenes, equations, all commands",
-    "ballpass[labelled]": "and `to_xarray`",
+    "ballpass[labelled]": "and `to_xarray`, `to_pandas`",
     "ballpass[labelled,scale]": "and data sets, clusters",
     "ballpass[labelled,scale,compiler]": "and a C compiler (Zig's)",
 }
