@@ -23,7 +23,8 @@ SPALL = """
 on = "outer"
 angle = "270 deg"
 chord = "1 mm"
-profile = "path"
+profile = "half-sine"
+depth = "5 um"
 
 [bearing.cage]
 slip = 0.0

@@ -26,10 +26,13 @@ on = "outer"
 angle = "270 deg"
 chord = "1 mm"
 profile = "half-sine"
-depth = "0 um"
+depth = "5 um"
+
+[bearing.cage]
+slip = 0.0
 """
 Path("generated").mkdir(exist_ok=True)
-scene = Path("generated/faulty_rotor.toml")
+scene = Path("generated/spalled_rotor.toml")
 scene.write_text(Path("../../scenes/rotor.toml").read_text() + SPALL)
 model = load(generate(scene))
 
@@ -40,12 +43,18 @@ def between(low, high):
 
 speed = {"shaft.speed": between(250, 370)}  # rad/s
 numbers = {
-    "healthy": {"bearing.clearance": between(2e-6, 8e-6)},
+    "healthy": {
+        "bearing.clearance": between(2e-6, 8e-6),
+        "bearing.defects.spall.depth": 0.0,
+    },
     "spall": {
         "bearing.clearance": between(2e-6, 8e-6),
         "bearing.defects.spall.depth": between(3e-6, 10e-6),
     },
-    "loose": {"bearing.clearance": between(30e-6, 50e-6)},
+    "loose": {
+        "bearing.clearance": between(30e-6, 50e-6),
+        "bearing.defects.spall.depth": 0.0,
+    },
 }
 classes = [
     SignalClass(label=name, model=model, members=20, parameters=speed | own)
