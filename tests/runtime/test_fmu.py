@@ -474,6 +474,32 @@ def test_a_shaft_whose_speed_is_set_turns_on_from_its_angle(exported: Callable[.
 
 
 @pytest.mark.long
+def test_a_driver_whose_speed_is_an_input_goes_the_way_of_its_table(
+    exported: Callable[..., Exported], scene_text: Callable[..., str]
+) -> None:
+    """The speed is linear within a step, so that a table with rows at communication points is the same run."""
+    motor = scene_text("punching_press_motor").partition("[mechanism.driver.torque]")[2]
+    motor = f"[mechanism.driver.torque]{motor.partition('[mechanism.driver.flywheel]')[0]}"
+    table = '{ time = ["0 s", "0.1 s", "0.2 s"], speed = ["490 rpm", "490 rpm", "520 rpm"] }'
+    given = ('speed = "490 rpm" ', f"table = {table} "), (motor, ""), ("cycles = 8 ", 'duration = "0.3 s" ')
+    given = (*given, ("transient_cycles = 4", "transient_cycles = 0"))
+    found = exported("punching_press_motor", ("mechanism.driver.speed",), *given)
+    solution = found.model.simulate(duration=0.3, rtol=1e-9)
+    names = ["driver.angle", "driver.speed", "inner.x", "inner.y"]
+    with found.instance() as one:
+        one.slave.enterInitializationMode(startTime=0.0, stopTime=0.3, tolerance=1e-9)
+        one.slave.exitInitializationMode()
+        for k in range(30):
+            speed = np.interp((k + 1) / 100, [0.1, 0.2], [490.0, 520.0]) * 2.0 * math.pi / 60.0
+            one.set(**{"mechanism.driver.speed": speed})
+            one.slave.doStep(k / 100, (k + 1) / 100 - k / 100)
+        ends = one.get(*names)
+    expected = np.array([solution.outputs[name][-1] for name in names])
+    assert np.allclose(ends[:2], expected[:2], rtol=1e-12)
+    assert np.allclose(ends[2:], expected[2:], rtol=0.0, atol=1e-3 * np.max(np.abs(expected[2:])))
+
+
+@pytest.mark.long
 def test_the_sources_alone_make_the_same_fmu(exported: Callable[..., Exported], tmp_path: Path) -> None:
     """As buildDescription.xml says, and without warnings."""
     found = press(exported)

@@ -301,7 +301,7 @@ def export(
     inputs: Annotated[
         list[str] | None,
         typer.Option(
-            "--input", metavar="NAME", help="A load, force or torque that is an input of the FMU; repeatable."
+            "--input", metavar="NAME", help="A load, force, torque or speed that is an input; repeatable."
         ),
     ] = None,
     out: Annotated[

@@ -24,16 +24,17 @@ from xml.etree import ElementTree as Xml
 
 import casadi
 
-from ballpass.runtime.contract import DRIVER_ACCELERATION, Manifest, read_artefact
+from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import CompileError, RequestError
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts
-from ballpass.runtime.export.model_description import build_description, model_description
+from ballpass.runtime.export.model_description import SPEED, build_description, initial_speed, model_description
 from ballpass.runtime.export.scene_numbers import (
     MOMENT,
     NOTE,
     behind,
     computed_outputs,
+    driven,
     outputs_function,
     varying,
 )
@@ -81,7 +82,7 @@ def export_fmu(
     sources = {name: text for name, text in program_texts(model).items() if name not in _PROGRAM_ONLY}
     sources |= _interface(model)
     token = _token(manifest, chosen, sources)
-    sources["fmu.h"] = _fmu_header(manifest, token)
+    sources["fmu.h"] = _fmu_header(manifest, token, chosen)
     identifier = model_identifier(manifest)
     files = {
         "modelDescription.xml": _xml(model_description(manifest, identifier, token, chosen)),
@@ -109,14 +110,14 @@ def input_names(manifest: Manifest, asked: Sequence[str]) -> tuple[str, ...]:
     RequestError
         A name that is none, or of a number that cannot change in a run.
     """
-    able, chosen = varying(manifest), set[str]()
+    able, chosen = (*varying(manifest), *([SPEED] if driven(manifest) else ())), set[str]()
     for name in asked:
         found = [known for known in able if known == name or known.startswith(f"{name}.")]
         if found:
             chosen.update(found)
         elif any(info.name == name or info.name.startswith(f"{name}.") for info in manifest.parameters):
             why = "it does not change in a run; set it as a parameter before"
-            if name in ("mechanism.driver", "mechanism.driver.speed"):
+            if name in ("mechanism.driver", SPEED):
                 why = (
                     "it is the speed at t = 0 alone; a torque drives"
                     if manifest.mechanism is not None and manifest.mechanism.angle
@@ -190,17 +191,20 @@ def _token(manifest: Manifest, inputs: Sequence[str], sources: Mapping[str, str]
     return f"{{{uuid.UUID(digest[:32])}}}"
 
 
-def _fmu_header(manifest: Manifest, token: str) -> str:
+def _fmu_header(manifest: Manifest, token: str, inputs: Sequence[str]) -> str:
     first, ends = 0, []
     for info in computed_outputs(manifest):
         first += info.size
         ends.append(first)
     # the state of a driver whose speed is given over time belongs to t = 0
-    given = any(item.name == DRIVER_ACCELERATION for item in manifest.inputs)
+    given = driven(manifest) is not None
+    speed = initial_speed(manifest) if SPEED in inputs else 0.0
     return (
         f"{NOTE}\n#ifndef FMU_H\n#define FMU_H\n\n"
         f'#define FMU_TOKEN "{token}"\n\n'
         f"enum {{ FMU_OUTPUTS = {len(ends)}, FMU_STARTS_AT_ZERO = {int(given)} }};\n\n"
+        "/* Whether the driver's speed is an input, and the one it has at first [rad/s]. */\n"
+        f"enum {{ FMU_DRIVEN = {int(SPEED in inputs)} }};\n#define FMU_SPEED {speed!r}\n\n"
         "/* Where the numbers of each output begin, and those of the last end. */\n"
         f"static const int fmu_outputs[] = {{{', '.join(map(str, (0, *ends)))}}};\n\n#endif\n"
     )
@@ -239,6 +243,7 @@ def _page(manifest: Manifest, inputs: Sequence[str]) -> str:
         return "<table>\n" + "".join(f"<tr>{row}</tr>\n" for row in cells) + "</table>"
 
     parameters = [(info.name, info.unit, info.description) for info in manifest.parameters]
+    parameters += [(SPEED, "rad/s", "Speed of the driver")] if SPEED in inputs else []
     outputs = [(info.name, info.unit, info.description) for info in manifest.outputs]
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{html.escape(manifest.title)}</title>'

@@ -1,7 +1,8 @@
 """What an FMU says of itself: ``modelDescription.xml`` and ``buildDescription.xml`` of FMI 3.0.
 
 In: a manifest, the names of its inputs.  Out: trees of XML.  Value references are those of ``driver/fmi/fmi.c``: 0 is
-the time; then parameters, states, derivatives of states, outputs that are no states, in the scene's order.
+the time; then parameters, states, derivatives of states, outputs that are no states, in the scene's order; then the
+driver's speed where it is an input.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS
 from ballpass.runtime.export.scene_numbers import computed_outputs, varying
+
+#: Input that the driver's speed is, where the scene has a table of it.
+SPEED = "mechanism.driver.speed"
 
 #: Units as products of powers of the base units.
 _UNITS = {
@@ -170,9 +174,19 @@ def _variables(root: Xml.Element, manifest: Manifest, inputs: Sequence[str]) -> 
         variable = add(output.name, output.unit, output.description, causality="output", **calculated)
         if output.size > 1:
             Xml.SubElement(variable, "Dimension", start=str(output.size))
+    if SPEED in inputs:
+        start = repr(initial_speed(manifest))
+        text = "Speed of the driver at the end of the coming step"
+        add(SPEED, "rad/s", text, causality="input", variability="continuous", start=start)
     for kind, references in (("Output", outputs), ("ContinuousStateDerivative", rates)):
         _references(structure, kind, references)
     _references(structure, "InitialUnknown", sorted([*unknown, *rates]))
+
+
+def initial_speed(manifest: Manifest) -> float:
+    """Speed of the driver at t = 0, as the scene has it [rad/s]."""
+    assert manifest.mechanism is not None  # it has the driver
+    return next(info.default for info in manifest.parameters if manifest.mechanism.speed == info.name)
 
 
 def _references(structure: Xml.Element, kind: str, references: Iterable[int]) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import casadi
 
-from ballpass.runtime.contract import InputInfo, Manifest, MarginInfo, VariableInfo
+from ballpass.runtime.contract import DRIVER_ACCELERATION, InputInfo, Manifest, MarginInfo, VariableInfo
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
@@ -72,6 +72,14 @@ def varying(manifest: Manifest) -> tuple[str, ...]:
     return tuple(info.name for info in manifest.parameters if _VARYING.fullmatch(info.name))
 
 
+def driven(manifest: Manifest) -> tuple[int, int] | None:
+    """Acceleration among the inputs, speed among the states, of a driver with a table of its speed; None without."""
+    names = [item.name for item in manifest.inputs]
+    if manifest.mechanism is None or DRIVER_ACCELERATION not in names:
+        return None
+    return names.index(DRIVER_ACCELERATION), [info.name for info in manifest.states].index(manifest.mechanism.rate)
+
+
 def filled(template: Path, **values: str) -> str:
     """Text of a template with values in place of ``@NAME@``."""
     return re.sub("@([A-Z]+)@", lambda found: values[found[1]], template.read_text(encoding="utf-8"))
@@ -119,6 +127,7 @@ def scene_source(manifest: Manifest) -> str:
     relations = [f"    {{{place[name]}, {place[other]}, {factor!r}}}," for name, factor, other in manifest.relations]
     columns = [f"    {{{_string(name)}, {_string(unit)}}}," for name, unit in columns_of(manifest)]
     indices, inputs = _inputs(manifest.inputs, place)
+    acceleration, driver = driven(manifest) or (-1, -1)
     offsets = [str(place[item.offset]) if item.offset else "-1" for item in manifest.inputs]
     return filled(
         STANDALONE / "scene.c.in",
@@ -132,6 +141,8 @@ def scene_source(manifest: Manifest) -> str:
         LINKAGE="".join(f"{line}\n" for line in _linkage(manifest, place)),
         PLACES="".join(f"{line}\n" for line in indices),
         INPUTS=inputs,
+        ACCELERATION=str(acceleration),
+        DRIVER=str(driver),
         OFFSETS=_listed(offsets) or "-1",  # C has no arrays of length zero
         CYCLES=repr(float(run.cycles or 0.0)),
         DURATION=repr(float(run.duration or 0.0)),

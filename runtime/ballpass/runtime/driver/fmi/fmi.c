@@ -1,7 +1,7 @@
 /* The interface of FMI 3.0 co-simulation over ballpass.h.
 
    Value references: 0 is the time; then parameters and inputs, states, derivatives of states, outputs that are no states, in the order of
-   the scene.  Functions of other kinds of interface, and of types that no variable has, are there and return fmi3Error with a message. */
+   the scene; then the driver's speed, where that is an input.  Functions of other kinds of interface, and of types that no variable has, are there and return fmi3Error with a message. */
 #include "fmi3Functions.h"
 
 #include <math.h>
@@ -27,6 +27,7 @@ typedef struct {
     int prepared; /* whether the run is begun with the values at hand */
     ballpass_request asked;
     int end_known;
+    double speed; /* of the driver, where it is an input [rad/s] */
 } bookkeeping;
 
 typedef struct {
@@ -123,6 +124,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     at->early_return = earlyReturnAllowed;
     at->own.where = INSTANTIATED;
     at->own.asked = ballpass_default(at->simulation);
+    at->own.speed = FMU_SPEED;
     return at;
 }
 
@@ -201,14 +203,14 @@ fmi3Status fmi3Reset(fmi3Instance instance)
     if (!fresh) return fail(at, "fmi3Reset: the memory is too small.");
     ballpass_free(at->simulation);
     at->simulation = fresh;
-    at->own = (bookkeeping){.where = INSTANTIATED, .asked = ballpass_default(fresh)};
+    at->own = (bookkeeping){.where = INSTANTIATED, .asked = ballpass_default(fresh), .speed = FMU_SPEED};
     return fmi3OK;
 }
 
 /* values */
 
 /* Place of a variable's numbers among those of its kind, and how many; 0 where there is no such variable. */
-typedef enum { NONE, TIME, PARAMETER, STATE, RATE, OUTPUT } kind;
+typedef enum { NONE, TIME, PARAMETER, STATE, RATE, OUTPUT, SPEED } kind;
 
 static kind find(fmi3ValueReference reference, size_t *first, size_t *count)
 {
@@ -219,6 +221,7 @@ static kind find(fmi3ValueReference reference, size_t *first, size_t *count)
     if (reference < FIRST_RATE) return *first = reference - FIRST_STATE, STATE;
     if (reference < FIRST_OUTPUT) return *first = reference - FIRST_RATE, RATE;
     const size_t k = reference - FIRST_OUTPUT;
+    if (k == FMU_OUTPUTS && FMU_DRIVEN) return SPEED;
     if (k >= FMU_OUTPUTS) return NONE;
     *first = (size_t)fmu_outputs[k];
     *count = (size_t)(fmu_outputs[k + 1] - fmu_outputs[k]);
@@ -240,6 +243,10 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
         if (count > nValues - at_value) return fail(at, "%s: the variables have more than the %zu values that were given.", call, nValues);
         if (what == PARAMETER) {
             values[at_value++] = ballpass_value(at->simulation, (int)first);
+            continue;
+        }
+        if (what == SPEED) {
+            values[at_value++] = at->own.speed;
             continue;
         }
         if (what == TIME && !at->own.prepared) {
@@ -273,6 +280,10 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     for (size_t k = 0; k < nValueReferences; k++) {
         size_t first, count;
         const kind what = find(valueReferences[k], &first, &count);
+        if (what == SPEED && isfinite(values[k])) {
+            at->own.speed = values[k];
+            continue;
+        }
         if (what != PARAMETER) return fail(at, "%s: the value reference %u was given. Allowed: parameters and inputs.", call, (unsigned)valueReferences[k]);
         if (at->own.where != STEP) {
             ballpass_stop(at->simulation);
@@ -309,6 +320,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
             *earlyReturn = fmi3True;
         }
     }
+    if (FMU_DRIVEN && answered(at, call, ballpass_drive(at->simulation, at->own.speed)) != fmi3OK) return fmi3Error;
     const fmi3Status status = answered(at, call, ballpass_run_to(at->simulation, there < here ? here : there));
     *lastSuccessfulTime = ballpass_time(at->simulation);
     if (status != fmi3OK) *earlyReturn = fmi3False;

@@ -40,6 +40,8 @@ enum { PLACES = SCENE_PARAMETERS + SCENE_CONSTANTS + SCENE_INPUTS, INPUTS = SCEN
 typedef struct {
     double values[PLACES];
     int started, changed, failed;
+    int driven;               /* whether the driver follows speeds that are set, */
+    double wanted, acceleration; /* to this one, at this acceleration */
     ballpass_request asked; /* begin and end: of the time that segments are known for */
     double tolerance[SCENE_STATES];
     long first, segments;   /* of the call at hand, the call's length */
@@ -249,6 +251,14 @@ static int find_edges(ballpass *s)
     return BALLPASS_OK;
 }
 
+/* Inputs of a segment, which begins at `start`. */
+static void inputs_of(const ballpass *s, double start, double middle, double *u)
+{
+    u[0] = 0.0;
+    schedule_inputs(scene_inputs, SCENE_INPUTS, s->run.values, start, middle, u);
+    if (s->run.driven) u[scene_acceleration] = s->run.acceleration;
+}
+
 /* Inputs and jumps of the segments of the call at hand. */
 static void find_inputs(ballpass *s)
 {
@@ -256,8 +266,7 @@ static void find_inputs(ballpass *s)
     const double *edges = s->edges + r->first;
     for (long i = 0; i < r->segments; i++) {
         double *u = s->inputs + i * INPUTS;
-        u[0] = 0.0;
-        schedule_inputs(scene_inputs, SCENE_INPUTS, r->values, edges[i], 0.5 * (edges[i] + edges[i + 1]), u);
+        inputs_of(s, edges[i], 0.5 * (edges[i] + edges[i + 1]), u);
         const double *past = i > 0 ? u - INPUTS : r->before;
         s->restarts[i] = (unsigned char)(i == 0 && r->first == 0);
         for (int k = 0; k < SCENE_INPUTS; k++)
@@ -344,7 +353,7 @@ int ballpass_start(ballpass *s, const ballpass_request *request)
 {
     run_state *r = &s->run;
     clear(s);
-    r->started = r->changed = r->failed = 0;
+    r->started = r->changed = r->failed = r->driven = 0;
     check_values(s);
     if (s->faults.count) return BALLPASS_REFUSED;
     r->asked = request ? *request : ballpass_default(s);
@@ -434,6 +443,19 @@ static int settle(ballpass *s)
     return start_anew(s, r->asked.end);
 }
 
+int ballpass_drive(ballpass *s, double speed)
+{
+    const int refused = must_run(s);
+    if (refused) return refused;
+    if (scene_driver < 0 || !isfinite(speed)) {
+        add_fault(&s->faults, "a speed of %g rad/s was given for the driver. Allowed: a finite one, where the scene has a table of its speed.", speed);
+        return BALLPASS_REFUSED;
+    }
+    s->run.wanted = speed;
+    s->run.driven = 1;
+    return BALLPASS_OK;
+}
+
 int ballpass_run_to(ballpass *s, double time)
 {
     run_state *r = &s->run;
@@ -442,6 +464,10 @@ int ballpass_run_to(ballpass *s, double time)
     if (!(isfinite(time) && time >= r->time)) {
         add_fault(&s->faults, "time %.9g s was asked for, and the run has come to %.9g s. Allowed: a finite time not before that.", time, r->time);
         return BALLPASS_REFUSED;
+    }
+    if (r->driven && time > r->time) {
+        r->acceleration = (r->wanted - r->state[scene_driver]) / (time - r->time);
+        r->changed = 1;
     }
     int fault = settle(s);
     while (!fault) {
@@ -495,8 +521,7 @@ double ballpass_moment(const ballpass *s, double *u)
 {
     double middle;
     const double start = ballpass_segment(s, &middle);
-    u[0] = 0.0;
-    schedule_inputs(scene_inputs, SCENE_INPUTS, s->run.values, start, middle, u);
+    inputs_of(s, start, middle, u);
     return s->run.time - start;
 }
 
@@ -522,10 +547,10 @@ double ballpass_next_switch(ballpass *s)
     double here[INPUTS], there[INPUTS];
     if (must_run(s) || settle(s)) return INFINITY;
     long i = segment_here(s);
-    for (here[0] = there[0] = 0.0; i + 1 < s->edge_count; i++) {
+    for (; i + 1 < s->edge_count; i++) {
         const double *e = s->edges + i;
-        schedule_inputs(scene_inputs, SCENE_INPUTS, s->run.values, e[0], 0.5 * (e[0] + e[1]), here);
-        schedule_inputs(scene_inputs, SCENE_INPUTS, s->run.values, e[1], 0.5 * (e[1] + e[2]), there);
+        inputs_of(s, e[0], 0.5 * (e[0] + e[1]), here);
+        inputs_of(s, e[1], 0.5 * (e[1] + e[2]), there);
         for (int k = 0; k < SCENE_INPUTS; k++)
             if (scene_inputs[k].kind != SCHEDULE_PHASE && here[k] != there[k]) return e[1];
     }

@@ -56,6 +56,10 @@ int ballpass_get(const ballpass *simulation, const char *name, double *value);
 double ballpass_value(const ballpass *simulation, int place);
 int ballpass_varies(int place);
 
+/* Of a driver whose scene has a table of its speed: the speed that it reaches at the end of the coming ballpass_run_to, which it goes to at a
+   constant acceleration [rad/s].  The table is out of use from then on. */
+int ballpass_drive(ballpass *simulation, double speed);
+
 /* The scene's run, of the parameters that are set. */
 ballpass_request ballpass_default(const ballpass *simulation);
 
