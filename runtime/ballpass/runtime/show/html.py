@@ -13,7 +13,7 @@ from typing import Any
 _STYLE = """
 .ballpass { font-size: 0.92em; line-height: 1.4; margin: 0.3em 0; }
 .ballpass .scroll { overflow-x: auto; max-width: 100%; }
-.ballpass .formula { display: block; overflow-y: hidden; }
+.ballpass .formula { display: block; overflow-y: hidden; padding: 0.2em 0; }
 .ballpass table { border-collapse: collapse; margin: 0.3em 0 0.6em; }
 .ballpass table th, .ballpass table td { text-align: left !important; vertical-align: top; border: 0; }
 .ballpass table th, .ballpass table td { padding: 0.15em 0.8em 0.15em 0; }
