@@ -46,7 +46,12 @@ NAMED: dict[str, dict[str, str]] = {
         "eight balls and 2 000 output points, at an error of 1e-3": "likewise",
         "takes 0.258 ms, and 950× as long": "test_speeds_of_the_landing_page_are_those_of_the_benchmarks",
     },
-    "docs/tutorial.md": {"more than 200 MB are written": "a limit of the code"},
+    "docs/tutorial.md": {
+        "more than 200 MB are written": "a limit of the code",
+        "of 100 turns": "a number of docs/make_figures.py",
+        "of 101 turns": "likewise",
+        "ball pass, 25.44 Hz, from the third harmonic, 25 Hz": "test_frequencies_of_the_tutorial_are_those_of_its_cage",
+    },
     "docs/howto/accuracy.md": {
         "estimate times 1.5 is within": "a number of the method",
         "at least 99 % keep their target, at most 1 %": "test_promises_hold_in_the_table_of_the_campaign",
@@ -81,6 +86,7 @@ NAMED: dict[str, dict[str, str]] = {
     },
     "docs/howto/find_spall.md": {"2 BSF by": "the name of a line"},
     "docs/howto/life.md": {
+        "17 runs of 64 steady turns": "what the command runs",
         "the 4200 MPa of ISO 76": "a limit of the standard",
         "take 12 to 15 % off": "test_life_table.py",
         "8 % unsafe": "test_life_table.py",
@@ -181,3 +187,9 @@ def test_promises_hold_in_the_table_of_the_campaign() -> None:
         assert float(often.removesuffix(" %")) <= 1.0
         assert int(never) == 0
         assert float(worst) < 100.0
+
+
+def test_frequencies_of_the_tutorial_are_those_of_its_cage() -> None:
+    turns = 500 / 60
+    assert f"{8 * turns * (1 - 7.9375 / 33.5) / 2:.2f} Hz" == "25.44 Hz"
+    assert 3 * turns == pytest.approx(25.0)
