@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import threading
@@ -67,6 +68,7 @@ def test_a_shaft_at_rest_runs_for_a_time_and_comes_to_rest_at_the_static_point(
         (("--set", "load.force.x=1 N", "--set", "load.force.x=2 N"), "1 N and 2 N"),
         (("--set", "load.force.x=1 N", "--set", "load.force.x = 1 N"), "set twice"),
         (("--set", "bearing.clearance=-8 mm"), "preload (a negative clearance) is as large as a ball"),
+        (("--format", "jpg"), "'jpg' is no kind of figure. Allowed: png, svg, pdf"),
     ],
 )
 def test_contradictions_and_nonsense_end_with_exit_code_2_and_no_folder(
@@ -77,6 +79,36 @@ def test_contradictions_and_nonsense_end_with_exit_code_2_and_no_folder(
     assert told in done.stderr
     assert "error: error" not in done.stderr
     assert not (site / "never").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--format", "avi"), "Allowed: html, mp4, gif"),
+        (("--pictures", "9"), "--pictures is of movies"),
+        (("--last", "9"), "Simulate more turns, or show fewer"),
+    ],
+)
+def test_animations_that_cannot_be_end_with_exit_code_2(
+    site: Path, ballpass: Callable[..., Result], words: tuple[str, ...], told: str
+) -> None:
+    done = ballpass("animate", SCENE, *words, "--out", "moving")
+    assert done.exit_code == 2, done.output
+    assert told in " ".join(done.stderr.split())
+    assert not list(site.glob("moving/*"))
+
+
+def test_animate_writes_the_page_of_the_last_turns(site: Path, ballpass: Callable[..., Result]) -> None:
+    done = ballpass("animate", SCENE, "--cycles", "4", "--transient", "1", "--last", "2", "--out", "moving")
+    assert done.exit_code == 0, done.output
+    assert done.stdout.startswith("moving/animation.html (")
+    text = (site / "moving" / "animation.html").read_text(encoding="utf-8")
+    numbers = json.loads(text.partition('id="data">')[2].partition("</script>")[0])
+    angles = np.array(numbers["angle"]["values"]) / 10.0 ** numbers["angle"]["decimals"]
+    assert angles[-1] - angles[0] == pytest.approx(720.0, abs=1e-2)
+    assert len(angles) == pytest.approx(1000, abs=3)
+    assert numbers["linkage"] is None
+    assert len(numbers["bearings"]) == 1
 
 
 @pytest.mark.parametrize("clearance", ["-7.9375 mm", "-1 m"])

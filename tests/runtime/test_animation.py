@@ -20,8 +20,8 @@ BROWSER = shutil.which("chromium")
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on PATH")
 
 
-def shown(page: Path, place: str, home: Path) -> dict[str, str]:
-    """Numbers that the page shows at a place, by quantity; fails where the browser complains."""
+def dom(page: Path, place: str, home: Path) -> str:
+    """The page at a place, when its script has run; fails where the browser complains."""
     assert BROWSER is not None
     quiet = ("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-quic")
     done = subprocess.run(
@@ -30,8 +30,14 @@ def shown(page: Path, place: str, home: Path) -> dict[str, str]:
         capture_output=True, text=True, check=True, timeout=120,
     )  # fmt: skip
     assert "CONSOLE" not in done.stderr, done.stderr
-    found = dict(re.findall(r'<dd data-quantity="([^"]+)">([^<]*)</dd>', done.stdout))
-    (found["now"],) = re.findall(r'<output id="now"[^>]*>([^<]*)</output>', done.stdout)
+    return done.stdout
+
+
+def shown(page: Path, place: str, home: Path) -> dict[str, str]:
+    """Numbers that the page shows at a place, by quantity."""
+    text = dom(page, place, home)
+    found = dict(re.findall(r'<dd data-quantity="([^"]+)">([^<]*)</dd>', text))
+    (found["now"],) = re.findall(r'<output id="now"[^>]*>([^<]*)</output>', text)
     return found
 
 
@@ -92,6 +98,36 @@ def test_browser_shows_every_kind_of_scene(
     page = write_animation(model, solution, tmp_path / f"{scene}.html")
     found = shown(page, f"angle=225&bearing={bearing}", tmp_path / "home")
     compare(found, expected_of(solution, len(solution) - 1 - cycle + cycle * 5 // 8, f"{bearing}." if bearing else ""))
+
+
+@needs_browser
+@pytest.mark.long
+def test_keys_clicks_and_play_move_the_page(press: tuple[Model, Solution], tmp_path: Path) -> None:
+    """Arrow keys by a position, space for a second of a turn in six, a click in a chart to its place."""
+    # a browser without a screen draws no frames: a clock in their place
+    clock = "requestAnimationFrame = (f) => setTimeout(() => f(performance.now()), 16);"
+    clock += "cancelAnimationFrame = clearTimeout;"
+    actions = """
+        const press = (key) => document.body.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+        const note = (name) => { document.body.dataset[name] = get("now").textContent.match(/[0-9.]+/)[0]; };
+        setTimeout(() => { note("begin"); press("ArrowRight"); note("right"); press(" "); }, 100);
+        setTimeout(() => { press(" "); note("played"); }, 1100);
+        setTimeout(() => {
+          const chart = document.querySelector(".chart"), box = chart.getBoundingClientRect();
+          chart.dispatchEvent(new PointerEvent("pointerdown", { clientX: box.left + box.width * 231 / 420 }));
+          note("clicked");
+        }, 1200);
+    """
+    text = animation_page(*press).replace('"use strict";', clock, 1)
+    page = tmp_path / "press.html"
+    page.write_text(text.replace("</body>", f"<script>{actions}</script></body>"), encoding="utf-8")
+    found = re.search(r"<body ([^>]*)>", dom(page, "angle=90", tmp_path / "home"))
+    assert found is not None
+    noted = {name: float(value) for name, value in re.findall(r'data-(\w+)="([^"]+)"', found[1])}
+    assert noted["begin"] == 90.0
+    assert noted["right"] == pytest.approx(90.36, abs=0.1)
+    assert noted["played"] - noted["right"] == pytest.approx(60.0, abs=3.0)
+    assert noted["clicked"] == pytest.approx(180.0, abs=0.5)  # the middle of the axis
 
 
 def test_page_needs_nothing_but_itself_and_is_small(press: tuple[Model, Solution]) -> None:

@@ -11,20 +11,13 @@ const highest = (values) => values.reduce((most, value) => Math.max(most, value)
 const joined = (places) => places.map(([x, y]) => `${x.toFixed(3)},${y.toFixed(3)}`).join(" ");
 const set = (node, values) => { for (const [name, value] of Object.entries(values)) node.setAttribute(name, value); };
 
-function draw(parent, kind, attributes, text = "") {
-  const node = document.createElementNS("http://www.w3.org/2000/svg", kind);
+function draw(parent, kind, attributes, text = "", node = document.createElementNS("http://www.w3.org/2000/svg", kind)) {
   set(node, attributes);
   node.textContent = text;
   parent.append(node);
   return node;
 }
-
-function element(parent, kind, text = "", attributes = {}) {
-  const node = Object.assign(document.createElement(kind), { textContent: text });
-  set(node, attributes);
-  parent.append(node);
-  return node;
-}
+const element = (parent, kind, text = "", attributes = {}) => draw(parent, kind, attributes, text, document.createElement(kind));
 
 // An arrow from foot to tip in units of the picture; a short one is left out.
 function arrow(parent, colour) {
@@ -182,11 +175,9 @@ function drawChart(title, unit, curves) {
   const cursor = draw(picture, "line", { y1: top, y2: height - below, stroke: "var(--signal)", "stroke-width": 1.6 });
   const follow = (event) => {
     const box = picture.getBoundingClientRect(), x = (event.clientX - box.left) / box.width * width;
-    stop();
-    go(nearest((k) => Math.abs(X(across[k]) - x)));
+    if (event.buttons || event.type === "pointerdown") { stop(); go(nearest((k) => Math.abs(X(across[k]) - x))); }
   };
-  picture.addEventListener("pointerdown", (event) => { picture.setPointerCapture(event.pointerId); follow(event); });
-  picture.addEventListener("pointermove", (event) => { if (event.buttons) follow(event); });
+  for (const kind of ["pointerdown", "pointermove"]) picture.addEventListener(kind, follow);
   return (k) => set(cursor, { x1: X(across[k]), x2: X(across[k]) });
 }
 
@@ -242,12 +233,11 @@ function go(k) {
 
 function stop() {
   cancelAnimationFrame(playing);
-  playing = 0;
-  get("play").textContent = "Play";
+  [playing, get("play").textContent] = [0, "Play"];
 }
 
 function play() {
-  if (playing) { stop(); return; }
+  if (playing) return stop();
   get("play").textContent = "Pause";
   const first = at(data.time, 0), whole = at(data.time, last) - first, turns = data.turning ? (end - begin) / 360 : 1;
   let t = at(data.time, frame) - first, before = null;
@@ -284,8 +274,6 @@ addEventListener("keydown", (event) => {
   if (steps) { stop(); go(frame + steps); } else play();
 });
 data.bearings.forEach((bearing, number) => get("bearing").append(new Option(bearing.name, number)));
-get("choose").hidden = data.bearings.length < 2;
-get("rings").hidden = !data.bearings.length;
-get("linkage").hidden = !data.linkage;
+for (const [id, hidden] of [["choose", data.bearings.length < 2], ["rings", !data.bearings.length], ["linkage", !data.linkage]]) get(id).hidden = hidden;
 build(0);
 follow();

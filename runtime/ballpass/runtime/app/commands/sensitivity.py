@@ -112,7 +112,10 @@ def sensitivity(
 
         show_tables(render_report(report, top=ROWS))
         if written:
-            show(f"results in {out}: {', '.join(path.name for path in written)}")
+            charts = [path for path in written if path.name.startswith("tornado_")]
+            told = [path.name for path in written if path not in charts]
+            told += [f"{len(charts)} chart{'s' if len(charts) > 1 else ''}"] if charts else []
+            show(f"results in {out}: {', '.join(told)}")
     if report.disagreements:
         first = report.disagreements[0]
         complain(
