@@ -21,7 +21,7 @@ fi
 # an environment with pip, not just a folder: a setup that was interrupted is taken up again
 "$venv/bin/python" -c 'import pip, sys; sys.exit(sys.prefix == sys.base_prefix)' 2>/dev/null ||
   { printf '%s\n' "setup: making $venv"; "$python" -m venv "$venv"; }
-printf '%s\n' "setup: installing ballpass${extras:+ with $extras} into $venv (first time: some 150 MB of downloads, a minute or so)"
+printf '%s\n' "setup: installing ballpass${extras:+ with $extras} into $venv (first time: some 180 MB of downloads, a minute or so)"
 target=.
 [ -z "$extras" ] || target=".[$extras]"
 "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -c requirements.txt -e "$target"
