@@ -39,7 +39,7 @@ def test_the_report_is_printed_written_and_drawn(ballpass: Callable[..., Result]
     assert result.exit_code == 0, result.output
     assert "verified" in result.stdout
     assert "peak_ball_force" in result.stdout
-    assert max(map(len, result.stdout.splitlines())) <= 100
+    assert "…" not in result.stdout
     assert "N/(m/s^2)" in result.stdout
     report = json.loads((folder / "out" / "sensitivity.json").read_text(encoding="utf-8"))
     assert report["verdicts"]["verified"] == 4

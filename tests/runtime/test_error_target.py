@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.certify.error_target import LADDER, TargetMissed, meet_target
 from ballpass.runtime.certify.trade import REFERENCE, perturbed
-from ballpass.runtime.certify.whole_run import WholeRun, check_observables, default_observables, prepare
+from ballpass.runtime.certify.whole_run import Way, WholeRun, check_observables, default_observables, prepare
 from ballpass.runtime.run.request import Request
 
 PEAK = "peak_ball_force"
@@ -114,15 +115,23 @@ def test_chaos_is_refused_with_words_at_every_target(
         assert refused.value.best.estimate > 1e-3
 
 
-def test_what_is_added_is_a_few_runs(make_model: Callable[..., Model]) -> None:
-    """Three times the chosen run and 50 ms; in steps, which no other program disturbs."""
-    model = make_model("punching_press_tangent")
-    run = run_of(model, cycles=40.0)
+def test_what_is_added_is_a_few_runs(make_model: Callable[..., Model], monkeypatch: pytest.MonkeyPatch) -> None:
+    """The chosen run, a tighter one, and one of both from a moved start."""
+    runs: list[Way] = []
+
+    def counted(run: WholeRun, observables: Any, way: Way, *rest: Any) -> Any:
+        runs.append(way)
+        return integrate(run, observables, way, *rest)
+
+    integrate = WholeRun.integrate
+    monkeypatch.setattr(WholeRun, "integrate", counted)
+    run = run_of(make_model("punching_press_tangent"), cycles=40.0)
     for target in (0.03, 1e-3, 1e-5):
+        runs.clear()
         found = meet_target(run, target, [PEAK])
         assert found.tried == ()
-        # the chosen run is integrated once more, with samples
-        assert found.time + found.check_time <= 3.0 * found.time + 0.05
+        assert len(runs) <= 3
+        assert all(way.rtol >= 0.01 * found.rtol for way in runs)
 
 
 def test_the_solution_is_the_run_whose_error_was_estimated(make_model: Callable[..., Model]) -> None:

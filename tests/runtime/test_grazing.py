@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from ballpass.runtime import Model
 from ballpass.runtime.certify.grazing import Grazing, describe, find_grazing, merge_grazing
 from ballpass.runtime.certify.sensitivity_report import SensitivityReport
+from ballpass.runtime.plot.style import caption_of
 from ballpass.runtime.plot.tornado import tornado
 
 #: Ball and time [s].
@@ -85,7 +86,7 @@ def test_the_chart_counts_the_places_that_the_table_lists(make_model: Callable[.
     found = tuple(Grazing(ball=k, time=t, crank_angle=0.0, depth=1e-9, kink="contact") for k, t in PLACES)
     for some, count in ((found, "2 places"), (found[:2], "1 place")):
         grazing = replace(report, grazing=some)
-        words = " ".join(tornado(grazing, "static_deflection").get_supxlabel().split())
+        words = caption_of(tornado(grazing, "static_deflection"))
         assert f"grazes a kink at {count}, where" in words
         assert f"grazing at {count} ({len(some)} counting each ball)" in str(grazing)
 

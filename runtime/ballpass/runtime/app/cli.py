@@ -300,9 +300,7 @@ def export(
     ] = False,
     inputs: Annotated[
         list[str] | None,
-        typer.Option(
-            "--input", metavar="NAME", help="A load, force, torque or speed that is an input; repeatable."
-        ),
+        typer.Option("--input", metavar="NAME", help="A load, force, torque or speed that is an input; repeatable."),
     ] = None,
     out: Annotated[
         Path | None,
