@@ -7,6 +7,7 @@ import shutil
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,12 @@ from rich.console import Group
 from rich.markup import escape
 from rich.table import Table
 
+import ballpass.derive
+import ballpass.runtime
 from ballpass.derive import derive, equations
 from ballpass.derive.lower.functions import lower
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime import Model
+from ballpass.runtime import DataSetReport, Distribution, MemberFailure, Model, QuantityFunction, Results, SignalClass
 from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
 from ballpass.runtime.ask.vibration import diagnosis, spectrogram
 from ballpass.runtime.certify.trade import measure_trade
@@ -34,6 +37,8 @@ ATTACK = '<script>alert("&")</script>'
 WAYS = (Way(method="stepper", rtol=1e-5), Way(method="stepper-rodas4", rtol=1e-3))
 
 CLEARANCE = "bearing.clearance"
+
+MISSING = MemberFailure(member=3, status="REFUSED", time=0.0, message="Give another.")
 
 #: Symbols of parameters that are letters with an index.
 SYMBOL = re.compile(r"[A-Za-z]_\{?[a-z]+\}?")
@@ -60,7 +65,11 @@ def shown(rotor: Model, scene_text: Callable[..., str]) -> dict[str, Any]:
         *(model.refine_peak(solution, "ball.elastic_force"), model.explain(), model.static_equilibrium()),
         *(model.linearize(), model.linearize().modes[0], model.jacobian_function("rhs"), model.library),
         *(amplitude_spectrum(t, x), power_spectrum(t, x), spectrogram(t, x, segment=0.02), diagnosis(x)),
-        Signals(outputs=("inner.x",), sample_rate=1e4, duration=0.1),
+        *(model.refine_peak(solution, "inner.x"), solution.reductions["inner.x"]),
+        *(Signals(outputs=("inner.x",), sample_rate=1e4, duration=0.1), Distribution(name="norm")),
+        SignalClass(label="sound", model=model, members=9, parameters={f"a{k}": float(k) for k in range(1000)}),
+        DataSetReport(path=Path("set.zarr"), members=9, made=9, failures=(MISSING,) * 1000),
+        *(MISSING, Results(solution=solution, summary={"parameters": {f"a{k}": k for k in range(1000)}})),
     )
 
 
@@ -76,6 +85,7 @@ def reports(make_model: Callable[..., Model]) -> dict[str, Any]:
         *(life, life.states[0], life.bearings[0], life.bearings[0].inner, trade, trade.measured[0]),
         *(sensitivity, sensitivity.pairs[0], many, many.statistics, model.sensitivities(CLEARANCE, 1)),
         *(exact, exact.accuracy, model.settle(), model.growth(3)),
+        QuantityFunction(model, "rms:inner.y", [CLEARANCE], cycles=3),
     )
 
 
@@ -212,3 +222,14 @@ def test_the_blocks_of_the_page_on_notebooks_run_in_one(tmp_path: Path, monkeypa
     assert "41 parameters" in given[1][-1]["text/html"]
     assert "srcdoc" in given[-2][-1]["text/html"]
     assert "<math" in given[-1][-1]["text/html"]
+
+
+@pytest.mark.long
+def test_every_public_class_was_looked_at(shown: dict[str, Any], reports: dict[str, Any]) -> None:
+    classes = {
+        name
+        for package in (ballpass.derive, ballpass.runtime)
+        for name in package.__all__
+        if isinstance(found := getattr(package, name), type) and not issubclass(found, Exception | Enum)
+    }
+    assert classes - {*shown, *reports} == set()

@@ -18,6 +18,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folder import file_digest
 from ballpass.runtime.contract.folders import read_whole, replace_files
 from ballpass.runtime.run.solution import Solution, read_bytes
+from ballpass.runtime.show.short import ShortRepr
 
 SOLUTION = "solution.nc"
 SUMMARY = "summary.json"
@@ -26,8 +27,8 @@ SUMMARY = "summary.json"
 FILES = "files"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Results:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Results(ShortRepr):
     """What ``ballpass run`` wrote: the solution, and the summary as it stands in ``summary.json``.
 
     Examples

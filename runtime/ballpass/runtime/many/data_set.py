@@ -64,8 +64,8 @@ MOST_IN_CHUNK, MOST_MEMBERS = 256, 10_000_000
 _SNR = "snr"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SignalClass:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class SignalClass(ShortRepr):
     """Members of one label.
 
     Attributes
