@@ -213,7 +213,7 @@ function build(number) {
   if (bearing) {
     const worst = bearing.force.map((signal) => highest(all(signal))), top = worst.indexOf(highest(worst));
     moves.push(drawBearing(bearing), drawChart("Ball forces", "N", [...bearing.force.map((signal) => ({ signal, colour: "var(--bar)", wide: 0.8 })),
-      { signal: bearing.force[top], name: `dark: ball ${top + 1}, the most loaded; light: the others` }]));
+      { signal: bearing.force[top], name: `strong: ball ${top + 1}, the most loaded; faint: the others` }]));
     moves.push(drawChart("Inner ring against outer", "\u00b5m", [{ signal: bearing.inner[0], name: "solid: x" },
       { signal: bearing.inner[1], colour: "var(--signal)", dashes: "5 3", name: "dashed: y" }]));
   }

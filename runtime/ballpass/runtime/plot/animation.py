@@ -154,16 +154,18 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
                     "direction": None if direction is None else direction.tolist(),
                 }
             )
-    names: dict[int, list[str]] = {}
+    size = float(np.max(high - low))
+    names: dict[int, list[str]] = {}  # joints that stay together share a place
     for name, _, _, _, body, point in mechanism.joints:
-        names.setdefault(shown.index((body, point)), []).append(name)
+        path = paths[body, point]
+        near = (k for k in names if float(np.max(np.abs(paths[shown[k]] - path))) < 0.01 * size)
+        names.setdefault(next(near, shown.index((body, point))), []).append(name)
     return {
         "low": low.tolist(),
         "high": high.tolist(),
         "points": [_columns(paths[key]) for key in shown],
         "bodies": [
-            {"name": body, "points": [shown.index(key) for key in keys]}
-            for body, keys in links(used, poses[0], float(np.max(high - low)))
+            {"name": body, "points": [shown.index(key) for key in keys]} for body, keys in links(used, poses[0], size)
         ],
         "pins": [
             {"at": shown.index((second, point)), "fixed": FRAME in (first, body)}
