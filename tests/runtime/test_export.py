@@ -544,6 +544,15 @@ def test_command_writes_the_folder_and_wants_a_format(tmp_path: Path, monkeypatc
     assert "--c" in without.stderr
     taken = CliRunner().invoke(app, ["export", str(scene), "--c", "--out", str(scene)])
     assert taken.exit_code == 2
+    for wrong, words in (
+        (("--c", "--fmu"), "both formats were given"),
+        (("--c", "--input", "load"), "--input is for --fmu"),
+        (("--fmu", "--out", "there"), "this is a folder"),
+        (("--fmu", "--input", "bearing"), "does not change in a run"),
+    ):
+        refused = CliRunner().invoke(app, ["export", str(scene), *wrong])
+        assert refused.exit_code == 2
+        assert words in " ".join(refused.stderr.split()), refused.stderr
 
 
 # messages
