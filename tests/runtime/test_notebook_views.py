@@ -207,8 +207,8 @@ def test_equations_are_mathml_with_every_formula_of_the_page(shown: dict[str, An
 @pytest.mark.long
 def test_the_blocks_of_the_page_on_notebooks_run_in_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a kernel of Jupyter, with its backend of matplotlib, which shows a picture for each cell that draws."""
-    nbclient = pytest.importorskip("nbclient", reason="not installed: pip install nbclient ipykernel")
-    nbformat = pytest.importorskip("nbformat", reason="not installed: pip install nbclient ipykernel")
+    nbclient = pytest.importorskip("nbclient", reason="not installed: pip install ballpass[notebook]")
+    nbformat = pytest.importorskip("nbformat", reason="not installed: pip install ballpass[notebook]")
     page = (ROOT / "docs/howto/notebooks.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     cells = ["import numpy as np", *blocks, "solution.plot.animate()", "derive(scene)"]
