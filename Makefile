@@ -59,7 +59,7 @@ $(BENCH_VENV)/.ready: pyproject.toml requirements.txt benchmarks/requirements.tx
 	@touch $@
 
 clean:
-	rm -rf results docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf results docs/_build docs/auto_gallery docs/gallery/generated build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 $(VENV)/.ready: pyproject.toml requirements.txt scripts/setup.sh
 	@scripts/setup.sh

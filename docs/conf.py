@@ -42,13 +42,12 @@ sphinx_gallery_conf = {
     "gallery_dirs": "auto_gallery",
     "abort_on_example_error": True,
     "within_subsection_order": "FileNameSortKey",
+    "first_notebook_cell": "# starts in docs/gallery of the repository; else change paths\n%matplotlib inline",
     "min_reported_time": 1000,
     "remove_config_comments": True,
-    "show_memory": False,
-    "copyfile_regex": r".*\.toml",
 }
 
-myst_enable_extensions = ["amsmath", "attrs_block", "colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 # words of signatures that name several things, as two classes Statistics: a link to either would do

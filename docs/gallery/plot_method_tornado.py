@@ -2,7 +2,7 @@
 Which number matters most
 =========================
 
-Derivatives of the highest ball force by every number of the bearing, all from one run,
+Derivatives of the highest ball force by eight numbers of the scene, all from one run,
 each checked by a second route.
 """
 
