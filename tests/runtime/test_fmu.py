@@ -21,9 +21,7 @@ import numpy as np
 import pytest
 from filelock import FileLock
 
-from ballpass.derive import generate
-from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime import Model, RequestError, load
+from ballpass.runtime import Model, RequestError
 from ballpass.runtime.export.fmu import export_fmu
 from ballpass.runtime.export.model_description import base_powers
 from ballpass.runtime.run import inputs as clock
@@ -38,39 +36,34 @@ TORQUE = "mechanism.driver.torque.torque"
 
 
 @pytest.fixture(scope="module")
-def exported(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., str]) -> Callable[..., Exported]:
+def exported(tmp_path_factory: pytest.TempPathFactory, make_model: Callable[..., Model]) -> Callable[..., Exported]:
     """A scene with replacements as an FMU, made once for all processes of the suite."""
     place = tmp_path_factory.getbasetemp()
     shared = (place.parent if place.name.startswith("popen-") else place) / "fmus"
     shared.mkdir(exist_ok=True)
 
     def make(name: str, inputs: Sequence[str] = (), *changes: tuple[str, str]) -> Exported:
-        label = f"{name}{'_'.join(('', *inputs))}{len(changes)}"
-        folder = shared / label
-        with FileLock(f"{folder}.lock"):
-            if not (folder / "scene.fmu").is_file():
-                generated = generate(scene_from_text(scene_text(name, *changes), name), folder / name)
-                export_fmu(generated, folder / "scene.fmu", inputs=inputs)
-        return Exported(folder / "scene.fmu", folder / name)
+        model = make_model(name, *changes)
+        path = shared / f"{'_'.join((name, *inputs))}{len(changes)}.fmu"
+        with FileLock(f"{path}.lock"):
+            if not path.is_file():
+                export_fmu(model.folder, path, inputs=inputs)
+        return Exported(path, model)
 
     return make
 
 
 class Exported:
-    """An FMU and the generated folder that it was made from."""
+    """An FMU and the model that it was made from."""
 
-    def __init__(self, path: Path, generated: Path) -> None:
-        self.path, self.generated = path, generated
+    def __init__(self, path: Path, model: Model) -> None:
+        self.path, self.model = path, model
         self.description = fmpy.read_model_description(str(path))
         self.places = {variable.name: variable.valueReference for variable in self.description.modelVariables}
         self.sizes = {
             variable.valueReference: int(variable.dimensions[0].start) if variable.dimensions else 1
             for variable in self.description.modelVariables
         }
-
-    @property
-    def model(self) -> Model:
-        return load(self.generated)
 
     @property
     def outputs(self) -> list[str]:
@@ -393,14 +386,14 @@ def test_bad_calls_are_errors_with_text(exported: Callable[..., Exported]) -> No
 
 
 def test_names_that_cannot_be_inputs_are_refused(exported: Callable[..., Exported]) -> None:
-    generated = press(exported).generated
+    folder = press(exported).model.folder
     for name, words in (
         ("mechanism.driver.speed", "has no acceleration"),
         ("bearing.clearance", "does not change in a run"),
         ("mechanism.forces.bunch", "There is no input 'mechanism.forces.bunch'"),
     ):
         with pytest.raises(RequestError, match=words):
-            export_fmu(generated, generated / "x.fmu", inputs=[name])
+            export_fmu(folder, folder / "x.fmu", inputs=[name])
 
 
 @pytest.mark.long
@@ -524,8 +517,7 @@ def test_the_sources_alone_make_the_same_fmu(exported: Callable[..., Exported], 
     with found.instance() as one:
         one.begin(0.1)
         expected = one.steps(times)
-    again = Exported(found.path, found.generated)
-    made = Instance(again, str(tmp_path))
+    made = Instance(found, str(tmp_path))
     made.begin(0.1)
     assert np.array_equal(made.steps(times), expected)
     made.slave.freeInstance()
