@@ -57,6 +57,12 @@ def write_animation(
     RequestError
         Another ending; the steady part is shorter; there is nothing to draw; a movie without matplotlib, an MP4
         without ffmpeg on PATH.
+
+    Examples
+    --------
+    >>> from ballpass.runtime.plot.animate import write_animation
+    >>> write_animation(model, model.simulate(cycles=4), "press.html").name
+    'press.html'
     """
     target = Path(path)
     if target.suffix.removeprefix(".") not in MOVING:
