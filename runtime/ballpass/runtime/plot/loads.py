@@ -140,7 +140,7 @@ def ball_loads(record: Record) -> Figure:
     ratios = (2.2, 1.0) if closer else (1.0,)
     grid = figure.subplots(balls, len(ratios), sharex="col", sharey=True, squeeze=False, width_ratios=ratios)
     for number, axes in ((number, axes) for number, row in enumerate(grid, start=1) for axes in row):
-        axes.fill_between(along, 0.0, force[:, number - 1], color=INK, alpha=0.35, linewidth=0)
+        axes.fill_between(along, 0.0, force[:, number - 1], color=INK, alpha=0.35, linewidth=0, rasterized=True)
         axes.plot(along, force[:, number - 1], color=INK, linewidth=0.9)
         shade_windows(axes, windows, range(-1, int(along.max() // 360.0) + 1))
         axes.set_ylim(min(1.1 * bottom, 0.0), 1.1 * top)
