@@ -139,8 +139,8 @@ def all_columns(solution: Solution) -> tuple[list[str], np.ndarray]:
             ),
             "1e-5",
         ),
-        ("punching_press_tangent", (), "1e-8"),
-        ("four_bar", (), "1e-7"),
+        pytest.param("punching_press_tangent", (), "1e-8", marks=pytest.mark.long),
+        pytest.param("four_bar", (), "1e-7", marks=pytest.mark.long),
         ("varying_compliance", (), "1e-9"),
     ],
 )
@@ -449,7 +449,11 @@ def test_program_of_another_language_embeds_the_scene_twice(exported: Callable[.
 # code
 
 
-@pytest.mark.parametrize("scene", MOST_OF_THEM_LONG)
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "scene",
+    ["punching_press", *(pytest.param(name, marks=pytest.mark.extreme) for name in ("varying_compliance", "four_bar"))],
+)
 def test_program_runs_clean_under_the_sanitizers(exported: Callable[..., Program], tmp_path: Path, scene: str) -> None:
     program = exported(scene)
     probe = tmp_path / "probe.c"
