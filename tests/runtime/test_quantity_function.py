@@ -219,6 +219,8 @@ def test_pytorch_gives_the_same_bits(torch: ModuleType, function: QuantityFuncti
     mass = torch.tensor(rows[0, 1], requires_grad=True)
     f({CLEARANCE: torch.tensor(rows[0, 0]), MASS: mass})[0].backward()
     assert float(mass.grad) == pytest.approx(slopes[0, 0, 1], rel=1e-15)
+    # numbers, and the scene's where a name is left out, have 64 bits as well
+    assert np.array_equal(f({MASS: rows[0, 1].item()}), function([function.start[0], rows[0, 1]]))
 
 
 @pytest.mark.filterwarnings(SCRIPT)

@@ -95,7 +95,7 @@ def wrap(function: QuantityFunction) -> Callable[[torch.Tensor | Mapping[str, to
 
     def wrapped(parameters: torch.Tensor | Mapping[str, torch.Tensor]) -> torch.Tensor:
         if isinstance(parameters, Mapping):
-            given = [torch.as_tensor(value) for value in function.arguments(parameters)]
+            given = [torch.as_tensor(value, dtype=torch.float64) for value in function.arguments(parameters)]
             x = torch.stack(torch.broadcast_tensors(*given), dim=-1)
         else:
             x = parameters
