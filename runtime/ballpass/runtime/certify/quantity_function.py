@@ -285,7 +285,10 @@ class QuantityFunction:
         if slopes and self._chaos == "refuse":
             refuse_chaos(self._model, numbers, self._quantities, self._span)
         free = self._free[slopes]
-        study = free.pop() if free else self._study(slopes=slopes)
+        try:
+            study = free.pop()
+        except IndexError:
+            study = self._study(slopes=slopes)
         stepping, _ = stepping_with_derivatives(
             self._model, numbers, study.window(numbers), rtol=self._rtol, sensitivity_rtol=10.0 * self._rtol
         )
