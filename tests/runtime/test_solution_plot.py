@@ -76,6 +76,12 @@ def test_what_is_drawn_is_the_steady_part(solution: Solution) -> None:
     assert f"{np.max(force):.4g} N" in strips.get_ylabel()
 
 
+def test_units_are_printed_as_in_the_figures(solution: Solution) -> None:
+    infos = tuple(replace(info, unit="kg*m/s^2") for info in solution.manifest.outputs)
+    other = replace(solution, manifest=replace(solution.manifest, outputs=infos))
+    assert other.plot.outputs("ball.force", ax=Figure().add_subplot()).get_ylabel() == "ball.force [kg·m/s²]"
+
+
 def test_the_spectrum_is_numpys(solution: Solution) -> None:
     (line,) = solution.plot.spectrum("inner.y", window="boxcar", ax=Figure().add_subplot()).lines
     y = 1e6 * solution.steady()["inner.y"][:-1]  # four whole turns; the last sample begins the next one
@@ -120,6 +126,17 @@ def test_a_solution_travels_without_its_model(solution: Solution) -> None:
     assert other.model is None
     np.testing.assert_array_equal(other["inner.x"], solution["inner.x"])
     assert other.plot.orbit(ax=Figure().add_subplot()).lines
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_missing_matplotlib_is_named_with_the_command(
+    solution: Solution, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delitem(sys.modules, "ballpass.runtime.plot.motion", raising=False)
+    for module in [module for module in sys.modules if module.partition(".")[0] == "matplotlib"]:
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(RequestError, match="needs matplotlib, which is not installed: pip install matplotlib"):
+        DRAWN[name](solution, None)
 
 
 def test_pandas_gets_a_column_for_each_ball_and_the_units(solution: Solution) -> None:

@@ -85,7 +85,7 @@ class SolutionPlot:
                 "outputs of one unit. Draw others on axes of their own."
             )
         (unit,) = units
-        factor, shown = _READ_IN.get(unit, (1.0, unit))
+        factor, shown = _read_in(unit)
         with _axes(ax) as axes:
             for name in chosen:
                 lines = axes.plot(steady.t, factor * steady[name], linewidth=1.0)
@@ -114,7 +114,8 @@ class SolutionPlot:
         --------
         >>> axes = model.simulate(cycles=3, transient=1).plot.orbit()  # of matplotlib
         """
-        from ballpass.runtime.plot.motion import draw_orbit  # with matplotlib
+        need("matplotlib")
+        from ballpass.runtime.plot.motion import draw_orbit
 
         rings = ("inner", "outer") if relative else ("inner",)
         record = self._record(bearing, *(f"{ring}.{axis}" for ring in rings for axis in "xy"))
@@ -141,8 +142,6 @@ class SolutionPlot:
         >>> axes.get_xlabel()
         'frequency [Hz]'
         """
-        from ballpass.runtime.plot.motion import shown_range
-
         steady = self._solution.steady()
         chosen = name or next(iter(self._displacements()), None)
         if chosen is None or steady[chosen].ndim > 1:
@@ -150,7 +149,9 @@ class SolutionPlot:
                 f"plot.spectrum: {chosen or 'no name'} was given. Allowed: an output or state with one value at a "
                 "time: solution.plot.spectrum('drive_torque')."
             )
-        factor, shown = _READ_IN.get(self._unit(chosen), (1.0, self._unit(chosen)))
+        factor, shown = _read_in(self._unit(chosen))
+        from ballpass.runtime.plot.motion import shown_range
+
         found = amplitude_spectrum(steady.t, factor * steady[chosen], cycle_length=steady.period, window=window)
         with _axes(ax) as axes:
             axes.semilogy(found.frequency[1:], found.amplitude[1:], linewidth=1.0, label=chosen)
@@ -243,7 +244,7 @@ class SolutionPlot:
     def _unit(self, name: str) -> str:
         self._solution[name]  # for its error
         infos = (*self._solution.manifest.outputs, *self._solution.manifest.states)
-        return next(info.unit for info in infos if info.name == name).replace("*", "·")
+        return next(info.unit for info in infos if info.name == name)
 
 
 class Animation:
@@ -279,6 +280,15 @@ class Animation:
 
 def _lacks(names: str) -> str:
     return f"plot: the run has no {names}: name them in run.outputs of the scene, or in simulate(outputs=...)."
+
+
+def _read_in(unit: str) -> tuple[float, str]:
+    """Factor from SI, and the unit that an axis shows."""
+    need("matplotlib")
+    from ballpass.runtime.plot.style import unit_words
+
+    factor, shown = _READ_IN.get(unit, (1.0, unit))
+    return factor, unit_words(shown)
 
 
 @contextmanager
