@@ -166,6 +166,24 @@ def test_gif_has_as_many_pictures_as_asked_for(press: tuple[Model, Solution], tm
     assert np.any(pictures[1] != pictures[2])
 
 
+@pytest.mark.parametrize("stopped", [False, True])
+def test_a_failing_ffmpeg_is_told_and_an_interrupt_stays_one(
+    press: tuple[Model, Solution], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stopped: bool
+) -> None:
+    program = tmp_path / "ffmpeg"
+    program.write_text("#!/bin/sh\necho 'Unknown encoder' >&2\ncat > /dev/null\nexit 8\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+
+    def stop(done: float) -> None:
+        if stopped:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt if stopped else RequestError, match=None if stopped else "8: Unknown encoder"):
+        write_animation(*press, tmp_path / "a.mp4", pictures=2, progress=stop)
+    assert list(tmp_path.iterdir()) == [program]
+
+
 def test_what_cannot_be_shown_is_refused(
     press: tuple[Model, Solution], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from subprocess import CalledProcessError
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -39,7 +40,7 @@ def write_movie(
     Raises
     ------
     RequestError
-        An MP4 needs the program ffmpeg, which is not on PATH.
+        An MP4 needs the program ffmpeg, which is not on PATH or fails.
     """
     writer = _writer(path.suffix)
     record = frames.first
@@ -49,12 +50,21 @@ def write_movie(
         figure = new_figure(5.8, layout=None)
         FigureCanvasAgg(figure)  # the writers draw with the figure's canvas
         made = Path(home) / path.name
-        with writer.saving(figure, str(made), dpi):
-            for number, sample in enumerate(shown):
-                figure.clear()
-                _draw(figure, record, sample, shown, seen, turning=frames.turning)
-                writer.grab_frame()
-                progress((number + 1) / len(shown))
+        try:
+            with writer.saving(figure, str(made), dpi):
+                for number, sample in enumerate(shown):
+                    figure.clear()
+                    _draw(figure, record, sample, shown, seen, turning=frames.turning)
+                    writer.grab_frame()
+                    progress((number + 1) / len(shown))
+        except CalledProcessError as fault:
+            if isinstance(fault.__context__, KeyboardInterrupt):  # which ends ffmpeg too
+                raise KeyboardInterrupt from None
+            said = fault.stderr.strip().splitlines()
+            raise RequestError(
+                f"The program ffmpeg ended with code {fault.returncode}: {said[-1] if said else 'it says nothing'}. An "
+                "MP4 takes one with the encoder libx264: ffmpeg -encoders lists them. Or take --format gif or html."
+            ) from None
         made.replace(path)
     return path
 
