@@ -18,6 +18,7 @@ from ballpass.runtime.app.summary import add_turns, render_summary, summarize
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.run.settle import look_further
 from ballpass.runtime.run.tables import printed, show_tables, simple_table
+from ballpass.runtime.show.html import from_terminal
 
 
 @pytest.fixture(scope="module")
@@ -162,6 +163,15 @@ def test_names_and_numbers_of_tables_are_whole_at_any_width(
     assert sum(name in line for line in lines) == 3
     assert " ".join(word for line in lines for word in line.split() if word in words.split()) == words
     assert all(any(number in line for line in lines) for number in numbers)
+
+
+def test_no_word_of_a_scene_is_read_as_a_picture_or_as_a_style() -> None:
+    words = "Press [old] [/x] :fire:"
+    table = simple_table(words, ("name", "value"), caption=words)
+    table.add_row("rms:x:y", "1")
+    assert printed(table).splitlines()[:: len(printed(table).splitlines()) - 1] == [words, words]
+    assert "rms:x:y" in printed(table)
+    assert from_terminal(table).count(words) == 2
 
 
 def test_a_run_with_some_outputs_has_the_summary_of_these(

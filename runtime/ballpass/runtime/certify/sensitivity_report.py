@@ -344,7 +344,7 @@ def _title(report: SensitivityReport, name: str) -> str:
         words += f" at t = {quantity.time:.6g} s"
     if quantity.ball is not None:
         words += f", ball {quantity.ball}"
-    return escape(words)
+    return words
 
 
 def _row(pair: Sensitivity) -> tuple[str, ...]:

@@ -325,7 +325,7 @@ def _extent(samples: np.ndarray) -> tuple[str, str, str]:
     """Minimum, mean of the samples and maximum, as text."""
     if not samples.size:
         return ("", "", "")
-    return (f"{np.min(samples):.4g}", f"{np.mean(samples):.4g}", f"{np.max(samples):.4g}")
+    return (f"{np.min(samples):z.4g}", f"{np.mean(samples):z.4g}", f"{np.max(samples):z.4g}")
 
 
 def load_solution(path: str | Path) -> Solution:

@@ -13,6 +13,7 @@ from collections.abc import Collection, Iterator, Sequence
 
 from rich import box
 from rich.console import Console, Group, JustifyMethod, RenderableType
+from rich.markup import escape
 from rich.table import Column, Table
 from rich.text import Text
 
@@ -20,7 +21,7 @@ from rich.text import Text
 WIDTH = 80
 
 #: Measures what cells take.
-_WIDE = Console(width=10_000)
+_WIDE = Console(width=10_000, emoji=False)
 
 
 def simple_table(
@@ -35,10 +36,11 @@ def simple_table(
 
     Parameters
     ----------
+    title, caption : plain text; heads and cells are Rich's markup
     right : heads of the columns that are aligned to the right
     wrapped : heads of the columns of sentences, which take several lines where there is no room; others never do
     """
-    table = _empty(title, caption)
+    table = _empty(escape(title), None if caption is None else escape(caption))
     for head in heads:
         justify: JustifyMethod = "right" if head in right else "left"
         table.add_column(head, justify=justify, no_wrap=head not in wrapped)
@@ -60,7 +62,7 @@ def _empty(title: str | None = None, caption: str | None = None) -> Table:
 def printed(shown: RenderableType, width: int = WIDTH) -> str:
     """Text of tables and sentences without colours, and without blanks at the ends of lines."""
     stream = io.StringIO()
-    _print(shown, Console(file=stream, width=width, color_system=None, force_terminal=False))
+    _print(shown, Console(file=stream, width=width, color_system=None, force_terminal=False, emoji=False))
     return "\n".join(line.rstrip() for line in stream.getvalue().splitlines()).strip("\n")
 
 
@@ -80,14 +82,14 @@ def _print(shown: RenderableType, console: Console) -> None:
             console.print(part, highlight=False)
             continue
         if part.title:
-            console.print(Text.from_markup(str(part.title), style="italic"), highlight=False)
+            console.print(Text.from_markup(str(part.title), style="italic", emoji=False), highlight=False)
         for block in _blocks(part, console):
             # wider only where a block cannot be narrower, or where there is no terminal to wrap it
             console.width = max(width, _least_width(block))
             console.print(block, highlight=False)
             console.width = width
         if part.caption:
-            console.print(Text.from_markup(str(part.caption), style="dim italic"), highlight=False)
+            console.print(Text.from_markup(str(part.caption), style="dim italic", emoji=False), highlight=False)
 
 
 def _parts(shown: RenderableType) -> Iterator[RenderableType]:

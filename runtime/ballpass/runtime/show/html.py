@@ -114,7 +114,7 @@ def _parts(printed: Any) -> Iterator[str]:
 def _text(cell: Any) -> Any:
     from rich.text import Text
 
-    return cell if isinstance(cell, Text) else Text.from_markup(str(cell))
+    return cell if isinstance(cell, Text) else Text.from_markup(str(cell), emoji=False)
 
 
 def _cell(cell: Any) -> str:
