@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 from scene_texts import PRESS, ROTOR
 
-from ballpass.derive.lower.functions import Functions, lower
+from ballpass.derive.lowering.functions import Functions, lower
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import System, derive
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ballpass.derive.bearing import hertz
-from ballpass.derive.lower.visitor import Visitor
+from ballpass.derive.lowering.visitor import Visitor
 
 BALL, PITCH = 7.9375e-3, 33.5e-3
 COMPLIANCE = 2 * (1 - 0.3**2) / 207e9

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Callable
+from importlib import import_module
+from types import ModuleType
 
 import casadi as ca
 import numpy as np
 import pytest
 import sympy as sp
 
+from ballpass import derive as derivation
+from ballpass import runtime
 from ballpass.derive import derive
-from ballpass.derive.lower.functions import lower, operations
-from ballpass.derive.lower.visitor import Visitor
+from ballpass.derive.lowering.functions import lower, operations
+from ballpass.derive.lowering.visitor import Visitor
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
@@ -196,3 +201,10 @@ def test_shared_expressions_are_lowered_once() -> None:
     x = ca.SX.sym("x")
     function = ca.Function("f", [x], [Visitor({X: x, Y: ca.SX(0.5)}, {})(expression)])
     assert operations(function) == 4 * 60
+
+
+def test_no_module_takes_the_place_of_a_public_name() -> None:
+    for package in (derivation, runtime):
+        for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            import_module(found.name)
+        assert not [name for name in package.__all__ if isinstance(getattr(package, name), ModuleType)]

@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ballpass.derive.lower.functions import operations
-from ballpass.derive.lower.mass_matrix import solve_ldl
+from ballpass.derive.lowering.functions import operations
+from ballpass.derive.lowering.mass_matrix import solve_ldl
 
 
 def solver(n: int, pattern: np.ndarray) -> ca.Function:

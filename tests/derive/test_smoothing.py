@@ -11,7 +11,7 @@ import pytest
 
 from ballpass.derive import SceneError, derive, generate
 from ballpass.derive.bearing.laws.contact import RAMP_ERROR, SMOOTHED_HERTZ_ERROR
-from ballpass.derive.lower.functions import lower
+from ballpass.derive.lowering.functions import lower
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import System
 from ballpass.runtime import Model

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ballpass.derive.lower.functions import lower
+from ballpass.derive.lowering.functions import lower
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import derive
 

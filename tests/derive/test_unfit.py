@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ballpass.derive import generate
-from ballpass.derive.lower.ball_kernels import BallBuilder, UnfitError
+from ballpass.derive.lowering.ball_kernels import BallBuilder, UnfitError
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, NoKernelsWarning, load
 

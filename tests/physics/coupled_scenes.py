@@ -15,7 +15,7 @@ sys.path.append(str(Path(__file__).parents[1] / "derive"))
 from linkages import Machine
 
 from ballpass.derive import derive
-from ballpass.derive.lower.functions import _Lowering
+from ballpass.derive.lowering.functions import _Lowering
 from ballpass.derive.mechanism.forces import PointForce
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.quantity import Quantity, Vector

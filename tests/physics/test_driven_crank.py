@@ -12,7 +12,7 @@ import sympy as sp
 from scipy.integrate import simpson
 
 from ballpass.derive import derive, generate, read_scene
-from ballpass.derive.lower.functions import lower
+from ballpass.derive.lowering.functions import lower
 from ballpass.derive.mechanism.numeric import Evaluator
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError

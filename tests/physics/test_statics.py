@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ballpass.derive import derive
-from ballpass.derive.lower.functions import lower
+from ballpass.derive.lowering.functions import lower
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model
 

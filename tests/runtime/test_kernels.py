@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ballpass.derive import derive, generate
-from ballpass.derive.lower.functions import Functions, lower
+from ballpass.derive.lowering.functions import Functions, lower
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import System
 from ballpass.runtime.native.compile import compile_sources, find_compiler

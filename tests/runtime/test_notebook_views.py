@@ -19,7 +19,7 @@ from rich.table import Table
 import ballpass.derive
 import ballpass.runtime
 from ballpass.derive import derive, equations
-from ballpass.derive.lower.functions import lower
+from ballpass.derive.lowering.functions import lower
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import DataSetReport, Distribution, MemberFailure, Model, QuantityFunction, Results, SignalClass
 from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum

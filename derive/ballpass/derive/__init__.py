@@ -2,7 +2,7 @@
 
     read_scene -> Scene        what to model: frozen, SI, all faults of a file at once
     derive     -> System       SymPy: states, inputs, parameters, definitions, equations of motion, outputs
-    lower.functions.lower -> Functions    CasADi: right-hand side, Jacobians, contact, outputs, derived constants
+    lower      -> Functions    CasADi: right-hand side, Jacobians, contact, outputs, derived constants
     generate   -> folder       C, serialised functions, EQUATIONS.md, manifest.json
 
 Nothing flows back.  `ballpass.runtime` reads the folder and never imports this package.
@@ -18,12 +18,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ballpass.derive.emit.equations import equations
     from ballpass.derive.emit.generate import check, generate
+    from ballpass.derive.lowering.functions import lower
     from ballpass.derive.reading.read import read_scene
     from ballpass.derive.scene.errors import SceneError
     from ballpass.derive.scene.records import Scene
     from ballpass.derive.system import System, derive
 
-__all__ = ["Scene", "SceneError", "System", "check", "derive", "equations", "generate", "read_scene"]
+__all__ = ["Scene", "SceneError", "System", "check", "derive", "equations", "generate", "lower", "read_scene"]
 
 _HOME = {
     "Scene": "scene.records",
@@ -33,6 +34,7 @@ _HOME = {
     "derive": "system",
     "equations": "emit.equations",
     "generate": "emit.generate",
+    "lower": "lowering.functions",
     "read_scene": "reading.read",
 }
 

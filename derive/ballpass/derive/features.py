@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from ballpass.derive.bearing.effects import EFFECTS
-from ballpass.derive.lower.functions import lower, operations
+from ballpass.derive.lowering.functions import lower, operations
 from ballpass.derive.scene.bearing_records import Bearing, Damping, EquivalentMass, InitialState, InnerRing
 from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.records import FRAME, ConstantLoad, Load, Mechanism, Scene, Shaft

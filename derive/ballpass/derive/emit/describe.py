@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from ballpass.derive.emit.signature import catalogue_info, duty_info, lubrication_info, run_info, signature, versions
-from ballpass.derive.lower.functions import Functions, operations
+from ballpass.derive.lowering.functions import Functions, operations
 from ballpass.derive.mechanism.forces import drawn_forces
 from ballpass.derive.reading.usual import usual_ranges
 from ballpass.derive.reading.values import value_bounds, value_relations

@@ -31,8 +31,8 @@ from ballpass.derive.emit.describe import describe
 from ballpass.derive.emit.equations import equations
 from ballpass.derive.emit.kernel_headers import ensemble_header, kernels_header, switches_header, tangents_header
 from ballpass.derive.emit.methods_header import methods_header
-from ballpass.derive.lower.functions import Functions
-from ballpass.derive.lower.jacobians import DERIVATIVES, Described
+from ballpass.derive.lowering.functions import Functions
+from ballpass.derive.lowering.jacobians import DERIVATIVES, Described
 from ballpass.derive.system import System
 from ballpass.runtime import contract as mf
 

@@ -30,7 +30,7 @@ from ballpass.runtime.contract.folders import locked, replace_files
 from ballpass.runtime.show.progress import shown
 
 if TYPE_CHECKING:
-    from ballpass.derive.lower.functions import Functions
+    from ballpass.derive.lowering.functions import Functions
     from ballpass.derive.scene.records import Scene
     from ballpass.derive.system import System
 
@@ -154,7 +154,7 @@ def _read(scene: str | Path | Scene) -> tuple[Scene, str]:
 
 
 def _derive_and_lower(scene: Scene, say: Callable[[str], None]) -> tuple[System, Functions]:
-    from ballpass.derive.lower.functions import lower
+    from ballpass.derive.lowering.functions import lower
     from ballpass.derive.system import derive
 
     say("derive")

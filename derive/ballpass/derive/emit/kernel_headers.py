@@ -19,9 +19,9 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.emit.c_printer import print_array, print_function
-from ballpass.derive.lower.ball_kernels import CONTACT, RELATIVE, SUMS, BallKernels
-from ballpass.derive.lower.functions import Functions, operations
-from ballpass.derive.lower.kernels import Kernel, Kernels, only_deflections
+from ballpass.derive.lowering.ball_kernels import CONTACT, RELATIVE, SUMS, BallKernels
+from ballpass.derive.lowering.functions import Functions, operations
+from ballpass.derive.lowering.kernels import Kernel, Kernels, only_deflections
 from ballpass.derive.system import System
 
 #: Stage times evaluated at once, directions differentiated along at once, members that advance together: one 512-bit

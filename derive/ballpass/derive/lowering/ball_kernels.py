@@ -31,7 +31,7 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.lower.visitor import Visitor
+from ballpass.derive.lowering.visitor import Visitor
 
 #: Coefficients of a ball's deflection and rate, three and two, and the direction of the cage.
 RELATIVE = 7

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ballpass.derive.lower.visitor import Visitor
+from ballpass.derive.lowering.visitor import Visitor
 from ballpass.derive.system import System
 
 

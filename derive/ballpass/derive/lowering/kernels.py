@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import casadi as ca
 import sympy as sp
 
-from ballpass.derive.lower.ball_kernels import (
+from ballpass.derive.lowering.ball_kernels import (
     RELATIVE,
     SUMS,
     BallBuilder,
@@ -36,8 +36,8 @@ from ballpass.derive.lower.ball_kernels import (
     sums_by_relative,
     sums_by_time,
 )
-from ballpass.derive.lower.mass_matrix import accelerations
-from ballpass.derive.lower.visitor import Visitor
+from ballpass.derive.lowering.mass_matrix import accelerations
+from ballpass.derive.lowering.visitor import Visitor
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
 

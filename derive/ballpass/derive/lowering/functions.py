@@ -19,11 +19,11 @@ import casadi as ca
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.lower.ball_kernels import UnfitError
-from ballpass.derive.lower.jacobians import Described, Group, group_functions, partials, tangent
-from ballpass.derive.lower.kernels import KernelBuilder, Kernels
-from ballpass.derive.lower.mass_matrix import accelerations
-from ballpass.derive.lower.visitor import Visitor
+from ballpass.derive.lowering.ball_kernels import UnfitError
+from ballpass.derive.lowering.jacobians import Described, Group, group_functions, partials, tangent
+from ballpass.derive.lowering.kernels import KernelBuilder, Kernels
+from ballpass.derive.lowering.mass_matrix import accelerations
+from ballpass.derive.lowering.visitor import Visitor
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
 from ballpass.derive.variables import Output
