@@ -19,7 +19,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ballpass.runtime import Model, Solution
+from ballpass.runtime.ask.spectrum import amplitude_spectrum
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.plot.motion import shown_range
 
 matplotlib.use("agg")
 
@@ -88,6 +90,12 @@ def test_the_spectrum_is_numpys(solution: Solution) -> None:
     amplitude = 2.0 * np.abs(np.fft.rfft(y - np.mean(y))) / y.size
     found = np.asarray(line.get_ydata())
     np.testing.assert_allclose(found[:200], amplitude[1:201], rtol=1e-9, atol=1e-12)
+
+
+def test_the_range_of_a_spectrum_is_found_where_one_axis_hardly_moves() -> None:
+    t = np.linspace(0.0, 1.0, 1001)
+    large, small = (amplitude_spectrum(t, size * np.sin(2.0 * np.pi * 40.0 * t)) for size in (1.0, 1e-4))
+    assert shown_range([large, small], shaft=0.0) == shown_range([large], shaft=0.0)
 
 
 def test_what_cannot_be_drawn_is_told(rotor: Model, solution: Solution) -> None:

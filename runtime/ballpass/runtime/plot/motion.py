@@ -219,7 +219,8 @@ def shown_range(spectra: list[AmplitudeSpectrum], *, shaft: float) -> float:
     Above it lines stay below 1 % of the highest; at least 12, at most 60 harmonics of a turn are shown.
     """
     top = max(float(np.max(s.amplitude)) for s in spectra)
-    wanted = max((float(s.frequency[s.amplitude >= 0.01 * top][-1]) for s in spectra if top > 0.0), default=0.0)
+    seen = (float(f) for s in spectra if top > 0.0 for f in s.frequency[s.amplitude >= 0.01 * top][-1:])
+    wanted = max(seen, default=0.0)
     end = min(float(s.frequency[-1]) for s in spectra)
     if shaft > 0.0:
         wanted = min(max(1.1 * wanted, 12.5 * shaft), 60.5 * shaft)
