@@ -8,6 +8,8 @@ import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from PIL import Image
 from ballpass.runtime import Model, Solution
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.animate import animation_page, write_animation
+from ballpass.runtime.plot.animation import Frames
 
 BROWSER = shutil.which("chromium")
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on PATH")
@@ -92,6 +95,12 @@ def test_page_opens_at_the_highest_ball_force_which_no_thinning_misses(press: tu
         forces[sample, ball], abs=0.06
     )
     assert numbers["time"]["values"][numbers["peak"]] == pytest.approx(1e7 * press[1].t[-2001 + sample], abs=1.0)
+
+
+def test_page_of_several_bearings_opens_at_the_highest_force_of_all() -> None:
+    forces = [np.array(values) for values in ([1.0, 3.0, 2.0, 0.0], [0.0, 1.0, 5.0, 4.0])]
+    records: Any = [SimpleNamespace(bearing="", has_ball_force=True, highest_ball_force=one.copy) for one in forces]
+    assert Frames(records=(*records,), samples=np.arange(4), turning=True).peak == 2
 
 
 @needs_browser

@@ -48,9 +48,9 @@ class Frames:
     @property
     def peak(self) -> int:
         """Frame of the highest ball force; without it of the greatest drive torque; else the first."""
-        for record in self.records:
-            if record.bearing is not None and record.has_ball_force:
-                return int(np.argmax(np.max(record.ball_force()[1][self.samples], axis=1)))
+        drawn = [record for record in self.records if record.bearing is not None and record.has_ball_force]
+        if drawn:
+            return int(np.argmax(np.max([record.highest_ball_force()[self.samples] for record in drawn], axis=0)))
         if self.first.has("drive_torque"):
             return int(np.argmax(np.abs(self.first.values("drive_torque")[self.samples])))
         return 0
@@ -91,7 +91,7 @@ def choose_frames(records: Sequence[Record], turns: float = 1.0, pictures: int |
         chosen = {*range(first, len(angle), -(-(count - 1) // FRAMES)), len(angle) - 1}
         for one in records:
             if one.bearing is not None and one.has_ball_force:
-                chosen.add(first + int(np.argmax(np.max(one.ball_force()[1][first:], axis=1))))
+                chosen.add(first + int(np.argmax(one.highest_ball_force()[first:])))
     return Frames(records=tuple(records), samples=np.array(sorted(chosen)), turning=turning)
 
 

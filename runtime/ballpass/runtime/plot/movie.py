@@ -120,7 +120,7 @@ def _draw(figure: Figure, record: Record, sample: int, shown: list[int], seen: V
     across = turned if turning else 1e3 * record.t
     part = slice(shown[0], shown[-1] + 1)
     if record.can_draw_bearing:
-        axes.plot(across[part], np.max(record.ball_force()[1][part], axis=1), color=INK, linewidth=1.1)
+        axes.plot(across[part], record.highest_ball_force()[part], color=INK, linewidth=1.1)
         axes.set_ylabel("highest\nball force [N]")
     elif record.has("drive_torque"):
         axes.plot(across[part], record.values("drive_torque")[part], color=INK, linewidth=1.1)

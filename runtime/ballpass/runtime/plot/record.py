@@ -143,6 +143,10 @@ class Record:
             return "elastic and damping force" if damped else "elastic force", self.values("ball.force")
         return "elastic force", self.values("ball.elastic_force")
 
+    def highest_ball_force(self) -> Array:
+        """Ball force of the most loaded ball, (n,) [N]."""
+        return np.asarray(np.max(self.ball_force()[1], axis=1))
+
     @property
     def has_ball_force(self) -> bool:
         """Whether a ball force was asked for."""
