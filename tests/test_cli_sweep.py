@@ -243,6 +243,15 @@ def test_colours_of_a_map_grow_in_luminance_by_equal_steps() -> None:
     assert steps.min() > 0.5 * steps.mean()
 
 
+def test_an_error_that_is_none_of_the_scene_is_not_swallowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> float:
+        raise RequestError("no such unit")
+
+    monkeypatch.setattr("ballpass.runtime.app.commands.ranges.read_value", refuse)
+    with pytest.raises(RequestError, match="no such unit"):
+        read_ranges(read_scene(SCENE), [f"{CLEARANCE}=4um:11um:4"], {})
+
+
 def test_a_map_without_change_or_with_gaps_is_drawn_and_one_without_values_refused() -> None:
     axes = [
         VariedAxis(path="a", words="first", unit="um", values=np.array([1.0, 2.0, 4.0]), logarithmic=True),

@@ -23,6 +23,7 @@ from ballpass.runtime.contract.parameters import unknown_name
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
+    from ballpass.derive.scene.errors import Fault
 
 #: Most members of a sweep.
 MOST = 1_000_000
@@ -81,7 +82,11 @@ class _SceneNumbers:
         """All faults as one error."""
         from ballpass.derive import SceneError
 
-        faults = [fault for error in errors if isinstance(error, SceneError) for fault in error.faults]
+        faults: list[Fault] = []
+        for error in errors:
+            if not isinstance(error, SceneError):
+                return error
+            faults += error.faults
         return SceneError(faults, source="--vary")
 
     def check(self, path: str) -> None:
