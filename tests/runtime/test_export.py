@@ -389,6 +389,8 @@ int main()
     ballpass *one = ballpass_make(), *two = ballpass_make();
     std::vector<double> a(ballpass_columns()), b(a.size());
     std::vector<char> kept(ballpass_state_size());
+    double none;
+    if (ballpass_get(one, "nothing", &none) != BALLPASS_REFUSED || !*ballpass_error(one)) return 8;
     if (ballpass_set(two, "bearing.clearance", 20e-6)) return 1;
     if (ballpass_start(one, nullptr) || ballpass_start(two, nullptr)) return 1;
     const double end = ballpass_default(one).end;

@@ -141,14 +141,6 @@ int ballpass_varies(int place) { return place >= 0 && place < SCENE_PARAMETERS &
 
 double ballpass_value(const ballpass *s, int place) { return place >= 0 && place < SCENE_PARAMETERS ? s->run.values[place] : NAN; }
 
-int ballpass_get(const ballpass *s, const char *name, double *value)
-{
-    const int place = ballpass_place(name);
-    if (place < 0) return BALLPASS_REFUSED;
-    *value = s->run.values[place];
-    return BALLPASS_OK;
-}
-
 static void refuse_outside(ballpass *s, int i, double value)
 {
     const scene_parameter *info = &scene_parameters[i];
@@ -192,12 +184,25 @@ int ballpass_set_at(ballpass *s, int place, double value)
     return BALLPASS_OK;
 }
 
+static int refuse_name(ballpass *s, const char *name)
+{
+    clear(s);
+    return refuse(s, "parameter", name, "names that ballpass_parameter tells.");
+}
+
 int ballpass_set(ballpass *s, const char *name, double value)
 {
     const int place = ballpass_place(name);
-    if (place >= 0) return ballpass_set_at(s, place, value);
+    return place < 0 ? refuse_name(s, name) : ballpass_set_at(s, place, value);
+}
+
+int ballpass_get(ballpass *s, const char *name, double *value)
+{
+    const int place = ballpass_place(name);
+    if (place < 0) return refuse_name(s, name);
     clear(s);
-    return refuse(s, "parameter", name, "names that ballpass_parameter tells.");
+    *value = s->run.values[place];
+    return BALLPASS_OK;
 }
 
 /* runs */
@@ -382,9 +387,10 @@ static int start_anew(ballpass *s, double end)
     memcpy(r->x, r->state, sizeof r->x);
     r->asked.begin = r->time;
     r->asked.end = end;
-    r->changed = 0;
+    r->changed = 1; /* until there are segments for it */
     const int fault = find_edges(s);
     if (fault) return fault;
+    r->changed = 0;
     begin_call(s, 0);
     return BALLPASS_OK;
 }
@@ -476,8 +482,9 @@ int ballpass_run_to(ballpass *s, double time)
             if (time <= r->asked.end + near) break;
             const double length = r->asked.end - r->asked.begin, farther = r->asked.end + length;
             if (r->time < r->asked.end) fault = run_call(s, end);
+            if (fault) break;
             r->time = r->asked.end;
-            if (!fault) fault = start_anew(s, time > farther ? time : farther);
+            fault = start_anew(s, time > farther ? time : farther);
         } else {
             if (time < end - near) break;
             fault = run_call(s, end);
@@ -576,7 +583,8 @@ int ballpass_restore(ballpass *s, const void *bytes, size_t size)
     }
     memcpy(&s->run, bytes, sizeof s->run);
     memcpy(s->work, (const char *)bytes + sizeof s->run, work_size());
-    if (!s->run.started) return BALLPASS_OK;
+    /* values that were set and not run with have segments of their own, which come with the next call */
+    if (!s->run.started || s->run.changed) return BALLPASS_OK;
     const int fault = find_edges(s);
     if (!fault) find_inputs(s);
     return fault;

@@ -52,7 +52,7 @@ int ballpass_place(const char *name);
    speed of a shaft.  They hold from the time reached on; a shaft whose speed is set turns on from the angle that it has. */
 int ballpass_set(ballpass *simulation, const char *name, double value);
 int ballpass_set_at(ballpass *simulation, int place, double value);
-int ballpass_get(const ballpass *simulation, const char *name, double *value);
+int ballpass_get(ballpass *simulation, const char *name, double *value);
 double ballpass_value(const ballpass *simulation, int place);
 int ballpass_varies(int place);
 
