@@ -21,6 +21,8 @@ import numpy as np
 import pytest
 from filelock import FileLock
 
+from ballpass.derive import generate
+from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.export.fmu import export_fmu
 from ballpass.runtime.export.model_description import base_powers
@@ -280,7 +282,16 @@ def test_derivatives_are_those_of_differences(exported: Callable[..., Exported])
     manifest, states = model.manifest, list(model.states)
     others = [name for name in found.outputs if name not in states]
     with found.instance() as one:
-        one.begin(0.48)
+        one.slave.enterInitializationMode(startTime=0.0, stopTime=0.48)
+        start, ends = "bearing.initial.inner.x", []
+        unknowns, sizes = [found.places[name] for name in ("inner.x", "ball.deflection")], 9
+        moved = one.slave.getDirectionalDerivative(unknowns, [found.places[start]], [2.0], sizes)
+        for sign in (1.0, -1.0):
+            one.set(**{start: model.parameters[start] + sign * 1e-9})
+            ends.append(one.get("inner.x", "ball.deflection"))
+        one.set(**{start: model.parameters[start]})
+        assert np.allclose(moved, (ends[0] - ends[1]) / 1e-9, rtol=0.0, atol=1e-5)  # where the motion begins
+        one.slave.exitInitializationMode()
         one.slave.doStep(0.0, 0.0831)  # in the punch
         unknowns = [f"der({name})" for name in states] + others
         x = one.get(*states)
@@ -360,6 +371,7 @@ def test_bad_calls_are_errors_with_text(exported: Callable[..., Exported]) -> No
         slave.exitInitializationMode()
         refused("0.1 s was given. Allowed: 0 s", lambda: slave.doStep(0.1, 0.1))
         refused("a step of -0.1 s", lambda: slave.doStep(0.0, -0.1))
+        refused("Allowed: times up to the stop time, 0.4 s", lambda: slave.doStep(0.0, 0.41))
         refused("a value before the run starts", lambda: one.set(**{"bearing.clearance": 1e-6}))
         refused("Allowed: parameters and inputs", lambda: one.set(**{"inner.x": 0.0}))
         refused("value reference 9999", lambda: slave.getFloat64([9999]))
@@ -385,7 +397,9 @@ def test_bad_calls_are_errors_with_text(exported: Callable[..., Exported]) -> No
         assert words in heard[0]
 
 
-def test_names_that_cannot_be_inputs_are_refused(exported: Callable[..., Exported]) -> None:
+def test_names_that_cannot_be_inputs_are_refused(
+    exported: Callable[..., Exported], scene_text: Callable[..., str], tmp_path: Path
+) -> None:
     folder = press(exported).model.folder
     for name, words in (
         ("mechanism.driver.speed", "has no acceleration"),
@@ -394,6 +408,11 @@ def test_names_that_cannot_be_inputs_are_refused(exported: Callable[..., Exporte
     ):
         with pytest.raises(RequestError, match=words):
             export_fmu(folder, folder / "x.fmu", inputs=[name])
+    # what a cage has lagged would change with the speed, and its angle jump
+    slip = '[bearing.cage]\nslip = { time = ["0 s", "0.5 s"], value = [0.0, 0.04] }\n\n[bearing.damping]'
+    slipping = generate(scene_from_text(scene_text("rotor", ("[bearing.damping]", slip)), "rotor"), tmp_path / "rotor")
+    with pytest.raises(RequestError, match="does not change in a run"):
+        export_fmu(slipping, tmp_path / "x.fmu", inputs=["shaft.speed"])
 
 
 @pytest.mark.long
@@ -467,6 +486,28 @@ def test_a_shaft_whose_speed_is_set_turns_on_from_its_angle(exported: Callable[.
 
 
 @pytest.mark.long
+def test_a_speed_that_needs_too_many_segments_is_an_error_until_another_is_set(
+    exported: Callable[..., Exported],
+) -> None:
+    found = exported("rotor", ("shaft.speed",))
+    speed = found.model.parameters["shaft.speed"]
+    for early in (False, True):
+        with found.instance(earlyReturnAllowed=early) as one:
+            one.begin(0.4)
+            one.slave.doStep(0.0, 0.01)
+            one.set(**{"shaft.speed": 1e15})
+            for _ in range(2):
+                with pytest.raises(Exception, match="fmi3DoStep"):
+                    one.slave.doStep(0.01, 0.01)
+            one.set(**{"shaft.speed": speed})
+            one.slave.doStep(0.01, 0.01)
+            with found.instance() as two:
+                two.begin(0.4)
+                two.slave.doStep(0.0, 0.02)
+                assert np.allclose(one.get(), two.get(), rtol=1e-4, atol=1e-9)
+
+
+@pytest.mark.long
 def test_a_driver_whose_speed_is_an_input_goes_the_way_of_its_table(
     exported: Callable[..., Exported], scene_text: Callable[..., str]
 ) -> None:
@@ -489,6 +530,12 @@ def test_a_driver_whose_speed_is_an_input_goes_the_way_of_its_table(
             one.set(**{"mechanism.driver.speed": speed})
             one.slave.doStep(k / 100, (k + 1) / 100 - k / 100)
         ends = one.get(*names)
+        place = [found.places["mechanism.driver.speed"]]
+        assert one.slave.getDirectionalDerivative([found.places["driver.speed"]], place, [1.0], 1) == [0.0]
+    with found.instance(earlyReturnAllowed=True) as one:
+        one.slave.enterInitializationMode(startTime=0.0, stopTime=0.3)
+        one.slave.exitInitializationMode()
+        assert one.slave.doStep(0.0, 0.15)[3] == 0.15  # the table, with its rows, is out of use
     expected = np.array([solution.outputs[name][-1] for name in names])
     assert np.allclose(ends[:2], expected[:2], rtol=1e-12)
     assert np.allclose(ends[2:], expected[2:], rtol=0.0, atol=1e-3 * np.max(np.abs(expected[2:])))

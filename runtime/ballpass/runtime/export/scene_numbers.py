@@ -67,9 +67,13 @@ def computed_outputs(manifest: Manifest) -> tuple[VariableInfo, ...]:
 def varying(manifest: Manifest) -> tuple[str, ...]:
     """Parameters that may change in a run: forces, torques, loads, speed of a shaft.
 
-    Not the speed of a driver: one at constant speed has no acceleration that a change of it would need.
+    Not the speed of a driver: one at constant speed has no acceleration that a change of it would need.  Nor that of a
+    shaft whose cage slips by a table: what the cage has lagged is a multiple of it, so that its angle would jump.
     """
-    return tuple(info.name for info in manifest.parameters if _VARYING.fullmatch(info.name))
+    constants = {info.name for info in manifest.constants}
+    lags = any(value in constants for item in manifest.inputs for value in item.values)
+    names = (info.name for info in manifest.parameters if _VARYING.fullmatch(info.name))
+    return tuple(name for name in names if not (lags and name == "shaft.speed"))
 
 
 def driven(manifest: Manifest) -> tuple[int, int] | None:

@@ -313,14 +313,22 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         return fail(at, "%s: a step of %g s was given. Allowed: a time above 0.", call, communicationStepSize);
     if (!(fabs(currentCommunicationPoint - here) <= 1e-9 * (fabs(here) + communicationStepSize)))
         return fail(at, "%s: the communication point %.9g s was given. Allowed: %.9g s, where the last step has ended.", call, currentCommunicationPoint, here);
+    const double last = at->own.asked.end;
+    if (at->own.end_known && there - last > 1e-9 * (fabs(last) + communicationStepSize))
+        return fail(at, "%s: a step to %.9g s was given. Allowed: times up to the stop time, %.9g s.", call, there, last);
+    /* before loads that switch are asked for: the table of the driver's speed is none of them */
+    if (FMU_DRIVEN && answered(at, call, ballpass_drive(at->simulation, at->own.speed)) != fmi3OK) return fmi3Error;
     if (at->early_return) {
         const double next = ballpass_next_switch(at->simulation);
         if (next > here && next < there * (1.0 - 1e-12)) {
+            if (FMU_DRIVEN) { /* a part of the way to the speed at the end */
+                const double speed = ballpass_states(at->simulation)[scene_driver];
+                ballpass_drive(at->simulation, speed + (at->own.speed - speed) * (next - here) / (there - here));
+            }
             there = next;
             *earlyReturn = fmi3True;
         }
     }
-    if (FMU_DRIVEN && answered(at, call, ballpass_drive(at->simulation, at->own.speed)) != fmi3OK) return fmi3Error;
     const fmi3Status status = answered(at, call, ballpass_run_to(at->simulation, there < here ? here : there));
     *lastSuccessfulTime = ballpass_time(at->simulation);
     if (status != fmi3OK) *earlyReturn = fmi3False;
@@ -340,6 +348,7 @@ static fmi3Status seeds(instance_of *at, const char *call, const fmi3ValueRefere
         if (what == TIME) *dt += seed[k];
         else if (what == STATE) dx[first] += seed[k];
         else if (what == PARAMETER) dp[first] += seed[k];
+        else if (what == SPEED) continue; /* it moves nothing before the next step */
         else return fail(at, "%s: the known %u was given. Allowed: time, states, inputs and parameters.", call, (unsigned)knowns[k]);
     }
     return fmi3OK;
@@ -378,6 +387,7 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
     double dt = 0.0, dx[SCENE_STATES] = {0.0}, dp[SCENE_PARAMETERS] = {0.0};
     instance_of *at = in(instance, RUNNING, call);
     if (ready(at, call) != fmi3OK || seeds(at, call, knowns, nKnowns, seed, nSeed, &dt, dx, dp) != fmi3OK) return fmi3Error;
+    if (at->own.where == INITIALIZATION) ballpass_initial_tangent(at->simulation, dp, dx);
     return derive(at, call, dt, dx, dp, unknowns, nUnknowns, sensitivity, nSensitivity);
 }
 

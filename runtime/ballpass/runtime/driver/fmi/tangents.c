@@ -1,7 +1,6 @@
 /* See tangents.h. */
 #include "tangents.h"
 
-
 #include "scene.h"
 #include "simulation.h"
 
@@ -20,4 +19,12 @@ void ballpass_tangent(const ballpass *s, double dt, const double *dx, const doub
     schedule_tangents(scene_inputs, SCENE_INPUTS, p, values, start, middle, du);
     scene_constants_tangent(p, dp, dc);
     scene_tangent(t, ballpass_states(s), u, p, c, &dt, dx, du, dp, dc, moved);
+}
+
+void ballpass_initial_tangent(const ballpass *s, const double *dp, double *dx)
+{
+    double dc[SCENE_CONSTANTS + 1];
+    scene_constants_tangent(ballpass_values(s), dp, dc);
+    for (int i = 0; i < SCENE_STATES; i++)
+        dx[i] += scene_initial[i] < SCENE_PARAMETERS ? dp[scene_initial[i]] : dc[scene_initial[i] - SCENE_PARAMETERS];
 }

@@ -16,4 +16,7 @@ void scene_tangent(double t, const double *x, const double *u, const double *p, 
    them at fixed time, but for those that may change in a run: a shaft whose speed is set turns on from where it is. */
 void ballpass_tangent(const ballpass *simulation, double dt, const double *dx, const double *dp, double *moved);
 
+/* Adds to a direction of the initial states what follows from one of the parameters. */
+void ballpass_initial_tangent(const ballpass *simulation, const double *dp, double *dx);
+
 #endif
