@@ -53,6 +53,13 @@ def test_what_the_runtime_needs_is_said_once_more_by_the_whole_and_by_the_recipe
     assert (ROOT / "runtime" / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
 
 
+def test_every_package_has_types_for_its_users() -> None:
+    for half in ("derive", "runtime"):
+        packages = [path.parent for path in (ROOT / half / "ballpass").glob("*/__init__.py")]
+        assert packages
+        assert [package.name for package in packages if not (package / "py.typed").is_file()] == []
+
+
 @pytest.fixture(scope="module")
 def archives(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Source distributions, and the wheels that they give."""
