@@ -27,7 +27,7 @@ from ballpass.runtime.plot.gallery import FIGURES, draw, draw_all
 from ballpass.runtime.plot.mechanism import draw_mechanism
 from ballpass.runtime.plot.motion import phase_portrait, spectra
 from ballpass.runtime.plot.record import gather
-from ballpass.runtime.plot.style import INK, PALE, SAND, SIGNAL, caption_of, save, write_figures
+from ballpass.runtime.plot.style import INK, PALE, SAND, SIGNAL, caption, caption_of, frame, save, write_figures
 
 Run = tuple[Model, Solution]
 
@@ -98,6 +98,13 @@ def test_captions_stand_beside_the_pictures(press: Run, tmp_path: Path) -> None:
         "",
         f"**Orbit of the inner ring's centre.** {caption_of(figure)}",
     ]
+
+
+@pytest.mark.parametrize("put", [caption, frame])
+def test_dollars_in_a_scene_s_title_are_no_formula(put: Callable[[Figure, str, str], None], tmp_path: Path) -> None:
+    figure = Figure()
+    put(figure, "Press of $x_$", "")
+    assert save(figure, tmp_path / "a.png").is_file()
 
 
 def test_a_scene_without_mechanism_gets_the_bearing_s_figures(shaft: Run, tmp_path: Path) -> None:

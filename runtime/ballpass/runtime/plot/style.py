@@ -75,6 +75,9 @@ MANY: tuple[dict[str, Any], ...] = tuple(
     )
 )
 
+#: Look of a figure's title, in which no dollar begins a formula.
+TITLE: dict[str, Any] = {"ha": "left", "fontsize": 12, "fontweight": "bold", "parse_math": False}
+
 P = ParamSpec("P")
 
 
@@ -119,7 +122,7 @@ def frame(
     gaps : ``wspace`` and ``hspace`` between axes, in parts of their size
     """
     width, height = figure.get_size_inches()
-    figure.suptitle(title, x=0.1 / width, y=1.0 - 0.1 / height, ha="left", va="top", fontsize=12, fontweight="bold")
+    figure.suptitle(title, x=0.1 / width, y=1.0 - 0.1 / height, va="top", **TITLE)
     figure.set_label(text)
     figure.subplots_adjust(
         left=left / width,
@@ -132,7 +135,7 @@ def frame(
 
 def caption(figure: Figure, title: str, text: str) -> None:
     """Title above, inside the layout; the caption as `caption_of` gives it."""
-    figure.suptitle(title, x=0.012, ha="left", fontsize=12, fontweight="bold")
+    figure.suptitle(title, x=0.012, **TITLE)
     figure.set_label(text)
 
 
