@@ -2,7 +2,7 @@
 # Make the virtual environment .venv and install ballpass into it; say what is missing where something is.
 # usage: scripts/setup.sh [EXTRAS]      EXTRAS e.g. dev,docs
 set -eu
-extras=${1:-}
+extras=labelled${1:+,$1}  # the Python of the README gives labelled results
 python=${PYTHON:-python3}
 venv=${VENV:-.venv}
 
@@ -21,7 +21,5 @@ fi
 # an environment with pip, not just a folder: a setup that was interrupted is taken up again
 "$venv/bin/python" -c 'import pip, sys; sys.exit(sys.prefix == sys.base_prefix)' 2>/dev/null ||
   { printf '%s\n' "setup: making $venv"; "$python" -m venv "$venv"; }
-printf '%s\n' "setup: installing ballpass${extras:+ with $extras} into $venv (first time: some 180 MB of downloads, a minute or so)"
-target=.
-[ -z "$extras" ] || target=".[$extras]"
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check -c requirements.txt -e "$target"
+printf '%s\n' "setup: installing ballpass with $extras into $venv (first time: some 180 MB of downloads, a minute or so)"
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check -c requirements.txt -e ".[$extras]"
