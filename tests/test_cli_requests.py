@@ -87,13 +87,19 @@ def test_contradictions_and_nonsense_end_with_exit_code_2_and_no_folder(
         (("--format", "avi"), "Allowed: html, mp4, gif"),
         (("--pictures", "9"), "--pictures is of movies"),
         (("--last", "9"), "Simulate more turns, or show fewer"),
+        (("--format", "gif", "--pictures", "1"), "2 or more"),
+        (("--format", "gif", "--last", "nan"), "nan turns were asked for. Allowed: more than 0"),
+        (("--format", "mp4"), "ffmpeg, which is not on PATH"),
     ],
 )
 def test_animations_that_cannot_be_end_with_exit_code_2(
-    site: Path, ballpass: Callable[..., Result], words: tuple[str, ...], told: str
+    site: Path, ballpass: Callable[..., Result], words: tuple[str, ...], told: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    if "mp4" in words:
+        monkeypatch.setenv("PATH", str(site))
     done = ballpass("animate", SCENE, *words, "--out", "moving")
     assert done.exit_code == 2, done.output
+    assert ("simulating" in done.stderr) == (words == ("--last", "9"))  # what can be known before is told before
     assert told in " ".join(done.stderr.split())
     assert not list(site.glob("moving/*"))
 

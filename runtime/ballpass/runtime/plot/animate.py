@@ -10,7 +10,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.plot import MOVING
-from ballpass.runtime.plot.animation import choose_frames, to_plain
+from ballpass.runtime.plot.animation import check_turns, choose_frames, to_plain
 from ballpass.runtime.plot.html_page import page
 from ballpass.runtime.plot.record import Record, gather
 
@@ -70,13 +70,23 @@ def write_animation(
     if target.suffix == ".html":
         replace_file(target, animation_page(model, solution, turns=turns).encode())
         return target
-    need("matplotlib")
-    from ballpass.runtime.plot.movie import PICTURES, write_movie
+    count = count_pictures(target.suffix, turns, pictures)
+    from ballpass.runtime.plot.movie import write_movie
 
+    return write_movie(choose_frames(_records(model, solution), turns, count), target, progress=progress)
+
+
+def count_pictures(suffix: str, turns: float, pictures: int | None) -> int:
+    """Pictures of a movie of a kind, ``.gif`` or ``.mp4``, that can be made here; errors as for `write_animation`."""
+    check_turns(turns)
+    need("matplotlib")
+    from ballpass.runtime.plot.movie import PICTURES, writer_of
+
+    writer_of(suffix)
     count = round(PICTURES * turns) if pictures is None else pictures
     if count < 2:
         raise RequestError(f"A movie of {count} pictures does not move. Allowed: 2 or more.")
-    return write_movie(choose_frames(_records(model, solution), turns, count), target, progress=progress)
+    return count
 
 
 def _records(model: PointModel, solution: Solution) -> list[Record]:

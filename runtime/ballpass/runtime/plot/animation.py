@@ -70,8 +70,7 @@ def choose_frames(records: Sequence[Record], turns: float = 1.0, pictures: int |
     RequestError
         The record is shorter than these turns.
     """
-    if not turns > 0.0:
-        raise RequestError(f"{turns!r} turns were asked for. Allowed: more than 0. Give 1 for the last turn.")
+    check_turns(turns)
     angle = records[0].crank_angle()
     way = np.diff(angle)
     turning = bool(len(way) and (np.all(way > 0.0) or np.all(way < 0.0)))
@@ -93,6 +92,12 @@ def choose_frames(records: Sequence[Record], turns: float = 1.0, pictures: int |
             if one.bearing is not None and one.has_ball_force:
                 chosen.add(first + int(np.argmax(one.highest_ball_force()[first:])))
     return Frames(records=tuple(records), samples=np.array(sorted(chosen)), turning=turning)
+
+
+def check_turns(turns: float) -> None:
+    """Refuse turns that are no number above 0 with a `RequestError`."""
+    if not 0.0 < turns < math.inf:
+        raise RequestError(f"{turns!r} turns were asked for. Allowed: more than 0. Give 1 for the last turn.")
 
 
 def to_plain(frames: Frames) -> dict[str, Any]:

@@ -42,7 +42,7 @@ def write_movie(
     RequestError
         An MP4 needs the program ffmpeg, which is not on PATH or fails.
     """
-    writer = _writer(path.suffix)
+    writer = writer_of(path.suffix)
     record = frames.first
     shown = frames.samples.tolist()
     seen = view(record, shown) if record.manifest.mechanism is not None else None
@@ -95,7 +95,8 @@ def _palette() -> list[int]:
     return [int(part) for part in np.rint(255.0 * np.vstack((np.ones((1, 3)), found))[:256]).ravel()]
 
 
-def _writer(kind: str) -> AbstractMovieWriter:
+def writer_of(kind: str) -> AbstractMovieWriter:
+    """Matplotlib's writer of files with this ending; errors as for `write_movie`."""
     if kind == ".gif":
         return _GifWriter(fps=RATE)
     if not FFMpegWriter.isAvailable():

@@ -44,6 +44,10 @@ def animate(
             raise RequestError(f"--format: {format_!r} is no kind of animation. Allowed: {', '.join(MOVING)}.")
         if pictures is not None and format_ == "html":
             raise RequestError("--pictures is of movies; a page has up to 1000 positions. Omit it, or --format gif.")
+        if format_ != "html":
+            from ballpass.runtime.plot.animate import count_pictures
+
+            count_pictures(f".{format_}", last, pictures)  # what cannot be made is refused before anything is simulated
         seconds = read_duration(duration, cycles)
         asked = read_asked(scene, set_, seconds, transient)
         folder = results_folder(out, scene)
