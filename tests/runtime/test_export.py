@@ -412,6 +412,10 @@ int main()
         for (size_t i = 0; i < b.size(); i++) std::printf(i ? ",%.17g" : "%.17g", b[i]);
         std::printf("\n");
     }
+    if (ballpass_restore(one, kept.data(), kept.size())) return 9;
+    for (int k = 21; k <= 104; k++)  // beyond the end as well
+        if (ballpass_run_to(one, end * (k / 40.0)) || ballpass_read(one, a.data())) return 10;
+    if (ballpass_run_to(two, end * (104 / 40.0)) || ballpass_read(two, b.data()) || a != b) return 11;
     if (ballpass_run_to(one, 0.0) != BALLPASS_REFUSED) return 6;
     if (ballpass_set(one, "bearing.clearance", 1e-5) != BALLPASS_REFUSED) return 7;
     std::fprintf(stderr, "%s\n", ballpass_error(one));

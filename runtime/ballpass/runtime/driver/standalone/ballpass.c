@@ -43,6 +43,7 @@ typedef struct {
     int driven;               /* whether the driver follows speeds that are set, */
     double wanted, acceleration; /* to this one, at this acceleration */
     ballpass_request asked; /* begin and end: of the time that segments are known for */
+    double farther;         /* how much longer that becomes where the end is reached [s] */
     double tolerance[SCENE_STATES];
     long first, segments;   /* of the call at hand, the call's length */
     int begun;              /* whether the call has made a step */
@@ -370,6 +371,7 @@ int ballpass_start(ballpass *s, const ballpass_request *request)
     if (fault) return fault;
     for (int i = 0; i < SCENE_STATES; i++) r->x[i] = r->state[i] = r->values[scene_initial[i]];
     r->time = r->asked.begin;
+    r->farther = r->asked.end - r->asked.begin;
     find_tolerance(s);
     memset(r->before, 0, sizeof r->before);
     memset(&r->result, 0, sizeof r->result);
@@ -393,6 +395,14 @@ static int start_anew(ballpass *s, double end)
     r->changed = 0;
     begin_call(s, 0);
     return BALLPASS_OK;
+}
+
+/* As long again behind the end, and twice that the next time: where does not depend on the times that are asked for. */
+static int go_beyond(ballpass *s)
+{
+    const double end = s->run.asked.end + s->run.farther;
+    s->run.farther *= 2.0;
+    return start_anew(s, end);
 }
 
 /* The state at a time within the call at hand. */
@@ -445,8 +455,7 @@ static int settle(ballpass *s)
     if (!r->changed) return BALLPASS_OK;
     for (int k = 0; k < SCENE_CONSTANTS; k++)
         if (!isfinite(r->values[SCENE_PARAMETERS + k])) return refuse(s, "derived constant", scene_constant_names[k], "numbers that make it finite.");
-    if (r->time >= r->asked.end) return start_anew(s, 2.0 * r->asked.end - r->asked.begin);
-    return start_anew(s, r->asked.end);
+    return r->time >= r->asked.end ? go_beyond(s) : start_anew(s, r->asked.end);
 }
 
 int ballpass_drive(ballpass *s, double speed)
@@ -480,11 +489,10 @@ int ballpass_run_to(ballpass *s, double time)
         const double near = resolution(s), end = s->edges[r->first + r->segments];
         if (r->first + r->segments == s->edge_count) {
             if (time <= r->asked.end + near) break;
-            const double length = r->asked.end - r->asked.begin, farther = r->asked.end + length;
             if (r->time < r->asked.end) fault = run_call(s, end);
             if (fault) break;
             r->time = r->asked.end;
-            fault = start_anew(s, time > farther ? time : farther);
+            fault = go_beyond(s);
         } else {
             if (time < end - near) break;
             fault = run_call(s, end);
