@@ -173,9 +173,8 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
             {"name": body, "points": [shown.index(key) for key in keys]} for body, keys in links(used, poses[0], size)
         ],
         "pins": [
-            {"at": shown.index((second, point)), "fixed": FRAME in (first, body)}
+            {"at": shown.index((second, point)), "fixed": FRAME in (first, second)}
             for _, kind, first, _, second, point in mechanism.joints
-            for body in (second,)
             if kind == "revolute"
         ],
         "guides": guides,
