@@ -24,7 +24,8 @@ from filelock import FileLock
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError
-from ballpass.runtime.export.fmu import export_fmu
+from ballpass.runtime.contract import read_artefact
+from ballpass.runtime.export.fmu import export_fmu, input_names
 from ballpass.runtime.export.model_description import base_powers
 from ballpass.runtime.run import inputs as clock
 
@@ -413,6 +414,9 @@ def test_names_that_cannot_be_inputs_are_refused(
     slipping = generate(scene_from_text(scene_text("rotor", ("[bearing.damping]", slip)), "rotor"), tmp_path / "rotor")
     with pytest.raises(RequestError, match="does not change in a run"):
         export_fmu(slipping, tmp_path / "x.fmu", inputs=["shaft.speed"])
+    window = 'type = "unbalance"', 'type = "unbalance"\ntime_window = { start = "0.1 s" }'
+    windowed = generate(scene_from_text(scene_text("rotor", window), "rotor"), tmp_path / "windowed")
+    assert input_names(read_artefact(windowed), ["shaft"]) == ("shaft.speed",)  # though its end is a constant
 
 
 @pytest.mark.long

@@ -70,8 +70,7 @@ def varying(manifest: Manifest) -> tuple[str, ...]:
     Not the speed of a driver: one at constant speed has no acceleration that a change of it would need.  Nor that of a
     shaft whose cage slips by a table: what the cage has lagged is a multiple of it, so that its angle would jump.
     """
-    constants = {info.name for info in manifest.constants}
-    lags = any(value in constants for item in manifest.inputs for value in item.values)
+    lags = any(item.name.endswith("cage.lag") for item in manifest.inputs)
     names = (info.name for info in manifest.parameters if _VARYING.fullmatch(info.name))
     return tuple(name for name in names if not (lags and name == "shaft.speed"))
 
