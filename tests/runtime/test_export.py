@@ -231,7 +231,24 @@ def test_changed_parameters_move_loads_and_constants_as_in_python(
     assert np.max(np.abs(found[:, 1:] - plain[:, 1:]) / np.array(solution.statistics.magnitudes)) > 1e-3
 
 
-def test_table_of_loads_and_many_segments_equal_python(exported: Callable[..., Program]) -> None:
+SWITCHES = """
+#include <math.h>
+#include <stdio.h>
+#include "ballpass.h"
+
+int main(void)
+{
+    ballpass *simulation = ballpass_make();
+    if (ballpass_start(simulation, NULL)) return 1;
+    for (double next; isfinite(next = ballpass_next_switch(simulation)); printf("%.17g\\n", next))
+        if (ballpass_run_to(simulation, next)) return 1;
+    ballpass_free(simulation);
+    return 0;
+}
+"""
+
+
+def test_table_of_loads_and_many_segments_equal_python(exported: Callable[..., Program], tmp_path: Path) -> None:
     program = exported(
         "varying_compliance",
         ('type = "constant"  ', 'type = "table"  '),
@@ -254,6 +271,14 @@ def test_table_of_loads_and_many_segments_equal_python(exported: Callable[..., P
     refused = program("load.time.2=0.5")
     assert refused.returncode == 2
     assert "increase" in refused.stderr
+    # what switches are its rows, and no whole turn
+    build(program.folder, target="libvarying_compliance.a")
+    (tmp_path / "switches.c").write_text(SWITCHES, encoding="utf-8")
+    link = [f"-I{program.folder}", str(tmp_path / "switches.c"), str(program.folder / "libvarying_compliance.a"), "-lm"]
+    subprocess.run(["cc", "-std=c99", *link, "-o", str(tmp_path / "switches")], check=True, timeout=60)
+    told = subprocess.run([str(tmp_path / "switches")], capture_output=True, text=True, check=True, timeout=60).stdout
+    end = program.model.simulate(method="stepper", samples_per_cycle=1).statistics.duration
+    assert [float(word) for word in told.split()] == [row for row in (10e-3, 0.05, 0.153, 0.3) if row < end]
 
 
 @pytest.mark.long

@@ -566,8 +566,10 @@ double ballpass_next_switch(ballpass *s)
         const double *e = s->edges + i;
         inputs_of(s, e[0], 0.5 * (e[0] + e[1]), here);
         inputs_of(s, e[1], 0.5 * (e[1] + e[2]), there);
-        for (int k = 0; k < SCENE_INPUTS; k++)
-            if (scene_inputs[k].kind != SCHEDULE_PHASE && here[k] != there[k]) return e[1];
+        for (int k = 0; k < SCENE_INPUTS; k++) {
+            const int even = scene_inputs[k].kind == SCHEDULE_PHASE || scene_inputs[k].kind == SCHEDULE_TABLE; /* slopes tell of its rows */
+            if (!even && here[k] != there[k]) return e[1];
+        }
     }
     return INFINITY;
 }
