@@ -39,11 +39,22 @@ for _name in (
     os.environ.pop(_name, None)
 
 
+#: Names a folder whose compiled models several runs of the suite share, all compiled as those of the quick tests.
+SHARED = "BALLPASS_TESTS_SHARE"
+
+
+def _shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder that the processes of a run share."""
+    if SHARED in os.environ:
+        return Path(os.environ[SHARED])
+    place = tmp_path_factory.getbasetemp()
+    return place.parent if "PYTEST_XDIST_WORKER" in os.environ else place
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Compiled models of the suite stay out of the user's cache folder; the processes of one run share theirs."""
-    place = tmp_path_factory.getbasetemp()
-    cache = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "compiled"
+    cache = _shared(tmp_path_factory) / "compiled"
     cache.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("BALLPASS_CACHE_DIR", str(cache))
@@ -54,11 +65,11 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def _quick_compiler(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Half of the suite's time would go into gcc -O3: without the long tests, which run what users run, -Og does."""
     real = shutil.which("cc")
-    if real is None or "CC" in os.environ or request.config.option.markexpr != "not long":
+    quick = request.config.option.markexpr == "not long" or SHARED in os.environ
+    if real is None or "CC" in os.environ or not quick:
         yield
         return
-    place = tmp_path_factory.getbasetemp()
-    script = (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "cc"
+    script = _shared(tmp_path_factory) / "cc"
     with FileLock(f"{script}.lock"):
         if not script.exists():
             script.write_text(f'#!/bin/sh\nexec {real} "$@" -Og\n', encoding="utf-8")

@@ -30,7 +30,7 @@ from ballpass.runtime.app.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "scenes"
-NAMES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
+NAMES = ("punching_press", "four_bar", "varying_compliance")
 PRESS = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
 
 #: A compiler that does its work, in a hurry, unless the file beside it says no; its version stays the same, hence the

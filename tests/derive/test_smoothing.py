@@ -91,6 +91,7 @@ def test_outside_the_width_it_is_hertz_and_inside_within_the_stated_error(scene_
     assert 0.99 * bound <= np.max(error) <= bound
 
 
+@pytest.mark.long
 def test_error_falls_as_the_width_to_the_three_halves(scene_text: Callable[..., str]) -> None:
     """And the slope's as its root: Hertz's own law is the limit."""
     system = press(scene_text, "tangent", contact=True)
@@ -172,6 +173,7 @@ def test_motion_goes_to_that_of_hertz_with_the_width(make_model: Callable[..., M
     assert apart[0] > 4 * apart[1] > 16 * apart[2] > 0.0
 
 
+@pytest.mark.long
 def test_second_derivatives_are_given_for_the_smoothed_law_only(scene_text: Callable[..., str], tmp_path: Path) -> None:
     def virtual(name: str, *changes: tuple[str, str]) -> Model:
         """Evaluated a few times: not worth a compiler."""

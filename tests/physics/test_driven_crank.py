@@ -367,6 +367,7 @@ def test_torque_that_the_reactions_take_is_that_of_the_motor(bearing: bool) -> N
         assert float(results["drive_power"]) == pytest.approx(motor * arguments["x"][-1], rel=1e-12)
 
 
+@pytest.mark.long
 def test_windows_and_tables_over_an_angle_that_is_a_state_are_those_of_constant_speed() -> None:
     """At random angles of several turns either way: windows by arcs, also through zero; a table by NumPy."""
     loads = """[mechanism.forces.many]

@@ -134,6 +134,7 @@ def plain(folder: Path) -> dict[str, bytes]:
     return {name: (folder / name).read_bytes() for name in shown(folder)}
 
 
+@pytest.mark.long
 def test_a_reader_beside_a_process_that_derives_reads_one_folder(tmp_path: Path, both: tuple[Path, Path]) -> None:
     target = tmp_path / "rotor"
     shutil.copytree(both[0], target)
@@ -514,7 +515,9 @@ def test_a_full_disk_leaves_the_old_solution_and_says_so(rotor: Path, small_disk
     assert [path.name for path in small_disk.iterdir()] == ["solution.nc"]
 
 
-@pytest.mark.parametrize("what", ["cache", "generated", "results"])
+@pytest.mark.parametrize(
+    "what", ["results", *(pytest.param(name, marks=pytest.mark.long) for name in ("cache", "generated"))]
+)
 def test_a_full_disk_is_told_with_a_remedy_and_leaves_no_halves(
     scene: Path, tmp_path: Path, small_disk: Path, what: str
 ) -> None:
@@ -604,6 +607,7 @@ def test_a_read_only_cache_warns_and_names_the_folder_that_is_taken_instead(
         assert compiling.compile_sources((source,), compiler).path == library.path  # of this process, not once more
 
 
+@pytest.mark.long
 def test_a_home_that_cannot_be_written_is_a_warning(scene: Path, tmp_path: Path) -> None:
     env = {"HOME": "/dev/null", "XDG_CACHE_HOME": "", "BALLPASS_CACHE_DIR": ""}
     words = ("run", scene, "--cycles", "2", "--transient", "1", "--json", "--no-figures")

@@ -179,6 +179,7 @@ def test_a_right_derivative_is_verified_and_a_wrong_one_disagrees(
     assert pair.derivative == pytest.approx(1.01 * right.pairs[0].derivative, rel=1e-12)
 
 
+@pytest.mark.long
 def test_quantities_do_not_depend_on_the_samples(make_model: Callable[..., Model]) -> None:
     """Sixteen samples a turn see 4395 N and half of the second derivative; quadratures follow the motion instead."""
     model = make_model("punching_press_tangent")
@@ -212,6 +213,7 @@ def test_integrals_follow_vibrations_that_take_a_thousandth_of_a_turn(make_model
     assert [pair.value for pair in report.pairs] == pytest.approx(values, rel=1e-5)
 
 
+@pytest.mark.long
 def test_one_quantity_has_one_value_whoever_is_asked(make_model: Callable[..., Model]) -> None:
     """Asking for more does not move it either."""
     model = make_model("punching_press_tangent")

@@ -358,6 +358,7 @@ def test_the_dataset_carries_parameters_and_units(make_model: ModelMaker) -> Non
     assert data["bearing.clearance"].attrs["units"] == "m"
 
 
+@pytest.mark.long
 def test_magnitudes_in_c_are_those_of_single_runs(make_model: ModelMaker) -> None:
     for model in (press(make_model), make_model("varying_compliance"), make_model("offset_slider")):
         count = 6

@@ -47,7 +47,13 @@ def true_values(run: WholeRun, of: tuple[str, ...] | list[str]) -> np.ndarray:
     return run.integrate(check_observables(run.model, of), REFERENCE).values
 
 
-@pytest.mark.parametrize("scene", ["punching_press", "punching_press_tangent", "four_bar"])
+@pytest.mark.parametrize(
+    "scene",
+    [
+        "punching_press",
+        *(pytest.param(name, marks=pytest.mark.long) for name in ("punching_press_tangent", "four_bar")),
+    ],
+)
 def test_true_errors_are_within_the_target_and_near_the_estimate(make_model: Callable[..., Model], scene: str) -> None:
     """A small version of the counts in the documentation."""
     model = make_model(scene)
@@ -95,7 +101,10 @@ def test_errors_that_come_from_the_whole_run_are_seen(
 @pytest.mark.parametrize(
     ("scene", "numbers", "cycles", "of"),
     [
-        ("punching_press_tangent", {SPEED: 600.0 * math.tau / 60.0, CLEARANCE: 60e-6}, 12.0, "range_inner_x"),
+        pytest.param(
+            *("punching_press_tangent", {SPEED: 600.0 * math.tau / 60.0, CLEARANCE: 60e-6}, 12.0, "range_inner_x"),
+            marks=pytest.mark.long,
+        ),
         ("four_bar", {CLEARANCE: 200e-6}, 6.0, PEAK),
         pytest.param("offset_slider", CONFINED, 14.0, "range_inner_x", marks=[pytest.mark.long, pytest.mark.extreme]),
     ],

@@ -248,6 +248,7 @@ int main(void)
 """
 
 
+@pytest.mark.long
 def test_table_of_loads_and_many_segments_equal_python(exported: Callable[..., Program], tmp_path: Path) -> None:
     program = exported(
         "varying_compliance",
@@ -520,6 +521,8 @@ def other_compilers() -> list[tuple[str, str]]:
     return found
 
 
+@pytest.mark.long
+@pytest.mark.extreme
 @pytest.mark.parametrize("scene", ["punching_press", "varying_compliance"])
 def test_another_compiler_gives_the_same_numbers(exported: Callable[..., Program], tmp_path: Path, scene: str) -> None:
     others = other_compilers()

@@ -70,6 +70,7 @@ def test_an_ensemble_marks_the_members_that_single_runs_differ_in(press: Model) 
     assert marked.sum() >= 2
 
 
+@pytest.mark.long
 def test_the_commands_say_it_and_print_statistics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 

@@ -26,6 +26,7 @@ def press(make_model: Callable[..., Model]) -> Model:
     return make_model("punching_press")
 
 
+@pytest.mark.long
 def test_a_report_is_what_its_quantities_give_one_by_one(press: Model) -> None:
     report = press.life()
     (state,), (bearing,) = report.states, report.bearings

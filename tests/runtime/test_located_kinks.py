@@ -242,10 +242,10 @@ VARIED = {
 @pytest.mark.parametrize(
     "scene",
     [
-        *("varying_compliance", "four_bar"),
+        "varying_compliance",
         *(
             pytest.param(name, marks=pytest.mark.long)
-            for name in ("punching_press", "punching_press_tangent", "offset_slider")
+            for name in ("punching_press", "punching_press_tangent", "offset_slider", "four_bar")
         ),
     ],
 )

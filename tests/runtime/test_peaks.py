@@ -155,6 +155,7 @@ def test_a_spike_of_a_solution_read_from_a_file_is_found(make_model: ModelMaker,
     assert peaks[0].searched == "every step"
 
 
+@pytest.mark.long
 def test_a_spike_in_a_long_run_of_several_calls_is_found(make_model: ModelMaker) -> None:
     model = make_model("offset_slider")
     run = model.simulate(130, transient=2, parameters=SPIKES[0], samples_per_cycle=40)

@@ -215,6 +215,7 @@ def test_an_interrupt_is_heard_within_a_segment(rotor: Model, monkeypatch: pytes
     assert 0.0 < heard[0] < 0.5
 
 
+@pytest.mark.long
 def test_a_run_that_crawls_ends_with_its_pace(rotor: Model) -> None:
     # decay 5e9 1/s: an explicit method needs steps of a nanosecond, 4e9 of them
     with pytest.raises(IntegrationError, match="1000000 steps for the last") as caught:

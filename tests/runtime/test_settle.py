@@ -46,6 +46,7 @@ def test_twice_the_turns_change_a_settled_run_by_less_than_it_says(press: Model)
         assert few.rms == pytest.approx(twice[name].rms, rel=MEANS)
 
 
+@pytest.mark.long
 def test_what_does_not_settle_says_so(press: Model) -> None:
     """At this angle of the balls 128 turns find higher extremes than 64."""
     found = press.settle(parameters={ANGLE: math.tau / 24.0}, most=2 * LEAST)

@@ -187,6 +187,7 @@ def test_a_solution_keeps_the_balls_of_each_bearing(pair: Model, tmp_path: Path)
         assert labelled[f"{name}.ball.force"].sel({f"{name}.ball": balls}).shape == run.t.shape
 
 
+@pytest.mark.long
 def test_explain_says_of_each_bearing_what_is_not_modelled(
     scene_text: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
