@@ -44,11 +44,13 @@ def on_terminal(count: int, interrupt: bool = False, **environment: str) -> tupl
     said: list[bytes] = []
 
     def read() -> None:
+        asked = not interrupt
         try:
             while part := os.read(ours, 4096):
                 said.append(part)
-                if interrupt and b"25%" in b"".join(said):
-                    child.send_signal(signal.SIGINT)
+                if not asked and b"25%" in b"".join(said):
+                    child.send_signal(signal.SIGINT)  # once: where Python ends already, another is a traceback more
+                    asked = True
         except OSError:  # the other side is closed
             pass
 
