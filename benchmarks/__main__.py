@@ -1,4 +1,4 @@
-"""Measure and write the page: ``python -m benchmarks [--quick] [--out FOLDER] [PART ...]``."""
+"""Measure and write the page: ``python -m benchmarks [--quick] [--draw] [--out FOLDER] [PART ...]``."""
 
 from __future__ import annotations
 
@@ -73,23 +73,35 @@ def main(arguments: list[str] | None = None) -> int:
     """Measure the parts that are asked for; the page holds them and those measured before at the same commit."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="a look at every part; numbers mean nothing")
+    parser.add_argument("--draw", action="store_true", help="measure nothing: write the page of the results there are")
     parser.add_argument("--out", type=Path, help="folder of page and results; default: docs and benchmarks/results")
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(parts(False))}")
     options = parser.parse_args(arguments)
-    known, now = parts(options.quick), state()
+    known = parts(options.quick)
     unknown = sorted(set(options.parts) - set(known))
     if unknown:
         parser.error(f"no such part: {', '.join(unknown)}. There are {', '.join(known)}.")
+    if options.draw and options.parts:
+        parser.error("--draw measures nothing: name no part, or leave --draw out.")
     out = options.out or (ROOT / "build" / "benchmarks" / "quick" if options.quick else None)
     folder = out / "results" if out else ROOT / "benchmarks" / "results"
     folder.mkdir(parents=True, exist_ok=True)
-    for name in options.parts or known:
+    now = None if options.draw else state()
+    for name in [] if options.draw else options.parts or known:
         print(f"benchmarks: {name}", file=sys.stderr, flush=True)
         content = {"state": now, "result": known[name]()}
-        (folder / f"{name}.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        (folder / f"{name}.json").write_text(json.dumps(content, separators=(",", ":")) + "\n", encoding="utf-8")
     found = {name: json.loads(path.read_text()) for name in known if (path := folder / f"{name}.json").is_file()}
-    same = {name: content["result"] for name, content in found.items() if content["state"]["commit"] == now["commit"]}
     target = (out or ROOT / "docs") / "benchmarks.md"
+    commits = {content["state"]["commit"]: content["state"] for content in found.values()}
+    if now is None:
+        if len(commits) != 1:
+            parser.error(
+                f"{folder} has results of {len(commits)} commits{': ' * bool(commits)}{', '.join(commits)}. A page is "
+                "of one: measure the others anew, or delete their files."
+            )
+        (now,) = commits.values()
+    same = {name: content["result"] for name, content in found.items() if content["state"]["commit"] == now["commit"]}
     page.write(same, now, target)
     print(target)
     return 0

@@ -1,14 +1,16 @@
-"""The page of the benchmarks: results in, Markdown and a figure for each damping out."""
+"""The page of the benchmarks: results in, Markdown and a figure for each damping out, with its caption on the page."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-from ballpass.runtime.plot.style import MANY, new_figure, save, styled
+from ballpass.runtime.plot.style import GREY, MANY, caption, caption_of, log_ticks, new_figure, save, styled
 from benchmarks.work_precision import LEVELS, curve, time_at
 
 Result = Mapping[str, Any]
@@ -22,8 +24,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 def measured(value: Sequence[float], factor: float = 1.0) -> str:
     """Median with 10th and 90th percentile."""
-    middle, low, high = (factor * part for part in value)
-    return f"{middle:.3g} ({low:.3g} … {high:.3g})"
+    middle, low, high = (rounded(factor * part) for part in value)
+    return f"{middle} ({low} … {high})"
 
 
 def write(results: Mapping[str, Result], state: Mapping[str, str], page: Path) -> None:
@@ -40,25 +42,67 @@ def write(results: Mapping[str, Result], state: Mapping[str, str], page: Path) -
     }
     (page.parent / "images").mkdir(parents=True, exist_ok=True)
     lines = [head.rstrip()]
+    if "work_precision" in results:
+        lines += ["", *_summary(results["work_precision"])]
     for name, section in sections.items():
         if name in results:
             lines += ["", *section(results[name], page.parent / "images")]
     page.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def level_words(level: float) -> str:
+    """An error as headings have it: 1e-3."""
+    return f"{level:.0e}".replace("e-0", "e-")
+
+
+def rounded(value: float, digits: int = 3) -> str:
+    """A number to its digits, never as a power of ten: 5.10, 2700."""
+    value = float(f"{value:.{digits}g}")
+    return f"{value:.{max(digits - 1 - math.floor(math.log10(value)), 0)}f}"
+
+
+def _curves(case: Result) -> dict[str, list[tuple[float, float]]]:
+    return {label: curve(contender) for label, contender in case["contenders"].items()}
+
+
+def _summary(result: Result) -> list[str]:
+    """What a user would take instead of the stepper, at the loosest of the errors."""
+    level, cases = LEVELS[0], [(case, _curves(case)) for case in result.values()]
+    base = [time_at(curves["stepper"], level) for _, curves in cases]
+    rows = [["**ballpass**, ms a cycle", *("–" if own is None else f"**{rounded(1e3 * own)}**" for own in base)]]
+    for label in dict.fromkeys(label for case, _ in cases for label in case["contenders"]):
+        if any(case["contenders"].get(label, {}).get("group") == "ballpass" for case, _ in cases):
+            continue
+        taken = [time_at(curves.get(label, []), level) for _, curves in cases]
+        rows.append([label, *(_times(t, own, 2) for t, own in zip(taken, base, strict=True))])
+    return [
+        "## What to take from it",
+        "",
+        f"At an error of {level_words(level)}: milliseconds of the stepper, and how many times as long others take.",
+        "",
+        *table(["", *(case["words"] for case, _ in cases)], rows),
+    ]
+
+
+def _times(taken: float | None, own: float | None, digits: int) -> str:
+    """How many times as long."""
+    return "–" if taken is None or own is None else f"{rounded(taken / own, digits)}×"
+
+
 def _work_precision(result: Result, images: Path) -> list[str]:
     lines = ["## Work and precision"]
     for key, case in result.items():
-        curves = {label: curve(contender) for label, contender in case["contenders"].items()}
-        save(_figure(case, curves), images / f"bench_{key}.png")
+        curves = _curves(case)
+        figure = _figure(case, curves)
+        save(figure, images / f"bench_{key}.png")
         base = [time_at(curves["stepper"], level) for level in LEVELS]
         rows = []
         for label, points in curves.items():
             cells = []
             for level, own in zip(LEVELS, base, strict=True):
                 taken = time_at(points, level)
-                cells.append("–" if taken is None else f"{1e3 * taken:.3g}")
-                cells.append("–" if taken is None or own is None else f"{taken / own:.3g}×")
+                cells.append("–" if taken is None else rounded(1e3 * taken))
+                cells.append(_times(taken, own, 3))
             rows.append([label, *cells])
         rows += [[f"{label}: {reason}", *["–"] * 6] for label, reason in case["absent"].items()]
         rates = ", ".join(f"{name} within {value:.0e}" for name, value in case["rate_agreement"].items())
@@ -66,10 +110,12 @@ def _work_precision(result: Result, images: Path) -> list[str]:
             "",
             f"### Damping {case['words']}",
             "",
-            f"![Time against error, damping {case['words']}](images/bench_{key}.png)",
+            f"![{figure.get_suptitle()}](images/bench_{key}.png)",
+            "",
+            f"*{caption_of(figure)}*",
             "",
             *table(
-                ["ms a cycle at error", *(cell for level in LEVELS for cell in (f"{level:.0e}", "× stepper"))], rows
+                ["ms a cycle at error", *(cell for level in LEVELS for cell in (level_words(level), "× stepper"))], rows
             ),
             "",
             f"{case['members']} parameter sets (three for runs above 0.1 s). The two references agree within "
@@ -81,36 +127,48 @@ def _work_precision(result: Result, images: Path) -> list[str]:
 
 @styled
 def _figure(case: Result, curves: Mapping[str, Sequence[tuple[float, float]]]) -> Figure:
-    """Time against error; of each library the best of its methods at every error."""
-    figure = new_figure(4.6)
-    axes = figure.subplots()
+    """Time against error; of each library the best of its methods at every error, the slowest on top of the legend."""
+    figure = new_figure(5.0)
+    axes = figure.add_subplot()
+    lines: list[tuple[float, Line2D, str]] = []
     groups = dict.fromkeys(contender["group"] for contender in case["contenders"].values())
     for look, group in zip(MANY, groups, strict=False):
         some = [curves[label] for label, contender in case["contenders"].items() if contender["group"] == group]
         errors = sorted({error for points in some for error, _ in points}, reverse=True)
         best = [min(t for t in (time_at(points, e) for points in some) if t is not None) for e in errors]
-        width = 2.4 if group == "ballpass" else 1.2
-        axes.loglog(errors, [1e3 * t for t in best], markersize=4, linewidth=width, label=group, **look)
-    axes.set(
-        xlabel="largest relative error of motion, peak force and rms", ylabel="time of a cycle [ms]", xlim=(1e-1, 1e-9)
+        width, size = (2.6, 3.5) if group == "ballpass" else (1.2, 4.5)
+        (line,) = axes.loglog(errors, [1e3 * t for t in best], markersize=size, linewidth=width, zorder=3, **look)
+        lines.append((best[0], line, group))
+    for level in LEVELS:
+        axes.axvline(level, color=GREY, linewidth=0.9, linestyle=(0, (1, 1.5)))
+    axes.set(xlabel="largest relative error of motion, peak force and rms [1]", ylabel="time of a cycle [ms]")
+    axes.set_xlim(1e-1, 1e-9)
+    log_ticks(axes.xaxis)
+    log_ticks(axes.yaxis)
+    _, handles, labels = zip(*sorted(lines, key=lambda line: -line[0]), strict=True)
+    axes.legend(handles, labels, loc="center left", bbox_to_anchor=(1.01, 0.5))
+    caption(
+        figure,
+        f"Time against error, damping {case['words']}",
+        "One cycle of the press. A line is the best of a library's methods at every error; dotted: the errors of the "
+        "table.",
     )
-    axes.set_title(f"One cycle of the press, damping {case['words']}")
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 
 def _coupling(result: Result, _: Path) -> list[str]:
     base = next(iter(result["scenes"].values()))
     body = [
-        [words, f"{1e3 * taken:.3g}", f"{taken / base:.3g}×", measured(result["lanes"][words])]
+        [words, rounded(1e3 * taken), f"{rounded(taken / base)}×", measured(result["lanes"][words])]
         for words, taken in result["scenes"].items()
     ]
     lines = [
         "## Bearings coupled both ways",
         "",
-        f"Raw calls of the stepper: the first turn of each scene from rest, at an error of {result['level']:.0e} of "
-        f"the range of the rings' motion; references agree within {result['agreement']:.0e}. *Lanes*: members a second "
-        "of an ensemble in SIMD lanes over one by one, on one thread.",
+        "Raw calls of the stepper: the first turn of each scene from rest, at an error of "
+        f"{level_words(result['level'])} of the range of the rings' motion; references agree within "
+        f"{result['agreement']:.0e}. *Lanes*: members a second of an ensemble in SIMD lanes over one by one, on one "
+        "thread.",
         "",
         *table(["", "ms a turn", "× one-way", "lanes"], body),
         "",
@@ -118,28 +176,30 @@ def _coupling(result: Result, _: Path) -> list[str]:
     if "absent" in result:
         return [*lines, f"Exudyn: {result['absent']}."]
     own = result["exudyn"]["ballpass"]
-    times = ", ".join(f"{name} {1e3 * s:.3g} ms ({s / own:.3g}×)" for name, s in result["exudyn"]["seconds"].items())
+    seconds = result["exudyn"]["seconds"]
+    times = ", ".join(f"{name} {rounded(1e3 * s)} ms ({_times(s, own, 3)})" for name, s in seconds.items())
     finest = min(error for curve in result["exudyn"]["curves"].values() for error, _ in curve)
     return [
         *lines,
-        f"The machine with two-way bearings at A in Exudyn, same turn, same error: {times}; ballpass {1e3 * own:.3g} "
-        "ms. There bodies have absolute coordinates, joints and drive are constraints, all balls are one connector "
-        "with a symbolic user function, steps are equal and end on the edges of the punch's window; its explicit "
-        f"integrators take no constraints. Its motion comes as close as {finest:.0e} to the reference with smaller "
-        "steps: it is the same machine.",
+        f"The machine with two-way bearings at A in Exudyn, same turn, same error: {times}; ballpass "
+        f"{rounded(1e3 * own)} ms. There bodies have absolute coordinates, joints and drive are constraints, all balls "
+        "are one connector with a symbolic user function, steps are equal and end on the edges of the punch's window; "
+        f"its explicit integrators take no constraints. Its motion comes as close as {finest:.0e} to the reference "
+        "with smaller steps: it is the same machine.",
     ]
 
 
 def _ensembles(result: Result, _: Path) -> list[str]:
+    members = f"{result['members']:_}".replace("_", " ")
     ways = list(dict.fromkeys(way for rows in result["cases"].values() for way in rows))
     body = [[way, *(measured(rows[way]) for rows in result["cases"].values())] for way in ways]
     return [
         "## Ensembles",
         "",
-        f"{result['members']} parameter sets (a tenth of them one by one), {result['cycles']} cycles each, rtol "
+        f"{members} parameter sets (a tenth of them one by one), {result['cycles']} cycles each, rtol "
         f"{result['rtol']:.0e}, preparation included. Members times cycles a second; median and 10th to 90th "
         "percentile over the rounds. *End*: `end:inner.y`; *states*: `rms:`, `range:` of `inner.y`; "
-        "*balls*: `max:ball.force` too.",
+        "*balls*: `max:ball.force` too; *life*: `max:ball.force` and the rating life.",
         "",
         *table(["members × cycles a second", *result["cases"]], body),
     ]
@@ -148,7 +208,7 @@ def _ensembles(result: Result, _: Path) -> list[str]:
 def _sensitivities(result: Result, _: Path) -> list[str]:
     counts = list(next(iter(result["cases"].values()))["ratios"])
     body = [
-        [words, measured(case["plain"], 1e3), *(f"{case['ratios'][count][0]:.3g}×" for count in counts)]
+        [words, measured(case["plain"], 1e3), *(f"{rounded(case['ratios'][count][0])}×" for count in counts)]
         for words, case in result["cases"].items()
     ]
     lines = [
@@ -158,7 +218,7 @@ def _sensitivities(result: Result, _: Path) -> list[str]:
         f"`model.simulate`, measured side by side, rtol {result['rtol']:.0e}. Central differences cost two plain "
         "runs a parameter.",
         "",
-        *table(["", "plain run, ms", *(f"{count} parameters" for count in counts)], body),
+        *table(["", "plain run, ms", *(f"{count} parameter{'s' * (count != '1')}" for count in counts)], body),
     ]
     if "query" in result:
         query = result["query"]

@@ -16,7 +16,9 @@ from typing import Any, Literal, ParamSpec
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 #: 1200 pixels wide.
@@ -155,6 +157,24 @@ def unit_words(unit: str) -> str:
     for plain, sign in (("*", "·"), ("^2", "²"), ("^3", "³")):
         unit = unit.replace(plain, sign)
     return unit
+
+
+def log_ticks(axis: Axis) -> None:
+    """Ticks of a logarithmic axis whose limits stand: decades, and of fewer than two decades 2 and 5 between them."""
+    low, high = sorted(axis.get_view_interval())
+    few = high < 100.0 * low
+    axis.set_major_locator(LogLocator(10.0, subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=20))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: decade_words(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def decade_words(value: float) -> str:
+    """A tick's number: 0.001 and 2000 in full, beyond them 2·10⁻⁵; not by mathtext, which is slow."""
+    if 0.9e-3 < value < 1.1e4:
+        return f"{value:g}"
+    digits, _, power = f"{value:.0e}".partition("e")
+    raised = str(int(power)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"10{raised}" if digits == "1" else f"{digits}·10{raised}"
 
 
 def shade_windows(axes: Axes, windows: Iterable[tuple[float, float]], turns: Iterable[int]) -> None:

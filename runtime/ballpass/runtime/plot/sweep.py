@@ -6,7 +6,6 @@ carry numbers, so that it survives a greyscale print.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,10 +15,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patheffects import AbstractPathEffect, withStroke
-from matplotlib.ticker import MaxNLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, label, new_figure, styled
+from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, label, log_ticks, new_figure, styled
 
 #: From dark to light, with equal steps of luminance: places are those of the palette's own luminances.
 LUMINANCE = LinearSegmentedColormap.from_list("luminance", [(0.0, INK), (0.43, SIGNAL), (0.82, SAND), (1.0, PALE)])
@@ -136,8 +135,4 @@ def _scale(panel: Axes, axis: str, varied: VariedAxis) -> None:
     if not varied.logarithmic:
         return
     panel.set(**{f"{axis}scale": "log"})
-    ruler = panel.xaxis if axis == "x" else panel.yaxis
-    ruler.set_major_formatter(StrMethodFormatter("{x:g}"))
-    # within a decade there is hardly a power of ten to read
-    decades = math.log10(float(np.max(varied.values) / np.min(varied.values)))
-    ruler.set_minor_formatter(StrMethodFormatter("{x:g}") if decades < 1.2 else NullFormatter())
+    log_ticks(panel.xaxis if axis == "x" else panel.yaxis)

@@ -8,10 +8,9 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from ballpass.runtime.certify.trade_report import Measured, Trade
-from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, new_figure, styled
+from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, log_ticks, new_figure, styled
 from ballpass.runtime.run.locating import LOCATED
 
 #: Marker and colour of each method; shapes tell them apart in grey as well, and open ones locate kinks.
@@ -80,15 +79,13 @@ def _axes(axes: Axes, floor: float) -> bool:
     axes.set_yscale("log")
     axes.set_xlabel("time a cycle [ms]")
     axes.set_ylabel("relative error [%]")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(LogLocator(10.0, numticks=20))
-        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.set_minor_formatter(NullFormatter())
     low, high = axes.get_ylim()
     shown = bool(floor > low * 10.0**-_DECADES)
     if shown:
         low = min(low, floor / 10.0)
         axes.axhspan(low, floor, facecolor=PALE, edgecolor=GREY, hatch="///", linewidth=0.0, zorder=0)
     axes.set_ylim(low, min(high, 1e3))
+    log_ticks(axes.xaxis)
+    log_ticks(axes.yaxis)
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return shown
