@@ -350,6 +350,48 @@ def test_an_interrupt_at_any_moment_ends_with_130_and_whole_files(
         assert not [*tmp_path.rglob(f"{NEW}*"), *tmp_path.rglob(".*.tmp")]
 
 
+#: A command line in which an interrupt comes where Python turns it into something else.
+ELSEWHERE = """
+import os, signal, sys, time, types
+
+def interrupt(*_):
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(0.1)
+
+def destroyed():
+    type("Short", (), {"__del__": interrupt})()
+    time.sleep(60.0)
+
+def named():  # another fault, a RuntimeError
+    type("Owner", (), {"part": type("Part", (), {"__set_name__": interrupt})()})
+
+def refused():  # as a package that takes what an import says for its absence
+    try:
+        interrupt()
+    except KeyboardInterrupt:
+        sys.exit(2)
+
+def done():
+    try:
+        interrupt()
+    except KeyboardInterrupt:
+        sys.exit(0)
+
+cli = types.ModuleType("ballpass.runtime.app.cli")
+cli.app = globals()[sys.argv[1]]
+sys.modules[cli.__name__] = cli
+from ballpass.runtime.app.entry import main
+main()
+"""
+
+
+@pytest.mark.parametrize(("where", "code"), [("destroyed", 130), ("named", 130), ("refused", 130), ("done", 0)])
+def test_an_interrupt_that_python_turns_into_something_else_is_one(where: str, code: int) -> None:
+    found = subprocess.run([sys.executable, "-c", ELSEWHERE, where], capture_output=True, text=True, timeout=PATIENCE)
+    assert found.returncode == code, found.stderr
+    assert found.stderr == ("error: interrupted. Whatever files are there are whole.\n" if code else "")
+
+
 def test_an_interrupt_while_compiling_ends_the_compiler_and_its_children(
     cache: Path, scene: Path, tmp_path: Path
 ) -> None:

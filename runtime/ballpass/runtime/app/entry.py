@@ -1,30 +1,48 @@
 """Entry point of the ``ballpass`` command.
 
-An interrupt (Ctrl-C) ends it with exit code 130, also while modules are imported.  One that comes when all is done
-changes nothing.
+An interrupt (Ctrl-C) ends it with exit code 130, also while modules are imported or objects destroyed, where Python
+turns an interrupt into other faults or into a remark.  One that comes when all is done changes nothing.
 """
 
 from __future__ import annotations
 
 import signal
 import sys
+import threading
+from types import FrameType
 
 from ballpass.runtime.app.interrupted import has_said, say_interrupted
 
 
 def main() -> None:
     """Import the command line and run it."""
+    interrupted = False
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        nonlocal interrupted
+        interrupted = True
+        raise KeyboardInterrupt
+
+    def ignored(fault: sys.UnraisableHookArgs) -> None:
+        if issubclass(fault.exc_type, KeyboardInterrupt):  # in a destructor or callback: again when that is over
+            threading.Timer(0.01, signal.pthread_kill, (threading.get_ident(), signal.SIGINT)).start()
+        else:
+            sys.__unraisablehook__(fault)
+
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have it ignored
+        signal.signal(signal.SIGINT, interrupt)
+        sys.unraisablehook = ignored
     try:
         from ballpass.runtime.app.cli import app
 
         app()
-    except KeyboardInterrupt:
-        say_interrupted()
-        sys.exit(130)
-    except SystemExit as done:
-        if done.code == 130 and not has_said():
+    except BaseException as end:
+        if not interrupted or (isinstance(end, SystemExit) and not end.code):
+            raise
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        if not has_said():
             say_interrupted()
-        raise
+        sys.exit(130)
     finally:
         # Python gives the signal back to the system while it ends, and that would kill a command that has succeeded
         signal.signal(signal.SIGINT, signal.SIG_IGN)
