@@ -28,7 +28,7 @@ def parts(quick: bool) -> dict[str, Callable[[], dict[str, Any]]]:
         "work_precision": lambda: {case.key: work_precision.measure(case, effort) for case in CASES},
         "coupling": lambda: coupling.measure(1 if quick else 15),
         "ensembles": lambda: ensembles.measure(64 if quick else 10_000, 1 if quick else 5),
-        "sensitivities": lambda: sensitivities.measure(1 if quick else 9, not quick),
+        "sensitivities": lambda: sensitivities.measure(1 if quick else 9, quick),
         "preparation": lambda: preparation.measure(1 if quick else 5),
     }
 

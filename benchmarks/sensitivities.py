@@ -15,7 +15,7 @@ COUNTS = (1, 5, 10, 20, 40)
 QUERY = ["peak_ball_force", "rms:inner.y", "range:inner.y", "mean:inner.y", "max:drive_torque"]
 
 
-def measure(rounds: int, query: bool) -> dict[str, Any]:
+def measure(rounds: int, quick: bool) -> dict[str, Any]:
     """Times of `model.sensitivities` over `model.simulate`, for every case, and of the full query [s]."""
     cases: dict[str, Any] = {}
     for case in CASES:
@@ -31,17 +31,15 @@ def measure(rounds: int, query: bool) -> dict[str, Any]:
             "plain": spread(times[:, 0]),
             "ratios": {count: spread(ratios[:, k]) for k, count in enumerate(counts)},
         }
-    found: dict[str, Any] = {"rtol": RTOL, "cases": cases}
-    if query:
-        model = CASES[1].model()
-        names = list(model.parameters)
-        model.sensitivity(QUERY[:1], names[:1], cycles=1)  # compiles
-        found["query"] = {
-            "quantities": QUERY,
-            "parameters": len(names),
-            "seconds": timed(lambda: model.sensitivity(QUERY, names)),
-        }
-    return found
+    model = CASES[1].model()
+    names, quantities = (list(model.parameters)[:1], QUERY[:1]) if quick else (list(model.parameters), QUERY)
+    model.sensitivity(QUERY[:1], names[:1])  # compiles
+    query = {
+        "quantities": quantities,
+        "parameters": len(names),
+        "seconds": timed(lambda: model.sensitivity(quantities, names)),
+    }
+    return {"rtol": RTOL, "cases": cases, "query": query}
 
 
 def _plain(model: Model, numbers: dict[str, float]) -> Callable[[], object]:
