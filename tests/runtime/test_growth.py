@@ -98,11 +98,11 @@ def test_the_commands_say_it_and_print_statistics(tmp_path: Path, monkeypatch: p
     assert calm["message"] == ""
     assert "range_inner_x" in chaotic["message"]
 
-    began = time.perf_counter()
+    began = time.process_time()
     code, _, said = ballpass("sensitivity", PRESS, *wide, "--cycles", "12")
     assert code == 1
     assert "the motion is chaotic" in said
-    assert time.perf_counter() - began < 3.0  # within a second, on a machine that does nothing else
+    assert time.process_time() - began < 3.0  # of minutes that the run by differences takes
 
 
 def test_derivatives_of_what_does_not_move_with_the_rings_are_not_refused(press: Model) -> None:
