@@ -14,11 +14,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import approx_fprime
+from scipy.optimize import approx_fprime, brentq
 
-from ballpass.runtime import BallpassError, Model, QuantityFunction, RequestError, SimulationError
+from ballpass.runtime import (
+    BallpassError,
+    KinkWarning,
+    Model,
+    QuantityFunction,
+    RequestError,
+    SimulationError,
+    UnknownValueWarning,
+)
 
 CLEARANCE, MASS, ANGLE = "bearing.clearance", "mechanism.bodies.slider.mass", "mechanism.driver.start_angle"
+SPEED = "mechanism.driver.speed"
 #: Reduced by ensembles, and not.
 OF = ("peak_ball_force", "rms:inner.y", "value:inner.y@200deg")
 SPAN: dict[str, Any] = {"cycles": 0.8, "transient": 0.4}
@@ -97,11 +106,67 @@ def test_what_fails_is_told_or_nan_as_asked(smooth: Model, function: QuantityFun
     for call in (function, function.jacobian):
         with pytest.raises(RequestError, match=r"slider\.mass = -1: .*allowed is a number above 0"):
             call(table)
-    lenient = QuantityFunction(smooth, OF, (CLEARANCE, MASS), **SPAN, failed="nan")
     table[2, 0] = np.nan
-    for mine, own in ((lenient(table), function(rows[:1])), (lenient.jacobian(table), function.jacobian(rows[:1]))):
+    for call, own in (("__call__", function(rows[:1])), ("jacobian", function.jacobian(rows[:1]))):
+        lenient = QuantityFunction(smooth, OF, (CLEARANCE, MASS), **SPAN, failed="nan")
+        with pytest.warns(UnknownValueWarning, match=r"slider\.mass: allowed is a number above 0") as caught:
+            mine = getattr(lenient, call)(table)
+        assert {name for name in OF if any(name in str(item.message) for item in caught)} == set(OF)
         assert np.array_equal(mine[:1], own)
         assert np.isnan(mine[1:]).all()
+        getattr(lenient, call)(table)  # a warning would be an error: it is said once
+
+
+def test_what_is_known_is_given_beside_what_is_not(smooth: Model) -> None:
+    """At twice the speed the run of 0.8 turns is over before the time that is asked for."""
+    known, beyond = ("rms:inner.y", "static_deflection@240deg"), "value:inner.y@0.08s"
+    both = QuantityFunction(smooth, (known[0], beyond, known[1]), SPEED, **SPAN, failed="nan")
+    alone = QuantityFunction(smooth, known, SPEED, **SPAN)
+    rows = both.start * np.array([[1.0], [2.0]])
+    with pytest.warns(UnknownValueWarning, match=r"0\.08s: the run ends at .*speed = 104\.7"):
+        values = both(rows)
+    slopes = both.jacobian(rows)  # said once
+    for found, expected in ((values, alone(rows)), (slopes, alone.jacobian(rows))):
+        assert np.array_equal(found[:, [0, 2]], expected)
+        assert np.isfinite(found[0, 1]).all()
+        assert np.isnan(found[1, 1]).all()
+
+
+def test_a_peak_that_passes_to_another_ball_is_warned_of_and_certified_as_a_kink(smooth: Model) -> None:
+    """Where the largest forces of balls 1 and 2 are equal, those of either ball alone have the slopes on both sides."""
+    balls = QuantityFunction(smooth, ("max:ball.force[1]", "max:ball.force[2]"), ANGLE, **SPAN)
+    tie = float(brentq(lambda angle: float(np.diff(balls([angle]))[0]), 0.9, 1.0, xtol=1e-7))
+    slopes = balls.jacobian([tie])[:, 0]
+    assert slopes[0] < 0.0 < slopes[1]
+    largest = QuantityFunction(smooth, "peak_ball_force", ANGLE, **SPAN)
+    for away in (-0.02, 0.02):
+        assert largest.jacobian([tie + away])[0] == pytest.approx(slopes[int(away > 0.0)], rel=0.1)
+    with pytest.warns(KinkWarning, match=f"peak_ball_force: a change of {ANGLE}") as caught:
+        given = largest.jacobian([tie])
+    words = str(caught[0].message)
+    for slope in slopes:
+        assert f"{slope:.4g}"[:3] in words
+    assert np.min(np.abs(given - slopes)) < 1e-3 * abs(slopes[0])
+    largest.jacobian([tie])  # said once
+    (pair,) = largest.certify([tie]).pairs
+    assert pair.check.sides == pytest.approx(slopes, rel=1e-2)
+    assert pair.by_steps == given[0]
+
+
+def test_the_certificate_is_of_the_numbers_of_the_jacobian(function: QuantityFunction) -> None:
+    at = {MASS: 18.0}
+    report = function.certify(at)
+    slopes = function.jacobian(function.arguments(at))
+    assert [pair.by_steps for pair in report.pairs] == slopes.ravel().tolist()
+    assert {pair.check.verdict.value for pair in report.pairs} == {"verified"}
+    with pytest.raises(RequestError, match="one point"):
+        function.certify(np.ones((2, 2)))
+
+
+def test_derivatives_by_the_speed_are_known_as_others_are(smooth: Model) -> None:
+    """At one tolerance they are a thousand times less accurate: what steps lose at each contact adds up."""
+    fine, usual = (QuantityFunction(smooth, OF, (SPEED, ANGLE), **SPAN, rtol=rtol) for rtol in (1e-11, 1e-9))
+    np.testing.assert_allclose(usual.jacobian(usual.start), fine.jacobian(fine.start), rtol=2e-3)
 
 
 def test_derivatives_that_mean_nothing_are_refused(
@@ -112,7 +177,10 @@ def test_derivatives_that_mean_nothing_are_refused(
     assert np.isfinite(chaotic(chaotic.start))
     with pytest.raises(SimulationError, match="chaotic"):
         chaotic.jacobian(chaotic.start)
-    assert np.isnan(QuantityFunction(press, "range:inner.x", MASS, **settings, failed="nan").jacobian([16.8])).all()
+    both = QuantityFunction(press, ("range:inner.x", "static_deflection@240deg"), MASS, **settings, failed="nan")
+    with pytest.warns(UnknownValueWarning, match=r"^range:inner\.x: .*chaotic"):
+        slopes = both.jacobian(both.start)
+    assert np.isnan(slopes).tolist() == [[True], [False]]
     jumping = replace(smooth.manifest, smoothness=(("damping", "discontinuous"),))
     monkeypatch.setattr(smooth, "manifest", jumping)
     with pytest.raises(RequestError, match="discontinuous"):
@@ -170,7 +238,7 @@ def test_a_batch_of_jax_is_one_ensemble(
 ) -> None:
     shapes = []
     plain = function._by_ensemble
-    monkeypatch.setattr(function, "_by_ensemble", lambda table: shapes.append(table.shape) or plain(table))
+    monkeypatch.setattr(function, "_by_ensemble", lambda table, tell: shapes.append(table.shape) or plain(table, tell))
     jax.vmap(in_jax(function))(rows)
     assert shapes == [(9, 2)]
 
@@ -190,7 +258,8 @@ def test_jax_refuses_what_it_cannot_do(smooth: Model, jax: ModuleType, function:
     with pytest.raises(jax.errors.JaxRuntimeError, match="above 0"):
         jax.jit(f)(wrong)
     lenient = in_jax(QuantityFunction(smooth, OF, (CLEARANCE, MASS), **SPAN, failed="nan"))
-    assert np.isnan(jax.jit(jax.jacrev(lenient))(wrong)).all()
+    with pytest.warns(UnknownValueWarning):
+        assert np.isnan(jax.jit(jax.jacrev(lenient))(wrong)).all()
     jax.config.update("jax_enable_x64", False)
     try:
         with pytest.raises(RequestError, match="jax_enable_x64"):

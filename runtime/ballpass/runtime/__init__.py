@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ballpass.runtime.app.results import Results, load_results
     from ballpass.runtime.ask.peaks import Peak
-    from ballpass.runtime.certify.quantity_function import QuantityFunction
+    from ballpass.runtime.certify.quantity_function import QuantityFunction, UnknownValueWarning
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport
     from ballpass.runtime.contract import Manifest, read_manifest
     from ballpass.runtime.contract.errors import (
         ArtefactError,
         BallpassError,
+        BallpassWarning,
         CompileError,
         RequestError,
         SimulationError,
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ArtefactError",
     "BallpassError",
+    "BallpassWarning",
     "CacheWarning",
     "CompileError",
     "DataSetReport",
@@ -81,6 +83,7 @@ __all__ = [
     "StaticEquilibrium",
     "Statistics",
     "Status",
+    "UnknownValueWarning",
     "UnusualWarning",
     "load",
     "load_results",
@@ -94,11 +97,13 @@ _HOME = {
     "load_results": "app.results",
     "Peak": "ask.peaks",
     "QuantityFunction": "certify.quantity_function",
+    "UnknownValueWarning": "certify.quantity_function",
     "SensitivityReport": "certify.sensitivity_report",
     "Manifest": "contract",
     "read_manifest": "contract",
     "ArtefactError": "contract.errors",
     "BallpassError": "contract.errors",
+    "BallpassWarning": "contract.errors",
     "CompileError": "contract.errors",
     "RequestError": "contract.errors",
     "SimulationError": "contract.errors",

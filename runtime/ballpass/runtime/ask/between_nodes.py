@@ -27,9 +27,6 @@ GRID, ROUNDS = 65, 2
 #: Nodes that are looked at closely: the best that no neighbour exceeds.
 CANDIDATES = 5
 
-#: Extremes nearer to each other than this share of the run are one.
-APART = 1e-9
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
@@ -61,7 +58,6 @@ class Extreme:
     column : ball, counted from 0
     other : ball that changes rank with it there, else None
     rate, other_rate : time derivatives of both where there is another [channel's unit / s]
-    runner_up : relative distance to the best elsewhere; infinite where there is none
     """
 
     value: float
@@ -72,7 +68,6 @@ class Extreme:
     other: int | None = None
     rate: float = 0.0
     other_rate: float = 0.0
-    runner_up: float = math.inf
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -111,7 +106,10 @@ def find_extremes(
             bracket.values = seen[bracket.wanted.channel].value[k * GRID : (k + 1) * GRID]
             best = _top(_height(bracket))
             bracket.low, bracket.high = bracket.times[max(best - 1, 0)], bracket.times[min(best + 1, GRID - 1)]
-    return [_best(item, [_extreme(b, edges) for b in some], edges) for item, some in zip(wanted, brackets, strict=True)]
+    return [
+        max((_extreme(bracket, edges) for bracket in some), key=lambda found: item.sign * found.value)
+        for item, some in zip(wanted, brackets, strict=True)
+    ]
 
 
 def _brackets(wanted: Wanted, track: Track, values: Array) -> list[_Bracket]:
@@ -193,12 +191,3 @@ def _crossing(
         return result
     crossing = at(float(times[k]) + shift, float(found[k, a]) + rate_a * shift)
     return replace(crossing, column=a, other=b, rate=rate_a, other_rate=rate_b)
-
-
-def _best(wanted: Wanted, found: list[Extreme], edges: Edges) -> Extreme:
-    """The best of several, with its distance to the next one elsewhere."""
-    found.sort(key=lambda item: -wanted.sign * item.value)
-    first = found[0]
-    apart = [item for item in found[1:] if abs(item.time - first.time) > APART * edges.window.duration]
-    gap = min((abs(item.value - first.value) for item in apart), default=math.inf)
-    return replace(first, runner_up=gap / max(abs(first.value), 1e-300))

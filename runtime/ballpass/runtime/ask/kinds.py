@@ -13,7 +13,8 @@ import numpy as np
 
 from ballpass.runtime.ask.life import PLACES, life
 from ballpass.runtime.ask.quantity_location import frequency
-from ballpass.runtime.ask.quantity_records import Estimate, Quantity, View
+from ballpass.runtime.ask.quantity_records import Array, Estimate, Quantity, View
+from ballpass.runtime.ask.rivals import nearest_rival
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.ratings.readings import KINDS as LIFE
 from ballpass.runtime.run import inputs as clock
@@ -70,12 +71,14 @@ def _rms(view: View, quantity: Quantity) -> Estimate:
     square = total.real / length
     root = math.sqrt(square)
     if root == 0.0:
-        return Estimate(value=0.0, slope=np.zeros(view.directions), notes=("zero throughout",))
+        return _zero(view, "zero throughout", slope)
     return Estimate(value=root, slope=(moved.real - square * longer) / (2.0 * root * length))
 
 
-#: Extremes nearer to each other than this share are told: a small change may make the other one the largest.
-RIVAL = 1e-3
+def _zero(view: View, note: str, moved: Array) -> Estimate:
+    """A size that is zero; `moved` are derivatives of what it is the size of."""
+    kink = "it is zero and has a corner there; the derivative given is zero" if np.any(moved) else ""
+    return Estimate(value=0.0, slope=np.zeros(view.directions), notes=(note,), kink=kink)
 
 
 def _extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
@@ -90,15 +93,21 @@ def _extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
         notes.append(f"balls {mark.ball + 1} and {mark.other + 1} change rank there")
     if mark.at_edge:
         notes.append("at an edge: the moment moves with it")
-    if mark.runner_up < RIVAL:
-        notes.append(f"another extreme comes within {mark.runner_up:.1e} of it")
     ball = mark.ball + 1 if signal.value.shape[1] > 1 else None
-    return Estimate(value=float(value), slope=slope, time=mark.time, ball=ball, notes=tuple(notes))
+    # the least of the most loaded ball is no extreme of any one
+    ranked = kind == "min" and ball is not None and quantity.ball is None
+    kink = "" if ranked else nearest_rival(view, quantity, mark, 1.0 if kind == "max" else -1.0)
+    return Estimate(value=float(value), slope=slope, time=mark.time, ball=ball, notes=tuple(notes), kink=kink)
 
 
 def _range(view: View, quantity: Quantity) -> Estimate:
     top, bottom = _extreme(view, quantity, "max"), _extreme(view, quantity, "min")
-    return Estimate(value=top.value - bottom.value, slope=top.slope - bottom.slope, notes=top.notes + bottom.notes)
+    return Estimate(
+        value=top.value - bottom.value,
+        slope=top.slope - bottom.slope,
+        notes=top.notes + bottom.notes,
+        kink=top.kink or bottom.kink,
+    )
 
 
 def _at_place(view: View, quantity: Quantity) -> Estimate:
@@ -122,7 +131,7 @@ def _amplitude(view: View, quantity: Quantity) -> Estimate:
     line, line_slope = 2.0 * sum_ / length, 2.0 * (sum_slope - sum_ * longer / length) / length
     size = abs(line)
     if size == 0.0:
-        return Estimate(value=0.0, slope=np.zeros(view.directions), notes=("zero",))
+        return _zero(view, "zero", line_slope)
     return Estimate(value=size, slope=np.real(np.conj(line) * line_slope) / size)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -53,7 +52,6 @@ class Mark:
     ball : column of the channel
     other : column that the channel's most loaded ball changes to or from at this very moment; None elsewhere
     rate, other_rate : time derivatives of both columns there, where there is another
-    runner_up : relative distance to the next extreme elsewhere in the run; infinite where there is none
     at_edge : whether the extreme lies at an edge of a load or of the window
     """
 
@@ -63,7 +61,6 @@ class Mark:
     other: int | None = None
     rate: float = 0.0
     other_rate: float = 0.0
-    runner_up: float = math.inf
     at_edge: bool = False
 
 
@@ -77,7 +74,7 @@ class View:
     signals : channels along the nodes
     marks : moments by quantity, and "max", "min" or "place"
     slopes : derivative of a parameter or constant by name, shape (directions,)
-    directions : how many
+    names : parameters, one direction each
     """
 
     manifest: Manifest
@@ -87,7 +84,12 @@ class View:
     signals: Mapping[str, Signal]
     marks: Mapping[tuple[str, str], Mark]
     slopes: Callable[[str], Array]
-    directions: int
+    names: tuple[str, ...]
+
+    @property
+    def directions(self) -> int:
+        """How many there are."""
+        return len(self.names)
 
     def channel(self, quantity: Quantity) -> tuple[Array, Array]:
         """The quantity's channel along the nodes, and its derivative: shapes (nodes,), (nodes, directions)."""
@@ -124,6 +126,7 @@ class Estimate:
     slope : derivative along the directions, shape (directions,)
     time, ball : of an extreme: when [s], and which ball, counted from 1
     notes : what to mind
+    kink : why the derivative is that of one side, or of none; empty where there is one
     """
 
     value: float
@@ -131,3 +134,4 @@ class Estimate:
     time: float | None = None
     ball: int | None = None
     notes: tuple[str, ...] = ()
+    kink: str = ""

@@ -210,7 +210,6 @@ class Study:
                 other=item.other,
                 rate=item.rate,
                 other_rate=item.other_rate,
-                runner_up=item.runner_up,
                 at_edge=min(item.fraction, 1.0 - item.fraction) < AT_EDGE,
             )
         track = follow(self.model, numbers, edges, nodes, stepping, chain, still=self._still)
@@ -222,7 +221,7 @@ class Study:
             signals=self._outlook.look(track, numbers, chain),
             marks=marks,
             slopes=chain.derivative if chain is not None else lambda _: np.zeros(0),
-            directions=directions,
+            names=() if chain is None else chain.names,
         )
         return Course(track=track, estimates=tuple(self._estimate(view, item, chain) for item in self.quantities))
 

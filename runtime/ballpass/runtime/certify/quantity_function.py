@@ -4,37 +4,53 @@ In: a model, names of quantities and parameters, how long to run.  Out: a `Quant
 `ballpass.jax` and `ballpass.torch` wrap it.
 
 Values come from ensembles in lanes, derivatives from the stepper's own steps, both stepping over the kinks of the laws.
+Kinks that a run with derivatives shows are warned of; `QuantityFunction.certify` compares with differences.
 """
 
 from __future__ import annotations
 
 import os
+import warnings
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Literal, NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ballpass.runtime.ask.kinds import KINDS
 from ballpass.runtime.ask.quantities import parse_quantity
 from ballpass.runtime.ask.quantity_records import Estimate
 from ballpass.runtime.ask.study import Study
 from ballpass.runtime.certify.derivative_runs import differentiate, refuse_chaos, stepping_with_derivatives
 from ballpass.runtime.certify.member_runs import reduced_by_ensembles
-from ballpass.runtime.certify.sensitivity_query import NODES, make_span
-from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.certify.sensitivity_query import NODES, Query, answer, make_span
+from ballpass.runtime.certify.sensitivity_report import SensitivityReport
+from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.many.ensemble import simulate_many
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.point.slopes import KinkWarning
 from ballpass.runtime.run.locating import STEPPED_OVER, refuse_jumps
-from ballpass.runtime.run.request import tolerance
+from ballpass.runtime.run.request import TOLERANCES, tolerance
+from ballpass.runtime.show.progress import shown, shown_steps
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
-#: Tolerance of the states; that of the derivatives is ten times as large [1].
-RTOL = 1e-9
+#: Tolerance of the states [1], and that of the derivatives over it.
+RTOL, SENSITIVITY = 1e-9, 10.0
+
+#: Units of parameters that move contacts in time, whose derivatives sum up what steps lose there; and how much smaller
+#: the tolerance is then.  At 1e-9 the derivative of a peak by the speed is 24 % off, at 1e-11 0.2 %.
+OF_TIME, FINER = ("rad", "rad/s", "s", "Hz"), 1e-2
+
+
+class UnknownValueWarning(BallpassWarning):
+    """A quantity is NaN for some parameters; the warning says why."""
 
 
 class QuantityFunction:
@@ -47,8 +63,9 @@ class QuantityFunction:
     wrt : parameters, in the order of the last axis of what the function is called with
     cycles, duration, transient : as for `Model.simulate`
     parameters : values of other parameters, SI.  Default: the scene's
-    rtol : error allowed per step of the states; ten times that of the derivatives [1]
-    failed : what stands for a run that fails: ``raise`` an error, or ``nan``, for values and derivatives
+    rtol : error allowed per step of the states; ten times that of the derivatives [1].  Runs with derivatives by
+        speeds, angles or times have a hundredth
+    failed : what stands for a value or derivative that is not known: ``raise`` an error, or ``nan``, with a warning
     chaos : ``refuse`` derivatives of a motion that amplifies a tiny change beyond meaning, which takes two more runs
         each; or ``ignore`` that
 
@@ -57,6 +74,13 @@ class QuantityFunction:
     of, wrt : names
     start : values of the parameters in the scene, shape (parameters,)
     shape : of one value: (quantities,), or () for one name
+
+    Warns
+    -----
+    KinkWarning
+        When differentiated: a quantity has no derivative, but one on each side.  Said once for each quantity.
+    UnknownValueWarning
+        With ``failed="nan"``: why a quantity is NaN.  Said once for each quantity.
 
     Raises
     ------
@@ -106,14 +130,16 @@ class QuantityFunction:
         self._quantities = [parse_quantity(model.manifest, name) for name in self.of]
         self._span = make_span(model.manifest, cycles, duration, transient)
         # a study is not for two threads at once: each takes one that is free, and puts it back
-        self._free: dict[bool, list[Study]] = {True: [], False: []}
+        self._free: defaultdict[tuple[int, ...], list[Study]] = defaultdict(list)
+        units = {info.unit for info in model.manifest.parameters if info.name in self.wrt}
+        self._slope_rtol = max(FINER * self._rtol, TOLERANCES[0]) if units.intersection(OF_TIME) else self._rtol
         self._reduced = reduced_by_ensembles(model, self._quantities)
-        self._others = [k for k in range(len(self.of)) if k not in self._reduced]
-        self._study(slopes=True).window(numbers)  # a wrong length is told now
+        self._all = tuple(range(len(self.of)))
+        self._said: set[tuple[type[BallpassWarning], str]] = set()
+        self._study(self._all).window(numbers)  # a wrong length is told now
 
     def __repr__(self) -> str:
-        of, wrt = (f"{', '.join(names[:3])}{', ...' if len(names) > 3 else ''}" for names in (self.of, self.wrt))
-        return f"QuantityFunction({self._model.manifest.scene}: {of} by {wrt})"
+        return f"QuantityFunction({self._model.manifest.scene}: {_some(self.of)} by {_some(self.wrt)})"
 
     def __call__(self, x: ArrayLike) -> Array:
         """Values of the quantities, SI, shape (..., quantities), or (...) for one name.
@@ -139,18 +165,20 @@ class QuantityFunction:
         """
         rows, able, batch = self._rows(x)
         found = np.full((len(rows), len(self.of)), np.nan)
-        if self._reduced and len(able):
-            found[able[:, None], list(self._reduced)] = self._by_ensemble(rows[able])
-        if self._others:
-            found[able[:, None], self._others] = self._each(self._values, rows[able], (len(self._others),))
-        found[np.isnan(found).any(axis=1)] = np.nan  # a run that failed for one quantity
+        others = tuple(k for k in self._all if k not in self._reduced)
+        with shown("simulating") as tell:
+            if self._reduced and len(able):
+                found[able[:, None], list(self._reduced)] = self._by_ensemble(rows[able], tell)
+            if others and len(able):
+                each = self._each(rows[able], others, tell, slopes=False)
+                found[able[:, None], others] = [[item.value for item in one] for one in each]
         return found.reshape((*batch, *self.shape))
 
     def jacobian(self, x: ArrayLike) -> Array:
         """Derivatives, SI, shape (..., quantities, parameters), or (..., parameters) for one name.
 
         Where a quantity has a kink, as an extreme that passes from one peak to another, it is the derivative on one
-        side.  `Model.sensitivity` tells such places, and compares derivatives with differences.
+        side, and a `KinkWarning` says so where the run shows it; `certify` compares both sides.
 
         Parameters
         ----------
@@ -172,8 +200,55 @@ class QuantityFunction:
         self.check_differentiable()
         rows, able, batch = self._rows(x)
         found = np.full((len(rows), len(self.of), len(self.wrt)), np.nan)
-        found[able] = self._each(self._slopes, rows[able], found.shape[1:])
+        if len(able):
+            with shown("differentiating") as tell:
+                each = self._each(rows[able], self._all, tell, slopes=True)
+            found[able] = [[item.slope for item in one] for one in each]
         return found.reshape((*batch, *self.shape, len(self.wrt)))
+
+    def certify(
+        self,
+        x: ArrayLike | Mapping[str, float] | None = None,
+        *,
+        progress: Callable[[str, float], None] | bool | None = None,
+    ) -> SensitivityReport:
+        """The derivatives of `jacobian` at one point, each with a certificate, as `Model.sensitivity` gives them.
+
+        They are compared with differences of tight runs to both sides, which takes as long as several gradients.
+
+        Parameters
+        ----------
+        x : values of the parameters, SI, shape (parameters,); or some by name.  Default: the scene's
+        progress : called with words and a finished fraction; else as for `Model.simulate`
+
+        Raises
+        ------
+        RequestError
+            As for `jacobian`; or several points.
+        SimulationError
+            The run failed, or its motion is chaotic.
+
+        Examples
+        --------
+        >>> f = QuantityFunction(model, "rms:inner.y", ["bearing.clearance"], cycles=3)
+        >>> report = f.certify({"bearing.clearance": 8e-6})
+        >>> [(pair.parameter, pair.check.verdict.value) for pair in report.pairs]
+        [('bearing.clearance', 'verified')]
+        """
+        values = self.start if x is None else self.arguments(x) if isinstance(x, Mapping) else x
+        given = np.asarray(values, dtype=float)
+        self.check_shape(given.shape)
+        if given.ndim > 1:
+            raise RequestError(f"certify: one point is expected, of shape ({len(self.wrt)},), not {given.shape}.")
+        query = Query(
+            of=self.of,
+            wrt=self.wrt,
+            span=self._span,
+            rtol=self._slope_rtol,
+            sensitivity_rtol=SENSITIVITY * self._slope_rtol,
+        )
+        with shown_steps("differentiating", progress) as tell:
+            return answer(self._model, self._numbers(given), replace(query, progress=tell))
 
     def check_shape(self, shape: tuple[int, ...]) -> None:
         """Refuse parameters of another shape than (..., parameters).
@@ -233,7 +308,7 @@ class QuantityFunction:
         check_assembly(self._model, numbers)
         return numbers
 
-    def _by_ensemble(self, rows: Array) -> Array:
+    def _by_ensemble(self, rows: Array, tell: Callable[[float], None] | None) -> Array:
         """Values of the quantities that ensembles reduce, shape (rows, quantities)."""
         table: dict[str, object] = {name: np.full(len(rows), value) for name, value in self._fixed.items()}
         result = simulate_many(
@@ -248,7 +323,7 @@ class QuantityFunction:
             kinks=None if self._model.manifest.borders else STEPPED_OVER,
             threads=None,
             lanes=True,
-            progress=None,
+            progress=tell,
         )
         if result.interrupted:
             raise KeyboardInterrupt
@@ -256,49 +331,70 @@ class QuantityFunction:
             failure = result.failures[0]
             kind = RequestError if failure.status == "REFUSED" else SimulationError
             raise kind(f"{self._told(rows[failure.member])}: {failure.message}")
+        failed = [(rows[failure.member], failure.message) for failure in result.failures]
+        self._warn(UnknownValueWarning, [(self.of[k], *one) for one in failed for k in self._reduced])
         return np.array([result[name] for name in self._reduced.values()]).T
 
-    def _each(self, run: Callable[[Array], Array], rows: Array, shape: tuple[int, ...]) -> Array:
-        """What runs give that are made one by one, in threads, shape (rows, *shape)."""
+    def _each(
+        self, rows: Array, of: tuple[int, ...], tell: Callable[[float], None] | None, *, slopes: bool
+    ) -> list[list[Estimate]]:
+        """Quantities of rows that are run one by one, in threads."""
+        found: list[dict[int, Estimate]] = []
+        with ThreadPoolExecutor(os.cpu_count()) as threads:
+            for one in threads.map(lambda row: self._known(row, of, slopes=slopes), rows):
+                found.append(one)
+                if tell is not None:
+                    tell(len(found) / len(rows))
+        each = [(self.of[k], row, item) for row, one in zip(rows, found, strict=True) for k, item in one.items()]
+        nan = [(name, row, " ".join(item.notes)) for name, row, item in each if np.isnan(item.value)]
+        self._warn(UnknownValueWarning, nan)
+        self._warn(KinkWarning, [(name, row, item.kink) for name, row, item in each if item.kink])
+        return [[one[k] for k in of] for one in found]
 
-        def one(row: Array) -> Array:
-            try:
-                return run(row)
-            except (RequestError, SimulationError) as error:
-                if self._failed == "nan":
-                    return np.full(shape, np.nan)
+    def _known(self, row: Array, of: tuple[int, ...], *, slopes: bool) -> dict[int, Estimate]:
+        """Quantities of a row; where NaN is asked for, of those that fail together each that is known by itself."""
+        try:
+            return dict(zip(of, self._course(row, of, slopes=slopes), strict=True))
+        except (RequestError, SimulationError) as error:
+            if self._failed == "raise":
                 kind = RequestError if isinstance(error, RequestError) else SimulationError
                 raise kind(f"{self._told(row)}: {error}") from error
+            # a run that fails has nothing to give, but rings at rest need none
+            at_rest = any(KINDS[self._quantities[k].kind].static for k in of)
+            if len(of) > 1 and (at_rest or isinstance(error, RequestError)):
+                return {k: item for one in of for k, item in self._known(row, (one,), slopes=slopes).items()}
+            unknown = Estimate(value=np.nan, slope=np.full(len(self.wrt), np.nan), notes=(str(error),))
+            return dict.fromkeys(of, unknown)
 
-        with ThreadPoolExecutor(os.cpu_count()) as threads:
-            return np.array(list(threads.map(one, rows))).reshape(len(rows), *shape)
-
-    def _values(self, row: Array) -> Array:
-        return np.array([item.value for item in self._course(row, slopes=False)])
-
-    def _slopes(self, row: Array) -> Array:
-        return np.array([item.slope for item in self._course(row, slopes=True)])
-
-    def _course(self, row: Array, *, slopes: bool) -> tuple[Estimate, ...]:
+    def _course(self, row: Array, of: tuple[int, ...], *, slopes: bool) -> tuple[Estimate, ...]:
         """A run of its own."""
         numbers = self._numbers(row)
         if slopes and self._chaos == "refuse":
-            refuse_chaos(self._model, numbers, self._quantities, self._span)
-        free = self._free[slopes]
+            refuse_chaos(self._model, numbers, [self._quantities[k] for k in of], self._span)
         try:
-            study = free.pop()
+            study = self._free[of].pop()
         except IndexError:
-            study = self._study(slopes=slopes)
+            study = self._study(of)
+        rtol = self._slope_rtol if slopes else self._rtol
         stepping, _ = stepping_with_derivatives(
-            self._model, numbers, study.window(numbers), rtol=self._rtol, sensitivity_rtol=10.0 * self._rtol
+            self._model, numbers, study.window(numbers), rtol=rtol, sensitivity_rtol=SENSITIVITY * rtol
         )
         course = differentiate(study, numbers, self.wrt, stepping)[0] if slopes else study.measure(numbers, stepping)
-        free.append(study)
+        self._free[of].append(study)
         return course.estimates
 
-    def _study(self, *, slopes: bool) -> Study:
-        wanted = self._quantities if slopes else [self._quantities[k] for k in self._others]
-        return Study(self._model, wanted, self._span, NODES)
+    def _study(self, of: tuple[int, ...]) -> Study:
+        return Study(self._model, [self._quantities[k] for k in of], self._span, NODES)
+
+    def _warn(self, kind: type[BallpassWarning], told: Sequence[tuple[str, Array, str]]) -> None:
+        """Say what there is to mind, once of each quantity."""
+        fresh: dict[str, list[str]] = {}
+        for name, row, words in told:
+            if (kind, name) not in self._said:
+                self._said.add((kind, name))
+                fresh.setdefault(f"{words} ({self._told(row)})", []).append(name)
+        for words, names in fresh.items():
+            warnings.warn(f"{_some(names)}: {words}. Said once of each quantity.", kind, stacklevel=4)
 
     def _told(self, row: Array) -> str:
         return ", ".join(f"{name} = {value:.9g}" for name, value in zip(self.wrt, row.tolist(), strict=True))
@@ -307,3 +403,7 @@ class QuantityFunction:
 def _check_word(what: str, given: str, allowed: tuple[str, ...]) -> None:
     if given not in allowed:
         raise RequestError(unknown_name(f"choice of {what}", given, allowed))
+
+
+def _some(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:3])}{', ...' if len(names) > 3 else ''}"

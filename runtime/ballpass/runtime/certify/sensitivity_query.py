@@ -271,7 +271,12 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
         scene=manifest.scene,
         quantities=tuple(
             QuantityValue(
-                name=item.name, value=found.value, unit=item.unit, time=found.time, ball=found.ball, notes=found.notes
+                name=item.name,
+                value=found.value,
+                unit=item.unit,
+                time=found.time,
+                ball=found.ball,
+                notes=(*found.notes, found.kink) if found.kink else found.notes,
             )
             for item, found in zip(quantities, course.estimates, strict=True)
         ),

@@ -1,4 +1,4 @@
-"""The errors this package raises on purpose."""
+"""The errors this package raises on purpose, and the base of its warnings."""
 
 from __future__ import annotations
 
@@ -21,3 +21,7 @@ class CompileError(BallpassError, RuntimeError):
 
 class SimulationError(BallpassError, RuntimeError):
     """The computation failed (exit code 1): cause, time, crank angle, remedy."""
+
+
+class BallpassWarning(UserWarning):
+    """Base of every warning."""

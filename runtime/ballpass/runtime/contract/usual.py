@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.runtime.contract.errors import BallpassWarning
 from ballpass.runtime.contract.manifest import Manifest, UsualInfo
 
 
-class UnusualWarning(UserWarning):
+class UnusualWarning(BallpassWarning):
     """A number, or what a run made of it, is allowed and unlike what bearings and machines have."""
 
 

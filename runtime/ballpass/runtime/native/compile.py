@@ -32,7 +32,7 @@ from pathlib import Path
 import platformdirs
 
 from ballpass.runtime.contract import Manifest, read_unchanged
-from ballpass.runtime.contract.errors import CompileError, RequestError
+from ballpass.runtime.contract.errors import BallpassWarning, CompileError, RequestError
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.compilers import Compiler, find_compiler, run_compiler
 
@@ -50,11 +50,11 @@ LEFT_BEHIND = 86_400.0
 _opened: dict[Path, ctypes.CDLL] = {}
 
 
-class NoCompilerWarning(UserWarning):
+class NoCompilerWarning(BallpassWarning):
     """No C compiler was found: the functions run in CasADi's virtual machine."""
 
 
-class CacheWarning(UserWarning):
+class CacheWarning(BallpassWarning):
     """The cache cannot be written, or a library in it was damaged: libraries are compiled anew."""
 
 

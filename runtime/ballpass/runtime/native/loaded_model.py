@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ballpass.runtime.contract import Manifest
-from ballpass.runtime.contract.errors import ArtefactError, RequestError
+from ballpass.runtime.contract.errors import ArtefactError, BallpassWarning, RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters
 from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.compilers import find_compiler
@@ -33,7 +33,7 @@ from ballpass.runtime.show import html
 _Driver = TypeVar("_Driver", Stepper, EnsembleDriver)
 
 
-class NoKernelsWarning(UserWarning):
+class NoKernelsWarning(BallpassWarning):
     """The generated folder has no kernels: CasADi's functions and integrators take the place of the stepper."""
 
 

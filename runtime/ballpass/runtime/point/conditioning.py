@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ballpass.runtime.contract.errors import BallpassWarning
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 
@@ -40,7 +41,7 @@ BOUND = 1e4
 PASSES = 12
 
 
-class ConditioningWarning(UserWarning):
+class ConditioningWarning(BallpassWarning):
     """The reactions of a linkage near a position where it locks."""
 
 

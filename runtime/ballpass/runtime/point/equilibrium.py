@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.table import Table
 
-from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
@@ -45,7 +45,7 @@ LARGEST_ANGLE = 4.0 * math.pi
 FREE = 1e-9
 
 
-class FreeRingWarning(UserWarning):
+class FreeRingWarning(BallpassWarning):
     """The equilibrium is one of many: a ring can move without force along some direction."""
 
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.contract.errors import BallpassWarning
 from ballpass.runtime.contract.manifest import BearingInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -41,8 +42,8 @@ ALIKE, ALIKE_BESIDE = 1e-6, 1e-9
 STEP = 1e-6
 
 
-class KinkWarning(UserWarning):
-    """The damping law has no derivative at this state; the warning says what is given."""
+class KinkWarning(BallpassWarning):
+    """There is no derivative, as where a law has a corner or two peaks are as high; the warning says what is given."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
