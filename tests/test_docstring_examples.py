@@ -51,6 +51,7 @@ INTERNAL = {
     "QuantityFunction.check_shape",
     "QuantityFunction.refuse_second",
     "Reductions.from_facts",
+    "Reductions.table_html",
     "SolutionPlot.__call__",
 }
 #: Code of a page at 1280 pixels, and what is code.

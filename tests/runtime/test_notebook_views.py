@@ -117,13 +117,17 @@ def test_reprs_of_reports_are_short(reports: dict[str, Any]) -> None:
     ("name", "words", "with_title"),
     [
         ("System", "Equations of motion", True),
+        ("Scene", "Diametral clearance", True),
         ("Model", "bearing.clearance", True),
         ("Parameters", "Diametral clearance", False),
         ("Solution", "centre of the inner ring", True),
         ("Linearization", "ratio", False),
         ("StaticEquilibrium", "ball 8", False),
+        ("Explanation", "at rest under the load", False),
+        ("Reductions", "ball.elastic_force", False),
         ("AmplitudeSpectrum", "frequency", False),
         ("PowerSpectrum", "power", False),
+        ("Spectrogram", "segments", False),
     ],
 )
 def test_notebooks_get_html_that_parses_and_escapes(
@@ -141,6 +145,7 @@ def test_notebooks_get_html_that_parses_and_escapes(
         ("Trade", "stepper-rodas4", True),
         ("EnsembleResult", "median", True),
         ("LifeReport", "peak pressure", True),
+        ("Settled", "steady turns", False),
     ],
 )
 def test_reports_give_html_that_parses_and_escapes(

@@ -18,6 +18,7 @@ from typing import Any, Literal
 from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
 from ballpass.derive.scene.quantity import Quantity, Vector
 from ballpass.derive.scene.toml_lines import LineIndex
+from ballpass.runtime.show import html
 
 #: Name of the body that does not move.
 FRAME = "frame"
@@ -299,6 +300,21 @@ class Scene:
         bearings = [bearing.name or "bearing" for bearing in self.bearings]
         parts = [f"bodies {', '.join(bodies)}"] * bool(bodies) + [f"bearings {', '.join(bearings)}"] * bool(bearings)
         return f"Scene({self.name}: {'; '.join((*parts, f'{len(self.quantities)} numbers'))})"
+
+    def _repr_html_(self) -> str:
+        joints = self.mechanism.joints if self.mechanism is not None else ()
+        numbers = [(item.path, f"{item.value:.8g}", item.unit, item.description) for item in self.quantities]
+        return html.block(
+            html.title(self.title or self.name, repr(self)),
+            html.table(("joint", "kind", "between"), [(j.name, j.kind, " and ".join(j.bodies)) for j in joints])
+            if joints
+            else "",
+            html.paragraph(f"outputs: {', '.join(self.outputs)}"),
+            html.folded(
+                f"{len(numbers)} numbers",
+                html.table(("name", "value", "unit", "description"), numbers, right=("value",)),
+            ),
+        )
 
     @property
     def coupled(self) -> bool:

@@ -10,9 +10,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_spectrum, even_samples, window_weights
+from ballpass.runtime.ask.spectrum import (
+    LISTED,
+    AmplitudeSpectrum,
+    Window,
+    amplitude_spectrum,
+    even_samples,
+    window_weights,
+)
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
+from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 
 Array = NDArray[np.float64]
@@ -171,6 +179,19 @@ class Spectrogram(ShortRepr):
     time: Array
     frequency: Array
     amplitude: Array
+
+    def _repr_html_(self) -> str:
+        segments = np.unique(np.linspace(0, self.time.size - 1, LISTED).round().astype(int))
+        lines = np.argmax(self.amplitude[:, segments], axis=0)
+        heads = ("time [s]", "frequency [Hz]", "amplitude")
+        rows = zip(self.time[segments], self.frequency[lines], self.amplitude[lines, segments], strict=True)
+        return html.block(
+            html.title(
+                f"Spectrogram: {self.time.size} segments from {self.time[0]:.6g} to {self.time[-1]:.6g} s",
+                f"{self.frequency.size} lines up to {self.frequency[-1]:.6g} Hz; the highest of some segments:",
+            ),
+            html.table(heads, [(f"{t:.6g}", f"{f:.6g}", f"{a:.4g}") for t, f, a in rows], right=heads),
+        )
 
 
 def spectrogram(

@@ -16,6 +16,7 @@ import numpy as np
 from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import BallpassError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.smoothness import WORDS
 from ballpass.runtime.contract.usual import unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
@@ -26,6 +27,7 @@ from ballpass.runtime.point.slopes import jacobian
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.run.simulate import STIFF_RATIO, choose_method
+from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 
 #: Instants of a turn that are searched for the lightest and the heaviest load.
@@ -110,6 +112,31 @@ class Explanation(ShortRepr):
     method: str
     reason: str
     unusual: tuple[str, ...] = ()
+
+    def _repr_html_(self) -> str:
+        heads = ("angle [deg]", "fastest decay [1/s]", "fastest frequency [Hz]", "slowest rate [1/s]", "stiffness")
+        scales = [
+            (
+                item.name,
+                f"{math.degrees(item.angle):.0f}",
+                f"{item.decay:.3g}",
+                f"{item.frequency / math.tau:.3g}",
+                f"{item.slowest:.3g}",
+                f"{item.stiffness:.2g}",
+            )
+            for item in self.scales
+        ]
+        breaks = [(f"{item.time:.6g}", f"{math.degrees(item.angle):.4g}", item.cause) for item in self.breakpoints]
+        return html.block(
+            html.title(f"Method: auto takes {self.method}", self.reason),
+            html.table(("time scales of small motions", *heads), scales, right=heads) if scales else "",
+            html.table(("breakpoint [s]", "angle [deg]", "cause"), breaks, right=("breakpoint [s]", "angle [deg]"))
+            if breaks
+            else "",
+            *(html.paragraph(f"{law}: {WORDS[kind]}") for law, kind in self.smoothness),
+            *(html.paragraph(f"no equilibrium at {place}") for place in self.unsupported),
+            *map(html.paragraph, self.unusual),
+        )
 
 
 def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -> Explanation:

@@ -28,6 +28,7 @@ from ballpass.runtime.native.reduction_rows import (
 from ballpass.runtime.ratings.of_bearing import ratings_of
 from ballpass.runtime.ratings.readings import KINDS as LIFE
 from ballpass.runtime.ratings.readings import LoadPowers, lives
+from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 
 
@@ -98,6 +99,23 @@ class Reductions(ShortRepr, Mapping[str, Reduction]):
     steps: int
     rejected: int
     cycle_length: float | None
+
+    def _repr_html_(self) -> str:
+        span = f"from {self.start:.6g} s on, over {self.duration:.6g} s; {self.steps} steps"
+        return html.block(html.title("Extremes and means of every step, SI", span), self.table_html())
+
+    def table_html(self) -> str:
+        """The table as HTML, for a larger block of a notebook."""
+        heads = ("min", "mean", "rms", "max", "max at [s]", "ball")
+        rows = [
+            (
+                name,
+                *(f"{number:z.6g}" for number in (one.minimum, one.mean, one.rms, one.maximum, one.maximum_time)),
+                one.maximum_ball or "",
+            )
+            for name, one in self.channels.items()
+        ]
+        return html.table(("channel", *heads), rows, right=heads)
 
     def __getitem__(self, name: str) -> Reduction:
         try:

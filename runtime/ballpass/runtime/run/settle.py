@@ -23,6 +23,7 @@ from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.run.start import RunEnd, start_time
+from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 
 #: Change of extremes, relative to the channel's range, and of rms, relative to itself, that counts as none [1].
@@ -51,6 +52,10 @@ class Settled(ShortRepr):
     turns: int
     settled: bool
     changes: Mapping[str, tuple[float, float]]
+
+    def _repr_html_(self) -> str:
+        state = "Settled" if self.settled else "Not settled"
+        return html.block(html.title(f"{state}: {self.turns} turns", self.words), self.reductions.table_html())
 
     @property
     def words(self) -> str:
