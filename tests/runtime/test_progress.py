@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model
+from ballpass.runtime.many import ensemble
 from ballpass.runtime.show import progress
 from ballpass.runtime.show.progress import shown, shown_steps, silent
 
@@ -134,6 +135,31 @@ def test_a_notebook_gets_a_bar_that_leaves_the_time(monkeypatch: pytest.MonkeyPa
     assert '<progress max="1">' in shown_there[0]["text/html"]
     assert re.fullmatch(r"<second>: \d+ s", shown_there[-1]["text/plain"])
     assert re.fullmatch(r"<small>&lt;second&gt;: \d+ s</small>", shown_there[-1]["text/html"])
+
+
+def test_an_interrupt_between_the_runs_of_a_call_is_no_result(rotor: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second ensemble of a call is interrupted: what it has not run is neither a derivative nor a verdict."""
+    plain, calls = ensemble.run_chunks, []
+
+    def interrupted(*given: Any) -> bool:
+        calls.append(plain(*given))
+        return len(calls) == 2
+
+    monkeypatch.setattr(ensemble, "run_chunks", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        rotor.sensitivity("rms:inner.y", "bearing.clearance", cycles=2, transient=1)
+    calls.clear()
+    table = {"bearing.clearance": [5e-6, 8e-6]}
+    found = rotor.simulate_many(table, "rms:inner.y", cycles=2, transient=1, growth=True)
+    assert found.interrupted
+    assert len(calls) == 2
+
+
+def test_growth_tells_how_far_both_runs_are(rotor: Model) -> None:
+    told: list[float] = []
+    rotor.growth(cycles=3, transient=1, progress=told.append)
+    assert told == sorted(told)
+    assert (told[0], told[-1]) == (0.5, 1.0)
 
 
 def test_a_bar_changes_no_bit(rotor: Model, monkeypatch: pytest.MonkeyPatch) -> None:

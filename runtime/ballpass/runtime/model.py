@@ -635,7 +635,7 @@ class Model(PointModel):
         parameters: Mapping[str, float] | None = None,
         rtol: float | None = None,
         initial: Initial = None,
-        progress: bool | None = None,
+        progress: Progress = None,
     ) -> Growth:
         """What a start moved by the tolerance changes in the extremes of a run (see `ballpass.runtime.certify.growth`).
 
@@ -662,8 +662,8 @@ class Model(PointModel):
             initial=self._start(numbers, initial),
             transient_cycles=transient,
         )
-        with shown("simulating from two starts", progress):
-            return find_growth(self, numbers, request)
+        with shown("simulating from two starts", progress) as tell:
+            return find_growth(self, numbers, replace(request, progress=tell))
 
     def refine_peak(self, solution: Solution, name: str, *, kind: Literal["max", "min"] = "max") -> Peak:
         """Peak of an output of a run of this model, between its samples too (see `ballpass.runtime.ask.peaks`).

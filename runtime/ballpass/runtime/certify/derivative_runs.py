@@ -5,7 +5,7 @@ In: a model, numbers, a window.  Out: a `Stepping`, and a `Course` made by it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -83,7 +83,13 @@ def differentiate(study: Study, numbers: Numbers, names: Sequence[str], stepping
             tolerance *= 10.0
 
 
-def refuse_chaos(model: LoadedModel, numbers: Numbers, quantities: Sequence[Quantity], span: Span) -> None:
+def refuse_chaos(
+    model: LoadedModel,
+    numbers: Numbers,
+    quantities: Sequence[Quantity],
+    span: Span,
+    progress: Callable[[float], None] | None = None,
+) -> None:
     """Refuse derivatives of quantities whose motion amplifies a tiny change beyond meaning; see `refuse_growth`.
 
     Raises
@@ -93,5 +99,5 @@ def refuse_chaos(model: LoadedModel, numbers: Numbers, quantities: Sequence[Quan
     """
     moving = [item.name for item in quantities if item.channel in channel_names(model.manifest)]
     if moving and model.has_stepper:
-        request = Request(cycles=span.cycles, duration=span.duration, transient_cycles=0.0)
+        request = Request(cycles=span.cycles, duration=span.duration, transient_cycles=0.0, progress=progress)
         refuse_growth(model, numbers, request, moving)

@@ -90,15 +90,14 @@ def find_growth(model: LoadedModel, numbers: Numbers, request: Request) -> Growt
     SimulationError
         The computation failed.
     """
+    request = replace(request, samples_per_cycle=1, outputs=[])  # none are kept
     run = prepare(model, numbers, request)
     rtol = min(make_plan(model, numbers, request).rtol, LOOSEST)
     kinks = choose_kinks(request.kinks, "stepper", model.manifest, rtol)
-    found = _compare(run, Way(method="stepper", rtol=rtol, kinks=kinks))
-    return (
-        found
-        if not found.uncertain or kinks == LOCATED
-        else _compare(run, Way(method="stepper", rtol=rtol, kinks=LOCATED))
-    )
+    found = _compare(run, Way(method="stepper", rtol=rtol, kinks=kinks), request.progress)
+    if not found.uncertain or kinks == LOCATED:
+        return found
+    return _compare(run, Way(method="stepper", rtol=rtol, kinks=LOCATED), request.progress)
 
 
 def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quantities: Sequence[str]) -> None:
@@ -120,11 +119,16 @@ def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quanti
         )
 
 
-def _compare(run: WholeRun, way: Way) -> Growth:
+def _compare(run: WholeRun, way: Way, progress: Callable[[float], None] | None) -> Growth:
     channels = [name for name in channel_names(run.model.manifest) if not name.endswith("ball.deflection")]
     observables = [(kind, name) for name in channels for kind in KINDS]
     moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
-    one, other = (run.integrate(observables, way, start).values.reshape(-1, len(KINDS)) for start in (0.0, moved))
+
+    def integrate(start: float | np.ndarray, before: float) -> np.ndarray:
+        tell = None if progress is None else lambda done: progress(before + 0.5 * done)
+        return run.integrate(observables, way, start, tell).values.reshape(-1, len(KINDS))
+
+    one, other = integrate(0.0, 0.0), integrate(moved, 0.5)
     tolerated = dict(zip(run.model.states, TOLERATED * way.rtol * run.magnitude, strict=True))
     changes, uncertain = {}, []
     for name, mine, its in zip(channels, one, other, strict=True):
@@ -165,11 +169,13 @@ def simulate_members(
         rows = {name: values[left] for name, values in result.parameters.items()}
         starts = {name: rows.get(name, np.full(len(left), numbers.parameters[name])) for name in positions}
         moved = {name: starts[name] + rtol * positions[name] for name in positions}
-        one = {name: result[name][left] for name in names} if not ways else run(rows, names, **ways)
-        other = run({**rows, **moved}, names, **ways)
+        again = run(rows, names, **ways) if ways else result
+        other = run({**rows, **moved}, names, **ways) if not again.interrupted else again
+        result = replace(result, interrupted=other.interrupted)
+        one = {name: again[name] if ways else result[name][left] for name in names}
         for name, (_, channel) in looked_at.items():
             scale = np.fmax(np.abs(one[name]), one[ranges[channel]])
-            # a run that fails from the moved start has no digits either
+            # a run that fails from the moved start, or was interrupted, has no digits either
             bears = np.abs(one[name] - other[name]) <= np.fmax(DIGITS * scale, tolerated.get(channel, 0.0))
             uncertain[name][left] = ~bears
         left = left[np.any([uncertain[name][left] for name in looked_at], axis=0)]

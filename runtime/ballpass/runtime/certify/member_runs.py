@@ -10,7 +10,7 @@ Steps end on the kinks of the laws: stepped over, they leave a thousand times th
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -65,6 +65,7 @@ class MemberRuns:
     family : of the stepper
     per_turn, magnitude : nodes in a turn and magnitudes of the states in the run itself
     closer : take what the balls carry along nodes too: slower, but integrals are cut where balls change rank
+    progress : told the finished part of each call
     """
 
     def __init__(
@@ -78,8 +79,9 @@ class MemberRuns:
         per_turn: int,
         magnitude: Array,
         closer: bool = False,
+        progress: Callable[[float], None] = lambda _done: None,
     ) -> None:
-        self._model, self._numbers, self._span = model, numbers, span
+        self._model, self._numbers, self._span, self._progress = model, numbers, span, progress
         self._stepping = Stepping(family=family, rtol=RTOL, magnitude=magnitude, kinks=LOCATED)
         self._count = len(quantities)
         self._reduced = reduced_by_ensembles(model, quantities)
@@ -112,14 +114,18 @@ class MemberRuns:
                 kinks=LOCATED,
                 threads=None,
                 lanes=True,
-                progress=None,
+                progress=self._progress,
                 bounded=False,
             )
+            if values.interrupted:
+                raise KeyboardInterrupt
             for k, name in self._reduced.items():
                 found[:, k] = values[name]
         if self._others:
             with ThreadPoolExecutor(os.cpu_count()) as threads:
-                found[:, list(self._others)] = list(threads.map(self._along_nodes, changes))
+                for k, one in enumerate(threads.map(self._along_nodes, changes)):
+                    found[k, list(self._others)] = one
+                    self._progress((k + 1) / len(changes))
         return found
 
     def _along_nodes(self, change: Mapping[str, float]) -> list[float]:

@@ -182,8 +182,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     magnitude = stepping.magnitude
     study.per_turn = max(query.samples_per_cycle or 0, NODES)
     tell = query.progress or (lambda _words, _fraction: None)
-    tell("looking for growth", 0.0)
-    refuse_chaos(model, numbers, quantities, query.span)
+    refuse_chaos(model, numbers, quantities, query.span, partial(tell, "looking for growth"))
     tell("differentiating", 0.0)
     course, tolerance = differentiate(study, numbers, names, stepping)
     values = np.array([item.value for item in course.estimates])
@@ -210,6 +209,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
             family=fine,
             per_turn=study.per_turn,
             magnitude=magnitude,
+            progress=partial(tell, "checking"),
         )
         second = by_differences(
             members(closer=False),

@@ -152,5 +152,7 @@ def _clearance(
     transient = model.manifest.run.transient_cycles
     asked = {reading: f"{info.prefix}life_{reading}" for reading in READINGS}
     found = model.simulate_many(table, list(asked.values()), cycles=transient + TURNS)
+    if found.interrupted:
+        raise KeyboardInterrupt
     lives = {reading: found[observable] for reading, observable in asked.items()}
     return figures.life_of_clearance(title, bearing, clearances, lives, present, group, TURNS)
