@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ballpass.derive import generate
 from ballpass.runtime import Model, load
 from ballpass.runtime.certify.sensitivity_report import SensitivityReport
-from ballpass.runtime.plot.style import FIRST, GREY, SECOND, caption, new_figure, save, styled
+from ballpass.runtime.plot.style import FIRST, GREY, SECOND, caption, legend_above, new_figure, save, styled
 from ballpass.runtime.plot.tornado import tornado
 
 DOCS = Path(__file__).resolve().parent
@@ -73,7 +73,7 @@ def linear_figure(model: Model, report: SensitivityReport) -> Figure:
         axis.set_xlabel("change of the parameter [%]")
     for axis in axes[:, 0]:
         axis.set_ylabel("change of the quantity [%]")
-    axes[0, 0].legend(loc="best")
+    legend_above(figure, *axes[0, 0].get_legend_handles_labels())
     caption(
         figure,
         "How far a linear prediction holds",

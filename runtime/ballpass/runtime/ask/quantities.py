@@ -37,6 +37,17 @@ DEFAULTS = (
 #: Units of integrals over time that have names.
 _OVER_TIME = {"W": "J", "m/s": "m", "m/s^2": "m/s", "rad/s": "rad", "rad/s^2": "rad/s"}
 
+#: Kinds as figures call them, where their name is no word for it.
+_IN_WORDS = {
+    "max": "highest",
+    "min": "lowest",
+    "end": "at the end",
+    "value": "at",
+    "amplitude": "amplitude at",
+    "peak_time": "time of the highest",
+    "peak_ball": "ball of the highest",
+}
+
 #: Words people use for kinds.
 _SYNONYMS = {"peak": "max"}
 
@@ -104,6 +115,24 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
     if KINDS[name].over_time:
         unit = _OVER_TIME.get(unit, f"{unit}*s")
     return Quantity(name=text, kind=name, channel=form["channel"], ball=ball, place=place, unit=unit)
+
+
+def channel_words(manifest: Manifest, kind: str, channel: str, ball: int | None = None, place: str = "") -> str:
+    """What a number of a state or output is, for figures: "Position of the centre of the inner ring along y, rms"."""
+    described = {info.name: info.description for info in manifest.quantities}
+    described |= {info.name: info.description for info in (*manifest.states, *manifest.outputs)}
+    which = "any ball" if ball is None else f"ball {ball}"
+    return f"{described[channel].replace('each ball', which)}, {_IN_WORDS.get(kind, kind)} {place}".rstrip()
+
+
+def quantity_words(manifest: Manifest, quantity: Quantity) -> str:
+    """What a quantity is, for figures."""
+    kind = KINDS[quantity.kind]
+    if not (kind.static or kind.channel or kind.of_loads):
+        return channel_words(manifest, quantity.kind, quantity.channel, quantity.ball, quantity.place)
+    bearings = [one.name for one in manifest.bearings if one.name and quantity.channel.startswith(one.prefix)]
+    words = [kind.summary, *(f"bearing {name}" for name in bearings), *filter(None, [quantity.place])]
+    return ", ".join(words)
 
 
 def default_quantities(manifest: Manifest) -> tuple[str, ...]:

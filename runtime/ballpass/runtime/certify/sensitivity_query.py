@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ballpass.runtime.ask.kinks import DEFLECTION
 from ballpass.runtime.ask.nodes import Window
 from ballpass.runtime.ask.panels import ROUGH
-from ballpass.runtime.ask.quantities import default_quantities, parse_quantity
+from ballpass.runtime.ask.quantities import default_quantities, parse_quantity, quantity_words
 from ballpass.runtime.ask.study import Course, Span, Study
 from ballpass.runtime.ask.track import Outlook
 from ballpass.runtime.certify.certificate import (
@@ -281,6 +281,10 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
             for item, found in zip(quantities, course.estimates, strict=True)
         ),
         parameters=tuple(names),
+        words={
+            **{item.name: quantity_words(manifest, item) for item in quantities},
+            **{info.name: info.description for info in manifest.parameters if info.name in names},
+        },
         pairs=tuple(pairs),
         grazing=_grazing(model, numbers, course),
         settings={

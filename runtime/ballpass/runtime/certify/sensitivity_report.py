@@ -100,6 +100,7 @@ class SensitivityReport:
     scene : name
     quantities : values
     parameters : names
+    words : what each quantity and parameter is, by name
     pairs : quantity by quantity, parameters in order
     grazing : where the trajectory grazes a kink
     settings : cycles, transient, method, tolerances, steps
@@ -117,6 +118,7 @@ class SensitivityReport:
     scene: str
     quantities: tuple[QuantityValue, ...]
     parameters: tuple[str, ...]
+    words: Mapping[str, str]
     pairs: tuple[Sensitivity, ...]
     grazing: tuple[Grazing, ...]
     settings: Mapping[str, Any]

@@ -7,6 +7,7 @@ per cent the quantity changes when the parameter grows by one.
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.certify.grazing import merge_grazing
 from ballpass.runtime.certify.sensitivity_report import Sensitivity, SensitivityReport
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, caption, new_figure, styled, write_figures
+from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, caption, new_figure, styled, unit_words, write_figures
 
 #: Bars of a chart.
 BARS = 15
@@ -49,28 +50,34 @@ def tornado(report: SensitivityReport, quantity: str) -> Figure:
     pairs = _bars(report, quantity)
     if not pairs:
         raise RequestError(f"tornado: no parameter of this report moves {quantity}: there is nothing to draw.")
-    figure = new_figure(1.6 + 0.3 * len(pairs))
+    told = [report.words[pair.parameter] for pair in pairs]
+    bars_of = [
+        words if told.count(words) == 1 else f"{words} ({pair.parameter})"
+        for words, pair in zip(told, pairs, strict=True)
+    ]
+    figure = new_figure(1.8 + 0.36 * len(pairs))
     axes = figure.add_subplot()
     bars = [pair.dimensionless for pair in pairs]
     for row, pair in enumerate(pairs):
         colour, hatch, _ = _LOOKS[pair.check.verdict]
         bar = axes.barh(row, bars[row], height=0.66, color=colour, hatch=hatch, edgecolor="#212529", linewidth=0.6)
         axes.bar_label(bar, [f"{bars[row]:+.3g}".replace("-", "−")], padding=3, fontsize=8.5)
-    axes.set_yticks(range(len(pairs)), [pair.parameter for pair in pairs], fontsize=8.5)
+    axes.set_yticks(range(len(pairs)), ["\n".join(textwrap.wrap(words, 40)) for words in bars_of], fontsize=8.5)
     axes.set_ylim(len(pairs) - 0.4, -0.6)
     left, right = min(0.0, *bars), max(0.0, *bars)
     room = 0.14 * (right - left)
     axes.set_xlim(left - (room if left < 0.0 else 0.02 * right), right + (room if right > 0.0 else -0.02 * left))
     axes.axvline(0.0, color=GREY, linewidth=1.0)
     axes.grid(visible=False, axis="y")
-    axes.set_xlabel("change of the quantity per change of the parameter, (p/Q) dQ/dp  [% per %]")
+    axes.set_xlabel("change of the quantity for a change of the parameter [% per %]")
     present = {pair.check.verdict for pair in pairs}
     looks = [_LOOKS[verdict] for verdict in Verdict if verdict in present]
     handles = [Patch(facecolor=c, hatch=hatch, edgecolor="#212529", label=words) for c, hatch, words in looks]
     axes.legend(handles=handles, loc="lower right" if right >= -left else "lower left")
     zero = sum(not math.isfinite(pair.dimensionless) for pair in report.of(quantity))
     hidden = len(report.parameters) - len(pairs) - zero
-    words = f"{report.scene}: {quantity} = {found.value:.5g} {found.unit}."
+    words = f"{report.scene}: {quantity} = {found.value:.5g} {unit_words(found.unit)}; bars are (p/Q) dQ/dp."
+    words += f" From the top: {', '.join(pair.parameter for pair in pairs)}."
     if hidden:
         words += f" Left out: {hidden} with smaller or no effect."
     if zero:
@@ -79,7 +86,8 @@ def tornado(report: SensitivityReport, quantity: str) -> Figure:
     if report.grazing:
         count = len(merge_grazing(report.grazing))
         words += f" The motion grazes a kink at {count} place{'s' if count > 1 else ''}, where derivatives are fragile."
-    caption(figure, f"What moves {quantity}", words)
+    about = report.words[quantity]
+    caption(figure, "\n".join(textwrap.wrap(f"What moves it: {about[:1].lower()}{about[1:]}", 76)), words)
     return figure
 
 

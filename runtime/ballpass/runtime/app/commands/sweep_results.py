@@ -18,6 +18,7 @@ from rich.table import Table
 from ballpass.runtime.app.commands.ranges import Range
 from ballpass.runtime.app.commands.shared import json_text
 from ballpass.runtime.app.summary import TABLE_UNITS
+from ballpass.runtime.ask.quantities import channel_words
 from ballpass.runtime.contract.folders import replace_files
 from ballpass.runtime.plot import FORMATS
 from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
@@ -30,9 +31,6 @@ if TYPE_CHECKING:
 
 #: Files of a sweep, beside a figure for each quantity.
 TABLE, GRID, REPORT, CAPTIONS = "sweep.csv", "sweep.nc", "sweep.json", "sweep.md"
-
-#: Kinds of quantities as figures call them.
-KINDS = {"max": "highest", "min": "lowest", "peak_time": "time of the highest", "peak_ball": "ball of the highest"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,9 +195,7 @@ class Sweep:
     def _words(self, quantity: str) -> str:
         """What a quantity is: "Position of the centre of the inner ring along y, rms"."""
         kind, _, channel = self._attributes[quantity]["long_name"].partition(" of ")
-        manifest = self.result.manifest
-        described = {info.name: info.description for info in (*manifest.states, *manifest.outputs)}
-        return f"{described[channel]}, {KINDS.get(kind, kind)}" if channel in described else quantity
+        return channel_words(self.result.manifest, kind, channel)
 
     def _cell(self, quantity: str, value: float, member: int) -> str:
         """A number with the digits that it has."""
