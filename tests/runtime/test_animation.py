@@ -24,17 +24,30 @@ BROWSER = shutil.which("chromium")
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no chromium on PATH")
 
 
-def dom(page: Path, place: str, home: Path) -> str:
-    """The page at a place, when its script has run; fails where the browser complains."""
+def browse(page: Path, place: str, home: Path) -> tuple[str, str, set[str]]:
+    """The page at a place when its script has run, what the browser says, and what the page asks the network for."""
     assert BROWSER is not None
     quiet = ("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-quic")
+    log = home / "network.json"
     done = subprocess.run(
         [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", *quiet, "--enable-logging=stderr",
-         f"--user-data-dir={home}", "--virtual-time-budget=2000", "--dump-dom", f"file://{page}#{place}"],
+         "--host-resolver-rules=MAP * ~NOTFOUND", f"--log-net-log={log}", f"--user-data-dir={home}",
+         "--virtual-time-budget=2000", "--dump-dom", f"file://{page}#{place}"],
         capture_output=True, text=True, check=True, timeout=120,
     )  # fmt: skip
-    assert "CONSOLE" not in done.stderr, done.stderr
-    return done.stdout
+    noted = [event.get("params", {}) for event in json.loads(log.read_text(encoding="utf-8"))["events"]]
+    # what the browser asks for by itself, for updates, is of no origin
+    asked = {one["url"] for one in noted if "url" in one and one.get("initiator", "not an origin") != "not an origin"}
+    return done.stdout, done.stderr, asked
+
+
+def dom(page: Path, place: str, home: Path) -> str:
+    """The page at a place, when its script has run; fails where the browser complains or a request leaves."""
+    home.mkdir()
+    text, complaints, asked = browse(page, place, home)
+    assert "CONSOLE" not in complaints, complaints
+    assert not asked
+    return text
 
 
 def shown(page: Path, place: str, home: Path) -> dict[str, str]:
@@ -42,6 +55,12 @@ def shown(page: Path, place: str, home: Path) -> dict[str, str]:
     text = dom(page, place, home)
     found = dict(re.findall(r'<dd data-quantity="([^"]+)">([^<]*)</dd>', text))
     (found["now"],) = re.findall(r'<output id="now"[^>]*>([^<]*)</output>', text)
+    return found
+
+
+def numbers_of(page: str) -> dict[str, Any]:
+    """The numbers in a page."""
+    found: dict[str, Any] = json.loads(page.partition('id="data">')[2].partition("</script>")[0])
     return found
 
 
@@ -87,7 +106,7 @@ def test_browser_shows_the_run_at_the_angle_of_the_address(press: tuple[Model, S
 
 
 def test_page_opens_at_the_highest_ball_force_which_no_thinning_misses(press: tuple[Model, Solution]) -> None:
-    numbers = json.loads(animation_page(*press).partition('id="data">')[2].partition("</script>")[0])
+    numbers = numbers_of(animation_page(*press))
     forces = press[1]["ball.force"][-2001:]
     sample, ball = np.unravel_index(np.argmax(forces), forces.shape)
     signal = numbers["bearings"][0]["force"][ball]
@@ -98,9 +117,12 @@ def test_page_opens_at_the_highest_ball_force_which_no_thinning_misses(press: tu
 
 
 def test_page_of_several_bearings_opens_at_the_highest_force_of_all() -> None:
-    forces = [np.array(values) for values in ([1.0, 3.0, 2.0, 0.0], [0.0, 1.0, 5.0, 4.0])]
-    records: Any = [SimpleNamespace(bearing="", has_ball_force=True, highest_ball_force=one.copy) for one in forces]
-    assert Frames(records=(*records,), samples=np.arange(4), turning=True).peak == 2
+    forces = [np.array(values) for values in ([1.0, 3.0, 2.0, 0.0], [0.0, 1.0, 0.0, 4.0])]
+    records: list[Any] = [
+        SimpleNamespace(bearing="", has_ball_force=True, highest_ball_force=one.copy) for one in forces
+    ]
+    for order in (records, records[::-1]):
+        assert Frames(records=(*order,), samples=np.arange(4), turning=True).peak == 3
 
 
 @needs_browser
@@ -157,11 +179,45 @@ def test_page_needs_nothing_but_itself_and_is_small(press: tuple[Model, Solution
     assert text.count("</script>") == 2
 
 
+@needs_browser
+def test_no_request_leaves_the_page_whatever_stands_in_it(press: tuple[Model, Solution], tmp_path: Path) -> None:
+    """What is elsewhere is not asked for; without the page's policy it is, and the network's log shows it."""
+    addresses, policy = {"http://127.0.0.1:9/a.png", "http://127.0.0.1:9/b"}, r'<meta http-equiv="Content-S[^>]*>'
+    strange = f'<img src="{min(addresses)}"><script>fetch("{max(addresses)}").catch(() => 0)</script>'
+    text = animation_page(*press).replace("</body>", f"{strange}</body>")
+    for name, written, expected in (("kept", text, set()), ("without", re.sub(policy, "", text), addresses)):
+        page = tmp_path / f"{name}.html"
+        page.write_text(written, encoding="utf-8")
+        (tmp_path / name).mkdir()
+        assert browse(page, "", tmp_path / name)[2] == expected
+
+
 def test_words_of_a_scene_end_no_element(make_virtual: Callable[..., Model]) -> None:
     model = make_virtual("punching_press", ('title = "Punching machine of the paper"', 'title = "</script><b>&"'))
     text = animation_page(model, model.simulate(cycles=1, transient=0))
     assert text.count("</script>") == 2
     assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in text
+
+
+def test_a_movie_and_a_page_begin_with_the_bearing_that_is_named(
+    make_virtual: Callable[..., Model], scene_text: Callable[..., str], tmp_path: Path
+) -> None:
+    text = scene_text("varying_compliance")
+    bearing = text[text.index("[bearing]\n") : text.index("[run]")]
+    two = "".join(re.sub(r"^\[bearing\b", f"[bearings.{name}", bearing, flags=re.MULTILINE) for name in ("a", "b"))
+    outputs = re.search(r"outputs = \[.*?\]", text, re.DOTALL)
+    assert outputs is not None
+    model = make_virtual("varying_compliance", (bearing, two), (outputs[0], 'outputs = ["*.inner.*", "*.ball.force"]'))
+    solution = model.simulate(cycles=0.1, transient=0, parameters={"bearings.b.clearance": 50e-6})
+    films = {}
+    for name in (None, "a", "b"):
+        page = numbers_of(animation_page(model, solution, turns=0.1, bearing=name))
+        assert page["bearings"][0]["name"] == (name or "a")
+        moving = solution.plot.animate(turns=0.1, bearing=name)
+        films[name] = moving.save(tmp_path / f"{name}.gif", pictures=2).read_bytes()
+    assert films["a"] == films[None] != films["b"]
+    with pytest.raises(RequestError, match=r"no bearing 'c'. There are: a, b\."):
+        write_animation(model, solution, tmp_path / "c.gif", bearing="c", pictures=2)
 
 
 def test_gif_has_as_many_pictures_as_asked_for(press: tuple[Model, Solution], tmp_path: Path) -> None:

@@ -365,6 +365,77 @@ def test_a_force_by_a_table_is_drawn_as_large_as_the_table_says(make_model: Call
         assert any(np.allclose(end, lug) for bar in bars for end in bar)
 
 
+def test_a_spring_pulls_what_moves_towards_its_other_end(make_virtual: Callable[..., Model]) -> None:
+    """With stiffness times elongation."""
+    spring = """[mechanism.springs.hold]
+bodies = ["frame", "slider"]
+points = ["hook", "C"]
+stiffness = "20 N/mm"
+free_length = "10 mm"
+
+[mechanism.forces.punch]
+"""
+    model = make_virtual(
+        "punching_press",
+        ("[mechanism.forces.punch]\n", spring),
+        ("[mechanism.frame.points]\n", '[mechanism.frame.points]\nhook = ["30 mm", "-60 mm"]\n'),
+        ('"drive_torque"', '"drive_torque", "spring.hold.tension"'),
+    )
+    record = gather(model, model.simulate(cycles=0.1, transient=0))
+    axes = Figure().add_subplot()
+    draw_mechanism(axes, record, 50)
+    points = record.points(float(record.t[50]))
+    slider, hook = points["slider", "C"], np.array([0.03, -0.06])
+    length = float(np.hypot(*(hook - slider)))
+    assert f"hold\n{20e3 * (length - 0.01):.0f} N" in [text.get_text() for text in axes.texts]
+    arrow = arrows(axes)[-1]
+    assert arrow.xyann == pytest.approx(slider)
+    way = np.array(arrow.xy) - slider
+    assert way / np.hypot(*way) == pytest.approx((hook - slider) / length)
+
+
+def test_a_motor_s_torque_turns_around_its_joint_and_the_punch_acts_in_its_window(
+    make_virtual: Callable[..., Model], scene_text: Callable[..., str]
+) -> None:
+    """The crank's angle is a state: no input holds the window.  The arc turns with the torque on the crank."""
+    text = scene_text("punching_press_motor")
+    bearing = text[text.index("[bearing]\n") : text.index("[run]\n")]
+    outputs = 'outputs = ["inner.*", "outer.*", "ball.force", "reaction.*", "drive_*", "driver.*"]'
+    wanted = 'outputs = ["reaction.*", "drive_*", "driver.*"]'
+    model = make_virtual("punching_press_motor", (bearing, ""), (outputs, wanted))
+    record = gather(model, model.simulate(cycles=1.2, transient=0))
+    degrees = np.degrees(record.values("driver.angle")) % 360.0
+    senses = set()
+    for angle, acts in ((236.0, False), (238.0, True), (266.0, True), (268.0, False)):
+        sample = int(np.argmin(np.abs(degrees - angle)))
+        axes = Figure().add_subplot()
+        draw_mechanism(axes, record, sample)
+        written = [item.get_text() for item in axes.texts]
+        assert ("punch\n8965 N" in written) is acts
+        torque = float(record.values("drive_torque")[sample])
+        assert f"drive\n{abs(torque):.3g} N·m" in written
+        x, y = next(line for line in axes.get_lines() if line.get_color() == SAND).get_xydata().T
+        assert np.sign(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) == np.sign(torque)  # around the origin, joint A
+        senses.add(np.sign(torque))
+    assert senses == {-1.0, 1.0}
+
+
+@pytest.mark.parametrize("angle", [0.0, 45.0, 90.0, 170.0, 240.0, 300.0])
+def test_no_words_of_the_mechanism_overlap(press: Run, angle: float) -> None:
+    """A and B are 6 mm apart on a machine of 112 mm."""
+    record = gather(*press)
+    sample = int(np.argmin(np.abs(np.degrees(record.crank_angle()) % 360.0 - angle)))
+    figure = Figure(figsize=(4.0, 5.0))
+    axes = figure.add_subplot()
+    draw_mechanism(axes, record, sample)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    boxes = [text.get_window_extent(canvas.get_renderer()) for text in axes.texts if text.get_text()]
+    assert len(boxes) >= 4
+    for number, box in enumerate(boxes):
+        assert not box.count_overlaps(boxes[:number])
+
+
 def test_a_load_by_a_table_is_shaded_where_it_is_not_zero(make_virtual: Callable[..., Model]) -> None:
     """Also over the start of the turn; a table that nowhere stays zero is not shaded."""
     rows = 'angle = ["20 deg", "100 deg", "150 deg", "200 deg", "300 deg"]'

@@ -9,7 +9,7 @@ from dataclasses import asdict
 
 from ballpass.derive.emit.signature import catalogue_info, duty_info, lubrication_info, run_info, signature, versions
 from ballpass.derive.lowering.functions import Functions, operations
-from ballpass.derive.mechanism.forces import drawn_forces
+from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
 from ballpass.derive.reading.usual import usual_ranges
 from ballpass.derive.reading.values import value_bounds, value_relations
 from ballpass.derive.system import System
@@ -121,6 +121,8 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
         forces=drawn_forces(mechanism),
         angle=driven.name if driven is not None else "",
         rate=driven.velocity.name if driven is not None else "",
+        driver=mechanism.driver.joint,
+        springs=drawn_springs(mechanism),
     )
 
 

@@ -259,7 +259,8 @@ class MechanismInfo:
     the parameter ``mechanism.forces.<name>.direction`` the direction.
 
     Where the speed changes, `angle` and `rate` name the states that hold the driver's angle and speed, and `speed` and
-    `start_angle` the parameters they start from; else they are empty.
+    `start_angle` the parameters they start from; else they are empty.  No input holds the gate or the table of a force
+    then: it follows from the angle.
     """
 
     speed: str
@@ -270,6 +271,8 @@ class MechanismInfo:
     forces: tuple[tuple[str, str, str, str], ...] = ()  # name, body, point, input: gate, table or ""
     angle: str = ""
     rate: str = ""
+    driver: str = ""  # the joint that is turned
+    springs: tuple[tuple[str, str, str, str, str], ...] = ()  # and stops between points: what outputs begin with, ends
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

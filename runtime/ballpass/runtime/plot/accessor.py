@@ -14,7 +14,6 @@ import numpy as np
 from ballpass.runtime.ask.spectrum import Window, amplitude_spectrum
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.plot.animate import animation_page, write_animation
 from ballpass.runtime.show import html
 
@@ -200,18 +199,19 @@ class SolutionPlot:
             axes.set_ylabel(f"contact load, highest {top:.4g} N")
         return axes
 
-    def animate(self, *, turns: float = 1.0) -> Animation:
+    def animate(self, *, turns: float = 1.0, bearing: str | None = None) -> Animation:
         """The last turns in motion: linkage, bearings, forces and signals, with a slider; see `Animation`.
 
         Parameters
         ----------
         turns : of driver or shaft; without any that turns on, all of the run is shown
+        bearing : the one that a movie shows and a page opens with; default: the first
 
         Raises
         ------
         RequestError
-            The steady part is shorter, there is nothing to draw, or the solution was read from a file, without the
-            model that places links.
+            The steady part is shorter, there is nothing to draw, an unknown bearing, or the solution was read from a
+            file, without the model that places links.
 
         Examples
         --------
@@ -222,17 +222,15 @@ class SolutionPlot:
                 "plot.animate: this solution was read from a file or sent by another process, without its model. Give "
                 "it back: dataclasses.replace(solution, model=ballpass.runtime.load(folder)).plot.animate()."
             )
-        return Animation(cast("PointModel", self._solution.model), self._solution, turns)
+        return Animation(cast("PointModel", self._solution.model), self._solution, turns, bearing)
 
     def _record(self, bearing: str | None, *names: str) -> Record:
         """What figures know of the run, of one bearing whose outputs these are."""
-        from ballpass.runtime.plot.record import gather
+        from ballpass.runtime.plot.record import bearing_named, gather
 
-        known = {info.name: info for info in self._solution.manifest.bearings}
-        if bearing is not None and bearing not in known:
-            raise RequestError(unknown_name("bearing", bearing, known))
+        named = None if bearing is None else bearing_named(self._solution.manifest, bearing)
         model = cast("PointModel", self._solution.model)  # no figure of samples alone asks it
-        record = gather(model, self._solution, None if bearing is None else known[bearing])
+        record = gather(model, self._solution, named)
         if not record.has(*names):
             raise RequestError(_lacks(", ".join(names)))
         return record
@@ -256,9 +254,9 @@ class Animation:
     Animation(punching_press, 0.1 turns; save(path) writes it)
     """
 
-    def __init__(self, model: PointModel, solution: Solution, turns: float) -> None:
-        self._run, self._turns = (model, solution), turns
-        self._page = animation_page(model, solution, turns=turns)
+    def __init__(self, model: PointModel, solution: Solution, turns: float, bearing: str | None = None) -> None:
+        self._run, self._turns, self._bearing = (model, solution), turns, bearing
+        self._page = animation_page(model, solution, turns=turns, bearing=bearing)
 
     def __repr__(self) -> str:
         return f"Animation({self._run[1].manifest.scene}, {self._turns:g} turns; save(path) writes it)"
@@ -275,7 +273,7 @@ class Animation:
         >>> moving.save("press.html").name
         'press.html'
         """
-        return write_animation(*self._run, path, turns=self._turns, pictures=pictures)
+        return write_animation(*self._run, path, turns=self._turns, bearing=self._bearing, pictures=pictures)
 
 
 def _lacks(names: str) -> str:

@@ -12,26 +12,27 @@ from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.plot import MOVING
 from ballpass.runtime.plot.animation import check_turns, choose_frames, to_plain
 from ballpass.runtime.plot.html_page import page
-from ballpass.runtime.plot.record import Record, gather
+from ballpass.runtime.plot.record import Record, bearing_named, gather
 
 if TYPE_CHECKING:
     from ballpass.runtime.point.point_model import PointModel
     from ballpass.runtime.run.solution import Solution
 
 
-def animation_page(model: PointModel, solution: Solution, *, turns: float = 1.0) -> str:
+def animation_page(model: PointModel, solution: Solution, *, turns: float = 1.0, bearing: str | None = None) -> str:
     """Text of an HTML page that moves through the last turns of a run and needs nothing but itself.
 
     Parameters
     ----------
     turns : of driver or shaft, at the end of the run; without any that turns on, the page shows all of it
+    bearing : the one that it opens with; default: the first
 
     Raises
     ------
     RequestError
-        The steady part is shorter, or there is nothing to draw.
+        The steady part is shorter, there is nothing to draw, or no such bearing.
     """
-    return page(to_plain(choose_frames(_records(model, solution), turns)))
+    return page(to_plain(choose_frames(_records(model, solution, bearing), turns)))
 
 
 def write_animation(
@@ -40,6 +41,7 @@ def write_animation(
     path: str | Path,
     *,
     turns: float = 1.0,
+    bearing: str | None = None,
     pictures: int | None = None,
     progress: Callable[[float], None] = lambda done: None,
 ) -> Path:
@@ -49,14 +51,15 @@ def write_animation(
     ----------
     path : its ending says which
     turns : of driver or shaft, at the end of the run; without any that turns on, all of it is shown
+    bearing : the one that a movie shows and a page opens with; default: the first
     pictures : of a movie, 72 a turn if None; a page has up to 1000 positions
     progress : called with the part that is done, 0 to 1
 
     Raises
     ------
     RequestError
-        Another ending; the steady part is shorter; there is nothing to draw; a movie without matplotlib, an MP4
-        without ffmpeg on PATH.
+        Another ending; the steady part is shorter; there is nothing to draw; an unknown bearing; a movie without
+        matplotlib, an MP4 without ffmpeg on PATH.
 
     Examples
     --------
@@ -68,12 +71,12 @@ def write_animation(
     if target.suffix.removeprefix(".") not in MOVING:
         raise RequestError(f"{target}: {target.suffix!r} is no kind of animation. Allowed: .{', .'.join(MOVING)}.")
     if target.suffix == ".html":
-        replace_file(target, animation_page(model, solution, turns=turns).encode())
+        replace_file(target, animation_page(model, solution, turns=turns, bearing=bearing).encode())
         return target
     count = count_pictures(target.suffix, turns, pictures)
     from ballpass.runtime.plot.movie import write_movie
 
-    return write_movie(choose_frames(_records(model, solution), turns, count), target, progress=progress)
+    return write_movie(choose_frames(_records(model, solution, bearing), turns, count), target, progress=progress)
 
 
 def count_pictures(suffix: str, turns: float, pictures: int | None) -> int:
@@ -89,8 +92,17 @@ def count_pictures(suffix: str, turns: float, pictures: int | None) -> int:
     return count
 
 
-def _records(model: PointModel, solution: Solution) -> list[Record]:
+def _records(model: PointModel, solution: Solution, name: str | None) -> list[Record]:
+    """Records of all bearings, that of the named one first."""
     records = [gather(model, solution, bearing) for bearing in model.manifest.bearings or (None,)]
+    if name is not None:
+        named = bearing_named(model.manifest, name)
+        records.sort(key=lambda record: record.bearing is not named)
+        if not records[0].can_draw_bearing:
+            raise RequestError(
+                f"Bearing {name} cannot be drawn: {name}.inner.x, {name}.inner.y and {name}.ball.force are not all "
+                "among the outputs. Name them in run.outputs of the scene."
+            )
     if model.manifest.mechanism is None and not any(record.can_draw_bearing for record in records):
         raise RequestError(
             "There is nothing to draw: the scene has no linkage, and no bearing of it has both inner.x, inner.y and "

@@ -37,6 +37,28 @@ function arrow(parent, colour) {
 // ------------------------------------------------------------------------------------------------------------ linkage
 function drawLinkage(parts) {
   const picture = get("linkage").querySelector("svg"), moves = [], ink = { stroke: "var(--ink)", "stroke-width": 0.45 };
+  // Words stand where they cover least: [x, y, half the width, half the height, weight] of what is there.
+  let full = [];
+  const covered = (box) => full.reduce((sum, one) => (Math.abs(one[0] - box[0]) < one[2] + box[2] && Math.abs(one[1] - box[1]) < one[3] + box[3] ? sum + one[4] : sum), 0);
+  const avoid = (one, other, weight = 0.2) => { for (let n = 0; n < 9; n += 1) full.push([...[0, 1].map((axis) => one[axis] + (other[axis] - one[axis]) * n / 8), 0.7, 0.7, weight]); };
+  const writer = (size, weight) => {
+    const label = draw(picture, "text", { "font-size": size, "font-weight": weight, "text-anchor": "middle" });
+    let kept = 0;
+    return (at, words, gap) => {
+      label.textContent = words;
+      if (!words) return;
+      const half = [0.31 * size * words.length, 0.6 * size];
+      const boxes = [[1, 0], [1, -1], [0, -1], [-1, -1], [-1, 0], [-1, 1], [0, 1], [1, 1]].map(([right, down]) => {
+        const far = gap / Math.hypot(right, down);
+        return [at[0] + right * (far + half[0]), at[1] + down * (far + half[1]), ...half, 3];
+      });
+      const costs = boxes.map(covered), best = costs.indexOf(Math.min(...costs));
+      if (costs[best] < costs[kept] - 0.5) kept = best; // words that jump at every step cannot be read
+      full.push(boxes[kept]);
+      set(label, { x: boxes[kept][0], y: boxes[kept][1] + 0.36 * size });
+    };
+  };
+  moves.push(() => { full = []; });
   const unit = 52 / Math.max(parts.high[0] - parts.low[0], parts.high[1] - parts.low[1], 1e-9);
   const place = (number, k) => pair(parts.points[number], k).map(
     (value, axis) => (axis ? -unit : unit) * (value - (parts.low[axis] + parts.high[axis]) / 2));
@@ -53,7 +75,9 @@ function drawLinkage(parts) {
     const from = place(block, 0), along = frames.map((k) => place(block, k).reduce((sum, value, axis) => sum + (value - from[axis]) * way(0)[axis], 0));
     const span = direction ? [-highest(along.map((value) => -value)) - 8, highest(along) + 8] : [-14, 14];
     moves.push((k) => {
-      const here = place(block, k), [x, y] = way(k), corner = (o, a, b) => [o[0] + a * x - b * y, o[1] + a * y + b * x];
+      const here = place(block, k), [x, y] = way(k);
+      avoid([here[0] - 5 * x, here[1] - 5 * y], [here[0] + 5 * x, here[1] + 5 * y], 0.1);
+      const corner = (o, a, b) => [o[0] + a * x - b * y, o[1] + a * y + b * x];
       set(box, { points: joined([[-5, -3.2], [5, -3.2], [5, 3.2], [-5, 3.2]].map(([a, b]) => corner(here, a, b))) });
       for (const [side, rail] of rails) {
         const [a, b] = span.map((far) => corner(direction ? from : here, far, side));
@@ -65,33 +89,69 @@ function drawLinkage(parts) {
     const [x, y] = place(pin.at, 0);
     draw(picture, "polygon", { points: joined([[x, y], [x - 3, y + 4.5], [x + 3, y + 4.5]]), fill: "var(--ring)", ...ink });
     draw(picture, "line", { x1: x - 5, x2: x + 5, y1: y + 4.5, y2: y + 4.5, ...ink });
+    moves.push(() => avoid([x, y], [x, y + 5], 0.1));
+  }
+  for (const [one, other] of parts.springs) {
+    const node = draw(picture, "polyline", { fill: "none", stroke: "var(--soft)", "stroke-width": 0.6, "stroke-linejoin": "round" });
+    moves.push((k) => {
+      const [a, b] = [place(one, k), place(other, k)], way = [b[0] - a[0], b[1] - a[1]], size = length(way) || 1;
+      const bend = (share, side) => [a[0] + share * way[0] - side * way[1] / size, a[1] + share * way[1] + side * way[0] / size];
+      const bends = Array.from({ length: 12 }, (_, n) => bend(0.2 + 0.6 * n / 11, n % 11 ? (n % 2 ? 1.2 : -1.2) : 0));
+      set(node, { points: joined([a, ...bends, b]) });
+      avoid(a, b);
+    });
   }
   for (const body of parts.bodies) {
+    const ends = body.points.map((number, n) => [number, body.points.at(n - 1)]);
     const node = draw(picture, "polygon", { fill: "var(--bar)", stroke: "var(--bar)", "stroke-width": 2.6, "stroke-linejoin": "round" });
     draw(node, "title", {}, body.name);
-    moves.push((k) => set(node, { points: joined(body.points.map((number) => place(number, k))) }));
+    moves.push((k) => {
+      set(node, { points: joined(body.points.map((number) => place(number, k))) });
+      for (const [one, other] of ends) avoid(place(one, k), place(other, k));
+    });
   }
   for (const [number, r, fill] of [...parts.masses.map((one) => [one, 0.7, "var(--soft)"]), ...parts.pins.map((pin) => [pin.at, 1.1, "var(--paper)"])]) {
     const node = draw(picture, "circle", { r, fill, ...ink });
     moves.push((k) => { const [cx, cy] = place(number, k); set(node, { cx, cy }); });
   }
-  const scale = 19 / highest(parts.forces.flatMap((force) => frames.map((k) => length(pair([force.x, force.y], k))))), written = [];
+  const scale = 19 / highest(parts.forces.flatMap((force) => frames.map((k) => length(pair([force.x, force.y], k)))));
   for (const force of parts.forces) {
-    const move = arrow(picture, force.pushes ? "var(--sand)" : "var(--signal)"), label = draw(picture, "text", { "font-size": 3.3, "font-weight": 600 });
-    moves.push((k) => {
+    const move = arrow(picture, force.name.startsWith("reaction.") ? "var(--signal)" : "var(--sand)");
+    force.end = (k) => {
       const foot = place(force.at, k), [x, y] = pair([force.x, force.y], k), side = force.pushes ? -scale : scale;
-      const end = [foot[0] + side * x, foot[1] - side * y], size = length([x, y]), [right, down] = [side * x, -side * y].map((part) => part / (scale * size || 1));
+      return [foot, [foot[0] + side * x, foot[1] - side * y], length([x, y])];
+    };
+    moves.push((k) => {
+      const [foot, end] = force.end(k);
       move(...(force.pushes ? [end, foot] : [foot, end]));
-      if (force === parts.forces[0]) written.length = 0;
-      const free = size * scale > 2 && written.every((other) => Math.abs(other[0] - end[0]) > 16 || Math.abs(other[1] - end[1]) > 4);
-      if (free) written.push(end);
-      label.textContent = free ? `${size.toFixed(0)} N` : "";
-      set(label, { x: end[0] + 1.5 * right, y: end[1] + 1 + 2.6 * down, "text-anchor": right > 0.4 ? "start" : right < -0.4 ? "end" : "middle" });
+      avoid(foot, end);
     });
   }
+  if (parts.driver !== null && data.torque) {
+    const node = draw(picture, "path", { fill: "none", stroke: "var(--torque)", "stroke-width": 1.1 }), head = draw(picture, "polygon", { fill: "var(--torque)" });
+    const most = highest(all(data.torque).map(Math.abs)), write = writer(3.3, 600);
+    moves.push((k) => {
+      const [x, y] = place(parts.driver, k), torque = at(data.torque, k), sense = Math.sign(torque), share = Math.abs(torque) / most, visible = share > 0.02;
+      const turn = (angle, r = 6) => [x + r * Math.cos(angle), y - r * Math.sin(angle)], half = sense * (0.35 + 1.75 * share);
+      const [from, to, tip] = [-half, half - 0.3 * sense, half + 0.15 * sense].map((angle) => Math.PI / 2 + angle);
+      for (const one of [node, head]) set(one, { visibility: visible ? "visible" : "hidden" });
+      set(node, { d: `M ${joined([turn(from)])} A 6 6 0 ${Math.abs(to - from) > Math.PI ? 1 : 0} ${sense > 0 ? 0 : 1} ${joined([turn(to)])}` });
+      set(head, { points: joined([turn(tip), turn(to, 7.5), turn(to, 4.5)]) });
+      if (visible) for (const n of [0, 1, 2, 3]) avoid(turn(from + (to - from) * n / 4), turn(from + (to - from) * (n + 1) / 4), 0.05);
+      write([x, y], visible ? `${Math.abs(torque).toPrecision(3)} N\u00b7m` : "", 7.5);
+    });
+  }
+  for (const force of parts.forces) {
+    const write = writer(3.3, 600);
+    moves.push((k) => {
+      const [, end, size] = force.end(k);
+      write(end, size * scale > 2 ? `${size.toFixed(0)} N` : "", 1.2);
+    });
+  }
+  const blocks = parts.guides.map((guide) => guide.block);
   for (const name of parts.names) {
-    const label = draw(picture, "text", { "font-size": 3.6, "text-anchor": "end" }, name.text);
-    moves.push((k) => { const [x, y] = place(name.at, k); set(label, { x: x - 4.6, y: y - 1.8 }); });
+    const write = writer(3.6, 400);
+    moves.push((k) => write(place(name.at, k), name.text, blocks.includes(name.at) ? 5.5 : 2.1));
   }
   return (k) => moves.forEach((move) => move(k));
 }
@@ -274,6 +334,7 @@ addEventListener("keydown", (event) => {
   if (steps) { stop(); go(frame + steps); } else play();
 });
 data.bearings.forEach((bearing, number) => get("bearing").append(new Option(bearing.name, number)));
-for (const [id, hidden] of [["choose", data.bearings.length < 2], ["rings", !data.bearings.length], ["linkage", !data.linkage]]) get(id).hidden = hidden;
+for (const [id, shown] of Object.entries({ choose: data.bearings.length > 1, rings: data.bearings.length, linkage: data.linkage,
+  sprung: data.linkage?.springs.length, turned: data.torque && data.linkage && data.linkage.driver !== null })) get(id).hidden = !shown;
 build(0);
 follow();

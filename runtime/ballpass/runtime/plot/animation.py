@@ -14,7 +14,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.record import FRAME, Array, Record
-from ballpass.runtime.plot.shapes import exaggeration, guide_direction, links, used_points
+from ballpass.runtime.plot.shapes import Points, exaggeration, guide_direction, links, used_points
 
 #: Samples of a page, at most: a turn in steps of a third of a degree.
 FRAMES = 1000
@@ -178,9 +178,19 @@ def _linkage(record: Record, samples: np.ndarray) -> dict[str, Any]:
             if kind == "revolute"
         ],
         "guides": guides,
+        "springs": [[shown.index((b, p)), shown.index((c, q))] for _, b, p, c, q in mechanism.springs],
+        "driver": next(
+            shown.index((body, point)) for name, *_, body, point in mechanism.joints if name == mechanism.driver
+        )
+        if mechanism.driver
+        else None,
         "masses": [shown.index(key) for key in shown if key[1] == "center_of_mass"],
         "names": [{"at": at, "text": ", ".join(words)} for at, words in names.items()],
-        "forces": [*_reactions(record, samples, shown), *_applied(record, samples, shown)],
+        "forces": [
+            *_reactions(record, samples, shown),
+            *_applied(record, samples, shown),
+            *_springs(record, samples, shown, paths),
+        ],
     }
 
 
@@ -224,6 +234,31 @@ def _applied(record: Record, samples: np.ndarray, shown: list[tuple[str, str]]) 
                 "y": y,
             }
         )
+    return found
+
+
+def _springs(record: Record, samples: np.ndarray, shown: list[tuple[str, str]], paths: Points) -> list[dict[str, Any]]:
+    """Forces of springs and stops on what moves, where their tension is an output."""
+    found = []
+    for label, *ends in record.mechanism.springs:
+        tension = record.spring_tension(label)
+        pairs = [(ends[0], ends[1]), (ends[2], ends[3])]
+        for key, other in (pairs, pairs[::-1]):
+            if tension is None or key[0] == FRAME:
+                continue
+            way = paths[other] - paths[key]
+            pull = tension[samples]
+            x, y = _columns(pull[:, None] * way / np.maximum(np.hypot(*way.T), 1e-12)[:, None])
+            found.append(
+                {
+                    "name": f"{label}.{key[0]}",
+                    "words": f"{label.replace('.', ' ')} on {key[0]}",
+                    "at": shown.index(key),
+                    "pushes": bool(np.mean(pull) < 0.0),
+                    "x": x,
+                    "y": y,
+                }
+            )
     return found
 
 

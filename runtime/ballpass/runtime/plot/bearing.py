@@ -103,8 +103,8 @@ def _draw_load(axes: Axes, record: Record, sample: int, shown: list[int], centre
     # beside the arrow, as far as the words' half width and half height ask for
     normal = np.array([load[1], -load[0]]) / size
     normal = normal if normal[0] > 0.0 else -normal
-    place = centre + (0.58 * abs(normal[0]) + 0.22 * abs(normal[1]) + 0.06) * length * normal
-    write(axes, place, f"load\n{_newton(size)}", fontsize=9, color=SIGNAL, fontweight="bold")
+    place = centre + (0.54 * abs(normal[0]) + 0.22 * abs(normal[1]) + 0.04) * length * normal
+    write(axes, place, f"load\n{_newton(size)}", fontsize=8, color=SIGNAL, fontweight="bold")
 
 
 def _newton(value: float) -> str:

@@ -1,4 +1,7 @@
-"""The mechanism at one moment: links, joints, frame, guide and slider block, forces on the frame and applied ones."""
+"""The mechanism at one moment: links, joints, frame, guide and slider block, springs, with the forces.
+
+Forces are those on the frame, applied ones, and those of springs; an arc shows the torque of the drive.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,11 @@ _TRACE = 72
 
 BAR = "#8fa3bf"
 
+#: Radius of the arc that shows a torque, and how far it reaches for the greatest one [deg].
+_ARC, _REACH = 0.1, 250.0
+
+_COMPASS = [np.array([np.cos(angle), np.sin(angle)]) for angle in np.radians(np.arange(0.0, 360.0, 45.0))]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
@@ -26,25 +34,54 @@ class View:
 
     Attributes
     ----------
-    trace : places of the points, over a turn where one is known, else at the samples
+    trace : places of the points, over a turn where one is known, else over the record
     size : larger side of the box around them [m]
     greatest : force that the longest arrow stands for [N]
+    torque : of the drive that the longest arc stands for [N*m]
+    left : whether the torque's words stand on the left of the driver's joint
     low, high : corners of the box around places and arrows, each (2,) [m]
     """
 
     trace: Points
     size: float
     greatest: float
+    torque: float
+    left: bool
     low: Array
     high: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Force:
+    """A force to draw: name, place [m], components [N]; it pulls at the place or, its tip there, pushes."""
+
+    name: str
+    at: Array
+    force: Array
+    colour: str
+    pushes: bool
+
+    @property
+    def strength(self) -> float:
+        return float(np.hypot(*self.force))
+
+    @property
+    def words(self) -> str:
+        return f"{self.name}\n{self.strength:.0f} N".lstrip()
+
+    def end(self, size: float, greatest: float) -> Array:
+        """The arrow's other end, where `greatest` [N] is the longest."""
+        reach = (0.08 + 0.24 * self.strength / greatest) * size / self.strength
+        return np.asarray(self.at + (-reach if self.pushes else reach) * self.force)
 
 
 def view(record: Record, samples: Sequence[int]) -> View:
     """View that holds the mechanism and its arrows at all these samples of the record."""
     poses = [record.points(float(record.t[k]), record.state(k)) for k in samples]
     length = record.cycle_length
+    whole = np.linspace(0, record.t.size - 1, _TRACE + 1).astype(int).tolist()
     turn = (
-        poses
+        [record.points(float(record.t[k]), record.state(k)) for k in whole]
         if length is None
         else [record.points(float(record.t[samples[0]] + length * k / _TRACE)) for k in range(_TRACE + 1)]
     )
@@ -52,13 +89,30 @@ def view(record: Record, samples: Sequence[int]) -> View:
     everything = np.vstack([trace[key] for key in used_points(record.mechanism)])
     size = max(float(np.max(np.ptp(everything, axis=0))), 1e-9)
     forces = [_forces(record, pose, k) for pose, k in zip(poses, samples, strict=True)]
-    greatest = max((float(np.hypot(*force)) for now in forces for _, _, force, _ in now), default=0.0)
-    ends = [end[None, :] for now in forces for _, _, end, _, _ in _arrows(now, size, greatest)]
+    greatest = max((one.strength for now in forces for one in now), default=0.0)
+    ends = [one.end(size, greatest)[None, :] for now in forces for one in _seen(now, greatest)]
     corners = np.vstack([everything, *ends])
+    driver, left = _driver_joint(record), True
+    if driver is not None:
+        joint, middle = trace[driver][0], 0.5 * (np.min(everything[:, 0]) + np.max(everything[:, 0]))
+        left = bool(joint[0] <= middle + 0.01 * size)
+        corners = np.vstack([corners, joint + np.array([-0.3 if left else 0.3, 0.0]) * size])
     margin = 0.16 * size
     return View(
-        trace=trace, size=size, greatest=greatest, low=corners.min(axis=0) - margin, high=corners.max(axis=0) + margin
+        trace=trace,
+        size=size,
+        greatest=greatest,
+        left=left,
+        torque=0.0 if driver is None else float(np.max(np.abs(record.values("drive_torque")))),
+        low=corners.min(axis=0) - margin,
+        high=corners.max(axis=0) + margin,
     )
+
+
+def _driver_joint(record: Record) -> tuple[str, str] | None:
+    """Body and point of the joint whose torque is drawn; None where the torque was not asked for."""
+    found = (item[2:4] for item in record.mechanism.joints if item[0] == record.mechanism.driver)
+    return next(found, None) if record.has("drive_torque") else None
 
 
 def draw_mechanism(axes: Axes, record: Record, sample: int, seen: View | None = None) -> None:
@@ -76,25 +130,92 @@ def draw_mechanism(axes: Axes, record: Record, sample: int, seen: View | None = 
         path = trace[key]
         if float(np.max(np.ptp(path, axis=0))) > 1e-9 * size:
             axes.plot(path[:, 0], path[:, 1], color="#adb5bd", linewidth=0.9, linestyle=(0, (3, 2)), zorder=1)
-    busy: list[tuple[Array, Array]] = []  # a place, and a way from there along which something is drawn
+    words = _Words(axes, seen)
     for _, kind, first, guide, second, block in mechanism.joints:
         if kind == "prismatic":
             direction = guide_direction(now, trace, (first, guide), (second, block))
             _draw_guide(axes, trace[second, block], now[second, block], direction, size, fixed=first == FRAME)
-            busy += [(now[second, block], direction * size), (now[second, block], -direction * size)]
+            words.avoid(now[second, block] - 0.1 * size * direction, now[second, block] + 0.1 * size * direction, 0.1)
+    for _, *ends in mechanism.springs:
+        one, other = (now[ends[k], ends[k + 1]] for k in (0, 2))
+        _draw_spring(axes, one, other, size)
+        words.avoid(one, other)
     _draw_links(axes, used, now, size)
+    for _, keys in links(used, now, size):
+        for k in range(len(keys)):
+            words.avoid(now[keys[k - 1]], now[keys[k]])
     for _, kind, first, point, second, _ in mechanism.joints:
+        at = now[first, point]
         if kind == "revolute":
             if FRAME in (first, second):
-                _draw_ground(axes, now[first, point], size)
+                _draw_ground(axes, at, size)
+                words.avoid(at, at - np.array([0.0, 0.09 * size]))
             look: dict[str, Any] = {"facecolor": "white", "edgecolor": INK, "linewidth": 1.5, "zorder": 6}
-            axes.add_patch(Circle(tuple(now[first, point]), 0.017 * size, **look))
-    arrows = _draw_forces(axes, _arrows(_forces(record, now, sample), size, seen.greatest), size)
-    _draw_names(axes, record, now, busy + arrows, size)
+            axes.add_patch(Circle(tuple(at), 0.017 * size, **look))
+    forces = _seen(_forces(record, now, sample), seen.greatest)
+    for one_force in forces:
+        words.avoid(one_force.at, one_force.end(size, seen.greatest))
+    for one_force in forces:
+        end = one_force.end(size, seen.greatest)
+        arrow(axes, *((end, one_force.at) if one_force.pushes else (one_force.at, end)), one_force.colour)
+        words.put(end, one_force.words, 0.02 * size, fontsize=9.5, color=one_force.colour)
+    driver = _driver_joint(record)
+    torque = float(record.values("drive_torque")[sample]) if driver is not None else 0.0
+    if driver is not None and abs(torque) > 0.02 * seen.torque:
+        at = now[driver]
+        arc = _draw_torque(axes, at, torque / seen.torque, size)
+        for k in range(3):
+            words.avoid(arc[13 * k], arc[13 * k + 13], 0.05)
+        side = [_COMPASS[k] for k in ((4, 3, 5) if seen.left else (0, 1, 7))]  # of a movie always the same
+        words.put(at, f"drive\n{abs(torque):.3g} N·m", 1.2 * _ARC * size, side, fontsize=9.5)
+    _put_names(words, record, now, size)
     axes.set_xlim(seen.low[0], seen.high[0])
     axes.set_ylim(seen.low[1], seen.high[1])
     axes.set_aspect("equal")
     axes.axis("off")
+
+
+class _Words:
+    """Words of a picture, each where it covers least of what is there."""
+
+    def __init__(self, axes: Axes, seen: View) -> None:
+        assert axes.figure is not None  # the axes were made by a figure
+        panel, inch = axes.get_window_extent(), axes.figure.dpi
+        extent = (seen.high - seen.low) / np.array([panel.width, panel.height]) * inch
+        self._axes, self._seen, self._point = axes, seen, float(np.max(extent)) / 72.0  # [m] of a printer's point
+        self._full: list[tuple[Array, Array, float]] = []  # centre and half the sides of a box, weight
+
+    def avoid(self, one: Array, other: Array, weight: float = 0.2) -> None:
+        """Words should not cover the line between two places."""
+        half = np.full(2, 3.0 * self._point)
+        self._full += [(place, half, weight) for place in np.linspace(one, other, 9)]
+
+    def put(
+        self,
+        at: Array,
+        words: str,
+        gap: float,
+        ways: Sequence[Array] = _COMPASS,
+        *,
+        fontsize: float,
+        color: str = "#212529",
+    ) -> None:
+        """Write beside a place, in one of these directions, so far from it."""
+        lines = words.splitlines()
+        half = 0.5 * fontsize * self._point * np.array([0.68 * max(map(len, lines)), 1.3 * len(lines)])
+
+        def place(way: Array) -> Array:
+            return np.asarray(at + gap * way + np.sign(np.round(way, 6)) * half)
+
+        def cost(way: Array) -> float:
+            middle = place(way)
+            inside = np.all(middle - half > self._seen.low) and np.all(middle + half < self._seen.high)
+            covered = (w for centre, room, w in self._full if np.all(np.abs(middle - centre) < half + room))
+            return sum(covered, 0.0 if inside else 1.0)
+
+        best = place(min(ways, key=cost))  # the first of equals
+        self._full.append((best, half, 3.0))
+        write(self._axes, best, words, fontsize=fontsize, fontweight="bold", color=color, zorder=8)
 
 
 def _draw_links(axes: Axes, used: list[tuple[str, str]], now: Points, size: float) -> None:
@@ -147,74 +268,78 @@ def _draw_guide(axes: Axes, path: Array, at: Array, direction: Array, size: floa
         _hatched_wall(axes, first + shift, last + shift, side * normal, size)
 
 
-def _draw_names(axes: Axes, record: Record, now: Points, busy: list[tuple[Array, Array]], size: float) -> None:
-    """Names of the joints, those at one place together, on the side where fewest links and forces leave the place."""
-    mechanism = record.mechanism
+def _draw_spring(axes: Axes, one: Array, other: Array, size: float) -> None:
+    """A zigzag between two points, and dots there."""
+    way = other - one
+    length = float(np.hypot(*way))
+    if length < 1e-6 * size:
+        return
+    along, across = way / length, np.array([-way[1], way[0]]) / length
+    places = np.linspace(0.2, 0.8, 12)
+    sides = np.array([0.0, *np.resize([1.0, -1.0], 10), 0.0])
+    bends = one + np.outer(places * length, along) + np.outer(sides * 0.02 * size, across)
+    axes.plot(*np.vstack([one, bends, other]).T, color=GREY, linewidth=1.3, zorder=2.6)
+    axes.plot(*np.vstack([one, other]).T, "o", color=GREY, markersize=3.5, zorder=6)
+
+
+def _put_names(words: _Words, record: Record, now: Points, size: float) -> None:
+    """Names of the joints, those at one place together."""
     places: list[tuple[Array, list[str]]] = []
-    for name, _, _, _, body, point in mechanism.joints:
+    for name, _, _, _, body, point in record.mechanism.joints:
         at = now[body, point]
         shared = next((names for place, names in places if np.hypot(*(place - at)) < 0.01 * size), None)
         if shared is None:
             places.append((at, [name]))
         else:
             shared.append(name)
-    ends = {key for item in mechanism.joints for key in (item[2:4], item[4:6])}
-    links = {key: place for key, place in now.items() if key in ends or key[1] == "center_of_mass"}
-    blocks = [now[item[4], item[5]] for item in mechanism.joints if item[1] == "prismatic"]
-    compass = [np.array([np.cos(angle), np.sin(angle)]) for angle in np.radians(np.arange(0.0, 360.0, 45.0))]
+    for at, _ in places:
+        words.avoid(at, at, 0.1)
+    blocks = [now[item[4], item[5]] for item in record.mechanism.joints if item[1] == "prismatic"]
     for at, names in places:
-        bodies = {key[0] for key, place in links.items() if np.hypot(*(place - at)) < 0.01 * size}
-        ways = [place - at for (body, _), place in links.items() if body in bodies - {FRAME}]
-        ways += [way for foot, way in busy if np.hypot(*(foot - at)) < 0.01 * size]
-        ways += [np.array([0.0, -size])] if FRAME in bodies else []  # its base or guide
-        taken = [way / np.hypot(*way) for way in ways if np.hypot(*way) > 1e-6 * size]
-        # the direction whose nearest neighbour is farthest; the first of equals
-        free = min(compass, key=lambda way: round(max((float(way @ other) for other in taken), default=0.0), 6))
-        distance = 0.15 if any(np.hypot(*(block - at)) < 0.01 * size for block in blocks) else 0.052
-        place = at + distance * size * free
-        write(axes, place, ", ".join(names), fontsize=10, fontweight="bold", color="#212529", zorder=8)
+        block = any(np.hypot(*(place - at)) < 0.01 * size for place in blocks)
+        words.put(at, ", ".join(names), (0.08 if block else 0.025) * size, fontsize=10)
 
 
-def _forces(record: Record, now: Points, sample: int) -> list[tuple[str, Array, Array, float]]:
-    """Reactions on the frame and applied forces that act: name, place [m], force [N], side of the arrow.
-
-    A reaction pulls at its place, side 1; an applied force pushes, side -1: its tip is where it acts.
-    """
-    applied = [(name, now[key], force) for name, key, force in record.applied_forces(float(record.t[sample]))]
-    forces = [("", at, force, 1.0) for at, force in _reactions(record, now, sample)]
-    return forces + [(f"{name}\n", at, force, -1.0) for name, at, force in applied]
-
-
-def _arrows(
-    forces: list[tuple[str, Array, Array, float]], size: float, greatest: float
-) -> list[tuple[str, Array, Array, Array, float]]:
-    """Arrows of forces that are seen, all to one scale: name, place [m], its other end [m], force [N], side."""
-    found = []
-    for name, at, force, side in forces:
-        strength = float(np.hypot(*force))
-        if strength > 0.02 * greatest:
-            end = at + side * (0.08 + 0.24 * strength / greatest) * size * force / strength
-            found.append((name, at, end, force, side))
+def _forces(record: Record, now: Points, sample: int) -> list[_Force]:
+    """Reactions on the frame, applied forces that act, and those of springs on what moves."""
+    found = [
+        _Force(name="", at=at, force=force, colour=SIGNAL, pushes=False)
+        for at, force in _reactions(record, now, sample)
+    ]
+    for name, key, force in record.applied_forces(float(record.t[sample])):
+        found.append(_Force(name=name, at=now[key], force=force, colour=INK, pushes=True))
+    for label, *ends in record.mechanism.springs:
+        tension = record.spring_tension(label)
+        pairs = ((ends[0], ends[1]), (ends[2], ends[3]))
+        for key, other in (pairs, pairs[::-1]):
+            way = now[other] - now[key]
+            length = float(np.hypot(*way))
+            if tension is not None and key[0] != FRAME and length > 0.0:
+                pull = float(tension[sample])
+                name = label.partition(".")[2]
+                found.append(_Force(name=name, at=now[key], force=pull * way / length, colour=INK, pushes=pull < 0.0))
     return found
 
 
-def _draw_forces(
-    axes: Axes, arrows: list[tuple[str, Array, Array, Array, float]], size: float
-) -> list[tuple[Array, Array]]:
-    """Arrows with their forces in words.
+def _seen(forces: list[_Force], greatest: float) -> list[_Force]:
+    """Forces whose arrows are long enough to be seen."""
+    return [one for one in forces if one.strength > 0.02 * greatest]
 
-    Returns
-    -------
-    where an arrow is: pairs of the place the force acts at and the way from there to the arrow's other end [m]
-    """
-    for name, at, end, force, side in arrows:
-        colour = SIGNAL if side > 0.0 else INK
-        arrow(axes, *((at, end) if side > 0.0 else (end, at)), colour)
-        right = side * force[0] >= 0.0
-        place = end + np.array([0.02 * size if right else -0.02 * size, 0.0])
-        look: dict[str, Any] = {"color": colour, "fontweight": "bold", "fontsize": 9.5, "zorder": 8}
-        write(axes, place, f"{name}{np.hypot(*force):.0f} N", ha="left" if right else "right", **look)
-    return [(at, end - at) for _, at, end, _, _ in arrows]
+
+def _draw_torque(axes: Axes, at: Array, share: float, size: float) -> Array:
+    """An arc around the driver's joint in the sense of the torque on the driven body; its places, (40, 2) [m]."""
+    half = np.radians(20.0 + 0.5 * (_REACH - 40.0) * abs(share)) * np.sign(share)
+
+    def around(angle: Any, radius: float = _ARC) -> Array:
+        turned = np.radians(90.0) + angle
+        return np.asarray(at + radius * size * np.stack((np.cos(turned), np.sin(turned)), axis=-1))
+
+    neck = half - 0.25 * np.sign(share)
+    arc = around(np.linspace(-half, neck, 40))
+    axes.plot(*arc.T, color=SAND, linewidth=2.6, solid_capstyle="butt", zorder=6.5)
+    head = np.array([around(half + 0.15 * np.sign(share)), around(neck, 1.25 * _ARC), around(neck, 0.75 * _ARC)])
+    axes.add_patch(Polygon(head, facecolor=SAND, edgecolor="none", zorder=6.5))
+    return arc
 
 
 def _reactions(record: Record, now: Points, sample: int) -> list[tuple[Array, Array]]:

@@ -33,8 +33,11 @@ def peak_moment(record: Record) -> Figure:
         draw_mechanism(figure.add_subplot(), record, sample)
     if with_mechanism:
         words = "force on the frame" if with_bearing else "forces on the frame"
-        if record.applied_forces(float(record.t[sample])):
+        sprung = any(record.spring_tension(label) is not None for label, *_ in record.mechanism.springs)
+        if sprung or record.applied_forces(float(record.t[sample])):
             words += ", applied force (dark)"
+        if record.has("drive_torque"):
+            words += ", torque of the drive (arc)"
         words += ", dashed paths of the joints. "
         text += f"Left: {words}" if with_bearing else words.capitalize()
     if with_bearing:
@@ -60,7 +63,7 @@ def _between_samples(record: Record) -> str:
     name = "ball.force" if record.has("ball.force") else "ball.elastic_force"
     numbers = record.model.numbers(record.solution.parameters)
     peak = refine_peak(record.model, numbers, record.solution, record.output(name))
-    shown, true = f"{peak.sampled:.4g}", f"{peak.value:.4g}"
+    shown, true = (f"{value:.4g}" if value < 9999.5 else f"{value:.0f}" for value in (peak.sampled, peak.value))
     return "" if shown == true else f"\n{shown} N; between the samples it reaches {true} N"
 
 

@@ -269,6 +269,7 @@ def phase_portrait(record: Record) -> Figure:
         text = f"{count} stroboscopic point{'' if count == 1 else 's'}, at {what} angle {angle % 360.0:g}°."
         if many:
             panels[1].set_title("stroboscopic points alone")
+            panels[1].set_ylabel("velocity along x [mm/s]")
             panels[1].ticklabel_format(useOffset=False)
             panels[1].locator_params(axis="x", nbins=4)
             dropped = source.solution.transient_cycles
@@ -281,5 +282,5 @@ def phase_portrait(record: Record) -> Figure:
     handles, labels = axes.get_legend_handles_labels()
     legend_above(figure, handles, labels)
     title = record.title("Phase portrait along x")
-    frame(figure, title, f"{text} {record.settings()}.", left=0.9, **({"wspace": 0.25} if many else {}))
+    frame(figure, title, f"{text} {record.settings()}.", left=0.9, **({"wspace": 0.36} if many else {}))
     return figure

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from ballpass.runtime.ask.characteristic import frequencies_of
 from ballpass.runtime.ask.observables import KinematicFrequencies, turns
 from ballpass.runtime.contract import force_components, table_direction
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.run.ball_angles import ball_angles
 
 if TYPE_CHECKING:
@@ -191,7 +193,8 @@ class Record:
         inputs = {info.name: value for info, value in zip(self.manifest.inputs, values, strict=True)}
         acting = []
         for name, body, point, given in self.mechanism.forces:
-            if given and inputs[given] == 0.0:
+            amount = inputs[given] if given in inputs else self._over_driver_angle(name, t) if given else 1.0
+            if amount == 0.0:
                 continue
             cartesian, (magnitude, direction) = force_components(name)
             if cartesian[0] in parameters:
@@ -199,9 +202,26 @@ class Record:
             elif magnitude in parameters:
                 force = parameters[magnitude] * _unit(parameters[direction])
             else:
-                force = inputs[given] * _unit(parameters[table_direction(name)])
+                force = amount * _unit(parameters[table_direction(name)])
             acting.append((name, (body, point), force))
         return tuple(acting)
+
+    def _over_driver_angle(self, name: str, t: float) -> float:
+        """Gate or table of a force that no input holds, for the driver's angle is a state."""
+        full, angle = 2.0 * np.pi, float(self.crank_angle(np.array([t]))[0])
+        windows = [item.windows[0] for item in self.manifest.inputs if item.name.startswith(f"border.{name}.")]
+        if windows:
+            edges = [(self.parameter(start), self.parameter(end)) for start, end in windows]
+            return float(any((angle - start) % full < (end - start) % full for start, end in edges))
+        columns = [f"mechanism.forces.{name}.table.{column}" for column in ("angle", "force")]
+        knots, values = ([v for n, v in self.solution.parameters.items() if n.startswith(c)] for c in columns)
+        return float(np.interp(angle, knots, values, period=full))
+
+    def spring_tension(self, label: str) -> Array | None:
+        """Tension of a spring or stop between two points, (n,) [N]; None where it was not asked for."""
+        if self.has(f"{label}.tension"):
+            return self.values(f"{label}.tension")
+        return -self.values(f"{label}.force") if self.has(f"{label}.force") else None
 
     def points(self, t: float, state: Array | None = None) -> dict[tuple[str, str], Array]:
         """Coordinates of the mechanism's points at a time, the state there or joints without play: -> (2,) [m]."""
@@ -248,6 +268,14 @@ def _acting_rows(table: InputInfo, parameter: Callable[[str], float]) -> list[tu
 def _unit(angle: float) -> Array:
     """Unit vector at an angle [rad] from +x, (2,)."""
     return np.array([np.cos(angle), np.sin(angle)])
+
+
+def bearing_named(manifest: Manifest, name: str) -> BearingInfo:
+    """The bearing of this name; a `RequestError` names those that there are."""
+    known = {info.name: info for info in manifest.bearings if info.name}
+    if name not in known:
+        raise RequestError(unknown_name("bearing", name, known))
+    return known[name]
 
 
 def gather(

@@ -16,9 +16,10 @@ Points = dict[tuple[str, str], Array]
 
 
 def used_points(mechanism: MechanismInfo) -> list[tuple[str, str]]:
-    """Points of joints and of applied forces, each once."""
+    """Points of joints, of applied forces and of springs, each once."""
     joined = [key for _, _, b, p, c, q in mechanism.joints for key in ((b, p), (c, q))]
-    return list(dict.fromkeys([*joined, *((body, point) for _, body, point, _ in mechanism.forces)]))
+    pulled = [key for _, b, p, c, q in mechanism.springs for key in ((b, p), (c, q))]
+    return list(dict.fromkeys([*joined, *((body, point) for _, body, point, _ in mechanism.forces), *pulled]))
 
 
 def links(used: list[tuple[str, str]], now: Points, size: float) -> list[tuple[str, list[tuple[str, str]]]]:

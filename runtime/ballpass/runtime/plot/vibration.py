@@ -29,7 +29,12 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "2 BSF": {"color": "#5b8e7d", "linestyle": (0, (3, 1, 1, 1)), "linewidth": 1.2},
 }
 #: Place of a legend: right above the axes.
-_ABOVE: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+_ABOVE: dict[str, Any] = {
+    "loc": "lower right",
+    "bbox_to_anchor": (1.0, 1.0),
+    "borderaxespad": 0.2,
+    "columnspacing": 1.2,
+}
 
 
 @styled
@@ -63,12 +68,13 @@ def draw_lines(
     axes.minorticks_off()
     axes.set_ylim(FLOOR * peak, 2.0 * peak)
     axes.set_xlim(0.0, limit)
+    unit = " Hz" if across.endswith("[Hz]") else ""
     looks = []
     for mark in marks:
         every = mark.frequency * np.arange(1, (1 if mark.name == "FTF" else MARKED) + 1)
         look = _LOOKS[mark.name]
         axes.vlines(every[every <= limit], 0.0, 1.0, transform=axes.get_xaxis_transform(), zorder=0.5, **look)
-        looks.append((Line2D([], [], **look | {"linewidth": 1.6}), f"{mark.label} {mark.frequency:.4g}"))
+        looks.append((Line2D([], [], **look | {"linewidth": 1.6}), f"{mark.label} {mark.frequency:.4g}{unit}"))
     axes.plot(position[shown], np.maximum(height[shown], FLOOR * peak), color=INK, linewidth=1.0)
     axes.grid(visible=False, axis="x")
     axes.set_xlabel(across)

@@ -10,6 +10,7 @@ from ballpass.derive.drive import Drive
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Setting
 from ballpass.derive.mechanism.forces.point_force import PointForce
+from ballpass.derive.mechanism.forces.two_points import TwoPoints
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.records import Force, Mechanism
 from ballpass.derive.terms import Definition, Smoothness
@@ -56,12 +57,21 @@ def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Force
 def drawn_forces(mechanism: Mechanism) -> tuple[tuple[str, str, str, str], ...]:
     """Forces on points: name, body, point, and input that gates it or holds its amount, or "" (acts always).
 
-    Where the driver's angle is a coordinate no input tells when a load acts: only those that always do are here.
+    Where the driver's angle is a coordinate there is no such input: the angle tells when it acts, and how much.
     """
     return tuple(
         (force.name, force.pathway.body, force.pathway.point, _input(force))
         for force in mechanism.forces
-        if isinstance(force.pathway, PointForce) and not (mechanism.driver.turns_unevenly and _input(force))
+        if isinstance(force.pathway, PointForce)
+    )
+
+
+def drawn_springs(mechanism: Mechanism) -> tuple[tuple[str, str, str, str, str], ...]:
+    """Springs and stops along a line: what their outputs begin with, body and point of both ends."""
+    return tuple(
+        (force.label, path.bodies[0], path.points[0], path.bodies[1], path.points[1])
+        for force in mechanism.forces
+        if isinstance(path := force.pathway, TwoPoints)
     )
 
 

@@ -23,6 +23,10 @@ def animate(
         typer.Option("--format", metavar="KIND", help="html, a page that needs no network and no server; mp4; or gif."),
     ] = "html",
     last: Annotated[float, typer.Option(metavar="N", help="Turns to show, the last ones of the run.")] = 1.0,
+    bearing: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Of several bearings the one that a movie shows; a page opens with it."),
+    ] = None,
     pictures: Annotated[
         int | None, typer.Option(metavar="N", help="Pictures of a movie; 72 a turn if not given.")
     ] = None,
@@ -53,6 +57,10 @@ def animate(
         folder = results_folder(out, scene)
         path = folder / f"animation.{format_}"
         model = load_model(scene, stages, asked.run.method, None, rtol, overrides=asked.overrides)
+        if bearing is not None:
+            from ballpass.runtime.plot.record import bearing_named
+
+            bearing_named(model.manifest, bearing)
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,
@@ -66,5 +74,5 @@ def animate(
         from ballpass.runtime.plot.animate import write_animation
 
         folder.mkdir(parents=True, exist_ok=True)
-        write_animation(model, solution, path, turns=last, pictures=pictures, progress=stages.fraction)
+        write_animation(model, solution, path, turns=last, bearing=bearing, pictures=pictures, progress=stages.fraction)
     show(f"{path} ({size_words(path.stat().st_size)})")
