@@ -45,6 +45,7 @@ sphinx_gallery_conf = {
     "first_notebook_cell": "# starts in docs/gallery of the repository; else change paths\n%matplotlib inline",
     "min_reported_time": 1000,
     "remove_config_comments": True,
+    "reset_modules": ("matplotlib", "ballpass.runtime.plot.style.use"),
 }
 
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]

@@ -99,7 +99,7 @@ print(
 
 figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
 for name, mark in zip(numbers, "os^", strict=True):
-    axes.loglog(
+    axes.semilogx(
         unseen[truth == name, 0],
         unseen[truth == name, 1],
         mark,

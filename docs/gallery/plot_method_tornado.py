@@ -34,7 +34,8 @@ for pair in report.of("peak_ball_force"):
 # grow.
 ranked = list(reversed(report.of("peak_ball_force")))
 figure, axes = plt.subplots(figsize=(8, 3.6), layout="constrained")
-axes.barh([pair.parameter for pair in ranked], [pair.dimensionless for pair in ranked])
+words = [report.words[pair.parameter] for pair in ranked]
+axes.barh(words, [pair.dimensionless for pair in ranked])
 axes.axvline(0, color="black", linewidth=0.8)
 axes.set(
     xlabel="change of the highest ball force [% for 1 %]",

@@ -192,7 +192,7 @@ class SolutionPlot:
                 foot = balls - ball  # ball 1 above
                 height = foot + 0.9 * force[:, ball] / top
                 axes.fill_between(along, foot, height, linewidth=0.0, alpha=0.35, color="C0")
-                axes.plot(along, height, linewidth=0.8, color="C0")
+                axes.plot(along, height, linewidth=0.8, linestyle="-", color="C0")
             axes.set_yticks(range(balls, 0, -1), [f"ball {ball}" for ball in range(1, balls + 1)])
             axes.set_xlim(float(along.min()), float(along.max()))
             axes.set_xlabel(label)
@@ -296,8 +296,9 @@ def _axes(given: Axes | None) -> Iterator[Axes]:
         yield given
         return
     pyplot = need("matplotlib.pyplot")
-    from ballpass.runtime.plot.style import settings
+    from ballpass.runtime.plot.style import settings, use
 
     figure = pyplot.figure(layout="constrained")  # outside: a notebook's backend, loaded here, changes settings
     with settings():
+        use()
         yield figure.add_subplot()

@@ -144,7 +144,7 @@ def ball_loads(record: Record) -> Figure:
         axes.plot(along, force[:, number - 1], color=INK, linewidth=0.9)
         shade_windows(axes, windows, range(-1, int(along.max() // 360.0) + 1))
         axes.set_ylim(min(1.1 * bottom, 0.0), 1.1 * top)
-        axes.locator_params(axis="y", nbins=2)
+        axes.set_yticks([0.0, _round_below(0.7 * top)])  # so low that no number touches that of the next strip
     for number, axes in enumerate(grid[:, -1], start=1):
         axes.text(1.02, 0.4, f"ball {number}", transform=axes.transAxes, fontsize=9, va="center")
     first = grid[-1, 0]
@@ -156,7 +156,7 @@ def ball_loads(record: Record) -> Figure:
     if closer:
         grid[-1, 1].set_xlim(*moment)
         grid[-1, 1].set_xlabel(label)
-    figure.supylabel("contact load [N]", fontsize=9.5)
+    figure.supylabel("contact load [N]", fontsize=9.5, x=0.008)
     shown = "last two turns" if len(record.turns) >= 2 else "last turn" if record.turns else "the whole record"
     shaded = " Shaded: an applied load acts." if windows else ""
     right = " Right: around the highest load." if closer else ""
@@ -165,11 +165,18 @@ def ball_loads(record: Record) -> Figure:
         record.title("Contact load of every ball"),
         f"{words.capitalize()}, {shown}; all strips at one scale, highest sample {top:.4g} N.{right}{shaded} "
         f"{record.settings()}.",
+        left=0.9,
         right=0.8,
         hspace=0.15,
         wspace=0.06,
     )
     return figure
+
+
+def _round_below(value: float) -> float:
+    """Largest of 1, 2, 2.5, 5, 10, 20 ... up to a value."""
+    decade = 10.0 ** np.floor(np.log10(value))
+    return float(max(digit * decade for digit in (1.0, 2.0, 2.5, 5.0) if digit * decade <= value))
 
 
 def _around_peak(along: Array, force: Array) -> tuple[tuple[float, float], bool]:

@@ -88,14 +88,14 @@ def draw_orbit(axes: Axes, record: Record, *, relative: bool = False) -> bool:
     if last.start > 0:
         x, y = (1e6 * _path(record, slice(0, last.start + 1), axis, relative=relative)[1] for axis in "xy")
         # wide, to be seen where the last turn covers it
-        axes.plot(x, y, color=SAND, linewidth=2.4, label="steady turns before it")
+        axes.plot(x, y, color=SAND, linestyle="-", linewidth=2.4, label="steady turns before it")
     (t, x, _), (_, y, _) = (_path(record, last, axis, relative=relative) for axis in "xy")
     x, y = 1e6 * x, 1e6 * y
-    axes.plot(x, y, color=INK, linewidth=1.1, label="last turn" if record.turns else "path")
+    axes.plot(x, y, color=INK, linestyle="-", linewidth=1.1, label="last turn" if record.turns else "path")
     _highlight_windows(axes, record, t, x, y)
-    start: dict[str, Any] = {"color": "white", "markeredgecolor": INK, "markersize": 8}
-    axes.plot(x[0], y[0], "o", label="start of the last turn", zorder=4, **start)
-    axes.plot(x[-1], y[-1], "s", color=INK, markersize=4, label="end of the last turn", zorder=5)
+    look: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}  # seen on any ground
+    axes.plot(x[0], y[0], marker="o", markersize=9, label="start of the last turn", zorder=4, **look)
+    axes.plot(x[-1], y[-1], marker="s", markersize=4.5, label="end of the last turn", zorder=5, **look)
     wide, high = (max(float(np.ptp(values)), 1e-9) for values in (x, y))
     equal = max(wide, high) < _SLIVER * min(wide, high)
     if equal:
@@ -116,7 +116,8 @@ def _highlight_windows(axes: Axes, record: Record, t: Array, x: Array, y: Array)
     label = "an applied load acts"
     for start, end in record.load_windows():
         inside = (angle - start) % (2.0 * np.pi) < end - start
-        axes.plot(np.where(inside, x, np.nan), np.where(inside, y, np.nan), color=SIGNAL, linewidth=1.9, label=label)
+        look: dict[str, Any] = {"color": SIGNAL, "linestyle": "-", "linewidth": 1.9}
+        axes.plot(np.where(inside, x, np.nan), np.where(inside, y, np.nan), label=label, **look)
         label = "_nolegend_"
 
 

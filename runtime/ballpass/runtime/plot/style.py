@@ -15,6 +15,7 @@ from typing import Any, Literal, ParamSpec
 
 import matplotlib
 import numpy as np
+from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
@@ -35,6 +36,12 @@ GREY = "#6c757d"
 #: First and second signal of an axes: dark solid, lighter dashed.
 FIRST: dict[str, Any] = {"color": INK, "linestyle": "-", "linewidth": 1.4}
 SECOND: dict[str, Any] = {"color": SIGNAL, "linestyle": (0, (5, 2)), "linewidth": 1.4}
+
+#: Looks of lines that are not told one: 20, each with another pair of colour and dashes.
+_CYCLE = cycler(
+    color=[INK, SIGNAL, SAND, "#5b8e7d", GREY] * 4,
+    linestyle=["-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2))] * 5,
+)
 
 _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # ships with matplotlib: the same letters on every machine
@@ -90,6 +97,11 @@ def settings() -> Iterator[None]:
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
         yield
+
+
+def use(*_: object) -> None:
+    """Take the settings of this module, and looks of lines, for all axes that follow: in examples and notebooks."""
+    matplotlib.rcParams.update({**_SETTINGS, "axes.prop_cycle": _CYCLE})
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
