@@ -90,6 +90,7 @@ def test_contradictions_and_nonsense_end_with_exit_code_2_and_no_folder(
         (("--format", "gif", "--pictures", "1"), "2 or more"),
         (("--format", "gif", "--last", "nan"), "nan turns were asked for. Allowed: more than 0"),
         (("--format", "mp4"), "ffmpeg, which is not on PATH"),
+        (("--bearing", "left"), "no bearing 'left'. There are: none, for the only bearing has no name."),
     ],
 )
 def test_animations_that_cannot_be_end_with_exit_code_2(

@@ -23,11 +23,24 @@ from ballpass.runtime import Model, Solution
 from ballpass.runtime.app.figure_run import run_for_figures
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot import CAPTIONS, NAMES
+from ballpass.runtime.plot.animation import choose_frames, to_plain
 from ballpass.runtime.plot.gallery import FIGURES, draw, draw_all
 from ballpass.runtime.plot.mechanism import draw_mechanism
 from ballpass.runtime.plot.motion import phase_portrait, spectra
 from ballpass.runtime.plot.record import gather
-from ballpass.runtime.plot.style import INK, PALE, SAND, SIGNAL, caption, caption_of, frame, save, write_figures
+from ballpass.runtime.plot.style import (
+    INK,
+    PALE,
+    SAND,
+    SIGNAL,
+    caption,
+    caption_of,
+    decade_words,
+    frame,
+    log_ticks,
+    save,
+    write_figures,
+)
 
 Run = tuple[Model, Solution]
 
@@ -392,6 +405,15 @@ free_length = "10 mm"
     assert arrow.xyann == pytest.approx(slider)
     way = np.array(arrow.xy) - slider
     assert way / np.hypot(*way) == pytest.approx((hook - slider) / length)
+    (told,) = (
+        force
+        for force in to_plain(choose_frames([record], 0.05))["linkage"]["forces"]
+        if force["words"] == "spring hold on slider"
+    )
+    last = record.points(float(record.t[-1]))["slider", "C"]
+    length = float(np.hypot(*(hook - last)))
+    shown = [told[axis]["values"][-1] / 10.0 ** told[axis]["decimals"] for axis in "xy"]
+    assert shown == pytest.approx(20e3 * (length - 0.01) * (hook - last) / length, rel=1e-3)
 
 
 def test_a_motor_s_torque_turns_around_its_joint_and_the_punch_acts_in_its_window(
@@ -461,6 +483,18 @@ def luminance(colour: tuple[float, float, float]) -> float:
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
     y = float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
     return 116.0 * y ** (1.0 / 3.0) - 16.0 if y > 0.008856 else 903.3 * y
+
+
+def test_ticks_of_decades_are_numbers_that_people_write() -> None:
+    shown = [decade_words(value) for value in (1e-11, 2e-5, 0.001, 0.5, 2000.0, 1e5)]
+    assert shown == ["10⁻¹¹", "2·10⁻⁵", "0.001", "0.5", "2000", "10⁵"]
+    axes = Figure().add_subplot()
+    axes.set_xscale("log")
+    for limits, expected in (((0.15, 2.5), [0.2, 0.5, 1.0, 2.0]), ((0.05, 200.0), [0.1, 1.0, 10.0, 100.0])):
+        axes.set_xlim(*limits)
+        log_ticks(axes.xaxis)
+        ticks = [tick for tick in axes.get_xticks() if limits[0] <= tick <= limits[1]]
+        assert ticks == pytest.approx(expected)
 
 
 def test_palette_keeps_its_order_in_greyscale() -> None:

@@ -80,10 +80,14 @@ def test_balls_that_graze_at_one_moment_are_one_place() -> None:
 
 
 def test_the_chart_counts_the_places_that_the_table_lists(make_model: Callable[..., Model]) -> None:
-    """Two balls at one moment, and one at another: the report tells of three, in two places."""
+    """Two balls at one moment, and one at another: the report tells of three, in two places.  Bars are in words."""
     model = make_model("varying_compliance")
     report = model.sensitivity("static_deflection", ["load.force.x", "bearing.contact.stiffness"], check=False)
     found = tuple(Grazing(ball=k, time=t, crank_angle=0.0, depth=1e-9, kink="contact") for k, t in PLACES)
+    chart = tornado(report, "static_deflection").axes[0]
+    written = {label.get_text().replace("\n", " ") for label in chart.get_yticklabels()}
+    words = {info.name: info.description for info in model.manifest.parameters}
+    assert written == {words["load.force.x"], words["bearing.contact.stiffness"]}
     for some, count in ((found, "2 places"), (found[:2], "1 place")):
         grazing = replace(report, grazing=some)
         words = caption_of(tornado(grazing, "static_deflection"))

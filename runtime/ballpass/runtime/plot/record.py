@@ -273,6 +273,10 @@ def _unit(angle: float) -> Array:
 def bearing_named(manifest: Manifest, name: str) -> BearingInfo:
     """The bearing of this name; a `RequestError` names those that there are."""
     known = {info.name: info for info in manifest.bearings if info.name}
+    if not known and manifest.bearings:
+        raise RequestError(
+            f"There is no bearing {name!r}. There are: none, for the only bearing has no name. Omit the name."
+        )
     if name not in known:
         raise RequestError(unknown_name("bearing", name, known))
     return known[name]
