@@ -110,6 +110,8 @@ NAMED: dict[str, dict[str, str]] = {
         "good to some 1e-5 at": "bounds of test_quantity_function.py",
         "the default `rtol` of 1e-9": "a default",
         "`tangent` law to 1e-3": "bounds of test_quantity_function.py",
+        "to 2e-3 (with": "measured against certificates",
+        "to 0.1), though": "measured against certificates",
     },
     "docs/howto/linearize.md": {"(exit code 1)": "a definition"},
     "docs/howto/sensitivity.md": {
