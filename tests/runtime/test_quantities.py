@@ -11,7 +11,7 @@ import pytest
 
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.ask.kinds import KINDS
-from ballpass.runtime.ask.quantities import parse_quantity
+from ballpass.runtime.ask.quantities import parse_quantity, quantity_words
 
 ENSEMBLE = [
     "peak_ball_force",
@@ -243,3 +243,19 @@ def test_every_kind_is_documented_and_evaluated(make_model: Callable[..., Model]
     found = values(model, asked, cycles=1, transient=0)
     assert all(np.isfinite(number) for number in found.values())
     assert all(kind.summary for kind in KINDS.values())
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("peak_ball_force", "Elastic and damping force of any ball, highest"),
+        ("max:ball.force[3]", "Elastic and damping force of ball 3, highest"),
+        ("rms_inner_y", "Position of the centre of the inner ring along y, rms"),
+        ("value:inner.y@240deg", "Position of the centre of the inner ring along y, at 240deg"),
+        ("life", "Rating life, shortest reading"),
+        ("drive_work", "work of the drive in a turn"),
+    ],
+)
+def test_quantities_have_words_for_figures(make_model: Callable[..., Model], name: str, words: str) -> None:
+    manifest = make_model("punching_press").manifest
+    assert quantity_words(manifest, parse_quantity(manifest, name)) == words

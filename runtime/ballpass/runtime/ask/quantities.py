@@ -23,6 +23,7 @@ from ballpass.runtime.ask.quantity_records import Quantity
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.ratings.readings import KINDS as LIFE
 from ballpass.runtime.run.request import no_output
 
 #: Kinds of the ensembles' observables that are no differentiable quantities.
@@ -119,6 +120,9 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
 
 def channel_words(manifest: Manifest, kind: str, channel: str, ball: int | None = None, place: str = "") -> str:
     """What a number of a state or output is, for figures: "Position of the centre of the inner ring along y, rms"."""
+    if kind in LIFE:
+        reading = f"reading {LIFE[kind][0]}" if len(LIFE[kind]) == 1 else "shortest reading"
+        return ", ".join(["Rating life", reading, *_bearings(manifest, channel)])
     described = {info.name: info.description for info in manifest.quantities}
     described |= {info.name: info.description for info in (*manifest.states, *manifest.outputs)}
     which = "any ball" if ball is None else f"ball {ball}"
@@ -128,11 +132,15 @@ def channel_words(manifest: Manifest, kind: str, channel: str, ball: int | None 
 def quantity_words(manifest: Manifest, quantity: Quantity) -> str:
     """What a quantity is, for figures."""
     kind = KINDS[quantity.kind]
-    if not (kind.static or kind.channel or kind.of_loads):
+    if not (kind.static or kind.channel):
         return channel_words(manifest, quantity.kind, quantity.channel, quantity.ball, quantity.place)
-    bearings = [one.name for one in manifest.bearings if one.name and quantity.channel.startswith(one.prefix)]
-    words = [kind.summary, *(f"bearing {name}" for name in bearings), *filter(None, [quantity.place])]
+    words = [kind.summary, *_bearings(manifest, quantity.channel), *filter(None, [quantity.place])]
     return ", ".join(words)
+
+
+def _bearings(manifest: Manifest, channel: str) -> list[str]:
+    """The bearing that a channel is of, where bearings have names."""
+    return [f"bearing {one.name}" for one in manifest.bearings if one.name and channel.startswith(one.prefix)]
 
 
 def default_quantities(manifest: Manifest) -> tuple[str, ...]:
