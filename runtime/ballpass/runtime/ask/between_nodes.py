@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 #: Points of a grid, and how often it is refined: 1e-4 of a turn becomes 1e-8 of it.
 GRID, ROUNDS = 65, 2
 
+#: Extremes nearer to each other than this share of the run are one.
+APART = 1e-9
+
 #: Nodes that are looked at closely: the best that no neighbour exceeds.
 CANDIDATES = 5
 
@@ -87,8 +90,8 @@ def find_extremes(
     track: Track,
     signals: Mapping[str, Signal],
     look: Callable[[Nodes], Mapping[str, Signal]],
-) -> list[Extreme]:
-    """Largest or smallest values over the nodes of a track and between them.
+) -> list[list[Extreme]]:
+    """Largest or smallest values over the nodes of a track and between them, and the next ones elsewhere.
 
     Parameters
     ----------
@@ -107,7 +110,7 @@ def find_extremes(
             best = _top(_height(bracket))
             bracket.low, bracket.high = bracket.times[max(best - 1, 0)], bracket.times[min(best + 1, GRID - 1)]
     return [
-        max((_extreme(bracket, edges) for bracket in some), key=lambda found: item.sign * found.value)
+        _ranked(item, [_extreme(bracket, edges) for bracket in some], edges)
         for item, some in zip(wanted, brackets, strict=True)
     ]
 
@@ -191,3 +194,10 @@ def _crossing(
         return result
     crossing = at(float(times[k]) + shift, float(found[k, a]) + rate_a * shift)
     return replace(crossing, column=a, other=b, rate=rate_a, other_rate=rate_b)
+
+
+def _ranked(wanted: Wanted, found: list[Extreme], edges: Edges) -> list[Extreme]:
+    """The best of several, and those elsewhere."""
+    found.sort(key=lambda item: -wanted.sign * item.value)
+    first = found[0]
+    return [first, *(item for item in found[1:] if abs(item.time - first.time) > APART * edges.window.duration)]

@@ -96,17 +96,18 @@ def _extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
     ball = mark.ball + 1 if signal.value.shape[1] > 1 else None
     # the least of the most loaded ball is no extreme of any one
     ranked = kind == "min" and ball is not None and quantity.ball is None
-    kink = "" if ranked else nearest_rival(view, quantity, mark, 1.0 if kind == "max" else -1.0)
+    kink = "" if ranked else nearest_rival(view, quantity, mark)
     return Estimate(value=float(value), slope=slope, time=mark.time, ball=ball, notes=tuple(notes), kink=kink)
 
 
 def _range(view: View, quantity: Quantity) -> Estimate:
     top, bottom = _extreme(view, quantity, "max"), _extreme(view, quantity, "min")
+    parts = (("largest", top.kink), ("smallest", bottom.kink))
     return Estimate(
         value=top.value - bottom.value,
         slope=top.slope - bottom.slope,
         notes=top.notes + bottom.notes,
-        kink=top.kink or bottom.kink,
+        kink="; ".join(f"of its {word} value, {kink}" for word, kink in parts if kink),
     )
 
 

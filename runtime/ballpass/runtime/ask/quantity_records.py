@@ -53,6 +53,7 @@ class Mark:
     other : column that the channel's most loaded ball changes to or from at this very moment; None elsewhere
     rate, other_rate : time derivatives of both columns there, where there is another
     at_edge : whether the extreme lies at an edge of a load or of the window
+    rivals : the next extremes elsewhere in the run
     """
 
     node: int
@@ -62,6 +63,7 @@ class Mark:
     rate: float = 0.0
     other_rate: float = 0.0
     at_edge: bool = False
+    rivals: tuple[Mark, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

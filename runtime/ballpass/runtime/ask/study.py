@@ -186,32 +186,28 @@ class Study:
         window = self.window(numbers)
         self._check_memory(window, directions)
         edges = make_edges(self.model, numbers, window, None if chain is None else chain.derivative, directions)
-        extremes: dict[tuple[str, str], Extreme] = {}
+        extremes: dict[tuple[str, str], list[Extreme]] = {}
         panels = uniform_panels(edges, self.per_turn) if self._panels is None else self._panels
         if self._summed:
             track, row, panels = self._resolve(numbers, edges, panels, stepping)
             asked = [(item, kind) for item in self._moving for kind in KINDS[item.kind].extremes]
             extremes = self._extremes(numbers, asked, track, row, stepping)
+            if chain is None:  # the next ones matter to derivatives alone
+                extremes = {key: some[:1] for key, some in extremes.items()}
             if self._kinked or self.model.manifest.edges:
                 passages = find_passages(self.model, numbers, track, stepping, chain)
                 kinks = self._kinks(numbers, track, passages.times) if self._kinked else []
                 broken = with_kinks(edges, kinks, passages.times, passages.slopes)
-                extremes = {key: _moved(item, edges, broken, passages) for key, item in extremes.items()}
+                extremes = {
+                    key: [_moved(item, edges, broken, passages) for item in some] for key, some in extremes.items()
+                }
                 edges, panels = broken, between_kinks(panels, edges, broken)
-        points = list(dict.fromkeys((item.segment, item.fraction) for item in extremes.values()))
+        points = list(dict.fromkeys((item.segment, item.fraction) for some in extremes.values() for item in some))
         plan = with_points(plan_of(panels, edges), points)
         nodes, marks = self._nodes(numbers, edges, plan, chain)
-        for key, item in extremes.items():
-            here = np.flatnonzero((plan.segment == item.segment) & (plan.fraction == item.fraction))
-            marks[key] = Mark(
-                node=int(here[0]),
-                time=item.time,
-                ball=item.column,
-                other=item.other,
-                rate=item.rate,
-                other_rate=item.other_rate,
-                at_edge=min(item.fraction, 1.0 - item.fraction) < AT_EDGE,
-            )
+        for key, some in extremes.items():
+            first, *others = (_mark(item, plan) for item in some)
+            marks[key] = replace(first, rivals=tuple(others))
         track = follow(self.model, numbers, edges, nodes, stepping, chain, still=self._still)
         view = View(
             manifest=self.model.manifest,
@@ -340,8 +336,8 @@ class Study:
         track: Track,
         row: Array | None,
         stepping: Stepping,
-    ) -> dict[tuple[str, str], Extreme]:
-        """Extremes of all quantities that need some."""
+    ) -> dict[tuple[str, str], list[Extreme]]:
+        """Extremes of all quantities that need some, and the next ones."""
         rows = reduction_rows(self.model.manifest)
 
         def wanted(item: Quantity, kind: str) -> Wanted:
@@ -372,6 +368,20 @@ def _appended(nodes: Nodes, edges: Edges, time: float, slope: Array, kind: Place
         segment=np.append(nodes.segment, segment),
         slope=np.vstack([nodes.slope, slope[None, :]]),
         weight_slope=np.vstack([nodes.weight_slope, np.zeros((1, len(slope)))]),
+    )
+
+
+def _mark(extreme: Extreme, plan: Plan) -> Mark:
+    """The node of an extreme in a plan that has its point."""
+    here = np.flatnonzero((plan.segment == extreme.segment) & (plan.fraction == extreme.fraction))
+    return Mark(
+        node=int(here[0]),
+        time=extreme.time,
+        ball=extreme.column,
+        other=extreme.other,
+        rate=extreme.rate,
+        other_rate=extreme.other_rate,
+        at_edge=min(extreme.fraction, 1.0 - extreme.fraction) < AT_EDGE,
     )
 
 

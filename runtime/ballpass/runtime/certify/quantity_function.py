@@ -397,7 +397,7 @@ class QuantityFunction:
             warnings.warn(f"{_some(names)}: {words}. Said once of each quantity.", kind, stacklevel=4)
 
     def _told(self, row: Array) -> str:
-        return ", ".join(f"{name} = {value:.9g}" for name, value in zip(self.wrt, row.tolist(), strict=True))
+        return _some([f"{name} = {value:.9g}" for name, value in zip(self.wrt, row.tolist(), strict=True)])
 
 
 def _check_word(what: str, given: str, allowed: tuple[str, ...]) -> None:
