@@ -56,6 +56,7 @@ def from_plain(data: Mapping[str, Any]) -> Trade:
 
 def write(trades: list[Trade], minutes: float, target: Path) -> None:
     """The page of the documentation and its pictures beside it."""
+    (target.parent / "images").mkdir(parents=True, exist_ok=True)
     captions = {}
     for trade in trades:
         figure = draw_trade(trade, PEAK)
