@@ -20,12 +20,14 @@ from typing import Any
 import numpy as np
 import pytest
 from filelock import FileLock
+from typer.testing import CliRunner
 
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError
+from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract import read_artefact
-from ballpass.runtime.export.fmu import export_fmu, input_names
+from ballpass.runtime.export.fmu import export_fmu, input_names, platform_tuple
 from ballpass.runtime.export.model_description import base_powers
 from ballpass.runtime.run import inputs as clock
 
@@ -36,6 +38,7 @@ pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C co
 
 FORCE = "mechanism.forces.punch.force.y"
 TORQUE = "mechanism.driver.torque.torque"
+SPEED = "mechanism.driver.speed"
 
 
 @pytest.fixture(scope="module")
@@ -325,12 +328,60 @@ def test_derivatives_are_those_of_differences(exported: Callable[..., Exported])
             scale = np.max(np.abs(expected))
             assert scale > 0.0
             assert np.max(np.abs(np.array(moved) / 2.0 - expected)) < 2e-6 * scale, known
+            weights = np.linspace(-1.0, 1.0, size)
+            place = [found.places[known]]
+            (adjoint,) = one.slave.getAdjointDerivative([found.places[name] for name in unknowns], place, weights, 1)
+            assert adjoint == pytest.approx(np.dot(weights, moved) / 2.0, rel=1e-12, abs=1e-12 * scale)
         # a derivative by time: that of outputs while the motion goes on
         place = found.places["reaction.A.y"]
         (rate,) = one.slave.getOutputDerivatives([place], [1])
         before = one.get("reaction.A.y")[0]
         one.slave.doStep(0.0831, 1e-7)
         assert rate == pytest.approx((one.get("reaction.A.y")[0] - before) / 1e-7, rel=1e-4)
+
+
+def test_what_is_no_dependency_has_no_derivative(exported: Callable[..., Exported]) -> None:
+    """At rest, in a run, in the punch; and an importer sees which outputs an input reaches at once: no other loop."""
+    found = press(exported)
+    description = found.description
+    running = [*description.outputs, *description.derivatives]
+    knowns = [item.name for item in description.modelVariables if item.causality in ("parameter", "input")]
+
+    def check(slave: Any, unknowns: Sequence[Any], names: Sequence[str]) -> None:
+        places = [item.variable.valueReference for item in unknowns]
+        sizes = [found.sizes[place] for place in places]
+        for name in names:
+            moved = slave.getDirectionalDerivative(places, [found.places[name]], [1.0], sum(sizes))
+            for item, part in zip(unknowns, np.split(np.array(moved), np.cumsum(sizes)[:-1]), strict=True):
+                if name not in [known.name for known in item.dependencies]:
+                    assert not np.any(part), (item.variable.name, name)
+
+    with found.instance() as one:
+        one.slave.enterInitializationMode(startTime=0.0, stopTime=0.48)
+        check(one.slave, description.initialUnknowns, ["time", *knowns])
+        one.slave.exitInitializationMode()
+        for begin, end in ((0.0, 0.02), (0.02, 0.0831)):
+            one.slave.doStep(begin, end - begin)
+            check(one.slave, running, ["time", *knowns, *found.model.states])
+    named = {item.variable.name: {known.name for known in item.dependencies} for item in running}
+    reached = {name for name, of in named.items() if FORCE in of}
+    assert {"reaction.A.x", "reaction.A.y", "der(inner.vy)"} <= reached
+    assert reached.isdisjoint({"ball.force", "inner.x", "inner.y", "der(inner.y)"})
+    assert {"inner.x", "bearing.ball_diameter"} <= named["ball.force"]
+    magnitudes = {item.name: float(item.nominal) for item in description.modelVariables if item.nominal}
+    solution = found.model.simulate()
+    reach = np.max(np.abs(solution.x), axis=0)
+    for name, most in zip(found.model.states, reach, strict=True):  # what the motion really reaches
+        assert 0.01 < most / magnitudes[name] < 5.0, name
+
+
+def test_a_system_that_fmi_has_no_name_for_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("platform.machine", lambda: "AMD64")
+    monkeypatch.setattr("platform.system", lambda: "Windows")
+    assert platform_tuple() == "x86_64-windows"
+    monkeypatch.setattr("platform.system", lambda: "FreeBSD")
+    with pytest.raises(RequestError, match=r"FreeBSD on amd64 was asked for. Allowed: Linux, .* --c"):
+        platform_tuple()
 
 
 def test_steps_end_early_where_a_load_switches(exported: Callable[..., Exported]) -> None:
@@ -380,7 +431,9 @@ def test_bad_calls_are_errors_with_text(exported: Callable[..., Exported]) -> No
         refused("more than the 1 values", lambda: slave.getFloat64([places["ball.force"]], 1))
         refused("the known", lambda: slave.getDirectionalDerivative([places["inner.x"]], [places["ball.force"]], [1.0]))
         refused("no variable has this type", lambda: slave.getInt32([0]))
-        refused("no adjoint", lambda: slave.getAdjointDerivative([places["inner.x"]], [places["inner.y"]], [1.0]))
+        x, y = [places["inner.x"]], [places["inner.y"]]
+        refused("Allowed: 1, one for each known", lambda: slave.getAdjointDerivative(x, y, [1.0], 2))
+        refused("2 values were given. Allowed: 1", lambda: slave.getAdjointDerivative(x, y, [1.0, 1.0], 1))
         refused("no event mode", slave.enterEventMode)
         refused("no clocks", lambda: slave.getClock([0]))
         refused("order 2", lambda: slave.getOutputDerivatives([places["ball.force"]], [2]))
@@ -403,7 +456,7 @@ def test_names_that_cannot_be_inputs_are_refused(
 ) -> None:
     folder = press(exported).model.folder
     for name, words in (
-        ("mechanism.driver.speed", "has no acceleration"),
+        ("mechanism.driver.speed", "Name the scene file instead"),
         ("bearing.clearance", "does not change in a run"),
         ("mechanism.forces.bunch", "There is no input 'mechanism.forces.bunch'"),
     ):
@@ -524,25 +577,75 @@ def test_a_driver_whose_speed_is_an_input_goes_the_way_of_its_table(
     found = exported("punching_press_motor", ("mechanism.driver.speed",), *given)
     solution = found.model.simulate(duration=0.3, rtol=1e-9)
     names = ["driver.angle", "driver.speed", "inner.x", "inner.y"]
+    assert not any(name.startswith("mechanism.driver.table") for name in found.places)  # the input takes its place
     with found.instance() as one:
-        # a table that stays where it begins, so that the input alone makes the way
-        one.set(**{"mechanism.driver.table.speed.3": found.model.parameters["mechanism.driver.table.speed.1"]})
         one.slave.enterInitializationMode(startTime=0.0, stopTime=0.3, tolerance=1e-9)
+        place = [found.places["mechanism.driver.speed"]]
+        assert one.slave.getDirectionalDerivative([found.places["driver.speed"]], place, [1.0], 1) == [1.0]
         one.slave.exitInitializationMode()
         for k in range(30):
             speed = np.interp((k + 1) / 100, [0.1, 0.2], [490.0, 520.0]) * 2.0 * math.pi / 60.0
             one.set(**{"mechanism.driver.speed": speed})
             one.slave.doStep(k / 100, (k + 1) / 100 - k / 100)
         ends = one.get(*names)
-        place = [found.places["mechanism.driver.speed"]]
         assert one.slave.getDirectionalDerivative([found.places["driver.speed"]], place, [1.0], 1) == [0.0]
-    with found.instance(earlyReturnAllowed=True) as one:
-        one.slave.enterInitializationMode(startTime=0.0, stopTime=0.3)
-        one.slave.exitInitializationMode()
-        assert one.slave.doStep(0.0, 0.15)[3] == 0.15  # the table, with its rows, is out of use
+    speeds = [name for name in found.model.parameters if name.startswith("mechanism.driver.table.speed")]
+    times = np.linspace(0.0, 0.3, 16)
+    for fast in (1.0, 1.3):  # one that is set before the run holds from its start on
+        speed = fast * found.model.parameters[speeds[0]]
+        still = found.model.simulate(
+            method="stepper", duration=0.3, times=reached(times), parameters=dict.fromkeys(speeds, speed)
+        )
+        with found.instance(earlyReturnAllowed=True) as one:
+            one.begin(0.3, **({"mechanism.driver.speed": speed} if fast > 1.0 else {}))
+            assert one.get("mechanism.driver.speed", "driver.speed").tolist() == [speed, speed]
+            assert np.array_equal(one.steps(times), columns(still, found.outputs))
+            one.slave.reset()
+            assert one.get("mechanism.driver.speed") == [found.model.parameters[speeds[0]]]
     expected = np.array([solution.outputs[name][-1] for name in names])
     assert np.allclose(ends[:2], expected[:2], rtol=1e-12)
     assert np.allclose(ends[2:], expected[2:], rtol=0.0, atol=1e-3 * np.max(np.abs(expected[2:])))
+
+
+@pytest.mark.long
+def test_a_driver_at_constant_speed_takes_its_speed_as_an_input(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, make_model: Callable[..., Model], scene_text: Callable[..., str]
+) -> None:
+    """The command derives the scene with a speed that may change: the motion is that of the scene until it does."""
+    from fmpy.validation import validate_fmu
+
+    monkeypatch.chdir(tmp_path)
+    Path("press.toml").write_text(scene_text("punching_press"), encoding="utf-8")
+    command = ["export", "press.toml", "--fmu", "--input", "mechanism.driver.speed"]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    assert validate_fmu("export/press.fmu") == []
+    model = make_model("punching_press")
+    found = Exported(Path("export/press.fmu"), model)
+    assert set(model.parameters) <= set(found.places)
+    names, times = ["inner.x", "inner.y", "reaction.A.x", "reaction.A.y"], np.linspace(0.0, 0.2, 41)
+    for fast in (1.0, 1.2):
+        speed = fast * model.parameters["mechanism.driver.speed"]
+        expected = columns(model.simulate(duration=0.2, times=times, rtol=1e-9, parameters={SPEED: speed}), names)
+        with found.instance() as one:
+            one.set(**{SPEED: speed})
+            one.slave.enterInitializationMode(startTime=0.0, stopTime=0.2, tolerance=1e-9)
+            one.slave.exitInitializationMode()
+            rows = [one.get(*names)]
+            for before, time in pairwise(times):
+                one.slave.doStep(before, time - before)
+                rows.append(one.get(*names))
+            assert np.all(np.abs(rows - expected) < 1e-4 * np.max(np.abs(expected), axis=0))
+            one.slave.reset()
+            one.begin(0.4)
+            one.set(**{SPEED: speed + 10.0})
+            one.slave.doStep(0.0, 0.1)
+            assert one.get("der(driver.speed)")[0] == pytest.approx((speed + 10.0 - model.parameters[SPEED]) / 0.1)
+    waviness = '[bearing.inner_waviness]\n8 = { amplitude = "1 um", phase = "0 deg" }\n\n[bearing.damping]'
+    Path("press.toml").write_text(scene_text("punching_press", ("[bearing.damping]", waviness)), encoding="utf-8")
+    refused = CliRunner().invoke(app, command)
+    assert refused.exit_code == 2
+    assert "input 'mechanism.driver.speed': with a speed that changes" in refused.stderr
+    assert "delete inner_waviness" in refused.stderr
 
 
 @pytest.mark.long

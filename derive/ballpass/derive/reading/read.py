@@ -68,7 +68,7 @@ def read_scene(
 
     Parameters
     ----------
-    changes : tables and values that take the place of those of the file, or come beside them
+    changes : tables and values that take the place of those of the file, or come beside them; None takes one away
     name : of the scene; the file's stem by default
 
     Raises
@@ -131,7 +131,7 @@ def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
     for key, value in changes.items():
         both = isinstance(value, Mapping) and isinstance(found.get(key), Mapping)
         found[key] = _merged(found[key], value) if both else value
-    return found
+    return {key: value for key, value in found.items() if value is not None}
 
 
 def _scene(

@@ -323,9 +323,14 @@ def export(
         stages("export")
         # here, for they bring CasADi
         if fmu:
+            from ballpass.runtime.app.commands.speed_input import speed_becomes_input, with_speed_over_time
             from ballpass.runtime.export.fmu import export_fmu
 
-            export_fmu(generated_folder(scene), target, inputs=inputs or (), manifest=manifest)
+            if scene.is_file() and speed_becomes_input(manifest, inputs or ()):
+                with with_speed_over_time(scene, stages) as folder:
+                    export_fmu(folder, target, inputs=inputs or ())
+            else:
+                export_fmu(generated_folder(scene), target, inputs=inputs or (), manifest=manifest)
         else:
             from ballpass.runtime.export.c_program import export_c
 

@@ -19,28 +19,38 @@ import tempfile
 import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import casadi
+import numpy as np
 
 from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import CompileError, RequestError
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts
-from ballpass.runtime.export.model_description import SPEED, build_description, initial_speed, model_description
+from ballpass.runtime.export.dependencies import dependencies, rates_and_outputs
+from ballpass.runtime.export.model_description import (
+    SPEED,
+    build_description,
+    experiment,
+    model_description,
+    time_of_turn,
+)
 from ballpass.runtime.export.scene_numbers import (
     MOMENT,
     NOTE,
     behind,
     computed_outputs,
     driven,
-    outputs_function,
+    speed_table,
     varying,
 )
 from ballpass.runtime.native.compilers import find_compiler, run_compiler
 from ballpass.runtime.native.driver_library import DRIVER
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run.magnitudes import model_scales
 
 #: C of the interface, the standard's headers, and the licence of both.
 FMI = DRIVER / "fmi"
@@ -84,8 +94,9 @@ def export_fmu(
     token = _token(manifest, chosen, sources)
     sources["fmu.h"] = _fmu_header(manifest, token, chosen)
     identifier = model_identifier(manifest)
+    description = model_description(manifest, identifier, token, chosen, dependencies(model), _magnitudes(model))
     files = {
-        "modelDescription.xml": _xml(model_description(manifest, identifier, token, chosen)),
+        "modelDescription.xml": _xml(description),
         "sources/buildDescription.xml": _xml(build_description(identifier, sources)),
         **{f"sources/{name}": text.encode() for name, text in sources.items()},
         "documentation/index.html": _page(manifest, chosen).encode(),
@@ -121,8 +132,8 @@ def input_names(manifest: Manifest, asked: Sequence[str]) -> tuple[str, ...]:
                 why = (
                     "it is the speed at t = 0 alone; a torque drives"
                     if manifest.mechanism is not None and manifest.mechanism.angle
-                    else "a driver at constant speed has no acceleration that a change of it would need; drive it by a "
-                    'torque, [mechanism.driver.torque] law = "constant", and make that an input'
+                    else "this folder was generated for a constant speed, and has no acceleration that a change of it "
+                    "would need. Name the scene file instead: `ballpass export` derives it with a speed that changes"
                 )
             allowed = f"Allowed: {', '.join(able)}." if able else "This scene has no number that can be an input."
             raise RequestError(f"input {name!r}: {why}. {allowed}")
@@ -138,9 +149,21 @@ def model_identifier(manifest: Manifest) -> str:
 
 
 def platform_tuple() -> str:
-    """Folder of the binaries for this machine, as the standard names it."""
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
-    return f"{machine}-{ {'Linux': 'linux', 'Darwin': 'darwin', 'Windows': 'windows'}[platform.system()] }"
+    """Folder of the binaries for this machine, as the standard names it.
+
+    Raises
+    ------
+    RequestError
+        The standard has no name for it.
+    """
+    machine, system = platform.machine().lower(), platform.system().lower()
+    if system not in ("linux", "darwin", "windows") or not machine:
+        raise RequestError(
+            f"export: an FMU for {platform.system() or 'an unknown system'} on {machine or 'an unknown processor'} was "
+            "asked for. Allowed: Linux, Darwin (macOS) and Windows, the systems that FMI 3.0 has names for. Export it "
+            "on one of these; `ballpass export SCENE --c` writes the same model as C sources for any."
+        )
+    return f"{ {'amd64': 'x86_64', 'arm64': 'aarch64', 'i386': 'x86', 'i686': 'x86'}.get(machine, machine) }-{system}"
 
 
 _SUFFIX = {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
@@ -165,18 +188,20 @@ def _interface(model: LoadedModel) -> dict[str, str]:
     }
 
 
+def _magnitudes(model: LoadedModel) -> list[float]:
+    """Of the states in the scene's run, which the error control is relative to."""
+    numbers = model.numbers()
+    initial = np.array([numbers.values[name] for name in model.manifest.initial])
+    duration, _ = experiment(model.manifest)
+    scales = model_scales(model, numbers, initial, duration, time_of_turn(model.manifest))
+    return [float(size) for size in scales.magnitude]
+
+
 def _tangents(model: LoadedModel) -> tuple[casadi.Function, casadi.Function]:
     """Directional derivatives of the derived constants over p, and of rates and outputs over t, x, u, p, c."""
-    manifest = model.manifest
-    sizes = {"t": 1, "x": len(manifest.states), "u": len(manifest.inputs)}
-    sizes |= {"p": len(manifest.parameters), "c": len(manifest.constants)}
-    moment = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
-    functions = [model.symbolic("rhs"), *([outputs_function(model)] if computed_outputs(manifest) else ())]
-    results = [function(*(moment[name] for name in function.name_in())) for function in functions]
+    moment, results = rates_and_outputs(model)
     constants = model.symbolic("constants")(moment["p"])
-    return _tangent("constants_tangent", {"p": moment["p"]}, constants), _tangent(
-        "tangent", moment, casadi.vertcat(*(casadi.densify(result) for result in results))
-    )
+    return _tangent("constants_tangent", {"p": moment["p"]}, constants), _tangent("tangent", moment, results)
 
 
 def _tangent(name: str, arguments: Mapping[str, casadi.SX], value: casadi.SX) -> casadi.Function:
@@ -198,13 +223,17 @@ def _fmu_header(manifest: Manifest, token: str, inputs: Sequence[str]) -> str:
         ends.append(first)
     # the state of a driver whose speed is given over time belongs to t = 0
     given = driven(manifest) is not None
-    speed = initial_speed(manifest) if SPEED in inputs else 0.0
+    speeds, times = speed_table(manifest) if SPEED in inputs else ((), ())
+    names = [info.name for info in manifest.parameters]
+    table = ", ".join(str(names.index(name)) for name in (*speeds, *times)) or "0"
     return (
         f"{NOTE}\n#ifndef FMU_H\n#define FMU_H\n\n"
         f'#define FMU_TOKEN "{token}"\n\n'
         f"enum {{ FMU_OUTPUTS = {len(ends)}, FMU_STARTS_AT_ZERO = {int(given)} }};\n\n"
-        "/* Whether the driver's speed is an input, and the one it has at first [rad/s]. */\n"
-        f"enum {{ FMU_DRIVEN = {int(SPEED in inputs)} }};\n#define FMU_SPEED {speed!r}\n\n"
+        "/* Whether the driver's speed is an input; then the parameters whose place it takes: speeds, times. */\n"
+        f"enum {{ FMU_DRIVEN = {int(SPEED in inputs)}, FMU_SPEEDS = {len(speeds)}, "
+        f"FMU_TABLE = {len(speeds) + len(times)} }};\n"
+        f"static const int fmu_table[] = {{{table}}};\n\n"
         "/* Where the numbers of each output begin, and those of the last end. */\n"
         f"static const int fmu_outputs[] = {{{', '.join(map(str, (0, *ends)))}}};\n\n#endif\n"
     )
@@ -242,7 +271,8 @@ def _page(manifest: Manifest, inputs: Sequence[str]) -> str:
         cells = ("".join(f"<td>{html.escape(text)}</td>" for text in row) for row in names)
         return "<table>\n" + "".join(f"<tr>{row}</tr>\n" for row in cells) + "</table>"
 
-    parameters = [(info.name, info.unit, info.description) for info in manifest.parameters]
+    gone = {*chain(*speed_table(manifest))} if SPEED in inputs else set()
+    parameters = [(info.name, info.unit, info.description) for info in manifest.parameters if info.name not in gone]
     parameters += [(SPEED, "rad/s", "Speed of the driver")] if SPEED in inputs else []
     outputs = [(info.name, info.unit, info.description) for info in manifest.outputs]
     return (

@@ -2,7 +2,7 @@
 
 In: a manifest, the names of its inputs.  Out: trees of XML.  Value references are those of ``driver/fmi/fmi.c``: 0 is
 the time; then parameters, states, derivatives of states, outputs that are no states, in the scene's order; then the
-driver's speed where it is an input.
+driver's speed where it is an input, in place of its table's parameters.
 """
 
 from __future__ import annotations
@@ -11,12 +11,14 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from itertools import chain
 from xml.etree import ElementTree as Xml
 
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS
-from ballpass.runtime.export.scene_numbers import computed_outputs, varying
+from ballpass.runtime.export.dependencies import Dependencies
+from ballpass.runtime.export.scene_numbers import computed_outputs, speed_table, varying
 
 #: Input that the driver's speed is, where the scene has a table of it.
 SPEED = "mechanism.driver.speed"
@@ -36,7 +38,14 @@ _UNITS = {
 _STRUCTURED = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
 
 
-def model_description(manifest: Manifest, identifier: str, token: str, inputs: Sequence[str]) -> Xml.Element:
+def model_description(
+    manifest: Manifest,
+    identifier: str,
+    token: str,
+    inputs: Sequence[str],
+    known: Dependencies,
+    magnitudes: Sequence[float],
+) -> Xml.Element:
     """Tree of ``modelDescription.xml``.
 
     Parameters
@@ -44,6 +53,8 @@ def model_description(manifest: Manifest, identifier: str, token: str, inputs: S
     identifier : C identifier that names the library
     token : instantiation token
     inputs : parameters that are inputs
+    known : what rates and outputs depend on
+    magnitudes : of the states [their units]
     """
     parameters = {info.name: info for info in manifest.parameters}
     names = [*parameters, *(info.name for info in manifest.outputs), *(info.name for info in manifest.states)]
@@ -65,6 +76,7 @@ def model_description(manifest: Manifest, identifier: str, token: str, inputs: S
         canSerializeFMUState="true",
         canHandleVariableCommunicationStepSize="true",
         providesDirectionalDerivatives="true",
+        providesAdjointDerivatives="true",
         maxOutputDerivativeOrder="1",
         mightReturnEarlyFromDoStep="true",
         providesIntermediateUpdate="false",
@@ -73,12 +85,12 @@ def model_description(manifest: Manifest, identifier: str, token: str, inputs: S
     _units(root, manifest)
     categories = Xml.SubElement(root, "LogCategories")
     Xml.SubElement(categories, "Category", name="logStatusError", description="Why a call has failed")
-    duration, step = _experiment(manifest, {name: info.default for name, info in parameters.items()})
+    duration, step = experiment(manifest)
     rtol = repr(manifest.run.rtol)
     Xml.SubElement(
         root, "DefaultExperiment", startTime="0", stopTime=repr(duration), tolerance=rtol, stepSize=repr(step)
     )
-    _variables(root, manifest, inputs)
+    _structure(root, manifest, _variables(root, manifest, inputs, magnitudes), known, inputs)
     return root
 
 
@@ -113,38 +125,47 @@ def _rate_unit(unit: str) -> str:
     return f"{unit}^2" if unit.endswith("/s") else f"{unit}/s"
 
 
-def _experiment(manifest: Manifest, values: dict[str, float]) -> tuple[float, float]:
-    """Length of the scene's run, and time between its samples [s]."""
-    run, speed = manifest.run, None
+def time_of_turn(manifest: Manifest) -> float:
+    """Time of a turn of driver or shaft, infinite where nothing turns [s]."""
+    name = None
     if manifest.mechanism is not None:
-        speed = values.get(manifest.mechanism.speed)
+        name = manifest.mechanism.speed
     elif manifest.bearing is not None:
-        speed = values.get(manifest.bearing.ring_speed)
-    turn = 2.0 * math.pi / abs(speed) if speed else math.inf
+        name = manifest.bearing.ring_speed
+    speed = next((info.default for info in manifest.parameters if info.name == name), 0.0)
+    return 2.0 * math.pi / abs(speed) if speed else math.inf
+
+
+def experiment(manifest: Manifest) -> tuple[float, float]:
+    """Length of the scene's run, and time between its samples [s]."""
+    run, turn = manifest.run, time_of_turn(manifest)
     duration = run.duration if run.cycles is None else run.cycles * turn
     if duration is None or not math.isfinite(duration):
         return 1.0, 1.0 / run.samples_per_cycle
     return duration, (turn if math.isfinite(turn) else duration) / run.samples_per_cycle
 
 
-def _variables(root: Xml.Element, manifest: Manifest, inputs: Sequence[str]) -> None:
-    """Variables, and which of them are outputs, derivatives, and unknown at the start."""
-    place, structure = Xml.SubElement(root, "ModelVariables"), Xml.SubElement(root, "ModelStructure")
-    reference = 0
+def _variables(
+    root: Xml.Element, manifest: Manifest, inputs: Sequence[str], magnitudes: Sequence[float]
+) -> dict[str, int]:
+    """Variables; returns their value references."""
+    place = Xml.SubElement(root, "ModelVariables")
+    references: dict[str, int] = {}
 
     def add(name: str, unit: str, description: str, **attributes: str) -> Xml.Element:
-        nonlocal reference
-        given = {"name": name, "valueReference": str(reference), "description": description, **attributes}
+        references[name] = len(references)
+        given = {"name": name, "valueReference": str(references[name]), "description": description, **attributes}
         if unit not in ("", "1"):
             given["unit"] = unit
-        reference += 1
         return Xml.SubElement(place, "Float64", {key: value for key, value in given.items() if value})
 
     add("time", "s", "Time", causality="independent", variability="continuous")
-    changing = varying(manifest)
+    changing, replaced = varying(manifest), {*chain(*speed_table(manifest))} if SPEED in inputs else {}
     for info in manifest.parameters:
         start = repr(info.default)
-        if info.name in inputs:
+        if info.name in replaced:
+            references[info.name] = len(references)
+        elif info.name in inputs:
             add(info.name, info.unit, info.description, causality="input", variability="continuous", start=start)
         else:
             tunable = "tunable" if info.name in changing else "fixed"
@@ -155,43 +176,52 @@ def _variables(root: Xml.Element, manifest: Manifest, inputs: Sequence[str]) -> 
                 **{"causality": "parameter", "variability": tunable, "start": start, **limits},
             )
     calculated = {"variability": "continuous", "initial": "calculated"}
-    outputs, unknown, rates = [], [], []
     wanted = {info.name for info in manifest.outputs}
-    first_state = reference
-    for state in manifest.states:
+    for state, magnitude in zip(manifest.states, magnitudes, strict=True):
         causality = "output" if state.name in wanted else "local"
-        if state.name in wanted:
-            outputs.append(reference)
-        unknown.append(reference)
-        add(state.name, state.unit, state.description, causality=causality, **calculated)
-    for k, state in enumerate(manifest.states):
-        rates.append(reference)
+        add(state.name, state.unit, state.description, causality=causality, nominal=repr(magnitude), **calculated)
+    for state in manifest.states:
         unit, description = _rate_unit(state.unit), f"Derivative of {state.name}"
-        add(f"der({state.name})", unit, description, causality="local", **calculated, derivative=str(first_state + k))
+        of = str(references[state.name])
+        add(f"der({state.name})", unit, description, causality="local", **calculated, derivative=of)
     for output in computed_outputs(manifest):
-        outputs.append(reference)
-        unknown.append(reference)
         variable = add(output.name, output.unit, output.description, causality="output", **calculated)
         if output.size > 1:
             Xml.SubElement(variable, "Dimension", start=str(output.size))
     if SPEED in inputs:
         start = repr(initial_speed(manifest))
-        text = "Speed of the driver at the end of the coming step"
+        text = "Speed of the driver: at first that of the start, then the one at the end of the coming step"
         add(SPEED, "rad/s", text, causality="input", variability="continuous", start=start)
-    for kind, references in (("Output", outputs), ("ContinuousStateDerivative", rates)):
-        _references(structure, kind, references)
-    _references(structure, "InitialUnknown", sorted([*unknown, *rates]))
+    return references
+
+
+def _structure(
+    root: Xml.Element, manifest: Manifest, references: dict[str, int], known: Dependencies, inputs: Sequence[str]
+) -> None:
+    """Which variables are outputs, derivatives, and unknown at the start, and what they depend on."""
+    structure = Xml.SubElement(root, "ModelStructure")
+    speeds, times = speed_table(manifest) if SPEED in inputs else ((), ())
+
+    def add(kind: str, name: str, knowns: Iterable[str], gone: Sequence[str]) -> None:
+        found = {SPEED if item in speeds else item for item in knowns if item not in gone}
+        numbers = " ".join(map(str, sorted(references[item] for item in found)))
+        Xml.SubElement(structure, kind, valueReference=str(references[name]), dependencies=numbers)
+
+    states, wanted = [info.name for info in manifest.states], {info.name for info in manifest.outputs}
+    rates, computed = [f"der({name})" for name in states], [info.name for info in computed_outputs(manifest)]
+    kinds = {"Output": [*(name for name in states if name in wanted), *computed], "ContinuousStateDerivative": rates}
+    for kind, names in kinds.items():
+        for name in names:
+            # a table whose place an input takes moves nothing in a run
+            add(kind, name, known.running[name], (*speeds, *times))
+    for name in (*states, *rates, *computed):
+        add("InitialUnknown", name, known.initial[name], times)
 
 
 def initial_speed(manifest: Manifest) -> float:
     """Speed of the driver at t = 0, as the scene has it [rad/s]."""
     assert manifest.mechanism is not None  # it has the driver
     return next(info.default for info in manifest.parameters if manifest.mechanism.speed == info.name)
-
-
-def _references(structure: Xml.Element, kind: str, references: Iterable[int]) -> None:
-    for reference in references:
-        Xml.SubElement(structure, kind, valueReference=str(reference))
 
 
 def build_description(identifier: str, sources: Iterable[str]) -> Xml.Element:

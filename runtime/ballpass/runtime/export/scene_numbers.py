@@ -83,6 +83,12 @@ def driven(manifest: Manifest) -> tuple[int, int] | None:
     return names.index(DRIVER_ACCELERATION), [info.name for info in manifest.states].index(manifest.mechanism.rate)
 
 
+def speed_table(manifest: Manifest) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Parameters that are speeds and times of the table of a driver's speed; none without."""
+    found = driven(manifest)
+    return ((), ()) if found is None else (manifest.inputs[found[0]].values, manifest.inputs[found[0]].times)
+
+
 def filled(template: Path, **values: str) -> str:
     """Text of a template with values in place of ``@NAME@``."""
     return re.sub("@([A-Z]+)@", lambda found: values[found[1]], template.read_text(encoding="utf-8"))

@@ -1,7 +1,7 @@
 /* The interface of FMI 3.0 co-simulation over ballpass.h.
 
    Value references: 0 is the time; then parameters and inputs, states, derivatives of states, outputs that are no states, in the order of
-   the scene; then the driver's speed, where that is an input.  Functions of other kinds of interface, and of types that no variable has, are there and return fmi3Error with a message. */
+   the scene; then the driver's speed, where that is an input in place of its table's parameters.  Functions of other kinds of interface, and of types that no variable has, are there and return fmi3Error with a message. */
 #include "fmi3Functions.h"
 
 #include <math.h>
@@ -27,6 +27,7 @@ typedef struct {
     int prepared; /* whether the run is begun with the values at hand */
     ballpass_request asked;
     int end_known;
+    int driven;   /* whether it has been another one than the driver's */
     double speed; /* of the driver, where it is an input [rad/s] */
 } bookkeeping;
 
@@ -88,6 +89,20 @@ static instance_of *in(fmi3Instance instance, int modes, const char *call)
     return NULL;
 }
 
+/* The driver's speed as an input: before the run, that of all rows of its table; then what a step is to reach. */
+static void set_speed(instance_of *at, double speed)
+{
+    at->own.speed = speed;
+    for (int k = 0; k < FMU_SPEEDS && at->own.where != STEP; k++) ballpass_put(at->simulation, fmu_table[k], speed);
+}
+
+static int in_table(size_t place)
+{
+    int found = 0;
+    for (int k = 0; k < FMU_TABLE; k++) found |= (size_t)fmu_table[k] == place;
+    return found;
+}
+
 enum { ANY = INSTANTIATED | INITIALIZATION | STEP | TERMINATED, RUNNING = INITIALIZATION | STEP | TERMINATED };
 
 /* creation */
@@ -123,8 +138,8 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     at->log = logMessage;
     at->early_return = earlyReturnAllowed;
     at->own.where = INSTANTIATED;
+    if (FMU_DRIVEN) set_speed(at, ballpass_value(at->simulation, fmu_table[0]));
     at->own.asked = ballpass_default(at->simulation);
-    at->own.speed = FMU_SPEED;
     return at;
 }
 
@@ -203,7 +218,8 @@ fmi3Status fmi3Reset(fmi3Instance instance)
     if (!fresh) return fail(at, "fmi3Reset: the memory is too small.");
     ballpass_free(at->simulation);
     at->simulation = fresh;
-    at->own = (bookkeeping){.where = INSTANTIATED, .asked = ballpass_default(fresh), .speed = FMU_SPEED};
+    at->own = (bookkeeping){.where = INSTANTIATED, .asked = ballpass_default(fresh)};
+    if (FMU_DRIVEN) set_speed(at, ballpass_value(fresh, fmu_table[0]));
     return fmi3OK;
 }
 
@@ -217,7 +233,7 @@ static kind find(fmi3ValueReference reference, size_t *first, size_t *count)
     *count = 1;
     *first = 0;
     if (reference == 0) return TIME;
-    if (reference < FIRST_STATE) return *first = reference - 1, PARAMETER;
+    if (reference < FIRST_STATE) return *first = reference - 1, in_table(*first) ? NONE : PARAMETER;
     if (reference < FIRST_RATE) return *first = reference - FIRST_STATE, STATE;
     if (reference < FIRST_OUTPUT) return *first = reference - FIRST_RATE, RATE;
     const size_t k = reference - FIRST_OUTPUT;
@@ -280,14 +296,16 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     for (size_t k = 0; k < nValueReferences; k++) {
         size_t first, count;
         const kind what = find(valueReferences[k], &first, &count);
-        if (what == SPEED && isfinite(values[k])) {
-            at->own.speed = values[k];
-            continue;
-        }
-        if (what != PARAMETER) return fail(at, "%s: the value reference %u was given. Allowed: parameters and inputs.", call, (unsigned)valueReferences[k]);
+        if (what != PARAMETER && what != SPEED)
+            return fail(at, "%s: the value reference %u was given. Allowed: parameters and inputs.", call, (unsigned)valueReferences[k]);
         if (at->own.where != STEP) {
             ballpass_stop(at->simulation);
             at->own.prepared = 0;
+        }
+        if (what == SPEED) {
+            if (!isfinite(values[k])) return fail(at, "%s: the driver's speed %g was given. Allowed: a finite number [rad/s].", call, values[k]);
+            set_speed(at, values[k]);
+            continue;
         }
         const fmi3Status status = answered(at, call, ballpass_set_at(at->simulation, (int)first, values[k]));
         if (status != fmi3OK) return status;
@@ -316,12 +334,13 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     const double last = at->own.asked.end;
     if (at->own.end_known && there - last > 1e-9 * (fabs(last) + communicationStepSize))
         return fail(at, "%s: a step to %.9g s was given. Allowed: times up to the stop time, %.9g s.", call, there, last);
-    /* before loads that switch are asked for: the table of the driver's speed is none of them */
-    if (FMU_DRIVEN && answered(at, call, ballpass_drive(at->simulation, at->own.speed)) != fmi3OK) return fmi3Error;
+    /* a driver that stays as fast as it is has the bits of one without such an input */
+    if (FMU_DRIVEN && at->own.speed != ballpass_states(at->simulation)[scene_driver]) at->own.driven = 1;
+    if (at->own.driven && answered(at, call, ballpass_drive(at->simulation, at->own.speed)) != fmi3OK) return fmi3Error;
     if (at->early_return) {
         const double next = ballpass_next_switch(at->simulation);
         if (next > here && next < there * (1.0 - 1e-12)) {
-            if (FMU_DRIVEN) { /* a part of the way to the speed at the end */
+            if (at->own.driven) { /* a part of the way to the speed at the end */
                 const double speed = ballpass_states(at->simulation)[scene_driver];
                 ballpass_drive(at->simulation, speed + (at->own.speed - speed) * (next - here) / (there - here));
             }
@@ -348,8 +367,9 @@ static fmi3Status seeds(instance_of *at, const char *call, const fmi3ValueRefere
         if (what == TIME) *dt += seed[k];
         else if (what == STATE) dx[first] += seed[k];
         else if (what == PARAMETER) dp[first] += seed[k];
-        else if (what == SPEED) continue; /* it moves nothing before the next step */
-        else return fail(at, "%s: the known %u was given. Allowed: time, states, inputs and parameters.", call, (unsigned)knowns[k]);
+        else if (what == SPEED) { /* in a run it moves nothing before the next step */
+            for (int row = 0; row < FMU_SPEEDS && at->own.where == INITIALIZATION; row++) dp[fmu_table[row]] += seed[k];
+        } else return fail(at, "%s: the known %u was given. Allowed: time, states, inputs and parameters.", call, (unsigned)knowns[k]);
     }
     return fmi3OK;
 }
@@ -380,15 +400,43 @@ static fmi3Status ready(instance_of *at, const char *call)
     return answered(at, call, ballpass_read(at->simulation, columns)); /* and so values that were set have arrived */
 }
 
+/* Derivatives of unknowns along seeds of knowns. */
+static fmi3Status along(instance_of *at, const char *call, const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[],
+                        size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 found[], size_t nFound)
+{
+    double dt = 0.0, dx[SCENE_STATES] = {0.0}, dp[SCENE_PARAMETERS] = {0.0};
+    if (seeds(at, call, knowns, nKnowns, seed, nSeed, &dt, dx, dp) != fmi3OK) return fmi3Error;
+    if (at->own.where == INITIALIZATION) ballpass_initial_tangent(at->simulation, dp, dx);
+    return derive(at, call, dt, dx, dp, unknowns, nUnknowns, found, nFound);
+}
+
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[],
                                         size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
     static const char call[] = "fmi3GetDirectionalDerivative";
-    double dt = 0.0, dx[SCENE_STATES] = {0.0}, dp[SCENE_PARAMETERS] = {0.0};
     instance_of *at = in(instance, RUNNING, call);
-    if (ready(at, call) != fmi3OK || seeds(at, call, knowns, nKnowns, seed, nSeed, &dt, dx, dp) != fmi3OK) return fmi3Error;
-    if (at->own.where == INITIALIZATION) ballpass_initial_tangent(at->simulation, dp, dx);
-    return derive(at, call, dt, dx, dp, unknowns, nUnknowns, sensitivity, nSensitivity);
+    if (ready(at, call) != fmi3OK) return fmi3Error;
+    return along(at, call, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity);
+}
+
+/* One direction for each known: models are small, and directions cheap. */
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[],
+                                    size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
+{
+    static const char call[] = "fmi3GetAdjointDerivative";
+    const double one = 1.0;
+    instance_of *at = in(instance, RUNNING, call);
+    if (ready(at, call) != fmi3OK) return fmi3Error;
+    if (nSensitivity != nKnowns) return fail(at, "%s: %zu values were given. Allowed: %zu, one for each known.", call, nSensitivity, nKnowns);
+    double *found = malloc((nSeed ? nSeed : 1) * sizeof *found);
+    fmi3Status status = found ? fmi3OK : fail(at, "%s: the memory is too small.", call);
+    for (size_t k = 0; k < nKnowns && status == fmi3OK; k++) {
+        status = along(at, call, unknowns, nUnknowns, knowns + k, 1, &one, 1, found, nSeed);
+        sensitivity[k] = 0.0;
+        for (size_t i = 0; i < nSeed && status == fmi3OK; i++) sensitivity[k] += seed[i] * found[i];
+    }
+    free(found);
+    return status;
 }
 
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences, const fmi3Int32 orders[],
@@ -563,10 +611,6 @@ REFUSED(fmi3UpdateDiscreteStates, NO_EVENTS,
          (void)nextEventTimeDefined, (void)nextEventTime))
 REFUSED(fmi3EnterConfigurationMode, "this FMU has no structural parameters", (fmi3Instance instance), (void)0)
 REFUSED(fmi3ExitConfigurationMode, "this FMU has no structural parameters", (fmi3Instance instance), (void)0)
-REFUSED(fmi3GetAdjointDerivative, "this FMU has directional derivatives, and no adjoint ones",
-        (fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns,
-         const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity),
-        ((void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed, (void)sensitivity, (void)nSensitivity))
 REFUSED(fmi3GetNumberOfVariableDependencies, "this FMU does not provide dependencies of elements",
         (fmi3Instance instance, fmi3ValueReference valueReference, size_t *nDependencies), ((void)valueReference, (void)nDependencies))
 REFUSED(fmi3GetVariableDependencies, "this FMU does not provide dependencies of elements",

@@ -467,7 +467,10 @@ int ballpass_drive(ballpass *s, double speed)
         return BALLPASS_REFUSED;
     }
     s->run.wanted = speed;
-    s->run.driven = 1;
+    if (!s->run.driven) {
+        s->run.driven = s->run.changed = 1;
+        s->run.acceleration = 0.0;
+    }
     return BALLPASS_OK;
 }
 
@@ -481,8 +484,9 @@ int ballpass_run_to(ballpass *s, double time)
         return BALLPASS_REFUSED;
     }
     if (r->driven && time > r->time) {
-        r->acceleration = (r->wanted - r->state[scene_driver]) / (time - r->time);
-        r->changed = 1;
+        const double acceleration = (r->wanted - r->state[scene_driver]) / (time - r->time);
+        if (acceleration != r->acceleration) r->changed = 1;
+        r->acceleration = acceleration;
     }
     int fault = settle(s);
     while (!fault) {

@@ -1,0 +1,88 @@
+"""What states, their rates and the outputs of a model depend on, as importers of an FMU ask.
+
+In: a model.  Out: for each of them the names of time, parameters and states that move it: at any moment, and where a
+run starts.  From the sparsity of the generated functions, so that what is not named has no influence at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+
+from ballpass.runtime.contract import InputInfo
+from ballpass.runtime.export.scene_numbers import computed_outputs, outputs_function
+from ballpass.runtime.native.loaded_model import LoadedModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dependencies:
+    """Names of what moves each state, rate ``der(<state>)`` and output that is no state.
+
+    Attributes
+    ----------
+    running : among ``time``, parameters and states, at any moment; a state is itself alone
+    initial : among ``time`` and parameters, where a run starts
+    """
+
+    running: dict[str, tuple[str, ...]]
+    initial: dict[str, tuple[str, ...]]
+
+
+def rates_and_outputs(model: LoadedModel) -> tuple[dict[str, casadi.SX], casadi.SX]:
+    """Symbols t, x, u, p, c; over them the rates and, behind these, numbers of the outputs that are no states."""
+    manifest = model.manifest
+    sizes = {"t": 1, "x": len(manifest.states), "u": len(manifest.inputs)}
+    sizes |= {"p": len(manifest.parameters), "c": len(manifest.constants)}
+    moment = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
+    functions = [model.symbolic("rhs"), *([outputs_function(model)] if computed_outputs(manifest) else ())]
+    results = [function(*(moment[name] for name in function.name_in())) for function in functions]
+    return moment, casadi.vertcat(*(casadi.densify(result) for result in results))
+
+
+def dependencies(model: LoadedModel) -> Dependencies:
+    """Of all states, rates and outputs of a model."""
+    manifest = model.manifest
+    moment, results = rates_and_outputs(model)
+    t, x, u, p, c = (_pattern(results, symbol) for symbol in moment.values())
+    # parameters and derived constants, and what follows from them
+    names = [*(info.name for info in manifest.parameters), *(info.name for info in manifest.constants)]
+    own = np.eye(len(manifest.parameters), dtype=bool)
+    both = np.vstack([own, _pattern(model.symbolic("constants")(moment["p"]), moment["p"])])
+    inputs = _among(names, [_named(item) for item in manifest.inputs]) @ both
+    start = _among(names, [(name,) for name in manifest.initial]) @ both
+    p = p | u @ inputs | c @ both[len(own) :]
+    unmoved, itself = np.zeros((len(start), 1), dtype=bool), np.eye(len(start), dtype=bool)
+    running = np.vstack([np.hstack([unmoved, np.zeros_like(start), itself]), np.hstack([t, p, x])])
+    initial = np.vstack([np.hstack([unmoved, start]), np.hstack([t, p | x @ start])])
+    outputs = [name for info in computed_outputs(manifest) for name in [info.name] * info.size]
+    unknowns = [*model.states, *(f"der({name})" for name in model.states), *outputs]
+    knowns = ("time", *names[: len(own)], *model.states)
+    return Dependencies(running=_by_name(unknowns, knowns, running), initial=_by_name(unknowns, knowns, initial))
+
+
+def _pattern(result: casadi.SX, symbol: casadi.SX) -> np.ndarray:
+    """Whether each number of a result depends on each of a symbol, shape (numbers of the result, of the symbol)."""
+    sparsity = casadi.Function("f", [symbol], [result], {"allow_free": True}).jac_sparsity(0, 0)
+    return np.array(casadi.DM(sparsity, 1.0).full() != 0.0)
+
+
+def _named(item: InputInfo) -> tuple[str, ...]:
+    """Parameters and derived constants that an input follows from."""
+    edges = (edge for window in item.windows for edge in window)
+    return tuple(name for name in (item.offset, item.rate, *edges, *item.times, *item.values) if name)
+
+
+def _among(names: Sequence[str], chosen: Sequence[Iterable[str]]) -> np.ndarray:
+    """For each choice whether it has each of the names, shape (choices, names)."""
+    return np.array([[name in some for name in names] for some in chosen], dtype=bool).reshape(-1, len(names))
+
+
+def _by_name(unknowns: Sequence[str], knowns: Sequence[str], pattern: np.ndarray) -> dict[str, tuple[str, ...]]:
+    """Names of the columns that the rows of a name have."""
+    found: dict[str, np.ndarray] = {}
+    for name, row in zip(unknowns, pattern, strict=True):
+        found[name] = found.get(name, False) | row
+    return {name: tuple(known for known, has in zip(knowns, row, strict=False) if has) for name, row in found.items()}
