@@ -51,28 +51,22 @@ class Kind:
 
 
 def _mean(view: View, quantity: Quantity) -> Estimate:
-    value, slope = view.channel(quantity)
-    total, moved = view.integral(value, slope)
-    length, longer = view.length
-    mean = total.real / length
-    return Estimate(value=mean, slope=(moved.real - mean * longer) / length)
+    value, slope = view.mean(*view.channel(quantity))
+    return Estimate(value=value, slope=slope)
 
 
 def _integral(view: View, quantity: Quantity) -> Estimate:
-    value, slope = view.channel(quantity)
-    total, moved = view.integral(value, slope)
-    return Estimate(value=total.real, slope=moved.real)
+    value, slope = view.integral(*view.channel(quantity))
+    return Estimate(value=value, slope=slope)
 
 
 def _rms(view: View, quantity: Quantity) -> Estimate:
     value, slope = view.channel(quantity)
-    total, moved = view.integral(value**2, 2.0 * value[:, None] * slope)
-    length, longer = view.length
-    square = total.real / length
+    square, moved = view.mean(value**2, 2.0 * value[:, None] * slope)
     root = math.sqrt(square)
     if root == 0.0:
         return _zero(view, "zero throughout", slope)
-    return Estimate(value=root, slope=(moved.real - square * longer) / (2.0 * root * length))
+    return Estimate(value=root, slope=moved / (2.0 * root))
 
 
 def _zero(view: View, note: str, moved: Array) -> Estimate:
@@ -121,9 +115,7 @@ def _amplitude(view: View, quantity: Quantity) -> Estimate:
     value, slope = view.channel(quantity)
     line_frequency, faster = frequency(view, quantity)
     length, longer = view.length
-    total, moved = view.integral(value, slope)
-    mean = total.real / length
-    mean_slope = (moved.real - mean * longer) / length
+    mean, mean_slope = view.mean(value, slope)
     turning = np.exp(-2j * np.pi * line_frequency * view.nodes.t)
     angle_slope = 2.0 * np.pi * (faster * view.nodes.t[:, None] + line_frequency * view.nodes.slope)
     swing = (value - mean) * turning
@@ -144,13 +136,10 @@ def _drive_work(view: View, quantity: Quantity) -> Estimate:
             f"{quantity.name}: the driver's speed changes in this scene, and its turns are not alike. Ask for "
             "mean:drive_power, times the length of the run."
         )
-    value, slope = view.channel(quantity)
-    total, moved = view.integral(value, slope)
-    length, longer = view.length
+    value, slope = view.mean(*view.channel(quantity))
     # mean torque times the angle of a turn, which no parameter changes
     angle = math.copysign(clock.TURN, view.numbers.values[mechanism.speed])
-    mean = total.real / length
-    return Estimate(value=angle * mean, slope=angle * (moved.real - mean * longer) / length)
+    return Estimate(value=angle * value, slope=angle * slope)
 
 
 def _of_life(name: str) -> Kind:

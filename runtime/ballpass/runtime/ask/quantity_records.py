@@ -102,7 +102,7 @@ class View:
         rows, best = np.arange(len(signal.value)), np.argmax(signal.value, axis=1)
         return signal.value[rows, best], signal.slope[rows, best]
 
-    def integral(self, values: Array, slopes: Array) -> tuple[complex, Array]:
+    def integral(self, values: Array, slopes: Array) -> tuple[float, Array]:
         """Integral over the time that counts, and its derivative, shape (directions,).
 
         Parameters
@@ -110,7 +110,14 @@ class View:
         values, slopes : integrand at the nodes and its derivative, shapes (nodes,), (nodes, directions)
         """
         nodes = self.nodes
-        return complex(nodes.weight @ values), nodes.weight @ slopes + values @ nodes.weight_slope
+        return float(nodes.weight @ values), nodes.weight @ slopes + values @ nodes.weight_slope
+
+    def mean(self, values: Array, slopes: Array) -> tuple[float, Array]:
+        """Mean over the time that counts, and its derivative; as `integral`."""
+        total, moved = self.integral(values, slopes)
+        length, longer = self.length
+        mean = total / length
+        return mean, (moved - mean * longer) / length
 
     @property
     def length(self) -> tuple[float, Array]:

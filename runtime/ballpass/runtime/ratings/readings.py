@@ -45,24 +45,26 @@ class LoadPowers:
     ten_thirds : of the power 10/3 [kN^(10/3)]
     outer_damage : of the mean over the balls of the power 10/3, to the power 9/10 [kN^3]
     raceways : of the third power at each place of the outer, then of the inner raceway, over the balls that pass,
-        shape (..., 2, places) [kN^3]
+        shape (..., 2, places) ; None where it is not known [kN^3]
     """
 
     cubes: Any
     ten_thirds: Any
     outer_damage: Any
-    raceways: Any
+    raceways: Any = None
 
 
 def equivalent_loads(powers: LoadPowers) -> Mapping[str, tuple[Any, Any]]:
-    """Q_ei and Q_ee of every reading [N]."""
+    """Q_ei and Q_ee of every reading [N]; not of `sectors` where the raceways are not known."""
     cubic = KILO * powers.cubes ** (1.0 / 3.0)
-    outer, inner = (KILO * sector_ball_load(np.moveaxis(powers.raceways[..., k, :], -1, 0)) for k in (0, 1))
-    return {
+    found = {
         "mean": (cubic, KILO * powers.ten_thirds**0.3),
         "miner": (cubic, KILO * powers.outer_damage ** (1.0 / 3.0)),
-        "sectors": (inner, outer),
     }
+    if powers.raceways is not None:
+        outer, inner = (KILO * sector_ball_load(np.moveaxis(powers.raceways[..., k, :], -1, 0)) for k in (0, 1))
+        found["sectors"] = (inner, outer)
+    return found
 
 
 def lives(ratings: Ratings, powers: LoadPowers) -> dict[str, Any]:
