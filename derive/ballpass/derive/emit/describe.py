@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from ballpass.derive.emit.signature import catalogue_info, duty_info, lubrication_info, run_info, signature, versions
+from ballpass.derive.emit.signature import catalogue_info, duty_info, info_of, lubrication_info, signature, versions
 from ballpass.derive.lowering.functions import Functions, operations
 from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
 from ballpass.derive.reading.usual import usual_ranges
@@ -28,55 +28,19 @@ def describe(system: System, functions: Functions, source: str, files: tuple[tup
         signature=signature(scene),
         versions=versions(),
         parameters=tuple(
-            mf.ParameterInfo(
-                name=p.name,
-                unit=p.unit,
-                description=p.description,
-                latex=p.latex,
-                default=p.default,
-                **(asdict(bounds[p.name]) if p.name in bounds else {}),
-            )
+            info_of(mf.ParameterInfo, p, **(asdict(bounds[p.name]) if p.name in bounds else {}))
             for p in system.parameters
         ),
         relations=value_relations(scene),
         usual=usual_ranges(scene),
-        constants=tuple(
-            mf.VariableInfo(name=c.name, unit=c.unit, description=c.description, latex=c.latex)
-            for c in functions.constants
-        ),
-        states=tuple(
-            mf.VariableInfo(name=s.name, unit=s.unit, description=s.description, latex=s.latex) for s in system.states
-        ),
-        coordinates=tuple(
-            mf.CoordinateInfo(
-                name=c.name, velocity=c.velocity.name, kind=c.kind, unit=c.unit, group=c.group, partner=c.partner
-            )
-            for c in system.coordinates
-        ),
+        constants=tuple(info_of(mf.VariableInfo, c) for c in functions.constants),
+        states=tuple(info_of(mf.VariableInfo, s) for s in system.states),
+        coordinates=tuple(info_of(mf.CoordinateInfo, c, velocity=c.velocity.name) for c in system.coordinates),
         initial=system.initial,
-        inputs=tuple(
-            mf.InputInfo(
-                name=i.name,
-                kind=i.kind,
-                offset=i.offset,
-                rate=i.rate,
-                windows=i.windows,
-                times=i.times,
-                values=i.values,
-            )
-            for i in system.inputs
-        ),
-        outputs=tuple(
-            mf.VariableInfo(
-                name=o.name,
-                unit=o.unit,
-                description=o.description,
-                size=_size(system, o),
-            )
-            for o in system.outputs
-        ),
+        inputs=tuple(info_of(mf.InputInfo, i) for i in system.inputs),
+        outputs=tuple(info_of(mf.VariableInfo, o, size=_size(system, o)) for o in system.outputs),
         quantities=tuple(
-            mf.QuantityInfo(name=o.name, unit=o.unit, description=o.description, size=_size(system, o), group=g.name)
+            info_of(mf.QuantityInfo, o, size=_size(system, o), group=g.name)
             for g in functions.groups
             for o in g.outputs
         ),
@@ -95,7 +59,7 @@ def describe(system: System, functions: Functions, source: str, files: tuple[tup
         smoothness=tuple((name, s.value) for name, s in system.smoothness),
         mechanism=_mechanism(system),
         bearings=_bearings(system),
-        run=run_info(scene),
+        run=info_of(mf.RunInfo, scene.run),
         unfit=functions.unfit,
         duty=duty_info(scene),
         files=files,
@@ -116,8 +80,8 @@ def _mechanism(system: System) -> mf.MechanismInfo | None:
         speed=mechanism.driver.speed.path,
         start_angle=mechanism.driver.start_angle.path,
         joints=tuple((j.name, j.kind, j.bodies[0], j.points[0], j.bodies[1], j.points[1]) for j in mechanism.joints),
-        points=tuple(mf.PointInfo(body=p.body, point=p.point) for p in linkage.points),
-        margins=tuple(mf.MarginInfo(joint=m.joint, description=m.description) for m in linkage.margins),
+        points=tuple(info_of(mf.PointInfo, p) for p in linkage.points),
+        margins=tuple(info_of(mf.MarginInfo, m) for m in linkage.margins),
         forces=drawn_forces(mechanism),
         angle=driven.name if driven is not None else "",
         rate=driven.velocity.name if driven is not None else "",
@@ -145,10 +109,9 @@ def _bearings(system: System) -> tuple[mf.BearingInfo, ...]:
             if speed is not None
             else "",
             outer_ring=bearing.outer is not None,
-            damping=mf.DampingInfo(law=bearing.damping.law)
-            if law is None
-            else mf.DampingInfo(
-                law=bearing.damping.law, in_deflection=law.in_deflection.value, in_rate=law.in_rate.value
+            damping=mf.DampingInfo(
+                law=bearing.damping.law,
+                **({} if law is None else {"in_deflection": law.in_deflection.value, "in_rate": law.in_rate.value}),
             ),
             catalogue=catalogue_info(bearing),
             lubrication=lubrication_info(bearing),

@@ -18,9 +18,9 @@ from ballpass.derive.emit.signature import (
     duty_info,
     folder_of,
     fresh_manifest,
+    info_of,
     intact_manifest,
     lubrication_info,
-    run_info,
     signature,
     source_key,
 )
@@ -176,7 +176,7 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> N
         present,
         title=scene.title,
         parameters=tuple(replace(p, default=values[p.name]) for p in present.parameters),
-        run=run_info(scene),
+        run=info_of(mf.RunInfo, scene.run),
         duty=duty_info(scene),
         bearings=tuple(
             replace(info, catalogue=catalogue_info(bearing), lubrication=lubrication_info(bearing))

@@ -9,9 +9,10 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import tomllib
+from dataclasses import fields
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ballpass.derive.scene.file_columns import named_files
 from ballpass.runtime import contract as mf
@@ -19,8 +20,12 @@ from ballpass.runtime.contract.errors import ArtefactError
 from ballpass.runtime.contract.version import __version__
 
 if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
     from ballpass.derive.scene.bearing_records import Bearing
     from ballpass.derive.scene.records import Scene
+
+T = TypeVar("T", bound="DataclassInstance")
 
 
 def signature(scene: Scene) -> str:
@@ -81,17 +86,10 @@ def intact_manifest(folder: Path) -> mf.Manifest | None:
     return present
 
 
-def run_info(scene: Scene) -> mf.RunInfo:
-    """The run settings of a scene."""
-    run = scene.run
-    return mf.RunInfo(
-        cycles=run.cycles,
-        duration=run.duration,
-        transient_cycles=run.transient_cycles,
-        samples_per_cycle=run.samples_per_cycle,
-        method=run.method,
-        rtol=run.rtol,
-    )
+def info_of(kind: type[T], record: object, **others: Any) -> T:
+    """A record of the manifest: the fields of a record of the scene or the system that have its names, and others."""
+    names = [field.name for field in fields(kind) if field.name not in others]
+    return kind(**{name: getattr(record, name) for name in names if hasattr(record, name)}, **others)
 
 
 def catalogue_info(bearing: Bearing) -> mf.CatalogueInfo | None:
@@ -100,30 +98,17 @@ def catalogue_info(bearing: Bearing) -> mf.CatalogueInfo | None:
     if catalogue is None:
         return None
     least, most = catalogue.clearance_range or (None, None)
-    return mf.CatalogueInfo(
-        designation=catalogue.designation,
-        clearance_group=catalogue.clearance_group,
-        clearance_least=least,
-        clearance_most=most,
-        dynamic_rating=catalogue.dynamic_rating,
-        static_rating=catalogue.static_rating,
-        fatigue_limit=catalogue.fatigue_limit,
-    )
+    return info_of(mf.CatalogueInfo, catalogue, clearance_least=least, clearance_most=most)
 
 
 def lubrication_info(bearing: Bearing) -> mf.LubricationInfo | None:
     """Film and dirt of a bearing."""
-    film = bearing.lubrication
-    if film is None:
-        return None
-    return mf.LubricationInfo(
-        viscosity_ratio=film.viscosity_ratio, viscosity=film.viscosity, contamination=film.contamination
-    )
+    return None if bearing.lubrication is None else info_of(mf.LubricationInfo, bearing.lubrication)
 
 
 def duty_info(scene: Scene) -> tuple[mf.DutyInfo, ...]:
     """The states of a scene's duty cycle."""
-    return tuple(mf.DutyInfo(name=s.name, share=s.share, parameters=s.parameters) for s in scene.duty)
+    return tuple(info_of(mf.DutyInfo, state) for state in scene.duty)
 
 
 def _sources() -> str:

@@ -7,8 +7,6 @@ import math
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import HarmonicLoad, Load, TableLoad, UnbalanceLoad
 
-_TURN = 2.0 * math.pi
-
 
 def check_load(checker: Checker, load: Load) -> None:
     """Note faults of the numbers of a load."""
@@ -26,15 +24,7 @@ def check_load(checker: Checker, load: Load) -> None:
 def _check_windows(checker: Checker, load: Load) -> None:
     window = load.angle_window
     if window is not None and window.end is not None:
-        span = window.end.value - window.start.value
-        if span == 0.0 or abs(span) >= _TURN * (1.0 - 1e-12):
-            checker.fault(
-                window.end.path,
-                "the window is empty or as long as a whole turn",
-                f"start {checker.show(window.start)}, end {checker.show(window.end)}",
-                "two angles that differ, by less than a turn; from start counter-clockwise to end",
-                "give another end, or delete the window for a load that always acts",
-            )
+        checker.window(window.start, window.end)
     window = load.time_window
     if window is not None and window.end is not None and window.end.value <= window.start.value:
         checker.fault(
@@ -76,7 +66,7 @@ def _check_table(checker: Checker, path: str, table: TableLoad) -> None:
                 f"sort the rows by {table.over}; write a jump as two rows with a short {table.over} between them, or "
                 "as a load with a window",
             )
-    if table.over == "angle" and table.rows[-1].value - table.rows[0].value >= _TURN * (1.0 - 1e-12):
+    if table.over == "angle" and table.rows[-1].value - table.rows[0].value >= math.tau * (1.0 - 1e-12):
         checker.fault(
             table.rows[-1].path,
             "the angles of the table cover a whole turn",

@@ -3,7 +3,7 @@
 In: the path of a TOML file, or its text.  Out: the frozen record in SI, every value checked.  A scene is data: nothing
 in it is evaluated.  All faults of a file are raised together, as one `SceneError`.
 
-The schema is in `read_mechanism.py`, `read_bearing.py` and here; the checks of values, which `--set` repeats, in
+The schema is in `read_*.py` and here; the checks of values, which `--set` repeats, in
 `values.py`.
 """
 
@@ -21,30 +21,20 @@ from ballpass.derive.reading.read_bearing import read_bearing, read_shaft
 from ballpass.derive.reading.read_duty import duty_faults, read_duty
 from ballpass.derive.reading.read_load import read_load
 from ballpass.derive.reading.read_mechanism import read_mechanism
+from ballpass.derive.reading.read_run import read_run
 from ballpass.derive.reading.recouple import Coupling, recoupled
 from ballpass.derive.reading.values import parse_override, quantities_of, replaced, value_faults, with_values
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.file_columns import with_columns
-from ballpass.derive.scene.records import Load, Mechanism, Run, Scene
+from ballpass.derive.scene.records import Load, Mechanism, Scene
 from ballpass.derive.scene.schema import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
 from ballpass.derive.terms import Names
 
-__all__ = ["METHODS", "parse_override", "read_scene", "scene_from_text", "with_values"]
+__all__ = ["parse_override", "read_scene", "scene_from_text", "with_values"]
 
-METHODS = (
-    "auto",
-    "stepper",
-    "stepper-rodas4",
-    "stepper-rodas5p",
-    "stepper-dp54",
-    "stepper-dop853",
-    "rosenbrock",
-    "erk",
-    "cvodes",
-)
 #: Largest file that is read [bytes]; the largest sensible one is a table of loads.
 MAX_FILE_SIZE = 8_000_000
 #: First parts of the names of a mechanism's variables and of inputs: a bearing's names may not begin so.
@@ -226,7 +216,7 @@ def _read(root: Table, name: str) -> Scene:
         bearings = _read_bearings(root, mechanism, driven) if has_bearing else ()
         if mechanism is not None:
             _check_loads_beside(root, loads, bearings)
-        run, outputs = _read_run(root.table("run", "cycles or duration, and outputs"))
+        run, outputs = read_run(root.table("run", "cycles or duration, and outputs"))
         quantities = tuple(quantities_of((mechanism, shaft, loads, bearings)))
         scene = Scene(
             name=name,
@@ -371,103 +361,3 @@ def _refuse_loads(root: Table, because: str) -> None:
                 allowed=f"[{key}] only in a scene with [bearing]" + (" and without [mechanism]" if because else ""),
                 remedy=f"delete [{key}]" + (", or delete [mechanism]" if because else ", or add [bearing]"),
             )
-
-
-def _read_run(table: Table) -> tuple[Run, tuple[str, ...]]:
-    with table as run:
-        run.know("cycles", "duration", "transient_cycles", "samples_per_cycle", "method", "rtol", "outputs")
-        both = [key for key in ("cycles", "duration") if key in run.data]
-        if len(both) != 1 and not run.missing:
-            run.fault(
-                "",
-                "the length of the run is given twice" if both else "the length of the run is missing",
-                given=listing(both),
-                allowed='either cycles, as in 4, or duration, as in "0.5 s"',
-                remedy="delete one of the two" if both else "add cycles = 4",
-            )
-        cycles = run.number("cycles", example="4") if "cycles" in both else None
-        duration = (
-            run.quantity("duration", "s", "Duration of the run", "", example="0.5 s").value
-            if "duration" in both
-            else None
-        )
-        for key, length in (("cycles", cycles), ("duration", duration)):
-            if length is not None and length <= 0.0:
-                run.fault(
-                    key,
-                    "the run has no length",
-                    given=show(run.data[key]),
-                    allowed="a value above zero",
-                    remedy="give a positive value",
-                )
-        transient = run.number("transient_cycles", example="2", default=0.0)
-        _check_transient(run, transient, cycles)
-        rtol = run.number("rtol", example="1e-6", default=1e-6)
-        if rtol < 1e-13 or rtol > 1e-1:
-            run.fault(
-                "rtol",
-                "the relative tolerance lies outside its bounds",
-                given=show(run.data.get("rtol")),
-                allowed="a number from 1e-13 to 0.1",
-                remedy="write rtol = 1e-6 where nothing speaks for another value",
-            )
-        outputs = _read_outputs(run)
-        return (
-            Run(
-                cycles=cycles,
-                duration=duration,
-                transient_cycles=transient,
-                samples_per_cycle=run.integer("samples_per_cycle", 16, 1_000_000, example="2000", default=2000),
-                method=run.choice("method", METHODS, default="auto") or "auto",
-                rtol=rtol,
-            ),
-            outputs,
-        )
-
-
-def _check_transient(run: Table, transient: float, cycles: float | None) -> None:
-    if transient < 0.0:
-        run.fault(
-            "transient_cycles",
-            "the value is negative",
-            given=show(run.data["transient_cycles"]),
-            allowed="zero or a value above it",
-            remedy="write 0 to keep the whole run",
-        )
-    elif cycles is not None and cycles > 0.0 and transient >= cycles:
-        run.fault(
-            "transient_cycles",
-            "the transient cycles fill the whole run",
-            given=f"{transient:g} of {cycles:g} cycles",
-            allowed="fewer than cycles",
-            remedy="run more cycles, or drop fewer",
-        )
-
-
-def _read_outputs(run: Table) -> tuple[str, ...]:
-    example = '["inner.*", "ball.force"]'
-    given = run.take("outputs", example)
-    if given is None:
-        return ()
-    if not isinstance(given, list) or not given:
-        run.fault(
-            "outputs",
-            "this is no list of names of outputs",
-            given=show(given),
-            allowed=f"a list of names and patterns, as in {example}",
-            remedy=f"write outputs = {example}",
-        )
-        return ()
-    patterns = []
-    for number, pattern in enumerate(given, start=1):
-        if isinstance(pattern, str) and pattern.strip() and len(pattern) <= 200:
-            patterns.append(pattern.strip())
-            continue
-        run.fault(
-            "outputs",
-            f"entry {number} is no name of an output",
-            given=show(pattern),
-            allowed='a name or a pattern, as in "inner.y" or "inner.*"',
-            remedy="delete the entry, or write a name",
-        )
-    return tuple(patterns)

@@ -31,7 +31,6 @@ _STRUCTURE = (
     "law",
     "support",
 )
-_TURN = 2.0 * math.pi
 
 
 def quantities_of(record: object) -> Iterator[Quantity]:
@@ -54,6 +53,18 @@ def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
     scene : NaN stands for a value that has been reported before; it passes every check
     given : text of a value by path, where the file has one; others are shown in SI
     """
+    checker = _checked(scene, given)
+    _check_run(checker, scene)
+    return checker.faults
+
+
+def value_bounds(scene: Scene) -> dict[str, Bounds]:
+    """What each quantity alone must satisfy, by path; quantities that may have any value are not in it."""
+    return _checked(scene, {}).bounds
+
+
+def _checked(scene: Scene, given: Mapping[str, str]) -> Checker:
+    """All quantities but those of the run."""
     checker = Checker(given)
     if scene.mechanism is not None:
         _check_mechanism(checker, scene.mechanism)
@@ -61,20 +72,7 @@ def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
         check_load(checker, load)
     for bearing in scene.bearings:
         _check_bearing(checker, bearing)
-    _check_run(checker, scene)
-    return checker.faults
-
-
-def value_bounds(scene: Scene) -> dict[str, Bounds]:
-    """What each quantity alone must satisfy, by path; quantities that may have any value are not in it."""
-    checker = Checker({})
-    if scene.mechanism is not None:
-        _check_mechanism(checker, scene.mechanism)
-    for load in scene.loads:
-        check_load(checker, load)
-    for bearing in scene.bearings:
-        _check_bearing(checker, bearing)
-    return checker.bounds
+    return checker
 
 
 def value_relations(scene: Scene) -> tuple[tuple[str, float, str], ...]:
@@ -391,7 +389,7 @@ def _check_run(checker: Checker, scene: Scene) -> None:
         )
     if run.duration is None or not run.transient_cycles > 0.0:
         return
-    turns = run.duration * abs(speed.value) / _TURN
+    turns = run.duration * abs(speed.value) / math.tau
     if turns <= run.transient_cycles:
         checker.fault(
             "run.transient_cycles",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -43,6 +44,18 @@ class Checker:
         self.bounds[quantity.path] = Bounds(least=0.0)
         if quantity.value < 0.0:
             self.fault(quantity.path, "the value is negative", self.show(quantity), "zero or a value above it", remedy)
+
+    def window(self, start: Quantity, end: Quantity) -> None:
+        """Two angles that differ, by less than a turn."""
+        span = end.value - start.value
+        if span == 0.0 or abs(span) >= math.tau * (1.0 - 1e-12):
+            self.fault(
+                end.path,
+                "the window is empty or as long as a whole turn",
+                f"start {self.show(start)}, end {self.show(end)}",
+                "two angles that differ, by less than a turn; from start counter-clockwise to end",
+                "give another end, or delete the window for a load that always acts",
+            )
 
     def polar(self, vector: Vector) -> None:
         """The amount of a vector in polar form is not negative."""

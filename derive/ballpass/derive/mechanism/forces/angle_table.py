@@ -14,8 +14,6 @@ from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.schema import Table, upright
 
-_TURN = 2.0 * math.pi
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AngleTable(Law):
@@ -54,7 +52,7 @@ class AngleTable(Law):
         remedy = "give every row an angle and a value, or delete the table for a load that does not change"
         if not checker.rows(self.angle[0].path.rpartition(".")[0], self.angle, self.values, "angle", remedy):
             return
-        if self.angle[-1].value - self.angle[0].value >= _TURN * (1.0 - 1e-12):
+        if self.angle[-1].value - self.angle[0].value >= math.tau * (1.0 - 1e-12):
             checker.fault(
                 self.angle[-1].path,
                 "the angles span a turn or more",

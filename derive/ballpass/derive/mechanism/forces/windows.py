@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -13,8 +12,6 @@ from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.schema import Table, upright
-
-_TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,15 +63,7 @@ class Windows(Law):
     def check(self, checker: Checker) -> None:
         """Start and end differ, by less than a turn."""
         for window in self.windows:
-            span = window.end.value - window.start.value
-            if span == 0.0 or abs(span) >= _TURN * (1.0 - 1e-12):
-                checker.fault(
-                    window.end.path,
-                    "the window is empty or as long as a whole turn",
-                    f"start {checker.show(window.start)}, end {checker.show(window.end)}",
-                    "two angles that differ, by less than a turn; from start counter-clockwise to end",
-                    "give another end, or delete the window for a load that always acts",
-                )
+            checker.window(window.start, window.end)
 
 
 def _read_window(table: Table, name: str, number: str) -> Window:
