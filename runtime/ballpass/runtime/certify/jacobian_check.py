@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ballpass.runtime.certify.certificate import UNCHECKED, Check, Verdict, compare
 from ballpass.runtime.certify.differences import richardson
+from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour, point
@@ -103,7 +104,7 @@ class CheckedJacobian:
                     {
                         "of": row,
                         "wrt": column,
-                        "value": _number(self.value[i, j]),
+                        "value": self.value[i, j],
                         "sides": [self.below[i, j], self.above[i, j]] if self.differ[i, j] else None,
                         "unit": _quotient(self.row_units[i], self.column_units[j]),
                         "second": check.value,
@@ -112,17 +113,20 @@ class CheckedJacobian:
                         "reason": check.reason,
                     }
                 )
-        return {
-            "time": {"value": self.time, "unit": "s"},
-            "state": self.x.tolist(),
-            "values": {
-                row: {"value": _number(value), "unit": unit}
-                for row, value, unit in zip(self.rows, self.at, self.row_units, strict=True)
-            },
-            "jacobian": entries,
-            "verdict": self.verdict.value,
-            "notes": list(self.notes),
-        }
+        found: dict[str, Any] = finite(
+            {
+                "time": {"value": self.time, "unit": "s"},
+                "state": self.x.tolist(),
+                "values": {
+                    row: {"value": value, "unit": unit}
+                    for row, value, unit in zip(self.rows, self.at, self.row_units, strict=True)
+                },
+                "jacobian": entries,
+                "verdict": self.verdict.value,
+                "notes": list(self.notes),
+            }
+        )
+        return found
 
 
 def checked_jacobian(
@@ -229,11 +233,6 @@ def _motion(
 def _same_kind(model: LoadedModel, k: int) -> slice:
     half = len(model.states) // 2
     return slice(0, half) if k < half else slice(half, 2 * half)
-
-
-def _number(value: float) -> float | None:
-    """A number for JSON, which knows no infinity."""
-    return float(value) if np.isfinite(value) else None
 
 
 def _quotient(above: str, below: str) -> str:

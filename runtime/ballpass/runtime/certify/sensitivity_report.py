@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Group
@@ -19,6 +19,7 @@ from ballpass.runtime.certify.certificate import Check, Verdict
 from ballpass.runtime.certify.grazing import Grazing, describe, merge_grazing
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.run.tables import printed, simple_table
 from ballpass.runtime.show import html
@@ -221,61 +222,54 @@ class SensitivityReport:
         >>> sorted(report.to_json())
         ['grazing', 'quantities', 'scene', 'sensitivities', 'settings', 'verdicts']
         """
-        return {
-            "scene": self.scene,
-            "settings": dict(self.settings),
-            "verdicts": {verdict.value: count for verdict, count in self.verdicts.items()},
-            "quantities": [
-                {
-                    "name": item.name,
-                    "value": _plain(item.value),
-                    "unit": item.unit,
-                    "time": _plain(item.time),
-                    "ball": item.ball,
-                    "notes": list(item.notes),
-                }
-                for item in self.quantities
-            ],
-            "sensitivities": [
-                {
-                    "quantity": pair.quantity,
-                    "parameter": pair.parameter,
-                    "value": _plain(pair.value),
-                    "parameter_value": pair.parameter_value,
-                    "derivative": _plain(pair.derivative),
-                    "unit": pair.unit,
-                    "dimensionless": _plain(pair.dimensionless),
-                    "parameter_scale": pair.scale,
-                    "change_per_scale": _plain(pair.change),
-                    "uncertainty": _plain(pair.uncertainty),
-                    "route": pair.route,
-                    "by_steps": _plain(pair.by_steps),
-                    "certificate": {
-                        "route": pair.check.route,
-                        "value": _plain(pair.check.value),
-                        "uncertainty": _plain(pair.check.uncertainty),
-                        "disagreement": _plain(pair.check.disagreement),
-                        "verdict": pair.check.verdict.value,
-                        "nothing": pair.is_nothing,
-                        "within_bound_only": pair.check.bounded,
-                        "bound": _plain(pair.check.quantum),
-                        "reason": pair.check.reason,
-                        "slopes_at_kink": None if pair.check.sides is None else list(pair.check.sides),
-                    },
-                }
-                for pair in self.pairs
-            ],
-            "grazing": [
-                {
-                    "ball": item.ball,
-                    "time": item.time,
-                    "crank_angle": item.crank_angle,
-                    "depth": item.depth,
-                    "kink": item.kink,
-                }
-                for item in self.grazing
-            ],
-        }
+        found: dict[str, Any] = finite(
+            {
+                "scene": self.scene,
+                "settings": dict(self.settings),
+                "verdicts": {verdict.value: count for verdict, count in self.verdicts.items()},
+                "quantities": [asdict(item) for item in self.quantities],
+                "sensitivities": [
+                    {
+                        "quantity": pair.quantity,
+                        "parameter": pair.parameter,
+                        "value": pair.value,
+                        "parameter_value": pair.parameter_value,
+                        "derivative": pair.derivative,
+                        "unit": pair.unit,
+                        "dimensionless": pair.dimensionless,
+                        "parameter_scale": pair.scale,
+                        "change_per_scale": pair.change,
+                        "uncertainty": pair.uncertainty,
+                        "route": pair.route,
+                        "by_steps": pair.by_steps,
+                        "certificate": {
+                            "route": pair.check.route,
+                            "value": pair.check.value,
+                            "uncertainty": pair.check.uncertainty,
+                            "disagreement": pair.check.disagreement,
+                            "verdict": pair.check.verdict.value,
+                            "nothing": pair.is_nothing,
+                            "within_bound_only": pair.check.bounded,
+                            "bound": pair.check.quantum,
+                            "reason": pair.check.reason,
+                            "slopes_at_kink": pair.check.sides,
+                        },
+                    }
+                    for pair in self.pairs
+                ],
+                "grazing": [
+                    {
+                        "ball": item.ball,
+                        "time": item.time,
+                        "crank_angle": item.crank_angle,
+                        "depth": item.depth,
+                        "kink": item.kink,
+                    }
+                    for item in self.grazing
+                ],
+            }
+        )
+        return found
 
 
 def ratio_unit(above: str, below: str) -> str:
@@ -291,10 +285,6 @@ def _rank(pair: Sensitivity) -> tuple[bool, float]:
     has_one = math.isfinite(pair.dimensionless)
     size = pair.dimensionless if has_one else pair.change
     return not has_one, -abs(size) if math.isfinite(size) else 1.0
-
-
-def _plain(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)
 
 
 def render_report(report: SensitivityReport, *, top: int | None = None) -> Group:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.certify.whole_run import Way
 from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.run.locating import LOCATED
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
@@ -174,15 +175,7 @@ def table(trade: Trade, quantity: str | None = None) -> tuple[tuple[str, ...], l
 
 def to_plain(trade: Trade) -> dict[str, Any]:
     """Plain data for JSON: the trade and its words; what is infinite becomes None."""
-    return {"trade": _finite(asdict(trade)), "words": words(trade)}
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _finite(item) for name, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return {"trade": finite(asdict(trade)), "words": words(trade)}
 
 
 def percent(error: float) -> str:

@@ -1,7 +1,8 @@
-"""Records from plain values, as JSON gives them."""
+"""Records from plain values, as JSON gives them, and plain values for JSON, which knows no infinity."""
 
 from __future__ import annotations
 
+import math
 import types
 from collections.abc import Callable
 from dataclasses import is_dataclass
@@ -10,6 +11,17 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 #: Types of a record's fields, found once: there are hundreds of records in a manifest, and few kinds.
 _hints: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
+
+
+def finite(value: Any) -> Any:
+    """Plain values at any depth with None for numbers that are not finite."""
+    if isinstance(value, dict):
+        return {name: finite(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value
 
 
 def from_plain(kind: Any, value: Any, place: str) -> Any:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.show.short import ShortRepr
 
 
@@ -48,9 +48,8 @@ class Accuracy(ShortRepr):
 
     def plain(self) -> dict[str, Any]:
         """Plain data for JSON; an estimate that is infinite becomes None."""
-        data = asdict(self)
-        data["tried"] = [(way, e if math.isfinite(e) else None) for way, e in self.tried]
-        return data
+        plain: dict[str, Any] = finite(asdict(self))
+        return plain
 
     @property
     def words(self) -> str:

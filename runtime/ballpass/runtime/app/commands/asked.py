@@ -135,22 +135,14 @@ def _asked_run(run: _Run, duration: float | None, transient: float | None) -> _R
 
 def _plain_overrides(manifest: Manifest, settings: list[str]) -> dict[str, float] | None:
     """Numbers of ``--set`` by path, where the manifest's bounds alone tell that they are right; else None."""
-    from ballpass.derive.scene.units import parse_quantity
-    from ballpass.runtime.contract.parameters import resolve_parameters
-
-    units = {info.name: info.unit for info in manifest.parameters}
-    found: dict[str, float] = {}
+    # ends of windows and knots of tables are checked against each other when a scene is read
+    paths = [text.partition("=")[0].strip() for text in settings]
+    if any("window" in path or path.startswith(("load.", "loads.")) for path in paths):
+        return None
     try:
-        for text in settings:
-            path, _, value = (part.strip() for part in text.partition("="))
-            # ends of windows and knots of tables are checked against each other when a scene is read
-            if path not in units or path in found or "window" in path or path.startswith(("load.", "loads.")):
-                return None
-            found[path] = parse_quantity(value, units[path])
-        resolve_parameters(manifest, found)
+        return _overrides_of(manifest, settings)
     except RequestError:
         return None
-    return found
 
 
 def read_with_settings(

@@ -17,6 +17,7 @@ from rich.table import Table
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_with_settings
 from ballpass.runtime.app.commands.shared import command, load_model, show_json
+from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.contract.smoothness import WORDS
 from ballpass.runtime.run.tables import show_tables, simple_table
 
@@ -99,10 +100,10 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
         "breakpoints": [
             {"time": b.time, "angle_deg": math.degrees(b.angle), "cause": b.cause} for b in said.breakpoints
         ],
-        "turn": said.turn if math.isfinite(said.turn) else None,
+        "turn": finite(said.turn),
         "smoothness": [{"law": law, "is": kind, "words": WORDS[kind]} for law, kind in said.smoothness],
         "time_scales": [
-            asdict(s) | {"angle_deg": math.degrees(s.angle), "stiffness": _number(s.stiffness)} for s in said.scales
+            asdict(s) | {"angle_deg": math.degrees(s.angle), "stiffness": finite(s.stiffness)} for s in said.scales
         ],
         "without_equilibrium": list(said.unsupported),
         "method": {"auto": said.method, "reason": said.reason},
@@ -168,10 +169,6 @@ def _absent(scene: Scene) -> list[str]:
         present = {effect.kind for effect in bearing.effects}
         out += [f"{effect.words} ({path}.{kind})" for kind, effect in EFFECTS.items() if kind not in present]
     return out
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _render(report: dict[str, Any]) -> Group:

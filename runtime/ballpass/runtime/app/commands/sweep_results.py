@@ -20,6 +20,7 @@ from ballpass.runtime.app.commands.shared import json_text
 from ballpass.runtime.app.summary import TABLE_UNITS
 from ballpass.runtime.ask.quantities import channel_words
 from ballpass.runtime.contract.folders import replace_files
+from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.plot import FORMATS
 from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
 from ballpass.runtime.run.tables import simple_table
@@ -124,7 +125,7 @@ class Sweep:
             "quantities": {
                 name: {
                     "unit": self.unit(name),
-                    "values": [value if math.isfinite(value) else None for value in values.tolist()],
+                    "values": finite(values.tolist()),
                 }
                 for name, values in result.observables.items()
             },
