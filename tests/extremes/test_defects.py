@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import IntegrationError, Model
-from ballpass.runtime.app.summary import render_summary, summarize
+from ballpass.runtime.app.summary import summarize
+from ballpass.runtime.app.summary_table import render_summary
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.point.conditioning import ConditioningWarning

@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 from stepper_runs import ORDERS, segments_between
 
 from ballpass.runtime import Model, load_solution
-from ballpass.runtime.app.summary import render_summary, summarize
+from ballpass.runtime.app.summary import summarize
+from ballpass.runtime.app.summary_table import render_summary
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.stepper import Family, Outcome, Stepper
 

@@ -14,7 +14,8 @@ import pytest
 from rich.console import Console
 
 from ballpass.runtime import Model, Solution
-from ballpass.runtime.app.summary import add_turns, render_summary, summarize
+from ballpass.runtime.app.summary import add_turns, summarize
+from ballpass.runtime.app.summary_table import render_summary
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.run.settle import look_further
 from ballpass.runtime.run.tables import printed, show_tables, simple_table

@@ -41,7 +41,8 @@ if TYPE_CHECKING:
     from ballpass.runtime.run.integration_error import IntegrationError
     from ballpass.runtime.run.reductions import Reduction, Reductions
     from ballpass.runtime.run.sensitivity import Sensitivities
-    from ballpass.runtime.run.solution import Solution, Statistics, load_solution
+    from ballpass.runtime.run.solution import Solution, Statistics
+    from ballpass.runtime.run.solution_file import load_solution
     from ballpass.runtime.run.start import RunEnd
 
 __all__ = [
@@ -137,7 +138,7 @@ _HOME = {
     "Sensitivities": "run.sensitivity",
     "Solution": "run.solution",
     "Statistics": "run.solution",
-    "load_solution": "run.solution",
+    "load_solution": "run.solution_file",
     "RunEnd": "run.start",
 }
 

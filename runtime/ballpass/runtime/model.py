@@ -37,7 +37,7 @@ from ballpass.runtime.show.progress import Progress, shown, shown_steps
 Initial = Sequence[float] | np.ndarray | RunEnd | Literal["equilibrium"] | None
 
 if TYPE_CHECKING:
-    from ballpass.runtime.ask.life_records import LifeReport
+    from ballpass.runtime.ask.life_text import LifeReport
     from ballpass.runtime.certify.sensitivity_report import SensitivityReport
     from ballpass.runtime.run.solution import Solution, Statistics
 

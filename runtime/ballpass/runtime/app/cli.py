@@ -164,7 +164,8 @@ def run(
     """
     with command(scene) as stages:
         # within: an interrupt while they are imported is one of the command
-        from ballpass.runtime.app.summary import add_turns, render_accuracy, render_summary, summarize
+        from ballpass.runtime.app.summary import add_turns, summarize
+        from ballpass.runtime.app.summary_table import render_accuracy, render_summary
         from ballpass.runtime.run.settle import look_further
         from ballpass.runtime.run.tables import show_tables
 
@@ -354,7 +355,7 @@ def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:
         return None
     if text == "equilibrium":
         return "equilibrium"
-    from ballpass.runtime.run.solution import load_solution
+    from ballpass.runtime.run.solution_file import load_solution
 
     return load_solution(text).end
 

@@ -17,7 +17,8 @@ from typing import Any
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.folder import file_digest
 from ballpass.runtime.contract.folders import read_whole, replace_files
-from ballpass.runtime.run.solution import Solution, read_bytes
+from ballpass.runtime.run.solution import Solution
+from ballpass.runtime.run.solution_file import read_bytes
 from ballpass.runtime.show.short import ShortRepr
 
 SOLUTION = "solution.nc"

@@ -1,4 +1,4 @@
-"""The numbers people read first, as one JSON-ready mapping and as a table for the terminal.
+"""The numbers people read first, as one JSON-ready mapping.
 
 In: a `Model` and its `Solution`.  Out: a dict; every number stands in an object with its ``unit``.
 
@@ -19,27 +19,23 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.table import Table
 
 from ballpass.runtime.ask.characteristic import frequencies_of
 from ballpass.runtime.ask.observables import drive_work, statistics, turns
 from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks
-from ballpass.runtime.certify.whole_run import check_observables
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.extras import is_installed
 from ballpass.runtime.contract.usual import UnusualWarning, unusual
 from ballpass.runtime.contract.version import __version__
-from ballpass.runtime.many.ensemble import observable_unit
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.run.inputs import breakpoints
 from ballpass.runtime.run.settle import MEANS, PEAKS
-from ballpass.runtime.run.tables import simple_table
 
 if TYPE_CHECKING:
+    from ballpass.runtime.ask.observables import Statistics
     from ballpass.runtime.certify.growth import Growth
     from ballpass.runtime.model import Model
-    from ballpass.runtime.run.accuracy import Accuracy
     from ballpass.runtime.run.reductions import Reduction
     from ballpass.runtime.run.settle import Settled
     from ballpass.runtime.run.solution import Solution
@@ -54,8 +50,11 @@ _BALL_FORCES = {"elastic": "ball.elastic_force", "total": "ball.force"}
 #: the torque's amount [1].
 MOST_DEFLECTION, LEAST_WORK = 0.01, 1e-3
 
-#: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
-_COLUMNS = ("value", "min", "max", "mean", "rms", "std")
+#: Numbers that `add_turns` names; the file has all.
+SHOWN = 5
+
+#: Unit of a number in the file -> factor and unit in the table, so that six digits of a displacement are six digits.
+TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
 
 
 def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict[str, Any]:
@@ -200,8 +199,11 @@ def _printed(channel: str, found: Reduction) -> tuple[str, dict[str, float]]:
         keys = {path: key for key, path in _BALL_FORCES.items()}
         name = channel.removeprefix(prefix)
         return f"{prefix}peak_ball_force", {keys[name]: found.maximum} if name in keys else {}
-    numbers = {"min": found.minimum, "max": found.maximum, "mean": found.mean, "rms": found.rms, "std": found.std}
-    return channel, numbers
+    return channel, _moments(found)
+
+
+def _moments(of: Reduction | Statistics) -> dict[str, float]:
+    return {"min": of.minimum, "max": of.maximum, "mean": of.mean, "rms": of.rms, "std": of.std}
 
 
 def _add_spread(summary: dict[str, Any], steady: Solution, name: str) -> None:
@@ -305,15 +307,7 @@ def _motions(sol: Solution) -> dict[str, Any]:
     for info in sol.manifest.states:
         reduced = None if sol.reductions is None else sol.reductions.get(info.name)
         values = reduced or statistics(sol.t, sol[info.name])
-        found[info.name] = _numbers(
-            info.name,
-            info.unit,
-            min=values.minimum,
-            max=values.maximum,
-            mean=values.mean,
-            rms=values.rms,
-            std=values.std,
-        )
+        found[info.name] = _numbers(info.name, info.unit, **_moments(values))
     return found
 
 
@@ -357,85 +351,3 @@ def _numbers(name: str, unit: str, **values: float | np.floating[Any]) -> dict[s
                 "check the scene"
             )
     return {**{key: float(value) for key, value in values.items()}, "unit": unit}
-
-
-#: Numbers that `add_turns` names; the file has all.
-SHOWN = 5
-
-#: Unit of a number in the file -> factor and unit in the table, so that six digits of a displacement are six digits.
-TABLE_UNITS = {"m": (1e6, "µm"), "m/s": (1e3, "mm/s")}
-
-#: What the table's caption tells of the run, and with which words.
-_RUN = {
-    "rtol": "rtol {}",
-    "steps": "{} steps",
-    "located_kinks": "{} kinks located",
-    "wall_time": "integrated in {} s",
-    "cycle_length": "cycle {} s",
-    "transient_cycles_dropped": "{} transient cycles dropped",
-    "steady_cycles": "{} steady ones",
-    "samples": "{} steady samples",
-    "growth": "a start moved by the tolerance changes results by {}",
-}
-
-
-def render_summary(summary: Mapping[str, Any]) -> Table:
-    """The summary as a table for a terminal of 80 columns; mean and standard deviation are in the file only.
-
-    Parameters
-    ----------
-    summary : what `summarize` gave
-    """
-    columns = ("value", "min", "max", "rms")
-    heads = ("quantity", *columns, "unit")
-    table = simple_table(f"{summary['title']}: {summary['method']}", heads, right=columns, caption=_caption(summary))
-    for name, item in summary.items():
-        if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
-            continue
-        factor, unit = TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
-        cells = [_cell(item, key, factor) for key in columns]
-        if any(cells):
-            table.add_row(name, *cells, unit)
-        for key, value in item.items():
-            if key not in _COLUMNS and key != "unit" and not isinstance(value, Mapping):
-                # a named part of a quantity, as the peak's elastic one; what is said of it is in the file
-                table.add_row(f"{name}.{key}", _cell(item, key, factor), "", "", "", unit)
-    return table
-
-
-def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
-    """A number of the table; where it has no digits, mean and standard deviation over the turns."""
-    spread = item.get("over_turns", {}).get(key)
-    if spread is not None:
-        return f"{factor * spread['mean']:z.3g} ± {factor * spread['std']:.1g}"
-    return f"{factor * item[key]:z.4g}" if key in item else ""
-
-
-def render_accuracy(model: Model, accuracy: Accuracy) -> Table:
-    """Quantities of ``--error`` with their values and estimated errors, as a table for a terminal."""
-    right = ("value", "estimated error")
-    table = simple_table("Extremes between samples included", ("quantity", *right, "unit"), right=right)
-    for name, found in zip(accuracy.of, check_observables(model, accuracy.of), strict=True):
-        unit = observable_unit(model.manifest, *found)
-        factor, unit = TABLE_UNITS.get(unit, (1.0, unit))
-        table.add_row(name, f"{factor * accuracy.values[name]:z.7g}", f"{100 * accuracy.estimates[name]:.2g} %", unit)
-    return table
-
-
-def _caption(summary: Mapping[str, Any]) -> str:
-    run = [
-        words.format(f"{summary[key]['value']:.4g}")
-        for key, words in _RUN.items()
-        if key in summary and summary[key]["value"] is not None
-    ]
-    laws = ", ".join(
-        f"{key.removesuffix('damping_law').replace('.', ' ')}{law}"
-        for key, law in summary.items()
-        if key == "damping_law" or key.endswith(".damping_law")
-    )
-    law = [f"damping law {laws}"] if laws else []
-    if any("over_turns" in item for item in summary.values() if isinstance(item, Mapping)):
-        law.append("± mean and standard deviation over the steady turns")
-    tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
-    sampled = [] if summary["method"].startswith("stepper") else ["extremes of the samples alone"]
-    return f"{', '.join(run + sampled + law)}.\n{', '.join(tools)}."

@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.ask.life_records import BearingStrength, DutyLife, LifeReport, RingStrength, StateStrength
+from ballpass.runtime.ask.life_records import BearingStrength, DutyLife, RingStrength, StateStrength
+from ballpass.runtime.ask.life_text import LifeReport
 from ballpass.runtime.ask.wear import LoadSamples, load_samples, wear_field
 from ballpass.runtime.contract import BearingInfo, DutyInfo
 from ballpass.runtime.contract.errors import RequestError

@@ -1,4 +1,4 @@
-"""NetCDF-4 files in memory: a disk that is full then fails in one plain write, not somewhere within HDF5.
+"""NetCDF-4 files in memory: a disk that is full then fails in one plain write, not somewhere within HDF5; their seal.
 
 In: variables with dimensions, units and descriptions.  Out: the bytes of a file that xarray and `h5netcdf` read.
 """
@@ -13,6 +13,18 @@ import numpy as np
 
 #: Dimensions, values and attributes of a variable.
 Variable = tuple[tuple[str, ...], np.ndarray, dict[str, str]]
+
+#: Bytes of `seal`.
+SEAL_LENGTH = 82
+
+
+def seal(digest: str) -> bytes:
+    """What stands behind the data of a saved file, which HDF5 does not look at: the SHA-256 digest of all bytes before.
+
+    The HDF5 library may end the process, or give other numbers, where bytes of a file have changed; so they are checked
+    first.
+    """
+    return b"\nballpass sha256 " + digest.encode() + b"\n"
 
 
 def netcdf_bytes(variables: Mapping[str, Variable], facts: Mapping[str, Any]) -> bytes:

@@ -114,7 +114,7 @@ def simulate(
         t=trajectory.t[:done],
         x=trajectory.x[:done],
         outputs=evaluate_outputs(model, numbers, trajectory, plan.outputs),
-        parameters=dict(numbers.parameters),
+        parameters=numbers.parameters,
         constants={info.name: numbers.values[info.name] for info in model.manifest.constants},
         cycle_length=plan.turn if math.isfinite(plan.turn) else None,
         transient_cycles=plan.transient_cycles,

@@ -1,9 +1,8 @@
-"""What a simulation gives: samples of states and outputs, with all that is needed to read them later."""
+"""What a simulation gives: samples of states and outputs, with all that is needed to read them later; its file."""
 
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
@@ -19,7 +18,7 @@ from ballpass.runtime.contract.folders import replace_file
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.accuracy import Accuracy
-from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
+from ballpass.runtime.run.netcdf import Variable, netcdf_bytes, seal
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import no_output
 from ballpass.runtime.run.start import RunEnd
@@ -34,12 +33,6 @@ if TYPE_CHECKING:
 
 #: Number of the layout of saved files.
 FILE_SCHEMA = 1
-
-#: What stands behind the data of a saved file, which HDF5 does not look at: the digest of all bytes before it.  The
-#: HDF5 library may end the process, or give other numbers, where bytes of a file have changed; so they are checked
-#: first.
-SEAL = b"\nballpass sha256 "
-_SEAL_LENGTH = len(SEAL) + 64 + 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -312,7 +305,7 @@ class Solution:
         target = Path(path)
         content = netcdf_bytes(*contents(self))
         try:
-            replace_file(target, content + SEAL + hashlib.sha256(content).hexdigest().encode() + b"\n")
+            replace_file(target, content + seal(hashlib.sha256(content).hexdigest()))
         except OSError as fault:
             raise RequestError(
                 f"{target}: cannot be written ({fault.strerror or fault}); a file that was there is as it was. Give a "
@@ -326,45 +319,6 @@ def _extent(samples: np.ndarray) -> tuple[str, str, str]:
     if not samples.size:
         return ("", "", "")
     return (f"{np.min(samples):z.4g}", f"{np.mean(samples):z.4g}", f"{np.max(samples):z.4g}")
-
-
-def load_solution(path: str | Path) -> Solution:
-    """Read a solution that `Solution.save` wrote.
-
-    Raises
-    ------
-    RequestError
-        There is no such file, it is none of ours, or it was cut short or edited.
-
-    Examples
-    --------
-    >>> path = model.simulate(cycles=1).save("press.nc")
-    >>> load_solution(path).manifest.title
-    'Punching machine of the paper'
-    """
-    try:
-        content = Path(path).read_bytes()
-    except FileNotFoundError:
-        raise RequestError(f"{path}: there is no such file. `Solution.save` and `ballpass run` write one.") from None
-    except (OSError, ValueError) as fault:  # a folder, no permission; no path
-        raise RequestError(
-            f"{path}: cannot be read ({getattr(fault, 'strerror', None) or fault}). A file that `Solution.save` or "
-            "`ballpass run` wrote is expected."
-        ) from None
-    return read_bytes(path, content)
-
-
-def read_bytes(path: str | Path, content: bytes) -> Solution:
-    """Solution from the bytes of a file; errors as for `load_solution`."""
-    inner, seal = content[:-_SEAL_LENGTH], content[-_SEAL_LENGTH:]
-    if seal != SEAL + hashlib.sha256(inner).hexdigest().encode() + b"\n":
-        ours = content.startswith(b"\x89HDF")
-        what = "the digest at its end does not fit its content" if ours else "not a NetCDF-4 file"
-        raise RequestError(
-            f"{path}: {what}: cut short, edited, or written by something else than `Solution.save` of this version. "
-            "Give a file that it wrote, or run the scene again."
-        )
-    return _read(path, inner)
 
 
 def contents(solution: Solution) -> tuple[dict[str, Variable], dict[str, Any]]:
@@ -408,47 +362,8 @@ def _ball_dimension(manifest: Manifest, output: str) -> str:
     return f"{prefix}ball"
 
 
-def _read(path: str | Path, content: bytes) -> Solution:
-    """Solution from the bytes of a file that nobody has touched."""
-    import h5netcdf
-
-    with h5netcdf.File(io.BytesIO(content), "r") as stored:
-        facts = dict(stored.attrs)
-        schema = facts.get("ballpass_schema")
-        if schema is None or int(schema) != FILE_SCHEMA:
-            raise RequestError(
-                f"{path}: layout {schema!r} was found, this version reads layout {FILE_SCHEMA}. Run the scene again."
-            )
-        values = {name: variable[...] for name, variable in stored.variables.items()}
-    manifest = Manifest.from_json(facts["ballpass_manifest"], source=f"{path}, manifest")
-    statistics = json.loads(facts["ballpass_statistics"])
-    statistics["magnitudes"] = tuple(statistics["magnitudes"])
-    if statistics.get("initial") is not None:
-        statistics["initial"] = tuple(statistics["initial"])
-    columns = [values[state.name] for state in manifest.states]
-    t = values["time"]
-    return Solution(
-        t=t,
-        x=np.stack(columns, axis=1) if columns else np.zeros((len(t), 0)),
-        outputs={name: values[name] for name in json.loads(facts["ballpass_outputs"])},
-        parameters=json.loads(facts["ballpass_parameters"]),
-        constants=json.loads(facts["ballpass_constants"]),
-        manifest=manifest,
-        statistics=Statistics(**statistics),
-        status=Status[facts["status"]],
-        reductions=_reductions(facts.get("ballpass_reductions")),
-        steady_reductions=_reductions(facts.get("ballpass_steady_reductions")),
-        **json.loads(facts["ballpass_run"]),
-    )
-
-
 def _facts(reductions: Reductions | None) -> dict[str, Any] | None:
     return None if reductions is None else asdict(reductions)
-
-
-def _reductions(text: str | None) -> Reductions | None:
-    facts = None if text is None else json.loads(text)
-    return None if facts is None else Reductions.from_facts(facts)
 
 
 def _attributes(info: VariableInfo) -> dict[str, str]:

@@ -26,15 +26,14 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.netcdf import seal
 from ballpass.runtime.run.request import Request, check_length, checked_rate, run_length
 from ballpass.runtime.run.simulate import simulate
-from ballpass.runtime.run.solution import SEAL, Solution, Statistics, contents
+from ballpass.runtime.run.solution import Solution, Statistics, contents
 from ballpass.runtime.run.start import start_time
 
 #: Numbers of the samples of a piece, 16 MB; in memory a few times as much is needed.
 PIECE = 2**21
-#: Bytes that are read at once for the digest.
-BLOCK = 2**20
 
 
 def stream_run(model: LoadedModel, numbers: Numbers, request: Request, path: Path, piece: int = PIECE) -> Statistics:
@@ -158,12 +157,10 @@ def _part(progress: Callable[[float], None] | None, done: float, share: float) -
 
 def _seal(path: Path) -> None:
     """Put the digest of its bytes behind a file, as `Solution.save` does."""
-    digest = hashlib.sha256()
     with path.open("rb") as stream:
-        while block := stream.read(BLOCK):
-            digest.update(block)
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
     with path.open("ab") as stream:
-        stream.write(SEAL + digest.hexdigest().encode() + b"\n")
+        stream.write(seal(digest))
 
 
 @contextmanager

@@ -24,7 +24,8 @@ from ballpass.runtime.app.commands.shared import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.runtime.ask.life_records import BearingStrength, LifeReport
+    from ballpass.runtime.ask.life_records import BearingStrength
+    from ballpass.runtime.ask.life_text import LifeReport
     from ballpass.runtime.contract import BearingInfo
     from ballpass.runtime.model import Model
 

@@ -100,7 +100,7 @@ def spectrum(
                     f"{scene} holds a run that is done: options of a simulation have no place. Allowed: --of, "
                     "--envelope, --orders, --spectrogram, --window, --scaling, --top, --transient."
                 )
-            from ballpass.runtime.run.solution import load_solution
+            from ballpass.runtime.run.solution_file import load_solution
 
             stages("read")
             solution = load_solution(scene)
