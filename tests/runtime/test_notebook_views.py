@@ -121,6 +121,7 @@ def test_reprs_of_reports_are_short(reports: dict[str, Any]) -> None:
         ("Model", "bearing.clearance", True),
         ("Parameters", "Diametral clearance", False),
         ("Solution", "centre of the inner ring", True),
+        ("Results", "centre of the inner ring", True),
         ("Linearization", "ratio", False),
         ("StaticEquilibrium", "ball 8", False),
         ("Explanation", "at rest under the load", False),

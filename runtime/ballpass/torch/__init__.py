@@ -26,7 +26,7 @@ def wrap(function: QuantityFunction) -> Callable[[torch.Tensor | Mapping[str, to
     It takes a tensor of shape (..., parameters), in the order of ``function.wrt``, or a mapping with some of these
     names, of which those left out keep the scene's values; all SI.  It gives a tensor of 64 bits of shape
     (..., quantities), or (...) where the function is of one name.  The models run on the processor, wherever the tensor
-    is.  Derivatives are first ones, forward and reverse.
+    is.  Derivatives are first ones, forward and reverse; ``function.certify`` checks them at a point.
 
     Raises
     ------

@@ -42,6 +42,9 @@ class Results(ShortRepr):
     solution: Solution
     summary: Mapping[str, Any]
 
+    def _repr_html_(self) -> str:
+        return self.solution._repr_html_()
+
 
 def write_results(
     folder: Path, write: Callable[[Path], dict[str, Any]], *, figures: Collection[str] = ()
