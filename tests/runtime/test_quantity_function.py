@@ -148,7 +148,9 @@ def test_a_peak_that_passes_to_another_ball_is_warned_of_and_certified_as_a_kink
         assert f"{slope:.4g}"[:3] in words
     assert np.min(np.abs(given - slopes)) < 1e-3 * abs(slopes[0])
     largest.jacobian([tie])  # said once
-    (pair,) = largest.certify([tie]).pairs
+    report = largest.certify([tie])
+    (pair,) = report.pairs
+    assert "not checked, 1 pairs: a kink: the slopes on both sides" in str(report)
     assert pair.check.sides == pytest.approx(slopes, rel=1e-2)
     assert pair.by_steps == given[0]
 

@@ -32,8 +32,9 @@ def wrap(function: QuantityFunction) -> Callable[[ArrayLike | Mapping[str, Array
     names, of which those left out keep the scene's values; all SI.  It gives an array of 64 bits of shape
     (..., quantities), or (...) where the function is of one name.
 
-    Derivatives are first ones, forward and reverse; ``function.certify`` checks them at a point.  An error of a run is a
-    `BallpassError`; from within ``jit`` and ``vmap`` JAX wraps it in a ``jax.errors.JaxRuntimeError``, with its message.
+    Derivatives are first ones, forward and reverse; ``function.certify`` checks them at a point.  An error of a run is
+    a `BallpassError`; from within ``jit`` and ``vmap`` JAX wraps it in a ``jax.errors.JaxRuntimeError``, with its
+    message.
 
     Raises
     ------

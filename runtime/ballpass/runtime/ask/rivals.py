@@ -36,11 +36,14 @@ def nearest_rival(view: View, quantity: Quantity, mark: Mark) -> str:
             change = np.where(apart > least, np.abs(value - best) / apart, np.inf)
         k = int(np.argmin(change)) if change.size else 0
         if change.size and change[k] < nearest:
-            nearest, ball = change[k], f", ball {other.ball + 1}" if signal.value.shape[1] > 1 else ""
+            nearest = change[k]
+            places = [
+                f"t = {one.time:.6g} s{f', ball {one.ball + 1}' if signal.value.shape[1] > 1 else ''}"
+                for one in (other, mark)
+            ]
             words = (
-                f"a change of {view.names[k]} by {change[k] * scales[k]:.2g} puts the extreme at t = {other.time:.6g} s"
-                f"{ball} in place of that at t = {mark.time:.6g} s, and makes the derivative {its[k]:.4g} instead of "
-                f"{slope[k]:.4g}"
+                f"a change of {view.names[k]} by {nearest * scales[k]:.2g} puts the extreme at {places[0]} in place of "
+                f"that at {places[1]}, and makes the derivative {its[k]:.4g} instead of {slope[k]:.4g}"
             )
     return words
 

@@ -384,6 +384,8 @@ def _remarks(report: SensitivityReport) -> list[str]:
             # numbers differ from pair to pair; what may help is the same
             kind = pair.check.reason.split(" by ", 1)[0] + ": " + pair.check.reason.rsplit(": ", 1)[-1]
             kind = pair.check.reason if ": " not in pair.check.reason else kind
+            if pair.check.sides is not None:
+                kind = "a kink: the slopes on both sides are in the table"
             reasons[kind] = reasons.get(kind, 0) + 1
     lines += [f"[yellow]not checked[/], {count} pairs: {escape(reason)}" for reason, count in reasons.items()]
     if report.grazing:
