@@ -42,7 +42,7 @@ sphinx_gallery_conf = {
     "gallery_dirs": "auto_gallery",
     "abort_on_example_error": True,
     "within_subsection_order": "FileNameSortKey",
-    "first_notebook_cell": "# starts in docs/gallery of the repository; else change paths\n%matplotlib inline",
+    "first_notebook_cell": "%matplotlib inline",
     "min_reported_time": 1000,
     "remove_config_comments": True,
     "reset_modules": ("matplotlib", "ballpass.runtime.plot.style.use"),

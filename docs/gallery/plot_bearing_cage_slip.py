@@ -15,7 +15,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 from ballpass.runtime.ask.characteristic import characteristic_lines
 from ballpass.runtime.ask.spectrum import amplitude_spectrum
@@ -34,7 +34,7 @@ slip = 0.0
 """
 Path("generated").mkdir(exist_ok=True)
 scene = Path("generated/spalled_rotor.toml")
-scene.write_text(Path("../../scenes/rotor.toml").read_text() + SPALL)
+scene.write_text(shipped_scenes()["rotor"].read_text() + SPALL)
 model = load(generate(scene))
 
 # %%

@@ -11,10 +11,10 @@ life comes from the simulated ball forces at every place of both raceways.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-model = load(generate("../../scenes/punching_press.toml"))
+model = load(generate(shipped_scenes()["press"]))
 clearance = np.linspace(0, 30e-6, 16)
 found = model.simulate_many(
     {"bearing.clearance": clearance}, ["life_sectors", "life_mean"], cycles=66

@@ -11,10 +11,10 @@ load and gives the matrices and modes of small vibrations about that place.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-model = load(generate("../../scenes/rotor.toml"))
+model = load(generate(shipped_scenes()["rotor"]))
 loads = np.logspace(1.5, 4, 26)
 modes = [
     model.linearize(

@@ -12,10 +12,10 @@ the rotor runs on.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-model = load(generate("../../scenes/rotor.toml"))
+model = load(generate(shipped_scenes()["rotor"]))
 speed = np.linspace(2000, 40000, 40) * np.pi / 30
 changed = {
     "bearing.clearance": -8e-6,

@@ -11,11 +11,11 @@ beside it.
 # A bearing without a mechanism: two degrees of freedom and eight balls.
 import matplotlib.pyplot as plt
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 from ballpass.runtime.ask.characteristic import frequencies_of
 
-model = load(generate("../../scenes/varying_compliance.toml"))
+model = load(generate(shipped_scenes()["varying-compliance"]))
 frequencies = frequencies_of(model.manifest.bearing, model.numbers().values)
 print(f"balls pass the load {frequencies.ball_pass_outer:.2f} times a second")
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
 orders = range(5, 12)
@@ -22,7 +22,7 @@ waves = "\n[bearing.inner_waviness]\n" + "".join(
 )
 Path("generated").mkdir(exist_ok=True)
 scene = Path("generated/wavy_rotor.toml")
-scene.write_text(Path("../../scenes/rotor.toml").read_text() + waves)
+scene.write_text(shipped_scenes()["rotor"].read_text() + waves)
 model = load(generate(scene))
 
 # %%

@@ -12,10 +12,10 @@ the frame up.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-model = load(generate("../../scenes/punching_press.toml"))
+model = load(generate(shipped_scenes()["press"]))
 bearing = model.life().bearings[0]
 for name, ring in (("inner", bearing.inner), ("outer", bearing.outer)):
     print(

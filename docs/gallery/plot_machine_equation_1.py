@@ -12,10 +12,10 @@ the scene file.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ballpass.derive import derive, generate, read_scene
+from ballpass.derive import derive, generate, read_scene, shipped_scenes
 from ballpass.runtime import load
 
-system = derive(read_scene("../../scenes/punching_press.toml"))
+system = derive(read_scene(shipped_scenes()["press"]))
 equations = system.reactions
 print(len(equations.unknowns), "unknowns:", *equations.unknowns[:5])
 print(*equations.unknowns[5:])
@@ -31,7 +31,7 @@ print(filled.sum(), "of", filled.size, "entries differ from zero")
 # Generated and run, the same equations give the reactions over a turn. The work of the
 # drive must equal the work against the punch: force times the way of the slider within
 # the window.
-model = load(generate("../../scenes/punching_press.toml"))
+model = load(generate(shipped_scenes()["press"]))
 turn = model.simulate(
     cycles=1, transient=0, outputs=["reaction.A.x", "reaction.A.y", "drive_torque"]
 )

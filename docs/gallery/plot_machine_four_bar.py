@@ -11,10 +11,10 @@ not close is refused, with the joint and the angle where it fails.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import RequestError, load
 
-model = load(generate("../../scenes/four_bar.toml"))
+model = load(generate(shipped_scenes()["four-bar"]))
 info = model.parameters.info("mechanism.bodies.crank.points.B")
 print(info.description, info.default, info.unit)
 

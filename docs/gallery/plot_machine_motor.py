@@ -12,10 +12,10 @@ brings it back in the rest of the turn.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-model = load(generate("../../scenes/punching_press_motor.toml"))
+model = load(generate(shipped_scenes()["punching-press-motor"]))
 
 # %%
 # The inertia of the flywheel is a number: three flywheels, one model. The range of the

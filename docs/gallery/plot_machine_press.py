@@ -10,10 +10,10 @@ crank turns in a 6204 bearing.
 # `generate` writes C code, `load` compiles it. Both are skipped where nothing changed.
 import matplotlib.pyplot as plt
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-model = load(generate("../../scenes/punching_press.toml"))
+model = load(generate(shipped_scenes()["press"]))
 solution = model.simulate(cycles=4, transient=2)
 
 # %%

@@ -11,11 +11,11 @@ wander along a curve.
 # Two hundred turns behind the transient, and one more with fine steps.
 import matplotlib.pyplot as plt
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 from ballpass.runtime.ask.observables import stroboscopic_points
 
-model = load(generate("../../scenes/punching_press.toml"))
+model = load(generate(shipped_scenes()["press"]))
 run = model.simulate(
     cycles=220, transient=20, samples_per_cycle=1000, outputs=["inner.y"]
 )

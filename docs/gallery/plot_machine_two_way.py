@@ -11,12 +11,12 @@ ways.
 # Two scenes, two models. The second one has the bearing as a joint with play.
 import matplotlib.pyplot as plt
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-scenes = {"one-way": "punching_press", "two-way": "punching_press_two_way"}
+scenes = {"one-way": "press", "two-way": "punching-press-two-way"}
 models = {
-    name: load(generate(f"../../scenes/{scene}.toml")) for name, scene in scenes.items()
+    name: load(generate(shipped_scenes()[scene])) for name, scene in scenes.items()
 }
 
 # %%

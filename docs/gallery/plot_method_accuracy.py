@@ -11,10 +11,10 @@ compares, and says how large the error is.
 # of 1e-12.
 import matplotlib.pyplot as plt
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-model = load(generate("../../scenes/punching_press.toml"))
+model = load(generate(shipped_scenes()["press"]))
 truth = model.reduce(cycles=4, rtol=1e-12, kinks="located")["ball.force"].maximum
 targets = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6]
 runs = [

@@ -11,10 +11,10 @@ together in the lanes of one processor core.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-model = load(generate("../../scenes/punching_press.toml"))
+model = load(generate(shipped_scenes()["press"]))
 clearance = np.linspace(0, 40e-6, 200)
 found = model.simulate_many(
     {"bearing.clearance": clearance},

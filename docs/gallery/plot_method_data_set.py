@@ -16,7 +16,7 @@ import numpy as np
 import xarray
 from sklearn.ensemble import RandomForestClassifier
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import Distribution, SignalClass, Signals, load, make_data_set
 from ballpass.runtime.ask.vibration import diagnosis, envelope
 
@@ -33,7 +33,7 @@ slip = 0.0
 """
 Path("generated").mkdir(exist_ok=True)
 scene = Path("generated/spalled_rotor.toml")
-scene.write_text(Path("../../scenes/rotor.toml").read_text() + SPALL)
+scene.write_text(shipped_scenes()["rotor"].read_text() + SPALL)
 model = load(generate(scene))
 
 

@@ -15,14 +15,14 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-folder = generate("../../scenes/punching_press.toml")
+folder = generate(shipped_scenes()["press"])
 program = Path("generated/punching_press_c")
 ballpass = Path(sys.executable).with_name("ballpass")
 subprocess.run(
-    [ballpass, "export", "../../scenes/punching_press.toml", "--c", "--out", program],
+    [ballpass, "export", folder, "--c", "--out", program],
     check=True,
 )
 subprocess.run(["make", "-s", "-C", program], check=True)

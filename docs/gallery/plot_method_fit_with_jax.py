@@ -16,11 +16,11 @@ import numpy as np
 import optax
 
 import ballpass.jax
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import QuantityFunction, load
 
 jax.config.update("jax_enable_x64", True)
-model = load(generate("../../scenes/punching_press.toml"))
+model = load(generate(shipped_scenes()["press"]))
 
 # %%
 # A measured signal is a quantity for each sample: the ring's place at 72 crank angles

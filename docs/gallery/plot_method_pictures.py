@@ -10,10 +10,10 @@ loads, and any output over time.
 # Without axes each call makes a figure of its own; with `ax` it draws into yours.
 import matplotlib.pyplot as plt
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-model = load(generate("../../scenes/punching_press.toml"))
+model = load(generate(shipped_scenes()["press"]))
 solution = model.simulate(cycles=8, transient=2)
 
 figure, axes = plt.subplots(2, 2, figsize=(9.5, 7), layout="constrained")

@@ -10,10 +10,10 @@ each checked by a second route.
 # %/% says by how many per cent the force changes when the number grows by one.
 import matplotlib.pyplot as plt
 
-from ballpass.derive import generate
+from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
 
-model = load(generate("../../scenes/punching_press.toml"))
+model = load(generate(shipped_scenes()["press"]))
 names = [
     "mechanism.forces.punch.force.y",
     "bearing.contact.inner_groove_radius",

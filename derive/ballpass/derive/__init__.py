@@ -22,9 +22,21 @@ if TYPE_CHECKING:
     from ballpass.derive.reading.read import read_scene
     from ballpass.derive.scene.errors import SceneError
     from ballpass.derive.scene.records import Scene
+    from ballpass.derive.scene.shipped import shipped_scenes
     from ballpass.derive.system import System, derive
 
-__all__ = ["Scene", "SceneError", "System", "check", "derive", "equations", "generate", "lower", "read_scene"]
+__all__ = [
+    "Scene",
+    "SceneError",
+    "System",
+    "check",
+    "derive",
+    "equations",
+    "generate",
+    "lower",
+    "read_scene",
+    "shipped_scenes",
+]
 
 _HOME = {
     "Scene": "scene.records",
@@ -36,6 +48,7 @@ _HOME = {
     "generate": "emit.generate",
     "lower": "lowering.functions",
     "read_scene": "reading.read",
+    "shipped_scenes": "scene.shipped",
 }
 
 

@@ -10,7 +10,15 @@ SHORT = {"punching_press": "press", "toggle_press": "toggle"}
 
 
 def shipped_scenes() -> dict[str, Path]:
-    """Scene files by the name that ``ballpass new`` has for them, the press first."""
+    """Scene files that come with ballpass, by the names that ``ballpass new`` has for them, the press first.
+
+    Examples
+    --------
+    >>> scenes = shipped_scenes()
+    >>> list(scenes)[0], scenes["four-bar"].name
+    ('press', 'four_bar.toml')
+    >>> folder = generate(scenes["press"])
+    """
     here = Path(__file__).resolve()
     packaged = here.parents[1] / "scenes"
     folder = packaged if packaged.is_dir() else here.parents[4] / "scenes"
