@@ -137,7 +137,7 @@ def test_a_notebook_gets_a_bar_that_leaves_the_time(monkeypatch: pytest.MonkeyPa
     assert re.fullmatch(r"<small>&lt;second&gt;: \d+ s</small>", shown_there[-1]["text/html"])
 
 
-def test_an_interrupt_between_the_runs_of_a_call_is_no_result(rotor: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_between_the_runs_of_a_call_is_no_result(press: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second ensemble of a call is interrupted: what it has not run is neither a derivative nor a verdict."""
     plain, calls = ensemble.run_chunks, []
 
@@ -147,10 +147,10 @@ def test_an_interrupt_between_the_runs_of_a_call_is_no_result(rotor: Model, monk
 
     monkeypatch.setattr(ensemble, "run_chunks", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        rotor.sensitivity("rms:inner.y", "bearing.clearance", cycles=2, transient=1)
+        press.sensitivity("rms:inner.y", "bearing.clearance", cycles=1, transient=0.5)
     calls.clear()
     table = {"bearing.clearance": [5e-6, 8e-6]}
-    found = rotor.simulate_many(table, "rms:inner.y", cycles=2, transient=1, growth=True)
+    found = press.simulate_many(table, "rms:inner.y", cycles=1, transient=0.5, growth=True)
     assert found.interrupted
     assert len(calls) == 2
 
