@@ -59,6 +59,15 @@ def test_every_feature_adds_operations_where_it_acts_and_none_where_it_does_not(
             assert added["kernel.stage"] > 0
 
 
+def test_parts_are_counted_whose_outputs_nobody_could_ask_for_without_them(scene_text: Callable[..., str]) -> None:
+    """Outputs on request of linkage, gravity and damping, and a pattern of two parts."""
+    outputs = ("point.slider.C.ay", "weight.power", "contact.loss", "*.power")
+    scene = replace(press(scene_text), outputs=outputs)
+    assert cost(scene).added["gravity"]["rhs"] == cost(press(scene_text)).added["gravity"]["rhs"] > 0
+    alone = cost(replace(scene, outputs=("point.slider.C.ay",))).added["mechanism"]
+    assert alone["rhs"] == cost(scene).added["mechanism"]["rhs"] > 0
+
+
 def test_a_ball_more_costs_nothing_in_the_steppers_text() -> None:
     scene = read_scene(ROOT / "scenes/punching_press.toml")
     (bearing,) = scene.bearings

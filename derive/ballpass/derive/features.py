@@ -12,7 +12,9 @@ from dataclasses import dataclass, replace
 
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.lowering.functions import lower, operations
+from ballpass.derive.outputs import OUTPUTS
 from ballpass.derive.scene.bearing_records import Bearing, Damping, EquivalentMass, InitialState, InnerRing
+from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.records import FRAME, ConstantLoad, Load, Mechanism, Scene, Shaft
 from ballpass.derive.system import derive
@@ -87,9 +89,21 @@ def cost(scene: Scene, progress: Callable[[str], None] | None = None) -> Cost:
             continue
         if progress is not None:
             progress(feature.name)
-        rest = count_operations(feature.without)
+        rest = _count_what_is_left(feature.without)
         added[feature.name] = {name: count - rest.get(name, 0) for name, count in full.items()}
     return Cost(functions=full, added=added)
+
+
+def _count_what_is_left(scene: Scene) -> dict[str, int]:
+    """Operations of a scene without one of its parts; outputs that were of this part go with it."""
+    try:
+        return count_operations(scene)
+    except SceneError as error:
+        gone = {fault.given for fault in error.faults if fault.key == OUTPUTS}
+        if not gone:
+            raise
+        left = tuple(pattern for pattern in scene.outputs if repr(pattern) not in gone)
+        return count_operations(replace(scene, outputs=left))
 
 
 def _features(scene: Scene) -> Iterator[Feature]:
@@ -130,16 +144,11 @@ def _of_mechanism(scene: Scene, mechanism: Mechanism) -> Iterator[Feature]:
         )
     for force in mechanism.forces:
         rest = tuple(f for f in mechanism.forces if f is not force)
-        alone = all(f.table != force.table for f in rest)
         yield Feature(
             name=f"{force.word.replace('_', ' ')} {force.name}",
             path=f"mechanism.{force.table}.{force.name}",
             modelled=force.pathway.words() + force.law.words(),
-            without=replace(
-                scene,
-                mechanism=replace(mechanism, forces=rest),
-                outputs=_patterns(scene, f"{force.word}." if alone else f"{force.label}."),
-            ),
+            without=replace(scene, mechanism=replace(mechanism, forces=rest)),
         )
 
 
@@ -172,7 +181,7 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
             name=f"contact damping{of}",
             path=f"{bearing.path}.damping",
             modelled=f"law {bearing.damping.law} at each ball",
-            without=_keep(scene, f"{bearing.prefix}ball.damping_force", bearing=undamped),
+            without=_with(scene, undamped),
         )
     if bearing.damping.smoothing is not None:
         kinked = replace(bearing, damping=replace(bearing.damping, smoothing=None))
@@ -199,7 +208,7 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
             name=f"outer ring{of}",
             path=f"{bearing.path}.outer_ring",
             modelled="outer ring on an elastic, damped housing: two coordinates more",
-            without=_keep(scene, f"{bearing.prefix}outer", bearing=fixed),
+            without=_with(scene, fixed),
         )
     if bearing.cage is not None:
         cage = bearing.cage
@@ -257,7 +266,6 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
         shaft=Shaft(speed=mechanism.driver.speed),
         bearings=tuple(bearings),
         quantities=tuple(quantities),
-        outputs=_patterns(scene, "reaction", "drive", "body", *(f"{f.word}." for f in mechanism.forces)),
     )
 
 
@@ -284,17 +292,6 @@ def _one_way(scene: Scene, bearing: Bearing) -> Scene | None:
     return replace(_with(scene, loaded), quantities=(*kept, share, mass))
 
 
-def _keep(scene: Scene, *vanished: str, bearing: Bearing) -> Scene:
-    return replace(_with(scene, bearing), outputs=_patterns(scene, *vanished))
-
-
 def _with(scene: Scene, bearing: Bearing) -> Scene:
     """The scene with another bearing of that name."""
     return replace(scene, bearings=tuple(bearing if b.name == bearing.name else b for b in scene.bearings))
-
-
-def _patterns(scene: Scene, *vanished: str) -> tuple[str, ...]:
-    """Output patterns without those of a feature that is left out."""
-    return tuple(p for p in scene.outputs if not p.startswith(vanished)) or (
-        f"{scene.bearings[0].prefix if scene.bearings else ''}inner.*",
-    )

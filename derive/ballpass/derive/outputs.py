@@ -17,6 +17,9 @@ from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.records import Mechanism
 from ballpass.derive.variables import DRIVER_ANGLE, Output
 
+#: Key of the scene file under which its outputs stand.
+OUTPUTS = "run.outputs"
+
 
 def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None) -> list[Output]:
     """What a bearing reports, in the order it is listed: rings, balls, sums over the balls, load on the inner ring."""
@@ -127,7 +130,7 @@ def select_outputs(
     beyond = tuple(p for p in patterns if not any(fnmatchcase(name, p) for name in names))
     faults = [
         Fault(
-            key="run.outputs",
+            key=OUTPUTS,
             problem="no output of this scene matches",
             given=repr(pattern),
             allowed=", ".join(names) + f"; on request {_grouped(further)}" * bool(further),
