@@ -86,6 +86,8 @@ def test_new_prints_the_command_that_runs_the_copy(tmp_path: Path, monkeypatch: 
     assert following == "Next: ballpass run 'my rotor/rotor.toml'"
     assert call("new", "punching_press").exit_code == 0  # the file's name, to here
     assert Path("punching_press.toml").is_file()
+    named = call("new", "press", "mine.toml")  # taken for the name of the copy
+    assert (named.exit_code, "rename the file then" in named.stderr, Path("mine.toml").exists()) == (2, True, False)
     unknown = call("new", "rotr")
     assert unknown.exit_code == 2
     assert "rotor" in unknown.stderr

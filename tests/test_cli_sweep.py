@@ -203,6 +203,7 @@ def test_a_member_that_fails_is_named_and_the_others_are_kept(site: Path, sweep:
         (("--vary", f"{CLEARANCE}=1um:9um:2", "--set", f"{CLEARANCE}=2um"), "given twice"),
         (("--vary", f"{CLEARANCE}=1um:9um:2", "--set", f"{LOAD}=2N", "--set", f"{LOAD}=3N"), "2N and 3N"),
         (("--vary", f"{CLEARANCE}=1um:9um:2000000"), f"at most {MOST}"),
+        (("--vary", f"{CLEARANCE}=1um:9um:2000000000"), f"at most {MOST}"),
         (("--vary", f"{CLEARANCE}=1um:9um:2000", "--vary", f"{LOAD}=2N:9N:2000"), f"at most {MOST}"),
         (("--vary", f"{CLEARANCE}=1um:9um:2", "--of", "peak_ball_farce"), "peak_ball_force"),
         (("--vary", f"{CLEARANCE}=1um:9um:2", "--threads", "0"), "from 1 on"),

@@ -586,6 +586,7 @@ def test_command_writes_the_folder_and_wants_a_format(tmp_path: Path, monkeypatc
         (("--c", "--fmu"), "both formats were given"),
         (("--c", "--input", "load"), "--input is for --fmu"),
         (("--fmu", "--out", "there"), "this is a folder"),
+        (("--fmu", "--out", "press"), "ends in .fmu"),
         (("--fmu", "--input", "bearing"), "does not change in a run"),
     ):
         refused = CliRunner().invoke(app, ["export", str(scene), *wrong])

@@ -135,7 +135,7 @@ def _scene(
     if coupling is not None:
         data, name = recoupled(data, coupling), f"{name}_{coupling.replace('-', '_')}"
     collector = Collector(lines=index_lines(text))
-    collector.check_name((), name, "scene")
+    collector.check_name((), name, "scene file")
     if not any(key in data for key in _TABLES):
         collector.fault(
             (),

@@ -23,7 +23,7 @@ from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 
 MAX_NAME = 64
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-NAME_RULE = f'a letter, then letters, digits and "_"; at most {MAX_NAME} characters; not "{FRAME}"'
+NAME_RULE = f'a letter (a to z, A to Z), then letters, digits and "_"; at most {MAX_NAME} characters; not "{FRAME}"'
 
 Path = tuple[str, ...]
 Choice = TypeVar("Choice", bound=str)

@@ -320,8 +320,12 @@ def export(
         check_folder(target.parent if fmu else target)
         if fmu and target.is_dir():
             raise RequestError(f"--out {target}: this is a folder. Name the FMU to write, as in export/press.fmu.")
+        if fmu and target.suffix != ".fmu":
+            raise RequestError(
+                f"--out {target}: importers take an FMU by its ending. Allowed: a name that ends in .fmu."
+            )
         manifest = read_own(scene, stages, read_artefact, lambda manifest: manifest)
-        stages("export")
+        stages("export the FMU" if fmu else "export")
         # here, for they bring CasADi
         if fmu:
             from ballpass.runtime.app.commands.speed_input import speed_becomes_input, with_speed_over_time

@@ -173,7 +173,9 @@ def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str
             change = math.inf if kind == "total" else abs(value - before) / max(abs(before), abs(value), 1e-300)
             counts = (kind in ("min", "max") and peak > PEAKS) or (kind == "rms" and mean > MEANS)
             if change == math.inf or (counts and change > PEAKS):
-                lines.append((change, f"{entry}.{kind} {factor * value:.4g} {shown} instead of {factor * before:.4g}"))
+                now, first = (f"{factor * number:z.4g}" for number in (value, before))
+                than = f"instead of {first}" if now != first else "as before"
+                lines.append((change, f"{entry}.{kind} {now} {shown} {than}"))
         if instead:
             summary[entry] |= told[entry]
             for key in numbers.keys() & _BALL_FORCES.keys():

@@ -38,6 +38,11 @@ def new(
         source = scenes.get(name.replace("_", "-")) or {path.stem: path for path in scenes.values()}.get(name)
         if source is None:
             raise RequestError(f"new: {unknown_name('scene', name, scenes)}")
+        if folder.suffix == ".toml" or folder.is_file():
+            raise RequestError(
+                f"new: {folder} is to be the folder that the copy, {source.name}, is written into. Allowed: a folder, "
+                "there or not. Copy first and rename the file then."
+            )
         folder.mkdir(parents=True, exist_ok=True)
         target = folder / source.name
         try:

@@ -55,6 +55,7 @@ STAGES = {
     "check": "deriving to compare",
     "compile": "compiling",
     "export": "writing the C program",
+    "export the FMU": "compiling the FMU",
     "simulate": "simulating",
     "spectrum": "computing the spectrum",
     "draw": "drawing figures",

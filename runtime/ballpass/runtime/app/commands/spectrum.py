@@ -53,7 +53,11 @@ class Lines:
 def spectrum(
     scene: Annotated[
         Path,
-        typer.Argument(help="Scene file (TOML), or the solution.nc of a run, or what ballpass stream wrote."),
+        typer.Argument(
+            metavar="SCENE",
+            help="Scene file (TOML), or the solution.nc of a run, or what ballpass stream wrote.",
+            show_default=False,
+        ),
     ],
     of: Annotated[str, typer.Option("--of", metavar="OUTPUT", help="Output or state of the scene: inner.ax.")],
     envelope: Annotated[
