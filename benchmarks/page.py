@@ -41,9 +41,8 @@ def write(results: Mapping[str, Result], state: Mapping[str, str], page: Path) -
         "preparation": _preparation,
     }
     (page.parent / "images").mkdir(parents=True, exist_ok=True)
-    lines = [head.rstrip()]
-    if "work_precision" in results:
-        lines += ["", *_summary(results["work_precision"])]
+    summary = _summary(results["work_precision"]) if "work_precision" in results else []
+    lines = [head.rstrip().replace("@SUMMARY@", "\n".join(summary))]
     for name, section in sections.items():
         if name in results:
             lines += ["", *section(results[name], page.parent / "images")]
@@ -78,7 +77,8 @@ def _summary(result: Result) -> list[str]:
     return [
         "## What to take from it",
         "",
-        f"At an error of {level_words(level)}: milliseconds of the stepper, and how many times as long others take.",
+        f"At an error of {level_words(level)}: milliseconds of ballpass's stepper; how many times as long others take.",
+        "The columns are three damping laws, from stiff to light.",
         "",
         *table(["", *(case["words"] for case, _ in cases)], rows),
     ]
