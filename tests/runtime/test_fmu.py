@@ -470,6 +470,10 @@ def test_names_that_cannot_be_inputs_are_refused(
     window = 'type = "unbalance"', 'type = "unbalance"\ntime_window = { start = "0.1 s" }'
     windowed = generate(scene_from_text(scene_text("rotor", window), "rotor"), tmp_path / "windowed")
     assert input_names(read_artefact(windowed), ["shaft"]) == ("shaft.speed",)  # though its end is a constant
+    polar = 'force = ["0 N", "-49.03 N"]', 'force = { magnitude = "49.03 N", direction = "-90 deg" }'
+    weight = generate(scene_from_text(scene_text("rotor", polar), "rotor"), tmp_path / "polar")
+    names = tuple(f"loads.weight.force.{part}" for part in ("magnitude", "direction"))
+    assert input_names(read_artefact(weight), ["loads.weight"]) == names
 
 
 @pytest.mark.long

@@ -26,8 +26,7 @@ NOTE = "/* Written by ballpass export. */"
 
 #: Names of parameters that may change in a run.
 _VARYING = re.compile(
-    r"loads?(\.\w+)?\.force\.[xy]"
-    r"|mechanism\.forces\.\w+\.force\.(x|y|magnitude|direction)"
+    r"(loads?(\.\w+)?|mechanism\.forces\.\w+)\.force\.(x|y|magnitude|direction)"
     r"|mechanism\.torques\.\w+\.torque"
     r"|mechanism\.driver\.torque\.torque"
     r"|shaft\.speed"
