@@ -1,15 +1,18 @@
 """Claims about exported FMUs: valid, the bits of `simulate`, independent instances, states that come back, errors told.
 
-The importer is FMPy, of the Modelica Association.
+The importer is FMPy, of the Modelica Association, and in some tests Ecos, in C++.
 """
 
 from __future__ import annotations
 
 import ctypes
+import importlib.util
+import json
 import math
 import re
 import shutil
 import subprocess
+import sys
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -39,6 +42,17 @@ pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C co
 FORCE = "mechanism.forces.punch.force.y"
 TORQUE = "mechanism.driver.torque.torque"
 SPEED = "mechanism.driver.speed"
+
+#: The press with a motor gets a constant torque in its place.
+WITHOUT_MOTOR = (
+    (
+        'law = "asynchronous"                    # Kloss\'s curve\n'
+        'breakdown_torque = "25 N*m"             # [assumption] some 2.2 times the nominal torque\n'
+        "breakdown_slip = 0.3                    # [assumption] small motors of many poles have much slip\n"
+        'synchronous_speed = "500 rpm"           # [paper] the speed of the crank',
+        'law = "constant"\ntorque = "0 N*m"',
+    ),
+)
 
 
 @pytest.fixture(scope="module")
@@ -279,6 +293,41 @@ def test_inputs_hold_until_the_next_step(exported: Callable[..., Exported]) -> N
     assert np.max(other) > 0.5
 
 
+@pytest.mark.long
+def test_a_load_on_a_ring_is_an_input(exported: Callable[..., Exported]) -> None:
+    """A constant one has the bits of the scene with it.  A ramp of held values becomes that of a table: the error is of
+    first order in the step where each is the value of the step's begin, of second where it is that of its middle."""
+    found = exported("rotor", ("loads.weight",))
+    weight = 'type = "constant"\nforce = ["0 N", "-49.03 N"]             # of 5 kg'
+    ramp = 'type = "table"\ntime = ["0 s", "0.1 s"]\nx = ["0 N", "20 N"]\ny = ["-49.03 N", "-149.03 N"]'
+    table = exported("rotor", (), (weight, ramp)).model
+    loads, names, end = ("loads.weight.force.x", "loads.weight.force.y"), ("inner.x", "inner.y"), 0.1
+    still = dict(zip(loads, (7.0, -80.0), strict=True))
+    times = np.linspace(0.0, end, 5)
+    expected = found.model.simulate(method="stepper", duration=end, times=reached(times), parameters=still)
+    with found.instance() as one:
+        one.begin(end, **still)
+        one.slave.doStep(0.0, times[1])
+        one.set(**still)
+        assert np.array_equal(one.steps(times[1:]), columns(expected, found.outputs)[1:])
+    solution = table.simulate(duration=end, times=[end], rtol=1e-11)
+    errors = []
+    for count in (200, 400, 800):
+        for part in (0.0, 0.5):
+            with found.instance() as one:
+                one.set(**dict(zip(loads, (0.0, -49.03), strict=True)))
+                one.slave.enterInitializationMode(startTime=0.0, stopTime=end, tolerance=1e-10)
+                one.slave.exitInitializationMode()
+                for k in range(count):
+                    there = (k + part) / count
+                    one.set(**dict(zip(loads, (20.0 * there, -49.03 - 100.0 * there), strict=True)))
+                    one.slave.doStep(k * end / count, (k + 1) * end / count - k * end / count)
+                errors.append(one.get(*names) - [solution.outputs[name][-1] for name in names])
+    first, second = (np.abs(errors[part::2]) for part in (0, 1))
+    assert np.all(np.abs(first[:-1] / first[1:] - 2.0) < 0.05), first
+    assert np.all(second[-1] < 1e-3 * first[-1]), (first, second)
+
+
 def test_derivatives_are_those_of_differences(exported: Callable[..., Exported]) -> None:
     """Of rates and outputs at a moment, to states, inputs and parameters, those that turn the balls as well."""
     found = press(exported)
@@ -482,13 +531,7 @@ def test_motor_outside_becomes_the_motor_inside_as_steps_get_shorter(exported: C
     outside = exported(
         "punching_press_motor",
         (TORQUE,),
-        (
-            'law = "asynchronous"                    # Kloss\'s curve\n'
-            'breakdown_torque = "25 N*m"             # [assumption] some 2.2 times the nominal torque\n'
-            "breakdown_slip = 0.3                    # [assumption] small motors of many poles have much slip\n"
-            'synchronous_speed = "500 rpm"           # [paper] the speed of the crank',
-            'law = "constant"\ntorque = "0 N*m"',
-        ),
+        *WITHOUT_MOTOR,
     )
     inside = exported("punching_press_motor").model
     end, synchronous = 0.25, 500.0 / 60.0 * 2.0 * math.pi
@@ -510,6 +553,76 @@ def test_motor_outside_becomes_the_motor_inside_as_steps_get_shorter(exported: C
             errors.append([angle - expected.outputs["driver.angle"][-1], speed - expected.outputs["driver.speed"][-1]])
     ratios = np.array(errors[:-1]) / np.array(errors[1:])
     assert np.all(np.abs(errors[-1]) < [1e-4, 2e-3]), errors
+    assert np.all(np.abs(ratios - 2.0) < 0.15), (errors, ratios)
+
+
+def in_ecos(tmp_path: Path, **asked: Any) -> np.ndarray:
+    """Values wanted behind each step of a co-simulation in Ecos."""
+    asked["result"] = str(tmp_path / "result.json")
+    script = Path(__file__).parent / "in_ecos.py"
+    subprocess.run(
+        [sys.executable, str(script)], input=json.dumps(asked), text=True, check=True, stdout=subprocess.PIPE
+    )
+    return np.array(json.loads(Path(asked["result"]).read_text(encoding="utf-8")))
+
+
+needs_ecos = pytest.mark.skipif(
+    importlib.util.find_spec("ecospy") is None, reason="needs Ecos, on Linux and x86-64: pip install ballpass[dev]"
+)
+
+
+@needs_ecos
+def test_another_importer_gets_the_same_bits(exported: Callable[..., Exported], tmp_path: Path) -> None:
+    """Two instances in Ecos, which reads FMUs by a C library of its own; without a stop time, as it steps."""
+    found = press(exported)
+    names = ["time", "inner.x", "outer.y", "reaction.A.y"]
+    rows = in_ecos(
+        tmp_path,
+        models={"one": str(found.path), "two": str(found.path)},
+        connections=[],
+        parameters={"two::bearing.clearance": 20e-6},
+        step=1e-3,
+        count=150,
+        wanted=[f"{model}::{name}" for model in ("one", "two") for name in names],
+    )
+    duration = found.model.simulate(method="stepper", samples_per_cycle=1).statistics.duration
+    for own, parameters in ((rows[:, :4], {}), (rows[:, 4:], {"bearing.clearance": 20e-6})):
+        solution = found.model.simulate(
+            method="stepper", times=np.concatenate([[0.0], own[:, 0]]), duration=duration, parameters=parameters
+        )
+        assert np.array_equal(own[:, 1:], columns(solution, names[1:])[1:])
+
+
+@needs_ecos
+@pytest.mark.long
+def test_fmus_connected_by_another_importer_turn_as_one_model(
+    exported: Callable[..., Exported], tmp_path: Path
+) -> None:
+    """One press has its motor inside; one its motor in Ecos; a third gets the torque of the first one's motor."""
+    inside, outside = exported("punching_press_motor"), exported("punching_press_motor", (TORQUE,), *WITHOUT_MOTOR)
+    speed = inside.model.parameters["mechanism.driver.speed"]
+    torque = float(
+        inside.model.simulate(duration=1e-3, times=[0.0], outputs=["drive_torque"]).outputs["drive_torque"][0]
+    )
+    errors = []
+    for count in (200, 400, 800):
+        rows = in_ecos(
+            tmp_path,
+            models={"inside": str(inside.path), "outside": str(outside.path), "third": str(outside.path)},
+            connections=[
+                ["outside::driver.speed", f"outside::{TORQUE}", True],
+                ["inside::drive_torque", f"third::{TORQUE}", False],
+            ],
+            parameters={f"{model}::{TORQUE}": torque for model in ("outside", "third")},
+            step=0.25 / count,
+            count=count,
+            wanted=[f"{model}::driver.speed" for model in ("inside", "outside", "third")],
+        )
+        whole, *others = rows[-1]
+        errors.append(np.array(others) - whole)
+    assert abs(whole / speed - 1.0) > 1e-3
+    ratios = np.array(errors[:-1]) / np.array(errors[1:])
+    assert np.all(np.abs(errors[-1]) < [1e-3, 3e-3]), errors
     assert np.all(np.abs(ratios - 2.0) < 0.15), (errors, ratios)
 
 
