@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +22,7 @@ from ballpass.derive.scene.errors import SceneError
 from ballpass.derive.system import System
 from ballpass.runtime import IntegrationError, Model, Solution, load
 from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.native.driver_library import DRIVER
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
@@ -45,6 +49,16 @@ def test_andrews_squeezer_starts_with_the_published_accelerations(andrews: Model
     definitions = [d for d in system.definitions if d in system.linkage.definitions]
     found = Evaluator(definitions, [system.linkage.pose(name).acceleration for name in names])(numbers)
     assert found == pytest.approx([BETA + THETA, 0.0, 0.0, 0.0], rel=1e-11, abs=1e-8)
+
+
+def test_a_driver_without_bearings_has_no_arrays_without_entries(andrews: Model) -> None:
+    """C knows none; nor does it say what a number is that is assigned twice in one expression."""
+    if shutil.which("gcc") is None:
+        pytest.skip("no gcc, whose warnings these are")
+    warnings = [f"-Werror={name}" for name in ("array-bounds", "stringop-overflow", "sequence-point")]
+    places = [f"-I{place}" for place in (andrews.folder, DRIVER)]
+    command = ["gcc", "-std=c99", "-O2", "-fopenmp-simd", *warnings, *places, "-DBALLPASS_REDUCTIONS", "-S"]
+    subprocess.run([*command, "-o", os.devnull, str(DRIVER / "stepper.c")], check=True)
 
 
 def test_andrews_squeezer_comes_to_the_published_end(andrews: Model) -> None:

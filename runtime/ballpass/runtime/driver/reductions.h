@@ -88,8 +88,9 @@ static const double BP_HAIR = 1e-14;
 /* Weights of Boole's rule. */
 static const double bp_boole[BP_POINTS] = {7.0 / 90.0, 32.0 / 90.0, 12.0 / 90.0, 32.0 / 90.0, 7.0 / 90.0};
 
-/* Quantities of all balls at a state and time: for each bearing BP_BALL_CHANNELS rows, one entry a ball. */
-enum { BP_BALL_QUANTITIES = BP_BALL_CHANNELS * BP_NB };
+/* Quantities of all balls at a state and time: for each bearing BP_BALL_CHANNELS rows, one entry a ball.  At least one: C knows no arrays
+   without entries. */
+enum { BP_BALL_QUANTITIES = BP_NB > 0 ? BP_BALL_CHANNELS * BP_NB : 1 };
 
 static inline void bp_ball_quantities(const bp_numbers *n, double t, const double *restrict x, double *restrict q)
 {
@@ -213,7 +214,7 @@ static inline double bp_channel(const bp_within *step, double theta, int channel
 {
     double x[BP_NX], q[BP_BALL_QUANTITIES];
     const double t = step->state(step->source, theta, x);
-    if (channel < BP_NX) return x[channel];
+    if (BP_NB == 0 || channel < BP_NX) return x[channel];
     int balls;
     bp_ball_quantities(step->n, t, x, q);
     const double *of = bp_ball_row(q, channel - BP_NX, &balls);

@@ -141,7 +141,10 @@ static inline void bp_field_held(const bp_numbers *n, const double *x, double *a
     for (int k = 0; k < BP_NQ; k++) {
         if (!bp_is_angle[k]) continue;
         a[k] = 0.0;
-        for (int j = 0; j < BP_NQ; j++) A[k * BP_NQ + j] = A[j * BP_NQ + k] = 0.0;
+        for (int j = 0; j < BP_NQ; j++) {
+            A[k * BP_NQ + j] = 0.0;
+            A[j * BP_NQ + k] = 0.0;
+        }
     }
 }
 
