@@ -1,9 +1,10 @@
 """Every command and every Python block of README and the documentation runs, page by page, and prints what it shows.
 
-The blocks of a page run in its order in a folder with copies of the shipped scenes.  Lines under a command are what it
-prints; where one begins with "error:", what it says on stderr as it fails.  A comment that begins with a number or a
-truth value is what the expression before it gives, to the printed digits; "shape (3,)" is its shape, and "refused" a
-refusal.  Gallery pages print their numbers themselves, while the site is built.
+The blocks of a page run in its order in a folder with copies of shipped scenes; a scene that starts with the name of
+a file, as a comment, is written there.  Lines under a command are what it prints; where one begins with "error:", what
+it says on stderr as it fails.  A comment that begins with a number or a truth value is what the expression before it
+gives, to the printed digits; "shape (3,)" is its shape, and "refused" a refusal.  Gallery pages print their numbers
+themselves, while the site is built.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ NOT_RUN = {
     r"ballpass trade ": "measures for minutes; tests/test_cli_trade.py runs it",
     r".* --of life_sectors --cycles 6 ": "takes minutes; tests/docs/test_life_table.py holds its numbers",
 }
-BLOCK = re.compile(r"^( *)```(console|python)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^( *)```(console|python|toml(?=\n# \w+\.toml\n))\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
 #: Columns of code that a page of 1280 pixels shows beside its contents.
 COLUMNS = 90
 FENCE = re.compile(r"^ *```([^`\n]*)\n(.*?)^ *```$", re.MULTILINE | re.DOTALL)
@@ -135,7 +136,9 @@ def test_blocks_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.Mon
     names["model"] = load("generated/punching_press")
     for kind, text, line in blocks(page):
         try:
-            if kind == "console":
+            if kind == "toml":
+                (tmp_path / text.partition("\n")[0].removeprefix("# ")).write_text(text, encoding="utf-8")
+            elif kind == "console":
                 run_console(text, tmp_path)
             else:
                 run_python(text, names)
