@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import math
+import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
 from artefact import DEFAULTS, write_folder
 
-from ballpass.runtime import IntegrationError, Model, NoKernelsWarning, RequestError, Status, load, load_solution
+from ballpass.runtime import (
+    ArtefactError,
+    IntegrationError,
+    Model,
+    NoKernelsWarning,
+    RequestError,
+    Status,
+    load,
+    load_solution,
+)
 from ballpass.runtime.native import compile
 from ballpass.runtime.native.casadi_integrators import METHODS, Frozen, OneStepIntegrator
 from ballpass.runtime.native.kernel import EvaluationError
@@ -382,6 +392,16 @@ def test_parameters_print_as_a_table(model: Model) -> None:
     assert model.parameters["body.weight"] == 4.0
     with pytest.raises(KeyError, match=r"body\.weight"):
         model.parameters["body.wieght"]
+
+
+def test_a_pickled_model_gives_the_same_bits_and_is_refused_where_its_folder_has_changed(tmp_path: Path) -> None:
+    folder = tmp_path / "model"
+    write_folder(folder)
+    sent = pickle.dumps(load(folder))
+    assert np.array_equal(pickle.loads(sent).simulate(cycles=1).x, load(folder).simulate(cycles=1).x)
+    other = sent.replace(b"0" * 64, b"f" * 64)  # the signature
+    with pytest.raises(ArtefactError, match="since the model was pickled"):
+        pickle.loads(other)
 
 
 def test_progress_runs_to_one(model: Model) -> None:

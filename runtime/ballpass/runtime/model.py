@@ -83,6 +83,17 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     return Model(place, manifest, library, compiler=compiler)
 
 
+def _load_same(folder: str, signature: str, compiler: str | None) -> Model:
+    """The model that another process has sent: loaded anew, if its folder is still the same."""
+    model = load(folder, compiler=compiler)
+    if model.manifest.signature != signature:
+        raise ArtefactError(
+            f"{folder}: another scene was generated here since the model was pickled. Allowed: the folder it was "
+            "loaded from, unchanged. Load it and pickle it again."
+        )
+    return model
+
+
 class Model(PointModel):
     """Functions of one scene with their names, units and defaults.  All numbers are SI.
 
@@ -107,6 +118,9 @@ class Model(PointModel):
     ) -> None:
         super().__init__(folder, manifest, library, compiler=compiler)
         self._assembled = b""  # parameters whose linkage was looked at last
+
+    def __reduce__(self) -> tuple[Callable[[str, str, str | None], Model], tuple[str, str, str | None]]:
+        return _load_same, (str(self.folder), self.manifest.signature, self._compiler)
 
     @property
     def methods(self) -> tuple[str, ...]:
