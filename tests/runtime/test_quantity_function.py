@@ -283,7 +283,8 @@ def test_pytorch_finds_derivatives_right(smooth: Model, torch: ModuleType) -> No
 
 def test_pytorch_gives_the_same_bits(torch: ModuleType, function: QuantityFunction, rows: np.ndarray) -> None:
     f, x = in_torch(function), torch.as_tensor(rows)
-    assert np.array_equal(f(x), function(rows))
+    for given in (x, rows, rows.tolist()):
+        assert np.array_equal(f(given), function(rows))
     assert np.array_equal(torch.func.vmap(f)(x), function(rows))
     slopes = function.jacobian(rows[:2])
     np.testing.assert_allclose(torch.func.vmap(torch.func.jacrev(f))(x[:2]), slopes, rtol=1e-15)

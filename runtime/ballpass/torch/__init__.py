@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from numpy.typing import ArrayLike
+
 from ballpass.runtime.certify.quantity_function import QuantityFunction
 from ballpass.runtime.contract.extras import missing
 
@@ -20,11 +22,11 @@ except ModuleNotFoundError as error:
 __all__ = ["wrap"]
 
 
-def wrap(function: QuantityFunction) -> Callable[[torch.Tensor | Mapping[str, torch.Tensor]], torch.Tensor]:
+def wrap(function: QuantityFunction) -> Callable[[ArrayLike | torch.Tensor | Mapping[str, torch.Tensor]], torch.Tensor]:
     """A function of PyTorch that gives the quantities of a `QuantityFunction`.
 
-    It takes a tensor of shape (..., parameters), in the order of ``function.wrt``, or a mapping with some of these
-    names, of which those left out keep the scene's values; all SI.  It gives a tensor of 64 bits of shape
+    It takes a tensor or array of shape (..., parameters), in the order of ``function.wrt``, or a mapping with some
+    of these names, of which those left out keep the scene's values; all SI.  It gives a tensor of 64 bits of shape
     (..., quantities), or (...) where the function is of one name.  The models run on the processor, wherever the tensor
     is.  Derivatives are first ones, forward and reverse; ``function.certify`` checks them at a point.
 
@@ -93,12 +95,14 @@ def wrap(function: QuantityFunction) -> Callable[[torch.Tensor | Mapping[str, to
         def vmap(info: Any, in_dims: tuple[int], x: torch.Tensor) -> tuple[torch.Tensor, int]:
             return Jacobian.apply(x.movedim(in_dims[0], 0)), 0
 
-    def wrapped(parameters: torch.Tensor | Mapping[str, torch.Tensor]) -> torch.Tensor:
+    def wrapped(parameters: ArrayLike | torch.Tensor | Mapping[str, torch.Tensor]) -> torch.Tensor:
         if isinstance(parameters, Mapping):
             given = [torch.as_tensor(value, dtype=torch.float64) for value in function.arguments(parameters)]
             x = torch.stack(torch.broadcast_tensors(*given), dim=-1)
-        else:
+        elif isinstance(parameters, torch.Tensor):
             x = parameters
+        else:  # numbers, which a tensor of its own would round to 32 bits
+            x = torch.as_tensor(parameters, dtype=torch.float64)
         function.check_shape(tuple(x.shape))
         values: torch.Tensor = Values.apply(x.to("cpu", torch.float64))
         return values.to(x.device)
