@@ -157,6 +157,10 @@ def test_completion_offers_the_commands(shell: str) -> None:
     done = CliRunner().invoke(app, env={**told, "_BALLPASS_COMPLETE": f"complete_{shell}"}, prog_name="ballpass")
     assert "sensitivity" in done.stdout
     assert "spectrum" not in done.stdout
+    words = {name: text.replace("ballpass sen", "ballpass new fo").replace("1", "2") for name, text in told.items()}
+    named = CliRunner().invoke(app, env={**words, "_BALLPASS_COMPLETE": f"complete_{shell}"}, prog_name="ballpass")
+    assert "four-bar" in named.stdout
+    assert "rotor" not in named.stdout
 
 
 def test_help_groups_all_commands_in_80_columns() -> None:

@@ -10,13 +10,28 @@ import typer
 
 from ballpass.runtime.app.commands.shared import command, show
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import can_derive
 from ballpass.runtime.contract.parameters import unknown_name
+
+
+def _names(incomplete: str) -> list[str]:
+    """Names that the shell completes; none where only the runtime is installed."""
+    if not can_derive():
+        return []
+    from ballpass.derive.scene.shipped import shipped_scenes
+
+    return [name for name in shipped_scenes() if name.startswith(incomplete)]
 
 
 def new(
     name: Annotated[
         str | None,
-        typer.Argument(metavar="NAME", help="Name of a scene: press, four-bar, rotor, toggle ...", show_default=False),
+        typer.Argument(
+            metavar="NAME",
+            help="Name of a scene: press, four-bar, rotor, toggle ...",
+            show_default=False,
+            autocompletion=_names,
+        ),
     ] = None,
     folder: Annotated[
         Path, typer.Argument(metavar="DIR", help="Folder to copy it to, made where it is not there.")
