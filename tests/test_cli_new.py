@@ -150,6 +150,15 @@ def test_a_command_that_reads_the_scene_refuses_a_folder(folder: Path) -> None:
     assert "scene file" in done.stderr
 
 
+def test_a_sign_that_an_encoding_lacks_costs_the_sign_alone() -> None:
+    main = (
+        "import sys; from ballpass.runtime.app.entry import main; sys.argv = ['ballpass', 'bearings', '6204']; main()"
+    )
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run((sys.executable, "-c", main), env=environment, capture_output=True, check=True, timeout=60)
+    assert b"clearance in ?m" in done.stdout
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_offers_the_commands(shell: str) -> None:
     words = {"bash": {"COMP_WORDS": "ballpass sen", "COMP_CWORD": "1"}}

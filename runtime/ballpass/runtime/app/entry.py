@@ -6,6 +6,7 @@ turns an interrupt into other faults or into a remark.  One that comes when all 
 
 from __future__ import annotations
 
+import io
 import signal
 import sys
 import threading
@@ -16,6 +17,9 @@ from ballpass.runtime.app.interrupted import has_said, say_interrupted
 
 def main() -> None:
     """Import the command line and run it."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # ASCII has no µ, and pipes of Windows no rules of tables
     interrupted = False
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
