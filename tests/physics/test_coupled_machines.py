@@ -388,7 +388,11 @@ def test_energy_changes_by_the_work_of_the_drive_alone(clearance: str) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "name", ["press, A B C elastic", "run-down", "motor", *(("press, A", "four-bar", "sprung shaper") if LONG else ())]
+    "name",
+    [
+        *("press, A B C elastic", "motor", pytest.param("run-down", marks=pytest.mark.extreme)),
+        *(("press, A", "four-bar", "sprung shaper") if LONG else ()),
+    ],
 )
 def test_energy_changes_by_the_work_of_the_drive_alone_in_long_runs(name: str) -> None:
     press = text("punching_press", *IDLE_PRESS)

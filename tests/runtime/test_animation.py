@@ -128,7 +128,12 @@ def test_page_of_several_bearings_opens_at_the_highest_force_of_all() -> None:
 @needs_browser
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("scene", "bearing", "cycle"), [("rotor", "", 512), ("four_bar", "", 2000), ("punching_press_hinges", "pin", 2000)]
+    ("scene", "bearing", "cycle"),
+    [
+        ("rotor", "", 512),
+        pytest.param("four_bar", "", 2000, marks=pytest.mark.extreme),
+        ("punching_press_hinges", "pin", 2000),
+    ],
 )
 def test_browser_shows_every_kind_of_scene(
     make_model: Callable[..., Model], tmp_path: Path, scene: str, bearing: str, cycle: int

@@ -54,7 +54,13 @@ def same(a: EnsembleResult, b: EnsembleResult, rows: np.ndarray | slice = slice(
 
 
 @pytest.mark.parametrize(
-    "law", ["one-sided", *(pytest.param(k, marks=pytest.mark.long) for k in ("stiff", "one-sided-gated")), "tangent"]
+    "law",
+    [
+        "one-sided",
+        pytest.param("stiff", marks=pytest.mark.long),
+        pytest.param("one-sided-gated", marks=[pytest.mark.long, pytest.mark.extreme]),
+        "tangent",
+    ],
 )
 @pytest.mark.parametrize(
     "method",

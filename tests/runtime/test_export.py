@@ -140,7 +140,7 @@ def all_columns(solution: Solution) -> tuple[list[str], np.ndarray]:
             "1e-5",
         ),
         pytest.param("punching_press_tangent", (), "1e-8", marks=pytest.mark.long),
-        pytest.param("four_bar", (), "1e-7", marks=pytest.mark.long),
+        pytest.param("four_bar", (), "1e-7", marks=[pytest.mark.long, pytest.mark.extreme]),
         ("varying_compliance", (), "1e-9"),
     ],
 )

@@ -682,6 +682,7 @@ def test_a_speed_that_needs_too_many_segments_is_an_error_until_another_is_set(
 
 
 @pytest.mark.long
+@pytest.mark.extreme
 def test_a_driver_whose_speed_is_an_input_goes_the_way_of_its_table(
     exported: Callable[..., Exported], scene_text: Callable[..., str]
 ) -> None:
