@@ -289,7 +289,7 @@ static int pass(const bp_job *job, bp_lane_block *b, int linearly)
     if (waiting < 0) return 1;
     memset(b, 0, sizeof *b);
     b->linearly = linearly;
-    b->wanted = job->reductions != NULL ? bp_wanted(job->reductions) : 0;
+    b->wanted = job->reductions != NULL ? job->reductions + BP_WANTED : NULL;
     b->balls = job->reductions != NULL && bp_balls_wanted(job->reductions);
     b->powers = job->reductions != NULL ? bp_powers_wanted(job->reductions) : 0;
     b->numbers.u = b->u;

@@ -59,7 +59,7 @@ typedef struct {
     double start[BP_L] BP_ALIGNED, resolution[BP_L] BP_ALIGNED; /* of the segment, and of time within it [s] */
     int linearly;       /* which family this pass advances */
     int balls, powers;  /* whether channels of the balls, and powers of their loads, are reduced */
-    unsigned long wanted; /* channels reduced, a bit each; all members have the same */
+    const double *wanted; /* not zero for channels that are reduced; all members have the same */
     bp_lane_numbers numbers;
     bp_lane_angles angles; /* of the step tried */
 } bp_lane_block;

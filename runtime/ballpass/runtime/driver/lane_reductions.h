@@ -94,7 +94,7 @@ static void reduce(const bp_job *job, bp_lane_block *b)
     }
     double news[BP_CHANNELS][BP_L] BP_ALIGNED, any[BP_L] BP_ALIGNED = {0.0}, of_balls[BP_L] BP_ALIGNED = {0.0};
     for (int k = 0; k < BP_CHANNELS; k++) {
-        if (!(b->wanted >> k & 1)) continue;
+        if (b->wanted[k] == 0.0) continue;
         double *restrict of = news[k];
         const int row = k * BP_L;
         BP_EACH_LANE {
@@ -123,7 +123,7 @@ static void reduce(const bp_job *job, bp_lane_block *b)
         const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])source.balls;
         const bp_within step = {b->start[lane] + b->t[lane], b->h[lane], &source.n, lane_state, &source, balls};
         for (int k = 0; k < BP_CHANNELS; k++) {
-            if (!(b->wanted >> k & 1)) continue;
+            if (b->wanted[k] == 0.0) continue;
             const double *v = b->sampled[0] + k * BP_L + lane;
             if (news[k][lane] == 1.0 || news[k][lane] == 3.0) bp_extreme(reduction, BP_MAX, k, 1.0, v, BP_CHANNELS * BP_L, &step);
             if (news[k][lane] >= 2.0) bp_extreme(reduction, BP_MIN, k, -1.0, v, BP_CHANNELS * BP_L, &step);

@@ -42,10 +42,10 @@ enum {
 /* Places in a reduction: the head, then BP_CHANNELS entries of each kind. */
 enum {
     BP_FROM = 0,     /* nothing is reduced in segments that start before this time [s]; given by the caller */
-    BP_WANTED = 1,   /* sum of 2^k over the channels k that are wanted; given by the caller */
-    BP_DURATION = 2, /* time reduced so far [s] */
-    BP_HEAD = 3,
-    BP_MAX = BP_HEAD,
+    BP_DURATION = 1, /* time reduced so far [s] */
+    BP_HEAD = 2,
+    BP_WANTED = BP_HEAD, /* not zero for a channel that is wanted; given by the caller */
+    BP_MAX = BP_WANTED + BP_CHANNELS,
     BP_MAX_TIME = BP_MAX + BP_CHANNELS,
     BP_MAX_BALL = BP_MAX_TIME + BP_CHANNELS, /* counted from 1; 0 for a state */
     BP_MIN = BP_MAX_BALL + BP_CHANNELS,
@@ -67,16 +67,24 @@ enum {
 /* Of what few steps call: kept out of the code that all of them run. */
 #define BP_SELDOM __attribute__((noinline)) static
 
-/* Channels wanted, a bit each; whether those of the balls are among them. */
-static inline unsigned long bp_wanted(const double *reduction) { return (unsigned long)reduction[BP_WANTED]; }
-static inline int bp_balls_wanted(const double *reduction) { return bp_wanted(reduction) >> BP_NX != 0; }
+/* Whether channels of the balls are wanted. */
+static inline int bp_balls_wanted(const double *reduction)
+{
+    int wanted = 0;
+    for (int k = BP_NX; k < BP_CHANNELS; k++) wanted |= reduction[BP_WANTED + k] != 0.0;
+    return wanted;
+}
+
 /* 1 where third powers are, 2 where powers that need roots are wanted as well. */
 static inline int bp_powers_wanted(const double *reduction)
 {
-    const unsigned long powers = bp_wanted(reduction) >> BP_LOOKED_AT;
-    int rooted = 0;
-    for (int b = 0; b < BP_BEARINGS; b++) rooted |= (powers >> BP_POWERS * b & 6) != 0;
-    return powers != 0 ? 1 + rooted : 0;
+    int powers = 0, rooted = 0;
+    for (int k = 0; k < BP_POWERS * BP_BEARINGS; k++) {
+        const int wanted = reduction[BP_WANTED + BP_LOOKED_AT + k] != 0.0;
+        powers |= wanted;
+        rooted |= wanted && k % BP_POWERS != 0;
+    }
+    return powers + rooted;
 }
 
 /* How far a channel may reach beyond its values at the quarters of a step, as a part of their range. */
@@ -541,7 +549,6 @@ BP_SELDOM void bp_extreme(double *reduction, int value, int channel, double sign
 static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHANNELS], const bp_within *step)
 {
     const double h = step->h;
-    const unsigned long wanted = bp_wanted(reduction);
     const int first = !(reduction[BP_DURATION] > 0.0);
     double sum[BP_CHANNELS], square[BP_CHANNELS], top[BP_CHANNELS], bottom[BP_CHANNELS];
 #pragma omp simd
@@ -558,7 +565,7 @@ static inline void bp_reduce(double *reduction, const double v[BP_POINTS][BP_CHA
         square[k] = k < BP_NX ? exact : boole;
     }
     for (int k = 0; k < BP_CHANNELS; k++) {
-        if (!(wanted >> k & 1)) continue;
+        if (reduction[BP_WANTED + k] == 0.0) continue;
         reduction[BP_INTEGRAL + k] += h * sum[k];
         reduction[BP_SQUARE + k] += h * square[k];
         if (k >= BP_LOOKED_AT) continue;

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 from ballpass.runtime.contract import Manifest
 
 #: Head of a row, and what follows for every channel.
-HEAD = ("from", "wanted", "duration")
-ROWS = ("max", "max_time", "max_ball", "min", "min_time", "min_ball", "integral", "square")
+HEAD = ("from", "duration")
+ROWS = ("wanted", "max", "max_time", "max_ball", "min", "min_time", "min_ball", "integral", "square")
 
 #: Channels of a bearing behind those of the states, without its prefix: values of the most loaded ball.
 BALL_CHANNELS = ("ball.force", "ball.elastic_force", "ball.damping_force", "ball.deflection")
@@ -79,7 +79,8 @@ class ReductionRows:
         """Rows of reductions of these channels that count from `start` on [s], shape (count, size)."""
         rows = np.zeros((count, self.size))
         rows[:, HEAD.index("from")] = start
-        rows[:, HEAD.index("wanted")] = sum(2**k for k, name in enumerate(self.channels) if name in channels)
+        for name in self.channels:
+            rows[:, self.column("wanted", name)] = name in channels
         return rows
 
 
