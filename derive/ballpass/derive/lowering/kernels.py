@@ -8,8 +8,8 @@ relative       (x, u, p, c, w) -> r         of every bearing, see `ball_kernels`
 angles         (t, u, p, c) -> a, at        arguments of sines and cosines in w, linear in time, and their rates
 stage_turned   (C, S, t, u, p, c) -> w      w from cosines C and sines S of the angles
 stage_rate_turned  (C, S, at, t, u, p, c) -> w, wt     the same with its time derivative
-stage_slopes   (C, S, t, u, p, c) -> w, J    w and its derivatives by u, p, c, those that are not always zero
-stage_moved    (J, u_d, p_d, c_d) -> w_d       w along a direction of u, p, c
+stage_slopes   (C, S, t, u, p, c) -> w, J    w and its derivatives by t, u, p, c, those that are not always zero
+stage_moved    (J, t_d, u_d, p_d, c_d) -> w_d  w along a direction of t, u, p, c
 acceleration   (x, S, r, u, p, c, w) -> a      from the sums S over the balls of every bearing
 acceleration_jacobian  (x, S, G, r, u, p, c, w) -> A, B     da/dq, da/dv (row-major); G: sums of the slopes' rows
 acceleration_rate      (x, S, G, r, u, p, c, w, wt) -> at    partial time derivative at fixed state
@@ -363,7 +363,7 @@ def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Ker
     rated = ca.Function("stage_rate_turned", [*takes.values()], results, [*takes], ["w", "wt"])
     words = "from cosines and sines of its angles"
     # the angles move with inputs, parameters and constants as well
-    moving = {name: symbols[name] for name in ("u", "p", "c")}
+    moving = {name: symbols[name] for name in ("t", "u", "p", "c")}
     seeds = ca.vertcat(*moving.values())
     by_angle = ca.jacobian(w, sine) @ ca.diag(cosine) - ca.jacobian(w, cosine) @ ca.diag(sine)
     slopes = ca.jacobian(w, seeds) + by_angle @ ca.jacobian(angle, seeds)
@@ -380,14 +380,14 @@ def _turned(stage: ca.Function) -> tuple[Kernel, tuple[Kernel, ...], Kernel, Ker
             Kernel(function=plain, description=f"Stage variables {words}"),
             Kernel(function=rated, description=f"Stage variables and their time derivatives {words}"),
         ),
-        Kernel(function=sloped, description=f"Stage variables {words}, and their derivatives by u, p, c"),
+        Kernel(function=sloped, description=f"Stage variables {words}, and their derivatives by t, u, p, c"),
         Kernel(function=moved, description="Stage variables"),
     )
 
 
 #: Directional derivatives for sensitivities: name, kernel, the arguments that move, and the results that are wanted.
 _TANGENTS: tuple[tuple[str, str, tuple[str, ...], tuple[str, ...]], ...] = (
-    ("stage_rate_tangent", "stage_rate", ("u", "p", "c"), ("w", "wt")),
+    ("stage_rate_tangent", "stage_rate", ("t", "u", "p", "c"), ("w", "wt")),
     ("relative_tangent", "relative", ("x", "u", "p", "c", "w"), ("r",)),
     ("acceleration_tangent", "acceleration", ("x", "S", "r", "u", "p", "c", "w"), ("a",)),
     ("acceleration_jacobian_tangent", "acceleration_jacobian", ("x", "S", "G", "r", "u", "p", "c", "w"), ("A", "B")),

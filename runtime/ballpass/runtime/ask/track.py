@@ -252,9 +252,7 @@ class Outlook:
     def _differentiated(self, track: Track, numbers: Numbers, chain: Chain) -> dict[str, Signal]:
         if self._derivatives is None:
             self._derivatives = self._loop()
-        directions = len(chain.names)
-        moved = np.array([chain.inputs(float(time)) for time in track.edges.times[:-1]])
-        moved = moved.reshape(len(track.edges.times) - 1, track.u.shape[1], directions)
+        moved = chain.inputs(track.edges.times)
         values, slopes = [], []
         for first in range(0, len(track.nodes), BLOCK):
             part = slice(first, first + BLOCK)

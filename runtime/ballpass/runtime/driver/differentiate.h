@@ -8,7 +8,7 @@
 static void tangent_start(bp_run *run, double t)
 {
     if (run->tangents && is_explicit(run->method))
-        bp_explicit_tangent_start(run->tangents, run->blocks, &run->numbers, run->result->segment, t, run->x);
+        bp_explicit_tangent_start(run->tangents, run->blocks, &run->numbers, run->result->segment, t, run->x, run->plain.k[0]);
 }
 
 /* Differentiate the step tried; returns its error, with that of the derivatives where they are controlled. */
@@ -40,7 +40,8 @@ static void tangent_accept(bp_run *run)
     }
 }
 
-static void tangent_output(bp_run *run, double t, double h, double theta, int prepared)
+/* Derivatives at fixed time of the state y at theta of the step. */
+static void tangent_output(bp_run *run, double t, double h, double theta, const double *y, int prepared)
 {
     const ballpass_tangents *tangents = run->tangents;
     if (!tangents || !tangents->outputs) return;
@@ -49,6 +50,8 @@ static void tangent_output(bp_run *run, double t, double h, double theta, int pr
     double *out = tangents->outputs + run->result->written * tangents->blocks * (BP_NX * BP_LANES);
     if (!prepared && theta < 1.0 && plain)
         bp_explicit_tangent_dense(plain, tangents, run->blocks, &run->plain, &run->numbers, run->result->segment, t, run->x, h);
+    double slope[BP_NX];
+    bp_explicit_rate(&run->numbers, t + theta * h, y, slope);
     for (long b = 0; b < tangents->blocks; b++, out += BP_NX * BP_LANES) {
         bp_tangent_block *own = &run->blocks[b];
         const double *from = bp_tangent_state(tangents, b);
@@ -61,23 +64,45 @@ static void tangent_output(bp_run *run, double t, double h, double theta, int pr
             if (!prepared) bp_tangent_rosenbrock_dense(linear, (const double(*)[BP_NX * BP_LANES])own->k, own->dense);
             bp_tangent_rosenbrock_at(linear, dense, from, own->next, theta, out);
         }
+        bp_move(tangents, run->result->segment, b, t + theta * h, slope, -1.0, out);
     }
 }
 
-/* Where a load switches at a time that moves with a parameter, the derivative at fixed time jumps. */
+/* Derivatives of the states, at fixed time (sign 1) or along moving times (-1), the other way, at a time within a segment. */
+static void tangent_turn(bp_run *run, double time, double sign)
+{
+    const ballpass_tangents *tangents = run->tangents;
+    double slope[BP_NX];
+    bp_explicit_rate(&run->numbers, time, run->x, slope);
+    for (long b = 0; b < tangents->blocks; b++)
+        bp_move(tangents, run->result->segment, b, time, slope, sign, bp_tangent_state(tangents, b));
+}
+
+/* Where a load switches at a time that does not move with t', the derivative jumps; the first segment brings that at fixed time. */
 static void tangent_jump(bp_run *run)
 {
     const ballpass_tangents *tangents = run->tangents;
     const long segment = run->result->segment;
-    if (!tangents || segment == 0) return;
+    if (!tangents) return;
+    if (segment == 0) {
+        tangent_turn(run, 0.0, 1.0);
+        return;
+    }
     double behind[BP_NX];
     bp_explicit_rate(&run->numbers, 0.0, run->x, behind);
     for (long b = 0; b < tangents->blocks; b++) {
-        const double *shift = tangents->shift + (segment * tangents->blocks + b) * BP_LANES;
+        const long place = (segment * tangents->blocks + b) * BP_LANES;
+        const double *shift = tangents->shift + place, *moved = tangents->moved + place;
         double *xd = bp_tangent_state(tangents, b);
         for (int k = 0; k < BP_NX; k++)
-            for (int l = 0; l < BP_LANES; l++) xd[k * BP_LANES + l] += (run->rate_before[k] - behind[k]) * shift[l];
+            for (int l = 0; l < BP_LANES; l++) xd[k * BP_LANES + l] += (run->rate_before[k] - behind[k]) * (shift[l] - moved[l]);
     }
+}
+
+/* A run that ends at a time within its last segment. */
+static void tangent_end(bp_run *run, double time)
+{
+    if (run->tangents) tangent_turn(run, time, -1.0);
 }
 
 #if defined BALLPASS_LOCATED && defined BP_HAS_WINDOWS
@@ -121,8 +146,9 @@ static void tangent_switch(bp_run *run, double t)
 #define tangent_start(run, t) ((void)0)
 #define tangent_step(run, t, h, error) (error)
 #define tangent_accept(run) ((void)0)
-#define tangent_output(run, t, h, theta, prepared) ((void)(prepared))
+#define tangent_output(run, t, h, theta, y, prepared) ((void)(prepared))
 #define tangent_jump(run) ((void)0)
+#define tangent_end(run, time) ((void)(time))
 #endif
 
 #endif

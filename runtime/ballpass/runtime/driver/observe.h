@@ -24,7 +24,7 @@ static void write_outputs(bp_run *run, double start, double t, double h, double 
             state_at(run, theta > 0.0 ? theta : 0.0, y);
         }
         /* behind the state: the derivatives use its slopes */
-        tangent_output(run, t, h, theta > 0.0 ? theta : 0.0, tangents_prepared);
+        tangent_output(run, t, h, theta > 0.0 ? theta : 0.0, y, tangents_prepared);
         tangents_prepared = tangents_prepared || theta < 1.0;
         result->written++;
     }
@@ -50,7 +50,8 @@ static void reduce_start(bp_run *run, double start)
 {
     run->reduction = run->options->reduction;
     if (run->reduction != NULL && start < run->reduction[BP_FROM]) run->reduction = run->options->before;
-    if (run->reduction != NULL) bp_channels(&run->numbers, 0.0, run->x, bp_balls_wanted(run->reduction), bp_powers_wanted(run->reduction), run->sampled[0], run->balls[0]);
+    if (run->reduction == NULL) return;
+    bp_channels(&run->numbers, 0.0, run->x, bp_balls_wanted(run->reduction), bp_powers_wanted(run->reduction), run->sampled[0], run->balls[0]);
 }
 
 static void reduce_step(bp_run *run, double start, double t, double h)
@@ -59,12 +60,13 @@ static void reduce_step(bp_run *run, double start, double t, double h)
     prepare_dense(run, t, h);
     /* the output of DOP853 is of degree seven, more than five points tell: its steps are taken in halves */
     const int parts = run->method == BALLPASS_DOP853 ? 2 : 1;
+    const int of_balls = bp_balls_wanted(run->reduction), powers = bp_powers_wanted(run->reduction);
     for (int part = 0; part < parts; part++) {
         const bp_step_taken step = {run, t, h, (double)part / parts, 1.0 / parts};
         for (int i = 1; i < BP_POINTS; i++) {
             double y[BP_NX];
             const double time = state_of_step(&step, (double)i / (BP_POINTS - 1), y);
-            bp_channels(&run->numbers, time, y, bp_balls_wanted(run->reduction), bp_powers_wanted(run->reduction), run->sampled[i], run->balls[i]);
+            bp_channels(&run->numbers, time, y, of_balls, powers, run->sampled[i], run->balls[i]);
         }
         const double(*balls)[BP_BALL_QUANTITIES] = (const double(*)[BP_BALL_QUANTITIES])run->balls;
         const bp_within within = {start + t + step.from * h, step.span * h, &run->numbers, state_of_step, &step, balls};

@@ -8,7 +8,8 @@
    BP_S         type of an entry of [W^-1 A/s | W^-1]
    BP_NAME(linear), BP_NAME(linear_slope)(at, i, y, dx), BP_NAME(time_term)(at, i, c, d)
                 what the stages of a step need; dx/dt at the argument y of stage i; what d = h gamma_i adds to the acceleration of
-                coordinate c there */
+                coordinate c there
+   BP_STRETCHED where BP_NAME(position_term)(at, i, c) is added to the velocity of coordinate c there */
 
 /* Stages u of a step of size h from x; `solve`: column j tells what R[j] adds to kv. */
 BP_INLINE void BP_NAME(rosenbrock_stages)(const bp_rosenbrock_method *restrict method, const int stages, const BP_NAME(linear) *at,
@@ -52,6 +53,9 @@ BP_INLINE void BP_NAME(rosenbrock_stages)(const bp_rosenbrock_method *restrict m
             /* positions move with the velocities: taken from the vector, not from the copy just stored */
             BP_AT(BP_V, R, e) = coupled[e] * inverse_h + reached[BP_VS + e];
             BP_AT(BP_V, R, BP_VS + e) = coupled[BP_VS + e] * inverse_h;
+#ifdef BP_STRETCHED
+            BP_AT(BP_V, R, e) += BP_NAME(position_term)(at, i, e);
+#endif
         }
         const BP_H d = h * method->time_weights[i];
 #pragma GCC unroll 16

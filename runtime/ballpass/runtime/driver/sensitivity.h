@@ -1,8 +1,15 @@
 /* Forward sensitivities: the derivative of the discrete solution along any number of directions of the parameters.
 
    After a step is accepted, the same formulas (explicit.h, rosenbrock.h) are differentiated at fixed step size, BP_LANES directions at a
-   time; what does not depend on the direction (slopes of the law, the small inverse) is computed once for all.  Where a load switches at a
-   time that depends on the parameters, the derivative jumps by (rate before - rate behind) d(time)/d(parameter).
+   time; what does not depend on the direction (slopes of the law, the small inverse) is computed once for all.
+
+   Derivatives are taken along moving times, t' = moved + stretch (t - start) in each segment: with the driver's speed, all that happens at
+   an angle moves in time, and by more in every turn.  At fixed time the derivative would be a small difference of two large parts, and each
+   kink of a law that a step goes over would leave a share of their size behind.  Along moving times dx/dt = f(t, x) gives
+   (dx/dt)' = f_x x' + f_t t' + f_p p' + stretch f, steps that stretch with the time have the same formulas, and the caller gets
+   x' - f t', the derivative at fixed time.
+
+   Where a load switches at a time that moves otherwise, by `shift`, the derivative jumps by (rate before - rate behind) (shift - t').
 
    Where the caller gives tolerances for the derivatives, their embedded error takes part in the choice of the step size.  A step is
    differentiated before it is judged; the derivatives of the state change only when it is accepted, so that a rejected one leaves no trace.
@@ -35,7 +42,10 @@ typedef struct {
     const bp_numbers *n;
     const bp_linear *plain; /* of a linearly implicit step */
     const double *nodes;
+    double time[BP_METHOD_STAGES]; /* within the segment */
     double w[BP_METHOD_STAGES][BP_NW], y[BP_METHOD_STAGES][BP_NX];
+    const double *slope[BP_METHOD_STAGES];       /* dx/dt there ... */
+    double rate[BP_METHOD_STAGES][BP_NX]; /* ... where the step itself does not keep it */
     bp_stage_slopes J;
     bp_point at[BP_METHOD_STAGES];
 } bp_step_points;
@@ -44,6 +54,7 @@ typedef struct {
 typedef struct {
     bp_step_points *points;
     bp_direction d;
+    const double *moved, *stretch;
     bp_tangent_block *own;
 } bp_tangent_times;
 
@@ -60,18 +71,40 @@ static inline bp_tangent_times bp_tangent_of(const ballpass_tangents *tangents, 
     at.d.p = tangents->p + block * (BP_NP * BP_LANES);
     at.d.c = tangents->c + block * (BP_NC * BP_LANES);
     at.d.u = tangents->u + (segment * tangents->blocks + block) * (BP_NU * BP_LANES);
+    at.moved = tangents->moved + (segment * tangents->blocks + block) * BP_LANES;
+    at.stretch = tangents->stretch + block * BP_LANES;
     return at;
+}
+
+/* t' at a time within the segment. */
+static inline void bp_moved_time(const double *restrict moved, const double *restrict stretch, double time, double *restrict td)
+{
+    for (int l = 0; l < BP_LANES; l++) td[l] = moved[l] + stretch[l] * time;
+}
+
+/* x' += sign f t', from fixed time to t' at a time within the segment, or back. */
+static inline void bp_move(const ballpass_tangents *tangents, long segment, long block, double time, const double *restrict f, double sign,
+                           double *restrict xd)
+{
+    double td[BP_LANES];
+    bp_moved_time(tangents->moved + (segment * tangents->blocks + block) * BP_LANES, tangents->stretch + block * BP_LANES, time, td);
+    for (int k = 0; k < BP_NX; k++)
+        for (int l = 0; l < BP_LANES; l++) xd[k * BP_LANES + l] += sign * f[k] * td[l];
 }
 
 /* Derivatives of the stage variables at the time number `time` along a block's directions. */
 static inline void bp_tangent_stage(const bp_tangent_times *at, int time)
 {
-    bp_stage_moved_lanes(at->points->J[time / BP_LANES] + time % BP_LANES, at->d.u, at->d.p, at->d.c, at->own->w);
+    double td[BP_LANES];
+    bp_moved_time(at->moved, at->stretch, at->points->time[time], td);
+    bp_stage_moved_lanes(at->points->J[time / BP_LANES] + time % BP_LANES, td, at->d.u, at->d.p, at->d.c, at->own->w);
 }
 
 static inline void bp_tangent_rate(const bp_tangent_times *at, int i, const double *restrict y, double *restrict k)
 {
+    const bp_vector stretch = *(const bp_vector *)at->stretch;
     bp_rate_tangent(&at->points->at[i], at->points->n, &at->d, at->own->w, y, k);
+    for (int c = 0; c < BP_NX; c++) ((bp_vector *)k)[c] += stretch * at->points->slope[i][c];
 }
 
 /* The end slope is at the time of the last stage, whose variables are there. */
@@ -87,7 +120,7 @@ static inline void bp_tangent_linear_slope(const bp_tangent_linear *at, int i, c
     bp_tangent_rate(at, i, y, dx);
 }
 
-/* E u = R gives E u' = R' + J' u. */
+/* E u = R gives E u' = R' + J' u; with stretch l, J' is J' + l J and the partial derivative by time, f_t, moves by 2 l f_t. */
 BP_INLINE bp_vector bp_tangent_time_term(const bp_tangent_linear *at, int i, int c, double d)
 {
     const bp_vector *A = (const bp_vector *)at->own->A + c * BP_NQ, *B = (const bp_vector *)at->own->B + c * BP_NQ;
@@ -95,7 +128,16 @@ BP_INLINE bp_vector bp_tangent_time_term(const bp_tangent_linear *at, int i, int
     bp_vector term = d * ((const bp_vector *)at->own->at)[c];
 #pragma GCC unroll 16
     for (int j = 0; j < BP_NQ; j++) term += u[j] * A[j] + u[BP_NQ + j] * B[j];
-    return term;
+    double stretched = 2.0 * d * at->points->plain->at[c];
+    for (int j = 0; j < BP_NQ; j++)
+        stretched += at->points->plain->A[c * BP_NQ + j] * u[j] + at->points->plain->B[c * BP_NQ + j] * u[BP_NQ + j];
+    return term + stretched * *(const bp_vector *)at->stretch;
+}
+
+/* The same for position c, of which J has but the velocity. */
+BP_INLINE bp_vector bp_tangent_position_term(const bp_tangent_linear *at, int i, int c)
+{
+    return (at->points->slope[i][c] + at->points->plain->u[i][BP_NQ + c]) * *(const bp_vector *)at->stretch;
 }
 
 #define BP_NAME(f) bp_tangent_##f
@@ -105,8 +147,10 @@ BP_INLINE bp_vector bp_tangent_time_term(const bp_tangent_linear *at, int i, int
 #define BP_VS BP_NQ
 #define BP_H double
 #define BP_S double
+#define BP_STRETCHED
 #include "explicit.h"
 #include "rosenbrock.h"
+#undef BP_STRETCHED
 #undef BP_NAME
 #undef BP_W
 #undef BP_N
@@ -120,6 +164,7 @@ static inline void bp_sloped_stages(bp_step_points *points, const bp_numbers *n,
                                     const int count)
 {
     points->n = n;
+    for (int i = 0; i < count; i++) points->time[i] = t + nodes[i] * h;
     for (int first = 0; first < count; first += BP_LANES) {
         double some[BP_LANES], time[BP_LANES], C[BP_NA * BP_LANES], S[BP_NA * BP_LANES], lanes[BP_NW * BP_LANES];
         bp_some_nodes(nodes, first, count, some);
@@ -133,12 +178,13 @@ static inline void bp_sloped_stages(bp_step_points *points, const bp_numbers *n,
 
 /* Derivative of the first slope, where no step before has left it. */
 static inline void bp_explicit_tangent_start(const ballpass_tangents *tangents, bp_tangent_block *restrict work, const bp_numbers *n,
-                                             long segment, double t, const double *restrict x)
+                                             long segment, double t, const double *restrict x, const double *restrict slope)
 {
     static const double start[1] = {0.0};
     bp_step_points points;
     bp_sloped_stages(&points, n, t, 0.0, start, 1);
     bp_point_at(&points.at[1], n, points.w[0], x);
+    points.slope[1] = slope;
     for (long b = 0; b < tangents->blocks; b++) {
         const bp_tangent_times at = bp_tangent_of(tangents, work, &points, segment, b);
         bp_tangent_slope(&at, 1, 0, bp_tangent_state(tangents, b), work[b].k[0]);
@@ -158,6 +204,7 @@ static inline void bp_explicit_tangent_step(const bp_explicit_method *restrict m
         if (i == stages) memcpy(y, next, sizeof points.y[i]);
         else bp_combine(method->a[i], i, (const double(*)[BP_NX])plain->k, &h, x, y);
         bp_point_at(&points.at[i], n, points.w[i < stages ? i - 1 : stages - 2], y);
+        points.slope[i] = plain->k[i];
     }
     for (long b = 0; b < tangents->blocks; b++) {
         const bp_tangent_times at = bp_tangent_of(tangents, work, &points, segment, b);
@@ -177,15 +224,22 @@ static inline void bp_rosenbrock_tangent_step(const bp_rosenbrock_method *restri
     points.nodes = method->nodes;
     bp_sloped_stages(&points, n, t, h, method->nodes + 1, stages - 1);
     bp_point_at(&points.at[0], n, plain->w, x);
+    points.slope[0] = plain->dx;
     for (int i = 1; i < stages; i++) {
-        bp_add(method->a[i], i, (const double(*)[BP_NX])plain->u, &one, x, points.y[i]);
-        bp_point_at(&points.at[i], n, points.w[i - 1], points.y[i]);
+        double *restrict y = points.y[i], *restrict rate = points.rate[i];
+        bp_add(method->a[i], i, (const double(*)[BP_NX])plain->u, &one, x, y);
+        bp_point_at(&points.at[i], n, points.w[i - 1], y);
+        memcpy(rate, y + BP_NQ, BP_NQ * sizeof *rate);
+        bp_acceleration(y, points.at[i].S, points.at[i].r, n->u, n->p, n->c, points.w[i - 1], rate + BP_NQ);
+        points.slope[i] = rate;
     }
     for (long b = 0; b < tangents->blocks; b++) {
         const bp_tangent_times at = bp_tangent_of(tangents, work, &points, segment, b);
         const double *restrict xd = bp_tangent_state(tangents, b);
         bp_tangent_block *restrict own = &work[b];
-        bp_stage_rate_tangent_lanes(t, n->u, n->p, n->c, at.d.u, at.d.p, at.d.c, own->w, own->wt);
+        double td[BP_LANES];
+        bp_moved_time(at.moved, at.stretch, t, td);
+        bp_stage_rate_tangent_lanes(t, n->u, n->p, n->c, td, at.d.u, at.d.p, at.d.c, own->w, own->wt);
         bp_linearize_tangent(&points.at[0], n, &at.d, plain->wt, own->w, own->wt, xd, own->A, own->B, own->at);
         bp_tangent_rosenbrock_stages(method, stages, &at, matrix->solve[0], own->k, xd, &h);
         bp_tangent_rosenbrock_end(method, stages, (const double(*)[BP_NX * BP_LANES])own->k, xd, own->next);
@@ -225,6 +279,7 @@ static inline void bp_explicit_tangent_dense(const bp_explicit_method *restrict 
     for (int r = 0; r < method->dense_stages; r++) {
         bp_combine(method->dense_a[r], method->stages + 1 + r, (const double(*)[BP_NX])plain->k, &h, x, points.y[r]);
         bp_point_at(&points.at[r + 1], n, points.w[r], points.y[r]);
+        points.slope[r + 1] = plain->k[method->stages + 1 + r];
     }
     for (long b = 0; b < tangents->blocks; b++) {
         const bp_tangent_times at = bp_tangent_of(tangents, work, &points, segment, b);

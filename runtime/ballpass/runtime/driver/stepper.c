@@ -249,6 +249,7 @@ static int run_segments(bp_run *run, double *x, long first, long segments, const
         (void)x;
 #endif
     }
+    if (segments > first) tangent_end(run, result->time - times[result->segment]);
     result->method = run->method;
     const int goes_on = result->status == BALLPASS_TOO_MANY_STEPS || result->status == BALLPASS_PAUSED;
     if (goes_on && options->work != NULL) memcpy(options->work, run, sizeof *run);

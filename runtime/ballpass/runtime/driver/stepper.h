@@ -92,9 +92,11 @@ typedef struct {
     const double *p;     /* of the parameters, [blocks][BP_NP][BP_LANES] */
     const double *c;     /* of the derived constants, [blocks][BP_NC][BP_LANES] */
     const double *u;     /* of the inputs, [segments][blocks][BP_NU][BP_LANES] */
-    const double *shift; /* of the time at which each segment starts, [segments][blocks][BP_LANES] [s] */
-    double *x;           /* of the states, [blocks][BP_NX][BP_LANES]: at the start, on return at the end */
-    double *outputs;     /* at the output times, [outputs][blocks][BP_NX][BP_LANES], or NULL */
+    const double *shift; /* of the time at which a load switches at each segment's start, [segments][blocks][BP_LANES] [s] */
+    const double *moved; /* of the times along which it is differentiated (sensitivity.h), at each start, [segments][blocks][BP_LANES] [s] */
+    const double *stretch; /* and how fast they grow with time, [blocks][BP_LANES] */
+    double *x;           /* of the states at fixed time, [blocks][BP_NX][BP_LANES]: at the start, on return where the run ended */
+    double *outputs;     /* the same at the output times, [outputs][blocks][BP_NX][BP_LANES], or NULL */
     void *work;          /* ballpass_tangent_work(blocks) bytes, aligned for double */
     /* Where the derivatives take part in the choice of the step size: 1 / error allowed in a step, [blocks][BP_NX][BP_LANES], zero for
        directions that do not count, and the relative tolerance in it, for derivatives that have grown beyond 1 / (rtol weight).

@@ -81,7 +81,7 @@ class _Options(ctypes.Structure):
 class _Tangents(ctypes.Structure):
     _fields_ = (
         ("blocks", ctypes.c_long),
-        *((name, ctypes.c_void_p) for name in ("p", "c", "u", "shift", "x", "outputs", "work", "weight")),
+        *((name, ctypes.c_void_p) for name in ("p", "c", "u", "shift", "moved", "stretch", "x", "outputs", "work", "weight")),
         ("rtol", ctypes.c_double),
     )
 
@@ -174,8 +174,10 @@ class Tangents:
     p, c : derivatives of parameters and constants along the directions, shapes (blocks, parameters, lanes),
         (blocks, constants, lanes)
     u : of the inputs at each segment's start, shape (segments, blocks, inputs, lanes)
-    shift : of the time at which each segment starts, shape (segments, blocks, lanes) [s]
-    x : of the states at the start, on return at the end, shape (blocks, states, lanes)
+    shift : of the time at which a load switches at each segment's start, shape (segments, blocks, lanes) [s]
+    moved, stretch : of the times along which it is differentiated (`driver/sensitivity.h`): at each segment's start,
+        shape (segments, blocks, lanes) [s], and how fast they grow, shape (blocks, lanes) [1]
+    x : of the states at fixed time, at the start, on return at the end, shape (blocks, states, lanes)
     outputs : filled with those at the output times, shape (outputs, blocks, states, lanes)
     weight, rtol : where the derivatives take part in the choice of step sizes, 1 / error allowed in a step, shape
         (blocks, states, lanes), zero for directions that do not count, and the relative tolerance that is in it; a
@@ -186,6 +188,8 @@ class Tangents:
     c: np.ndarray
     u: np.ndarray
     shift: np.ndarray
+    moved: np.ndarray
+    stretch: np.ndarray
     x: np.ndarray
     outputs: np.ndarray
     weight: np.ndarray | None = None
@@ -285,7 +289,7 @@ class Stepper:
         else:
             blocks = len(tangents.x)
             work = np.empty(self._code.ballpass_tangent_work(blocks) // 8 + 8)
-            names = ("p", "c", "u", "shift", "x", "outputs", "weight")
+            names = ("p", "c", "u", "shift", "moved", "stretch", "x", "outputs", "weight")
             directions = _Tangents(
                 blocks=blocks,
                 work=address(work),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -34,6 +35,8 @@ class Chain:
     names : as given
     p, c : derivatives of parameters and derived constants, shapes (parameters, directions), (constants, directions)
     initial : of the states at the start, shape (states, directions)
+    moved, stretch : of the time at which driver or shaft reach an angle: at t = 0, and how fast it grows with time,
+        shape (directions,) each; zero where the speed is a state [s/unit], [1/unit]
 
     Raises
     ------
@@ -61,17 +64,33 @@ class Chain:
         self.initial = np.zeros((len(model.states), len(names)))
         for row, name in enumerate(model.manifest.initial):
             self.initial[row] = self.p[rows[name]]
+        self.moved, self.stretch = np.zeros(len(names)), np.zeros(len(names))
+        speed, mechanism = clock.speed_name(model.manifest), model.manifest.mechanism
+        if speed is not None and numbers.values[speed] != 0.0 and not (mechanism is not None and mechanism.angle):
+            self.stretch = -self.derivative(speed) / numbers.values[speed]
+            if mechanism is not None:
+                self.moved = -self.derivative(mechanism.start_angle) / numbers.values[speed]
 
     def derivative(self, name: str) -> np.ndarray:
         """Derivative of a parameter or derived constant, shape (directions,)."""
         matrix, row = (self.p, self._rows) if name in self._rows else (self.c, self._constants)
         return np.asarray(matrix[row[name]])
 
-    def inputs(self, time: float) -> np.ndarray:
-        """Derivative of the inputs at a fixed time, shape (inputs, directions); gates are flat."""
-        u = np.zeros((len(self._inputs), len(self.names)))
-        for row, name, slope in clock.input_derivatives(self._inputs, self._values, time):
-            u[row] += slope * self.derivative(name)
+    def inputs(self, times: np.ndarray) -> np.ndarray:
+        """Derivative of the inputs at fixed times, the starts of segments; gates are flat.
+
+        Parameters
+        ----------
+        times : ends of the segments, shape (segments + 1,) [s]
+
+        Returns
+        -------
+        array, shape (segments, inputs, directions)
+        """
+        u = np.zeros((len(times) - 1, len(self._inputs), len(self.names)))
+        for k, (start, end) in enumerate(pairwise(times.tolist())):
+            for row, name, slope in clock.input_derivatives(self._inputs, self._values, start, 0.5 * (start + end)):
+                u[k, row] += slope * self.derivative(name)
         return u
 
     def breakpoint(self, time: float) -> np.ndarray:
@@ -167,20 +186,23 @@ class Directions:
             f"{len(starts)} segments in one call, with derivatives of their inputs and starts by {self._count} "
             "parameters, of",
             len(starts),
-            self._height + 1,
+            self._height + 2,
         )
         u = np.zeros((len(starts), self._blocks, self._height, self._lanes))
-        shift = np.zeros((len(starts), self._blocks, self._lanes))
-        for k, start in enumerate(starts):
-            moved = self.chain.inputs(float(start))
-            u[k, :, : len(moved)] = self._blocked(moved)
-            if segments.restarts[k] and start > 0.0:
-                shift[k] = self._blocked(self.chain.breakpoint(float(start))[None, :])[:, 0]
+        shift, moved = (np.zeros((len(starts), self._blocks, self._lanes)) for _ in range(2))
+        first_moved, stretch = (self._blocked(row[None, :])[:, 0] for row in (self.chain.moved, self.chain.stretch))
+        for k, inputs in enumerate(self.chain.inputs(segments.times)):
+            u[k, :, : len(inputs)] = self._blocked(inputs)
+            moved[k] = first_moved + starts[k] * stretch
+            if segments.restarts[k] and starts[k] > 0.0:
+                shift[k] = self._blocked(self.chain.breakpoint(float(starts[k]))[None, :])[:, 0]
         return Tangents(
             p=self._blocked(self.chain.p),
             c=self._blocked(self.chain.c),
             u=u,
             shift=shift,
+            moved=moved,
+            stretch=stretch,
             x=self._x,
             outputs=self.samples[first : first + count],
             weight=self._weight,

@@ -192,8 +192,10 @@ def _turning(gate: InputInfo, values: Values, t0: float, t1: float) -> Iterator[
             yield offset + float(heights[left] - slope * knots[left]), rate + slope, begin, end
 
 
-def input_derivatives(inputs: Sequence[InputInfo], values: Values, t: float) -> list[tuple[int, str, float]]:
-    """Nonzero partial derivatives of ``inputs_at(t)``: (row of u, name of parameter or constant, derivative).
+def input_derivatives(
+    inputs: Sequence[InputInfo], values: Values, t: float, inside: float | None = None
+) -> list[tuple[int, str, float]]:
+    """Nonzero partial derivatives of `inputs_at`: (row of u, name of parameter or constant, derivative).
 
     A gate is flat between its edges; at an edge the derivative does not exist, and the flat one is given.
     """
@@ -202,7 +204,7 @@ def input_derivatives(inputs: Sequence[InputInfo], values: Values, t: float) -> 
         if item.kind == "phase":
             entries += [(row, item.offset, 1.0), (row, item.rate, t)]
         elif item.kind in ("table", "table_rate"):
-            piece = table_piece(item, values, t)
+            piece = table_piece(item, values, t, inside)
             left, right = piece.rows
             if left == right:
                 if item.kind == "table":
@@ -274,15 +276,22 @@ class TablePiece:
     argument: float
 
 
-def table_piece(item: InputInfo, values: Values, t: float) -> TablePiece:
-    """Piece of a table that holds at a time; at a knot the one that follows."""
+def table_piece(item: InputInfo, values: Values, t: float, inside: float | None = None) -> TablePiece:
+    """Piece of a table that holds at a time, and the argument at `t`.
+
+    Parameters
+    ----------
+    inside : a time at which the piece holds [s].  Default: `t`; the rounding of a time that lies on a knot decides then
+        on which side it is
+    """
     knots = _knots(item, values)[0]
+    within = t if inside is None else inside
+    argument, place = t, within
     if item.rate:
-        (argument,) = _within_turn(values[item.offset] + values[item.rate] * np.array([t]), knots[0])
+        (place,) = _within_turn(values[item.offset] + values[item.rate] * np.array([within]), knots[0])
+        argument = place + values[item.rate] * (t - within)
         knots = np.append(knots, knots[0] + TURN)
-    else:
-        argument = t
-    k = int(np.searchsorted(knots, argument, side="right"))
+    k = int(np.searchsorted(knots, place, side="right"))
     last = len(item.times) - 1
     if not item.rate and k in (0, len(knots)):
         row = 0 if k == 0 else last
