@@ -41,6 +41,18 @@ def pair_text(scene_text: Callable[..., str]) -> str:
     return (text[:start] + "".join(named) + text[end:]).replace(*outputs)
 
 
+def row_text(scene_text: Callable[..., str], count: int, changes: tuple[tuple[str, str], ...]) -> str:
+    """So many bearings like that of the press, side by side."""
+    text = scene_text("punching_press", *changes, ("share = 0.5", f"share = {1.0 / count}"))
+    start, end = (text.index(mark) for mark in ("[bearing]", "[run]"))
+    names = [f"b{k}" for k in range(count)]
+    named = [re.sub(r"^\[bearing(?=[.\]])", f"[bearings.{n}", text[start:end], flags=re.M) for n in names]
+    outputs = ", ".join(f'"{n}.inner.*", "{n}.ball.force"' for n in names)
+    return (
+        text[:start] + "".join(named) + re.sub(r"outputs = \[.*?\]", f"outputs = [{outputs}]", text[end:], flags=re.S)
+    )
+
+
 @pytest.fixture(scope="module")
 def pair(scene_text: Callable[..., str], tmp_path_factory: pytest.TempPathFactory) -> Model:
     return load(generate(scene_from_text(pair_text(scene_text), "pair"), tmp_path_factory.mktemp("pair") / "pair"))
@@ -63,6 +75,32 @@ def test_each_moves_as_it_does_alone(pair: Model, alone: dict[str, Model], metho
         for output in ("inner.x", "inner.y", "ball.force"):
             found, expected = both[f"{name}.{output}"], own[output]
             assert np.max(np.abs(found - expected)) < bound * np.max(np.abs(expected)), (name, output)
+
+
+@pytest.mark.parametrize(
+    ("count", "changes"),
+    [(6, OTHER[3:]), pytest.param(5, (), marks=pytest.mark.long), pytest.param(20, OTHER[3:], marks=pytest.mark.long)],
+    ids=lambda value: f"{value} bearings" if isinstance(value, int) else "fixed" if value else "elastic",
+)
+def test_bearings_alike_read_alike_however_many_there_are(
+    scene_text: Callable[..., str], tmp_path: Path, count: int, changes: tuple[tuple[str, str], ...]
+) -> None:
+    """In a run, in reductions and in lanes; beyond 53 channels the first bearings once read zero."""
+    model = load(generate(scene_from_text(row_text(scene_text, count, changes), "row"), tmp_path / "row"))
+    run = {"cycles": 0.2, "transient": 0, "rtol": 1e-8}
+    alone, solution = model.reduce(**run), model.simulate(**run)
+    kinds = ("min:{}.inner.y", "rms:{}.inner.y", "max:{}.ball.force")
+    each = [[kind.format(f"b{k}") for kind in kinds] for k in range(count)]
+    many = model.simulate_many({"bearings.b0.clearance": [10e-6] * 2}, [name for row in each for name in row], **run)
+    for found in (alone, solution.reductions):
+        assert found is not None
+        for k in range(count):
+            ring, force = found[f"b{k}.inner.y"], found[f"b{k}.ball.force"]
+            assert ring.minimum == pytest.approx(np.min(solution["b0.inner.y"]), rel=1e-3)
+            assert ring.rms == pytest.approx(alone["b0.inner.y"].rms, rel=1e-9)
+            assert force.maximum == pytest.approx(alone["b0.ball.force"].maximum, rel=1e-9)
+            lanes = [float(many[name][1]) for name in each[k]]
+            assert lanes == pytest.approx([ring.minimum, ring.rms, force.maximum], rel=1e-4)
 
 
 def test_reductions_and_lanes_tell_the_bearings_apart(pair: Model, alone: dict[str, Model]) -> None:
