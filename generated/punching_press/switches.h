@@ -144,4 +144,147 @@ static inline void bp_0_held_slopes_lanes(const double *restrict co, const doubl
     }
 }
 
+/* The same, and derivatives of the forces by the ball's angle, by r0 and by k. 76 operations a ball. */
+static inline void bp_0_held_partials_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, const double *restrict b, double *restrict rows)
+{
+#pragma omp simd
+    for (int lane = 0; lane < BP_0_BALLS; lane++) {
+        double w0 = 0.0;
+        double w1 = r[3];
+        double w2 = co[0 * BP_0_BALLS + lane];
+        double w3 = w1 * w2;
+        double w4 = r[4];
+        double w5 = si[0 * BP_0_BALLS + lane];
+        double w6 = w4 * w5;
+        w3 = w3 + w6;
+        w6 = (double)(w0 < w3);
+        double w7 = k[1];
+        double w8 = w3 * w7;
+        w8 = (w6 != 0.0 ? w8 : 0.0);
+        double w9 = r[0];
+        double w10 = r[1];
+        double w11 = w10 * w2;
+        w9 = w9 + w11;
+        w11 = r[2];
+        double w12 = w11 * w5;
+        w9 = w9 + w12;
+        w12 = (double)(w0 < w9);
+        double w13 = b[0 * BP_0_BALLS + lane];
+        w13 = (double)(w13 < w9);
+        w12 = (double)(w12 != 0.0 && w13 != 0.0);
+        w13 = k[0];
+        double w14 = sqrt(w9);
+        double w15 = w9 * w14;
+        double w16 = w13 * w15;
+        w16 = (w12 != 0.0 ? w16 : 0.0);
+        w8 = w8 + w16;
+        w16 = w8 * w2;
+        rows[0 * BP_0_BALLS + lane] = w16;
+        w8 = w8 * w5;
+        rows[1 * BP_0_BALLS + lane] = w8;
+        double w17 = k[2];
+        w17 = w17 * w14;
+        double w18 = w2 * w2;
+        double w19 = w17 * w18;
+        w19 = (w12 != 0.0 ? w19 : 0.0);
+        rows[2 * BP_0_BALLS + lane] = w19;
+        w19 = w2 * w5;
+        double w20 = w17 * w19;
+        w20 = (w12 != 0.0 ? w20 : 0.0);
+        rows[3 * BP_0_BALLS + lane] = w20;
+        w20 = w5 * w5;
+        w17 = w17 * w20;
+        w17 = (w12 != 0.0 ? w17 : 0.0);
+        rows[4 * BP_0_BALLS + lane] = w17;
+        w18 = w7 * w18;
+        w18 = (w6 != 0.0 ? w18 : 0.0);
+        rows[5 * BP_0_BALLS + lane] = w18;
+        w19 = w7 * w19;
+        w19 = (w6 != 0.0 ? w19 : 0.0);
+        rows[6 * BP_0_BALLS + lane] = w19;
+        w20 = w7 * w20;
+        w20 = (w6 != 0.0 ? w20 : 0.0);
+        rows[7 * BP_0_BALLS + lane] = w20;
+        w4 = w4 * w2;
+        w1 = w1 * w5;
+        w4 = w4 - w1;
+        w7 = w7 * w4;
+        w7 = (w6 != 0.0 ? w7 : 0.0);
+        w11 = w11 * w2;
+        w10 = w10 * w5;
+        w11 = w11 - w10;
+        w10 = w14 * w11;
+        w4 = 2.0 * w14;
+        const double i0 = 1.0 / w4;
+        w11 = w11 * i0;
+        w11 = w9 * w11;
+        w10 = w10 + w11;
+        w10 = w13 * w10;
+        w10 = (w12 != 0.0 ? w10 : 0.0);
+        w7 = w7 + w10;
+        w10 = w2 * w7;
+        w10 = w10 - w8;
+        rows[8 * BP_0_BALLS + lane] = w10;
+        w7 = w5 * w7;
+        w7 = w7 + w16;
+        rows[9 * BP_0_BALLS + lane] = w7;
+        w7 = w13 * w2;
+        w16 = w14 * w7;
+        w7 = w9 * w7;
+        w7 = w7 * i0;
+        w16 = w16 + w7;
+        w16 = (w12 != 0.0 ? w16 : 0.0);
+        rows[10 * BP_0_BALLS + lane] = w16;
+        w13 = w13 * w5;
+        w14 = w14 * w13;
+        w9 = w9 * w13;
+        w9 = w9 * i0;
+        w14 = w14 + w9;
+        w14 = (w12 != 0.0 ? w14 : 0.0);
+        rows[11 * BP_0_BALLS + lane] = w14;
+        w14 = w2 * w15;
+        w14 = (w12 != 0.0 ? w14 : 0.0);
+        rows[12 * BP_0_BALLS + lane] = w14;
+        w15 = w5 * w15;
+        w12 = (w12 != 0.0 ? w15 : 0.0);
+        rows[13 * BP_0_BALLS + lane] = w12;
+        w2 = w2 * w3;
+        w2 = (w6 != 0.0 ? w2 : 0.0);
+        rows[14 * BP_0_BALLS + lane] = w2;
+        w5 = w5 * w3;
+        w6 = (w6 != 0.0 ? w5 : 0.0);
+        rows[15 * BP_0_BALLS + lane] = w6;
+        rows[16 * BP_0_BALLS + lane] = w0;
+        rows[17 * BP_0_BALLS + lane] = w0;
+    }
+}
+
+/* Switching functions of a ball along BP_LANES directions. */
+static inline void bp_0_switches_moved_lanes(const double *restrict co, const double *restrict si, const double *restrict r, const double *restrict k, const double *restrict co_d, const double *restrict si_d, const double *restrict r_d, const double *restrict k_d, double *restrict g_d)
+{
+    (void)k;
+    (void)k_d;
+#pragma omp simd
+    for (int lane = 0; lane < BP_LANES; lane++) {
+        double w0 = r_d[0 * BP_LANES + lane];
+        double w1 = co[0];
+        double w2 = r_d[1 * BP_LANES + lane];
+        w1 = w1 * w2;
+        w2 = r[1];
+        double w3 = co_d[0 * BP_LANES + lane];
+        w2 = w2 * w3;
+        w1 = w1 + w2;
+        w0 = w0 + w1;
+        w1 = si[0];
+        w2 = r_d[2 * BP_LANES + lane];
+        w1 = w1 * w2;
+        w2 = r[2];
+        w3 = si_d[0 * BP_LANES + lane];
+        w2 = w2 * w3;
+        w1 = w1 + w2;
+        w0 = w0 + w1;
+        g_d[0 * BP_LANES + lane] = w0;
+    }
+}
+
 #endif

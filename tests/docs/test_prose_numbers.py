@@ -107,11 +107,9 @@ NAMED: dict[str, dict[str, str]] = {
         "9.9 kg for each bearing and not 0.41 kg": "blocks of two_way.md",
     },
     "docs/howto/jax.md": {
-        "good to some 1e-5 at": "bounds of test_quantity_function.py",
+        "good to 1e-4 of their size at": "test_derivatives_over_turns.py",
         "the default `rtol` of 1e-9": "a default",
-        "`tangent` law to 1e-3": "bounds of test_quantity_function.py",
-        "to 2e-3 (with": "measured against certificates",
-        "to 0.1), though": "measured against certificates",
+        "differences up to 5.5 turns": "test_derivatives_over_turns.py",
     },
     "docs/howto/linearize.md": {"(exit code 1)": "a definition"},
     "docs/howto/sensitivity.md": {
@@ -185,7 +183,7 @@ NAMED: dict[str, dict[str, str]] = {
     "docs/theory/linkage.md": {"(16 times the squared area": "Heron"},
     "docs/theory/reactions.md": {"8×8 matrix": "Eq. (1)", "is 8×8 and not 9×9": "Eq. (1)"},
     "docs/theory/sensitivities.md": {
-        "1e-10 unless given": "sensitivity_query.py",
+        "By default `rtol` is 1e-11 and": "run/sensitivity.py",
         "at a tolerance of 1e-11": "member_runs.py",
         "moving all parameters by 1e-7": "certificate.py",
         "(1e-3 of the derivative, plus 1e-5": "certificate.py",

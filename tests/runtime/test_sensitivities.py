@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ballpass.runtime import Model, RequestError
+from ballpass.runtime import IntegrationError, Model, RequestError, Sensitivities
 from ballpass.runtime.native.stepper import End, Family, Outcome, Segments
 from ballpass.runtime.point.evaluate import neighbour
 from ballpass.runtime.run import inputs as clock
@@ -63,7 +63,11 @@ def extrapolated(function: Callable[[float], np.ndarray], step: float) -> np.nda
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda f: f.name.lower())
 def test_every_method_differentiates_its_own_steps_exactly(make_model: Callable[..., Model], family: Family) -> None:
-    """All parameters in one pass, against differences of the same discrete map, which show no more than 1e-6."""
+    """All parameters in one pass, against differences of the same discrete map, which show no more than 1e-6.
+
+    By speed and start angle steps move with the times at which an angle is reached, and agree with unmoved ones to the
+    method's own error.
+    """
     model = make_model("punching_press_tangent")
     names = list(model.parameters)
     plain, _ = fixed_steps(model, family, SMOOTH, [], step=4e-6, duration=1e-3)
@@ -86,8 +90,10 @@ def test_every_method_differentiates_its_own_steps_exactly(make_model: Callable[
             scale = np.repeat([size[:half].max(), size[half:].max()], half)
             found.append(np.max(np.abs(difference - derivatives[:, :, k]) / np.where(scale > 0, scale, 1.0)))
         disagreement[name] = min(found)
+    moving = [disagreement.pop(name) for name in ("mechanism.driver.speed", "mechanism.driver.start_angle")]
     assert max(disagreement.values()) < 3e-6, max(disagreement, key=lambda n: disagreement[n])
     assert float(np.median(list(disagreement.values()))) < 1e-8
+    assert max(moving) < (1e-3 if family is Family.RODAS4 else 3e-5)
 
 
 def test_derivatives_by_moving_edges_of_a_load(make_model: Callable[..., Model]) -> None:
@@ -119,7 +125,7 @@ def test_errors_of_derivatives_fall_with_their_own_tolerance(make_model: Callabl
     names = ["bearing.clearance", "mechanism.driver.speed", "mechanism.forces.punch.force.y", "bearing.damping.ratio"]
     parameters = {"mechanism.driver.start_angle": 4.0}  # the punch strikes and leaves
 
-    def run(rtol: float, sensitivity_rtol: float | None, by: str = method) -> tuple[np.ndarray, np.ndarray]:
+    def run(rtol: float, sensitivity_rtol: float, by: str = method) -> tuple[np.ndarray, np.ndarray]:
         found = model.sensitivities(
             names,
             cycles=0.2,
@@ -144,16 +150,15 @@ def test_errors_of_derivatives_fall_with_their_own_tolerance(make_model: Callabl
     assert np.max(np.abs(moved - derivatives[:, :, 0]) / np.max(np.abs(moved), axis=0)) < 2e-4
     size, extent = np.max(np.abs(derivatives), axis=0), np.max(np.abs(x), axis=0)
 
-    def errors(rtol: float, sensitivity_rtol: float | None) -> tuple[float, float]:
+    def errors(rtol: float, sensitivity_rtol: float) -> tuple[float, float]:
         states, found = run(rtol, sensitivity_rtol)
         return float(np.max(np.abs(states - x) / extent)), float(np.max(np.abs(found - derivatives) / size))
 
-    free = errors(1e-4, None)
-    controlled = [errors(1e-4, tolerance) for tolerance in (1e-3, 1e-5, 1e-7)]
+    free, *controlled = [errors(1e-4, tolerance) for tolerance in (0.1, 1e-3, 1e-5, 1e-7)]
     assert controlled[0][1] > 5.0 * controlled[1][1]
     assert controlled[1][1] > 5.0 * controlled[2][1]
     assert free[1] > 5.0 * controlled[1][1]
-    assert free[1] > 100.0 * controlled[2][1]
+    assert free[1] > 50.0 * controlled[2][1]
     assert controlled[1][0] < free[0]
     assert controlled[2][0] < 1e-5
 
@@ -258,16 +263,35 @@ def test_wrong_requests_are_refused(make_model: Callable[..., Model]) -> None:
         model.sensitivities("bearing.clearance", cycles=1, sensitivity_rtol=0.0)
 
 
-def test_derivatives_are_those_of_steps_over_the_kinks_whoever_says_so(make_model: Callable[..., Model]) -> None:
-    model = make_model("punching_press_tangent")
-    plain, named = (
-        model.sensitivities("bearing.clearance", cycles=0.1, rtol=1e-9, kinks=kinks) for kinks in (None, "stepped-over")
-    )
-    assert plain.solution.statistics.kinks == "stepped-over"
-    assert np.array_equal(plain.x, named.x)
+def test_derivatives_of_steps_that_end_on_kinks_reach_tolerances_that_others_do_not(
+    make_model: Callable[..., Model],
+) -> None:
+    """The tangent law's slope has no bound where a contact begins or ends: steps over that place get too short; those
+    that end there, in the root of time, are few."""
+    model = make_model("crank_shaper")
+    names = ["bearing.clearance", "mechanism.driver.speed", "bearing.ball_angle"]
+
+    def run(kinks: str | None, rtol: float) -> Sensitivities:
+        return model.sensitivities(
+            *(names, 0.8),
+            rtol=rtol,
+            samples_per_cycle=100,
+            kinks=kinks,
+            method="stepper-dop853",  # type: ignore[arg-type]
+        )
+
+    reference = run(None, 1e-12).x
+    size = np.max(np.abs(reference), axis=0)
+    located, named, over = (run(kinks, 1e-9) for kinks in (None, "located", "stepped-over"))
+    assert np.array_equal(located.x, named.x)
+    assert located.solution.statistics.kinks == "located"
+    for found in (located, over):
+        assert np.max(np.abs(found.x - reference) / size) < 1e-4
+    assert 2 * located.solution.statistics.steps < over.solution.statistics.steps
+    assert np.max(np.abs(run(None, 1e-10).x - reference) / size) < 1e-5
+    with pytest.raises(IntegrationError, match="step size fell"):
+        run("stepped-over", 1e-10)
     for ask in (model.sensitivities, partial(model.sensitivity, "peak_ball_force")):
-        with pytest.raises(RequestError, match=r"Allowed: stepped-over\. Leave kinks out.*Model\.simulate_many"):
-            ask("bearing.clearance", cycles=1, kinks="located")  # type: ignore[operator]
         with pytest.raises(RequestError, match="Did you mean 'located'"):
             ask("bearing.clearance", cycles=1, kinks="locate")  # type: ignore[operator]
 

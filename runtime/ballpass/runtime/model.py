@@ -26,7 +26,7 @@ from ballpass.runtime.run.locating import Kinks, refuse_with_error
 from ballpass.runtime.run.reduced_run import reduce_run
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.sensitivity import Sensitivities, refuse_located, sensitivities
+from ballpass.runtime.run.sensitivity import Sensitivities, sensitivities
 from ballpass.runtime.run.settle import MOST, Settled, settle
 from ballpass.runtime.run.simulate import method_names, simulate
 from ballpass.runtime.run.start import RunEnd, Start
@@ -303,7 +303,7 @@ class Model(PointModel):
         rtol: float | None = None,
         sensitivity_rtol: float | None = None,
         samples_per_cycle: int | None = None,
-        kinks: Literal["stepped-over"] | None = None,
+        kinks: Literal["stepped-over", "located"] | None = None,
         progress: Progress = None,
     ) -> Sensitivities:
         """Simulate from t = 0 with the derivatives of the states by parameters, exact for the discrete solution.
@@ -311,10 +311,11 @@ class Model(PointModel):
         Parameters
         ----------
         wrt : names of parameters; any number in one pass
-        sensitivity_rtol : error allowed per step in the derivatives, which then take part in the choice of step sizes,
-            relative to the states' magnitudes over the parameters' scales (`run/direction_scales.py`) or to
-            the derivative itself where it is larger; None: the states alone choose the steps
-        kinks : ``stepped-over`` at any tolerance: what is differentiated are steps that go over the kinks of the laws
+        rtol : error allowed per step in the states.  Default: 1e-11, for derivatives lose digits
+        sensitivity_rtol : the same in the derivatives, which take part in the choice of step sizes, relative to the
+            states' magnitudes over the parameters' scales (`run/direction_scales.py`) or to the derivative itself where
+            it is larger.  Default: ten times `rtol`
+        kinks : ``located``, the default, at any tolerance; ``stepped-over`` costs digits
         others : as for `simulate`
 
         Raises
@@ -361,7 +362,7 @@ class Model(PointModel):
         rtol: float | None = None,
         sensitivity_rtol: float | None = None,
         samples_per_cycle: int | None = None,
-        kinks: Literal["stepped-over"] | None = None,
+        kinks: Literal["stepped-over", "located"] | None = None,
         agreement: float | None = None,
         progress: Callable[[str, float], None] | bool | None = None,
     ) -> SensitivityReport:
@@ -376,7 +377,7 @@ class Model(PointModel):
         check : compare with differences, the second route; False gives derivatives without certificates
         rtol, sensitivity_rtol : tolerances of states and derivatives; tight ones by default
         samples_per_cycle : nodes of quadratures in a turn that there are at least; there are more where signals need it
-        kinks : ``stepped-over`` at any tolerance, as for `sensitivities`
+        kinks : as for `sensitivities`
         agreement : relative disagreement of both routes that is allowed
         progress : called with words and a finished fraction; else as for `simulate`
 
@@ -399,7 +400,6 @@ class Model(PointModel):
             make_query,
         )
 
-        refuse_located(kinks)
         query = make_query(
             self.manifest,
             of=of,
@@ -412,6 +412,7 @@ class Model(PointModel):
             rtol=rtol,
             sensitivity_rtol=sensitivity_rtol,
             samples_per_cycle=samples_per_cycle,
+            kinks=kinks,
             agreement=agreement,
             progress=None,
         )

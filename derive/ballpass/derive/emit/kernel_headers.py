@@ -148,20 +148,21 @@ def _turned(kernel: Kernel) -> str:
     )
 
 
+def _moved(function: ca.Function, prefix: str, words: str) -> str:
+    return print_function(
+        function,
+        prefix=prefix,
+        description=f"{words} along BP_LANES directions.",
+        scalars=frozenset({"t"}),
+        lanes="BP_LANES",
+        varying=frozenset(n for n in function.name_in() if n.endswith("_d")),
+        # of one time among those of stage_slopes
+        strided=frozenset({"J"}),
+    )
+
+
 def tangents_header(kernels: Kernels) -> str:
     """Text of tangents.h."""
-
-    def moved(function: ca.Function, prefix: str, words: str) -> str:
-        return print_function(
-            function,
-            prefix=prefix,
-            description=f"{words} along BP_LANES directions.",
-            scalars=frozenset({"t"}),
-            lanes="BP_LANES",
-            varying=frozenset(n for n in function.name_in() if n.endswith("_d")),
-            # of one time among those of stage_slopes
-            strided=frozenset({"J"}),
-        )
 
     parts = ['#include "kernels.h"', _turned(kernels.stage_slopes)]
     for index, bearing in enumerate(kernels.bearings):
@@ -176,17 +177,19 @@ def tangents_header(kernels: Kernels) -> str:
                 lanes="BP_LANES",
                 varying=frozenset(numbers.name_in()),
             ),
-            moved(bearing.over_numbers["moved"], f"bp_{index}_", "Derivative of the slopes' summands of a ball"),
-            moved(bearing.over_numbers["sums_moved"], f"bp_{index}_", "Derivative of the sums over the balls"),
+            _moved(bearing.over_numbers["moved"], f"bp_{index}_", "Derivative of the slopes' summands of a ball"),
+            _moved(bearing.over_numbers["sums_moved"], f"bp_{index}_", "Derivative of the sums over the balls"),
         ]
-    parts += [moved(kernel.function, "bp_", kernel.description) for kernel in kernels.tangents]
+    parts += [_moved(kernel.function, "bp_", kernel.description) for kernel in kernels.tangents]
     return _header("TANGENTS", parts)
 
 
 _WITHOUT_SWITCHES = """/* Laws without switches: nothing to look at, no side to hold. */
 #define bp_{b}_switches_lanes(co, si, r, k, rows) ((void)0)
 #define bp_{b}_held_forces_lanes(co, si, r, k, border, rows) bp_{b}_forces_lanes(co, si, r, k, rows)
-#define bp_{b}_held_slopes_lanes(co, si, r, k, border, rows) bp_{b}_slopes_lanes(co, si, r, k, rows)"""
+#define bp_{b}_held_slopes_lanes(co, si, r, k, border, rows) bp_{b}_slopes_lanes(co, si, r, k, rows)
+#define bp_{b}_held_partials_lanes(co, si, r, k, border, rows) bp_{b}_partials_lanes(co, si, r, k, rows)
+#define bp_{b}_switches_moved_lanes(co, si, r, k, co_d, si_d, r_d, k_d, g_d) ((void)0)"""
 
 
 def switches_header(system: System, kernels: Kernels) -> str | None:
@@ -210,9 +213,11 @@ def switches_header(system: System, kernels: Kernels) -> str | None:
             "switches": "Switching functions [m, or m/s], and the rates of those of deflections",
             "held_forces": "Summands of the forces, sides held",
             "held_slopes": "The same, and of their slopes",
+            "held_partials": "The same, and derivatives of the forces by the ball's angle, by r0 and by k",
         }
         if switches:
             parts += [_of_balls(own.over_numbers[key], index, text) for key, text in words.items()]
+            parts.append(_moved(own.over_numbers["switches_moved"], f"bp_{index}_", "Switching functions of a ball"))
         else:
             parts.append(_WITHOUT_SWITCHES.format(b=index))
     first = len(flags["of_rate"])

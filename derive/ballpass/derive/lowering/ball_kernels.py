@@ -199,22 +199,18 @@ class BallBuilder:
             own["held_forces"] = made("held_forces", held, border)
             own["held_slopes"] = made("held_slopes", [*held, *self._slopes(at, at["held_d"], at["held_v"])], border)
         over_numbers = _over_numbers(own, len(takes))
-        forces, numbers = over_numbers["forces"], over_numbers["numbers"].size1_out(0)
-        k = ca.SX.sym("k", numbers)
-        turn = ca.vertcat(-si, co)
-        angled = ca.jtimes(forces(co, si, r, k), ca.vertcat(co, si), turn)
-        by_r0 = ca.jacobian(forces(co, si, r, k), r)[:, 0]
-        by_k = ca.jacobian(forces(co, si, r, k), k)
-        first = over_numbers["slopes"](co, si, r, k)
-        rows = ca.cse([ca.densify(ca.vertcat(first, angled, by_r0, ca.vec(by_k)))])
-        given, names = [co, si, r, k], ["co", "si", "r", "k"]
-        over_numbers["partials"] = ca.Function("partials", given, rows, names, ["rows"])
-        along = {f"{n}_d": ca.SX.sym(f"{n}_d", v.numel()) for n, v in zip(names, given, strict=True)}
-        moved = ca.jtimes(first[SUMS:], ca.vertcat(*given), ca.vertcat(*along.values()))
-        over_numbers["moved"] = ca.Function(
-            "moved", [*given, *along.values()], ca.cse([ca.densify(moved)]), [*names, *along], ["G_d"]
-        )
-        over_numbers["sums_moved"] = _sums_moved(rows[0].numel(), numbers)
+        numbers = over_numbers["numbers"].size1_out(0)
+        over_numbers["partials"] = _partials("partials", over_numbers["forces"], over_numbers["slopes"])
+        over_numbers["moved"] = _along("moved", over_numbers["slopes"], slice(SUMS, None), "G_d")
+        if at["b"].numel():
+            over_numbers["held_partials"] = _partials(
+                "held_partials", over_numbers["held_forces"], over_numbers["held_slopes"]
+            )
+            over_numbers["switches_moved"] = _along(
+                "switches_moved", over_numbers["switches"], slice(at["g"].numel()), "g_d"
+            )
+        partials = over_numbers["partials"].size1_out(0)
+        over_numbers["sums_moved"] = _sums_moved(partials, numbers)
         if self._pair is not None:
             one, other = self._pair
             both = [(one["F"] - other["F"]) * co, (one["F"] - other["F"]) * si]
@@ -227,7 +223,7 @@ class BallBuilder:
             over_model={**over_model, "contact": own["contact"]},
             paired=self._pair is not None,
             slopes=len(slopes),
-            partials=rows[0].numel() - SUMS,
+            partials=partials - SUMS,
         )
 
     def _slopes_of_pair(self, at: dict[str, ca.SX], other: dict[str, ca.SX]) -> list[ca.SX]:
@@ -261,6 +257,25 @@ def _by_rings(g: ca.SX) -> ca.SX:
 def sums_by_time(slopes: ca.SX, *, own: bool) -> ca.SX:
     """Time derivative of S at fixed state and r: what effects take."""
     return slopes[6:8] if own else ca.SX(SUMS, 1)
+
+
+def _partials(name: str, forces: ca.Function, slopes: ca.Function) -> ca.Function:
+    """The rows of `slopes`, and derivatives of those of `forces` by the ball's angle, by r0 and by k."""
+    given = {forces.name_in(k): ca.SX.sym(forces.name_in(k), forces.size1_in(k)) for k in range(forces.n_in())}
+    sums = forces(*given.values())
+    angled = ca.jtimes(sums, ca.vertcat(given["co"], given["si"]), ca.vertcat(-given["si"], given["co"]))
+    by_r0, by_k = ca.jacobian(sums, given["r"])[:, 0], ca.jacobian(sums, given["k"])
+    rows = ca.cse([ca.densify(ca.vertcat(slopes(*given.values()), angled, by_r0, ca.vec(by_k)))])
+    return ca.Function(name, [*given.values()], rows, [*given], ["rows"])
+
+
+def _along(name: str, of: ca.Function, rows: slice, result: str) -> ca.Function:
+    """Derivative of rows of a function's first result along a direction of all its arguments."""
+    given = {of.name_in(k): ca.SX.sym(of.name_in(k), of.size1_in(k)) for k in range(of.n_in())}
+    along = {f"{n}_d": ca.SX.sym(f"{n}_d", v.numel()) for n, v in given.items()}
+    value = of.call([*given.values()], True, False)[0][rows]
+    moved = ca.densify(ca.jtimes(value, ca.vertcat(*given.values()), ca.vertcat(*along.values())))
+    return ca.Function(name, [*given.values(), *along.values()], ca.cse([moved]), [*given, *along], [result])
 
 
 def _sums_moved(rows: int, numbers: int) -> ca.Function:

@@ -49,7 +49,7 @@ class Stepping:
     family : method of the driver
     rtol, magnitude : error allowed in a step: relative, and the states' magnitudes, shape (states,)
     sensitivity_rtol : tolerance of the derivatives in the choice of step sizes [1]
-    kinks : what is done at the kinks of the laws; derivatives step over them
+    kinks : what is done at the kinks of the laws
     """
 
     family: Family
@@ -131,10 +131,10 @@ def follow(
     times, back = np.unique(nodes.t, return_inverse=True)
     states = np.empty((len(times), count))
     start = np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
-    made = None if chain is None else Directions(model, numbers, chain.names, len(times))
+    made = None if chain is None else Directions(model, numbers, chain.names, len(times), stepping.kinks)
     if made is not None and stepping.sensitivity_rtol is not None:
         made.control(stepping.sensitivity_rtol, stepping.magnitude)
-    stepper = stepper_for(model, stepping.kinks) if made is None else model.differentiating_stepper
+    stepper = stepper_for(model, stepping.kinks, derivatives=made is not None)
     outcome = stepper.run(
         family=stepping.family,
         tolerance=stepping.rtol * stepping.magnitude,

@@ -19,7 +19,7 @@ from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS, Family
-from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER
+from ballpass.runtime.run.locating import kinks_with_derivatives
 from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.request import Request
@@ -38,6 +38,7 @@ def stepping_with_derivatives(
     method: str = "auto",
     rtol: float,
     sensitivity_rtol: float,
+    kinks: str | None = None,
 ) -> tuple[Stepping, Family]:
     """How to step with derivatives, and the family for tight runs of difference quotients.
 
@@ -58,13 +59,13 @@ def stepping_with_derivatives(
         magnitude, stiff = scales.magnitude, scales.stiffness > STIFF_RATIO
         family = METHODS.get(method, Family.AUTO)
         if family is Family.AUTO:
-            family = Family.RODAS5P if stiff else Family.DP54
+            family = Family.RODAS5P if stiff else Family.DOP853
         fine = Family.RODAS5P if stiff else Family.DOP853
     stepping = Stepping(
         family=family,
         rtol=rtol,
         magnitude=magnitude,
-        kinks=LOCATED if model.manifest.borders else STEPPED_OVER,  # as the steps with derivatives
+        kinks=kinks_with_derivatives(kinks, model.manifest),
         sensitivity_rtol=sensitivity_rtol,
     )
     return stepping, fine

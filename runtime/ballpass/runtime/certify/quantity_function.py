@@ -3,7 +3,7 @@
 In: a model, names of quantities and parameters, how long to run.  Out: a `QuantityFunction`, as optimisers take it;
 `ballpass.jax` and `ballpass.torch` wrap it.
 
-Values come from ensembles in lanes, derivatives from the stepper's own steps, both stepping over the kinks of the laws.
+Values come from ensembles in lanes, which step over the kinks of the laws, derivatives from steps that end on them.
 Kinks that a run with derivatives shows are warned of; `QuantityFunction.certify` compares with differences.
 """
 
@@ -36,17 +36,15 @@ from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.slopes import KinkWarning
 from ballpass.runtime.run.locating import STEPPED_OVER, refuse_jumps
 from ballpass.runtime.run.request import TOLERANCES, tolerance
+from ballpass.runtime.run.sensitivity import SENSITIVITY
 from ballpass.runtime.show.progress import shown, shown_steps
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
-#: Tolerance of the states [1], and that of the derivatives over it.
-RTOL, SENSITIVITY = 1e-9, 10.0
-
-#: Units of parameters that move contacts in time, whose derivatives sum up what steps lose there; and how much smaller
-#: the tolerance is then.  At 1e-9 the derivative of a peak by the speed is 24 % off, at 1e-11 0.2 %.
-OF_TIME, FINER = ("rad", "rad/s", "s", "Hz"), 1e-2
+#: Tolerance of values [1], and that of runs with derivatives over it: these lose digits, and end on kinks, which costs
+#: little.
+RTOL, FINER = 1e-9, 1e-2
 
 
 class UnknownValueWarning(BallpassWarning):
@@ -63,8 +61,7 @@ class QuantityFunction:
     wrt : parameters, in the order of the last axis of what the function is called with
     cycles, duration, transient : as for `Model.simulate`
     parameters : values of other parameters, SI.  Default: the scene's
-    rtol : error allowed per step of the states; ten times that of the derivatives [1].  Runs with derivatives by
-        speeds, angles or times have a hundredth
+    rtol : error allowed per step of the states [1].  Runs with derivatives have a hundredth
     failed : what stands for a value or derivative that is not known: ``raise`` an error, or ``nan``, with a warning
     chaos : ``refuse`` derivatives of a motion that amplifies a tiny change beyond meaning, which takes two more runs
         each; or ``ignore`` that
@@ -131,8 +128,7 @@ class QuantityFunction:
         self._span = make_span(model.manifest, cycles, duration, transient)
         # a study is not for two threads at once: each takes one that is free, and puts it back
         self._free: defaultdict[tuple[int, ...], list[Study]] = defaultdict(list)
-        units = {info.unit for info in model.manifest.parameters if info.name in self.wrt}
-        self._slope_rtol = max(FINER * self._rtol, TOLERANCES[0]) if units.intersection(OF_TIME) else self._rtol
+        self._slope_rtol = max(FINER * self._rtol, TOLERANCES[0])
         self._reduced = reduced_by_ensembles(model, self._quantities)
         self._all = tuple(range(len(self.of)))
         self._said: set[tuple[type[BallpassWarning], str]] = set()

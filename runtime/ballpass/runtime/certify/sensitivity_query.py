@@ -49,13 +49,11 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.direction_scales import ANGLE
-from ballpass.runtime.run.locating import refuse_jumps
+from ballpass.runtime.run.locating import check_kinks, refuse_jumps
 from ballpass.runtime.run.request import TOLERANCES, asked_length
+from ballpass.runtime.run.sensitivity import RTOL, SENSITIVITY
 
 Array = NDArray[np.float64]
-
-#: Tolerance of the states in a run with derivatives, and that of the derivatives themselves.
-RTOL, SENSITIVITY_RTOL = 1e-11, 1e-10
 
 #: Nodes of quadratures in a turn to begin with.  They have nothing to do with the samples of a run.
 NODES = 4096
@@ -80,6 +78,7 @@ class Query:
     check : True (differences), False, or one of `CHECKS`
     rtol, sensitivity_rtol : tolerances of states and derivatives
     samples_per_cycle : nodes of quadratures in a turn that there are at least
+    kinks : what the steps do at the kinks of the laws; None locates them
     agreement : relative disagreement that is allowed [1]
     progress : called with words and a finished fraction
     """
@@ -90,8 +89,9 @@ class Query:
     method: str = "auto"
     check: bool = True
     rtol: float = RTOL
-    sensitivity_rtol: float = SENSITIVITY_RTOL
+    sensitivity_rtol: float = SENSITIVITY * RTOL
     samples_per_cycle: int | None = None
+    kinks: str | None = None
     agreement: float = AGREEMENT
     progress: Callable[[str, float], None] | None = None
 
@@ -124,6 +124,7 @@ def make_query(
     rtol: float | None,
     sensitivity_rtol: float | None,
     samples_per_cycle: int | None,
+    kinks: str | None,
     agreement: float | None,
     progress: Callable[[str, float], None] | None,
 ) -> Query:
@@ -152,8 +153,9 @@ def make_query(
         method=method,
         check=check,
         rtol=RTOL if rtol is None else rtol,
-        sensitivity_rtol=SENSITIVITY_RTOL if sensitivity_rtol is None else sensitivity_rtol,
+        sensitivity_rtol=SENSITIVITY * RTOL if sensitivity_rtol is None else sensitivity_rtol,
         samples_per_cycle=samples_per_cycle,
+        kinks=None if kinks is None else check_kinks(kinks),
         agreement=AGREEMENT if agreement is None else agreement,
         progress=progress,
     )
@@ -177,7 +179,13 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     study = Study(model, quantities, query.span, 4)
     window = study.window(numbers)
     stepping, fine = stepping_with_derivatives(
-        model, numbers, window, method=query.method, rtol=query.rtol, sensitivity_rtol=query.sensitivity_rtol
+        model,
+        numbers,
+        window,
+        method=query.method,
+        rtol=query.rtol,
+        sensitivity_rtol=query.sensitivity_rtol,
+        kinks=query.kinks,
     )
     magnitude = stepping.magnitude
     study.per_turn = max(query.samples_per_cycle or 0, NODES)

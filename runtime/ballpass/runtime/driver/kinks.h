@@ -26,17 +26,17 @@ static const double BP_BAND = 0.01, BP_BRIEF = 1.5, BP_CLOSE = 0.1;
 /* Steps have the clock of sqrt_time.h where they are longer than BP_FAR times the time since an onset.  A slope at a step's end is divided by
    the pace there unless it is below BP_LEAST_PACE.  The end of a contact is foreseen no nearer than BP_NEAREST times the step that error
    control proposes, and looked for up to BP_ASTRAY times as far as it was foreseen; a step that leaves less than the part BP_ARRIVED of
-   the way there has arrived. */
-static const double BP_FAR = 2.0, BP_LEAST_PACE = 0.25, BP_NEAREST = 0.1, BP_ASTRAY = 1.5, BP_ARRIVED = 1e-6;
+   the way there has arrived.  Derivatives foresee it up to BP_SOON times the step that they refuse. */
+static const double BP_FAR = 2.0, BP_LEAST_PACE = 0.25, BP_NEAREST = 0.1, BP_ASTRAY = 1.5, BP_ARRIVED = 1e-6, BP_SOON = 4.0;
 
-/* Events before this one are let go for good.  The derivative of a force of a ball does not jump at its kinks, and the clock of sqrt_time.h is
-   not differentiated: a run with derivatives locates the events of loads alone. */
-#if defined BALLPASS_SENSITIVITIES && defined BP_HAS_WINDOWS
-enum { BP_FIRST_LOCATED = BP_FIRST_WINDOW }; /* stops come behind them */
-#elif defined BALLPASS_SENSITIVITIES && defined BP_HAS_STOPS
-enum { BP_FIRST_LOCATED = BP_FIRST_STOP };
+/* Events of loads start here, those of the balls are before.  Second derivatives of the law are not held, and the clock of sqrt_time.h is
+   one of explicit methods: linearly implicit steps with derivatives locate the events of loads alone. */
+#if defined BP_HAS_WINDOWS
+enum { BP_FIRST_LOAD = BP_FIRST_WINDOW }; /* stops come behind them */
+#elif defined BP_HAS_STOPS
+enum { BP_FIRST_LOAD = BP_FIRST_STOP };
 #else
-enum { BP_FIRST_LOCATED = 0 };
+enum { BP_FIRST_LOAD = BP_EVENTS };
 #endif
 
 typedef struct {
@@ -51,6 +51,7 @@ typedef struct {
     unsigned char brief[BP_EVENTS], still[BP_EVENTS]; /* brief crossings in a row, those without a step between */
     unsigned char rest[BP_EVENTS];  /* steps for which an event is let go */
     int resting; /* events let go */
+    int first;   /* events before this one are not located */
 } bp_sides;
 
 /* Switching functions of all events at a state and time, and their rates.  One ball a lane. */
@@ -109,8 +110,20 @@ static inline void bp_sides_start(bp_sides *restrict s, const bp_numbers *n, dou
             for (int k = 0; k < BP_NX; k++) s->band[e] += BP_BAND * fabs(moved[(e - BP_FIRST_STOP) * BP_NX + k]) / weight[k];
         }
 #endif
-        bp_set_side(s, e, e < BP_FIRST_LOCATED ? 0.0 : s->seen[0][e] > 0.0 ? 1.0 : -1.0);
+        bp_set_side(s, e, s->seen[0][e] > 0.0 ? 1.0 : -1.0);
         s->last[e] = -INFINITY;
+    }
+}
+
+/* Locate the events of the balls, or not. */
+static inline void bp_locate_balls(bp_sides *s, int located)
+{
+    const int first = located ? 0 : BP_FIRST_LOAD;
+    if (first == s->first) return;
+    s->first = first;
+    for (int e = 0; e < BP_FIRST_LOAD; e++) {
+        s->resting -= !located && s->side[e] == 0.0;
+        bp_set_side(s, e, !located ? 0.0 : s->seen[0][e] > 0.0 ? 1.0 : -1.0);
     }
 }
 
@@ -219,7 +232,7 @@ static inline void bp_sides_move_on(bp_sides *s)
     memcpy(s->seen[0], s->seen[BP_LOOKS], sizeof s->seen[0]);
     memcpy(s->slope[0], s->slope[1], sizeof s->slope[0]);
     if (!s->resting) return;
-    for (int e = BP_FIRST_LOCATED; e < BP_EVENTS; e++) {
+    for (int e = s->first; e < BP_EVENTS; e++) {
         if (s->side[e] != 0.0 || --s->rest[e] > 0) continue;
         /* the side that the law takes by itself: nothing jumps */
         bp_set_side(s, e, s->seen[0][e] > 0.0 ? 1.0 : -1.0);

@@ -175,6 +175,26 @@ static void foresee(bp_run *run, double t, double h, double *next)
     run->release = (bp_release){t + *next, which};
 }
 
+/* Where the derivatives refuse a step of size h, the end of a contact that comes soon, by the rate of its deflection: in front of it their
+   rate is unbounded, and even steps would come nearer and nearer without ever passing it.  Once from each place, so that the step that
+   aims there may be refused as well. */
+static void foresee_by_rate(bp_run *run, double t, double h, double *next)
+{
+    const bp_sides *s = &run->sides;
+    if (!is_explicit(run->method) || run->foreseen == t) return;
+    const bp_release known = run->release;
+    double soonest = BP_SOON * h;
+    run->foreseen = t;
+    for (int e = 0; e < BP_FIRST_LOAD; e++) {
+        const double ahead = -s->seen[0][e] / s->slope[0][e];
+        if (!(bp_has_rate[e] > 0.0 && bp_ends(e, s->side[e]) && s->side[e] * s->slope[0][e] < 0.0)) continue;
+        if (!(ahead > 0.0 && ahead < soonest) || (known.time > t && t + ahead > known.time)) continue;
+        soonest = ahead;
+        run->release = (bp_release){t + ahead, e};
+        *next = ahead;
+    }
+}
+
 #ifdef BP_HAS_WINDOWS
 static const double BP_TURN = 6.283185307179586476925286766559;
 
@@ -335,12 +355,31 @@ static void sides_here(bp_run *run)
 
 static void sides_start(bp_run *run, double t)
 {
+    run->lead = 1.0;
     bp_sides_start(&run->sides, &run->numbers, t, run->x, run->weight);
     sides_here(run);
     start_passages(run);
     run->onset = -INFINITY;
     run->touch = INFINITY;
 }
+
+/* No side is turned: the step is refused. */
+static void keep_sides(bp_run *run) { memset(run->sides.turn, 0, sizeof run->sides.turn); }
+
+/* Sides that the method at hand is to have. */
+static void sides_of_method(bp_run *run)
+{
+#ifdef BALLPASS_SENSITIVITIES
+    bp_locate_balls(&run->sides, is_explicit(run->method));
+    hold_borders(run);
+#else
+    (void)run;
+#endif
+}
+
+/* Pace at the end of the step taken, and whether it is too slow to tell the slope there. */
+static double pace_at_end(const bp_run *run) { return bp_pace(run->lead, 1.0); }
+static int stands_at_end(const bp_run *run) { return pace_at_end(run) < BP_LEAST_PACE; }
 
 static void sides_move_on(bp_run *run)
 {
@@ -355,7 +394,11 @@ static void remember_touch(bp_run *run, double h, double factor)
 }
 
 /* The coming times are those of another segment. */
-static void forget_release(bp_run *run) { run->release = (bp_release){NAN, 0}; }
+static void forget_release(bp_run *run)
+{
+    run->release = (bp_release){NAN, 0};
+    run->foreseen = NAN;
+}
 
 /* Whether a step is to end where a contact is foreseen to, no farther than `longest`; `h` is the way there then. */
 static int aim(bp_run *run, double t, double longest, double resolution, double *h)
@@ -377,6 +420,10 @@ static int aim(bp_run *run, double t, double longest, double resolution, double 
 #define has_stalled(run) 0
 #define sides_start(run, t) ((void)0)
 #define sides_here(run) ((void)0)
+#define sides_of_method(run) ((void)0)
+#define keep_sides(run) ((void)0)
+#define pace_at_end(run) 1.0
+#define stands_at_end(run) 0
 #define sides_move_on(run) ((void)0)
 #define remember_touch(run, h, factor) ((void)0)
 #define forget_release(run) ((void)0)
@@ -384,6 +431,7 @@ static int aim(bp_run *run, double t, double longest, double resolution, double 
 #define set_pace(run, start, t, h) ((void)0)
 #define stretched(run, start, t, h, factor, next) ((h) * (factor))
 #define foresee(run, t, h, next) ((void)0)
+#define foresee_by_rate(run, t, h, next) ((void)0)
 #endif
 
 #endif

@@ -92,6 +92,7 @@ typedef struct {
     double touch;
     double onset;       /* time of the branch point behind, minus infinity where there is none [s] */
     bp_release release; /* branch point ahead */
+    double foreseen;    /* time within the segment from which it was foreseen by its rate */
 #endif
 } bp_run;
 

@@ -68,6 +68,7 @@ static void begin_segment(bp_run *run, double start, double length, double resol
         run->step = estimate;
         run->last_error = BP_LOG_SMALL_ERROR;
     }
+    sides_of_method(run);
     /* slopes that overflow give an estimate of zero, or none */
     if (!(run->step > 2.0 * resolution)) run->step = 2.0 * resolution;
     forget_release(run);
@@ -116,6 +117,7 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
     const double reached = *time = taken.last ? length : t + h;
     if (taken.met == CUT) {
         tangent_switch(run, reached);
+        tangent_onset(run, reached, 1);
         turn_sides(run, start + reached, taken.tried);
     }
     sides_move_on(run);
@@ -126,6 +128,7 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
     if (chosen != run->method) {
         run->method = chosen;
         result->switches++;
+        sides_of_method(run);
         if (is_explicit(chosen)) {
             if (run->step > family->stable) run->step = family->stable;
             first_slope(run, reached);
@@ -138,6 +141,7 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
         tangent_start(run, reached);
     } else if (is_explicit(run->method)) {
         next_slope(run, reached);
+        if (stands_at_end(run)) tangent_start(run, reached);
     } else if (reached < length) {
         linearize(run, reached, 0);
     }
@@ -193,15 +197,20 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
                             : NO_KINK;
         if (met == AT_ONCE) {
             tangent_switch(run, t);
+            tangent_onset(run, t, 0);
             turn_sides(run, start + t, tried);
             if (is_explicit(run->method)) first_slope(run, t);
             else linearize(run, t, 1);
             tangent_start(run, t);
             continue;
         }
+        int by_derivatives = 0;
         if (error >= 0.0 && error <= 1.0 && within_reach(run)) {
-            const double theirs = tangent_step(run, t, h, error);
-            if (met == NO_KINK) error = theirs; /* a step that was cut is shorter than one that both errors allowed */
+            const double theirs = tangent_step(run, t, h, error, met);
+            /* a step that was cut short is shorter than one that both errors allowed */
+            by_derivatives = (met == NO_KINK || h >= tried) && !(theirs <= 1.0);
+            if (met == NO_KINK || by_derivatives) error = theirs;
+            if (by_derivatives) keep_sides(run);
         }
         if (h != tried) last = 0;
         const double accepted = error >= 0.0 && error <= 1.0 && within_reach(run), rejected_before = rejected_last;
@@ -218,7 +227,8 @@ static int run_segment(bp_run *run, double start, double end, int restart, int c
             result->rejected++;
             rejected_last = 1;
             run->step = stretched(run, start, t, h, factor, 0);
-            if (finite) foresee(run, t, h, &run->step);
+            if (by_derivatives) foresee_by_rate(run, t, h, &run->step);
+            else if (finite) foresee(run, t, h, &run->step);
             if (run->step < options->smallest_step || run->step <= resolution) {
                 result->step = run->step;
                 result->state = worst_state(run);

@@ -25,6 +25,13 @@ typedef struct {
     const double *p, *c, *u;
 } bp_direction;
 
+/* Sums over the balls with their slopes and partial derivatives; where kinks are located the law's sides are held. */
+#ifdef BALLPASS_LOCATED
+#define BP_PARTIALS(b) bp_##b##_held_partials_lanes(co, si, r + BP_RELATIVE * (b), k, n->border + BP_##b##_FIRST_EVENT, rows);
+#else
+#define BP_PARTIALS(b) bp_##b##_partials_lanes(co, si, r + BP_RELATIVE * (b), k, rows);
+#endif
+
 static inline void bp_point_at(bp_point *restrict at, const bp_numbers *n, const double *restrict w, const double *restrict x)
 {
     at->x = x;
@@ -34,7 +41,7 @@ static inline void bp_point_at(bp_point *restrict at, const bp_numbers *n, const
     {                                                                                                                            \
         const double *const r = at->r;                                                                                           \
         BP_BALLS(b, 2 + BP_##b##_PARTIALS)                                                                                       \
-        bp_##b##_partials_lanes(co, si, at->r + BP_RELATIVE * (b), k, rows);                                                               \
+        BP_PARTIALS(b)                                                                                                           \
         BP_TOTALS(b, 0, 2 + BP_##b##_PARTIALS, at->total_##b)                                                                    \
         memcpy(at->S + 2 * (b), at->total_##b, 2 * sizeof *at->S);                                                               \
         memcpy(at->G + BP_##b##_FIRST_SLOPE, at->total_##b + 2, BP_##b##_SLOPES * sizeof *at->G);                                \

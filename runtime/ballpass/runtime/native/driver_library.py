@@ -60,7 +60,7 @@ _REDUCTIONS = (*_DERIVATIVES, "ensemble_kernels.h")
 #: with derivatives; with steps that end on the kinks of the laws.
 PLAIN = DriverSources(kind="stepper", headers=_REDUCTIONS, flags=("-DBALLPASS_REDUCTIONS",))
 DIFFERENTIATING = DriverSources(kind="stepper", headers=_DERIVATIVES, flags=("-DBALLPASS_SENSITIVITIES",))
-#: With derivatives, where stops or windows of an angle that is a state are, at which derivatives jump: steps end there.
+#: With derivatives, and steps that end on kinks of the laws, and where loads switch as the motion decides.
 DIFFERENTIATING_LOCATED = DriverSources(
     kind="differentiating",
     headers=(*_DERIVATIVES, SWITCHES),

@@ -113,8 +113,13 @@ class LoadedModel(Functions):
 
     @property
     def differentiating_stepper(self) -> Stepper:
-        """The stepper with the derivatives of its steps, compiled when first asked for; errors as for `stepper`."""
-        return self._driver(Stepper, DIFFERENTIATING_LOCATED if self.manifest.borders else DIFFERENTIATING)
+        """The stepper with the derivatives of its steps, which go over kinks; errors as for `stepper`."""
+        return self._driver(Stepper, DIFFERENTIATING)
+
+    @property
+    def locating_differentiating_stepper(self) -> Stepper:
+        """The same whose steps end on kinks of the laws; errors as for `locating_stepper`."""
+        return self._locating(DIFFERENTIATING_LOCATED)
 
     @property
     def locating_stepper(self) -> Stepper:
@@ -125,12 +130,15 @@ class LoadedModel(Functions):
         ArtefactError
             The folder does not say where the kinks are.
         """
-        if LOCATING not in self._drivers and not (self.folder / SWITCHES).is_file():
+        return self._locating(LOCATING)
+
+    def _locating(self, sources: DriverSources) -> Stepper:
+        if sources not in self._drivers and not (self.folder / SWITCHES).is_file():
             raise ArtefactError(
                 f"{self.folder}: has no {SWITCHES}, which says where the laws have kinks. Write the folder again with "
                 "`ballpass derive`, or leave kinks stepped-over."
             )
-        return self._driver(Stepper, LOCATING)
+        return self._driver(Stepper, sources)
 
     @property
     def ensemble_driver(self) -> EnsembleDriver:

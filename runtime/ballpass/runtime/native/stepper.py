@@ -81,7 +81,10 @@ class _Options(ctypes.Structure):
 class _Tangents(ctypes.Structure):
     _fields_ = (
         ("blocks", ctypes.c_long),
-        *((name, ctypes.c_void_p) for name in ("p", "c", "u", "shift", "moved", "stretch", "x", "outputs", "work", "weight")),
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("p", "c", "u", "shift", "moved", "stretch", "x", "outputs", "work", "weight")
+        ),
         ("rtol", ctypes.c_double),
     )
 

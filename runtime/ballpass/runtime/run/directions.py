@@ -19,6 +19,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments, Tangents
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.direction_scales import direction_scales
+from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, stepper_for
 from ballpass.runtime.run.request import check_memory
 
 
@@ -115,6 +116,7 @@ class Directions:
     model, numbers : the model and the run's numbers
     names : parameters
     samples : number of samples of the run
+    kinks : what the run does at the kinks of the laws
 
     Raises
     ------
@@ -122,10 +124,12 @@ class Directions:
         An unknown parameter, or derivatives that would not fit into memory.
     """
 
-    def __init__(self, model: LoadedModel, numbers: Numbers, names: Sequence[str], samples: int) -> None:
+    def __init__(
+        self, model: LoadedModel, numbers: Numbers, names: Sequence[str], samples: int, kinks: Kinks = STEPPED_OVER
+    ) -> None:
         self.chain = Chain(model, numbers, names)
         self.names = self.chain.names
-        count, lanes = len(names), model.differentiating_stepper.lanes
+        count, lanes = len(names), stepper_for(model, kinks, derivatives=True).lanes
         self._lanes, self._blocks, self._count = lanes, -(-count // lanes), count
         self._check_memory(
             f"{samples} samples of derivatives of {len(model.states)} states by {count} parameters, as the driver "

@@ -110,9 +110,27 @@ def refuse_with_error(kinks: str | None, error: object) -> None:
         )
 
 
-def stepper_for(model: LoadedModel, kinks: Kinks) -> Stepper:
+def kinks_with_derivatives(asked: str | None, manifest: Manifest) -> Kinks:
+    """What runs with derivatives do at kinks: located at any tolerance, where there are some, unless told otherwise.
+
+    Stepped over, the derivative of a step is not that of the motion; and where loads switch as the motion decides, it
+    jumps, so that steps have to end there.
+
+    Raises
+    ------
+    RequestError
+        Another word than of `CHOICES`.
+    """
+    chosen = LOCATED if asked is None else check_kinks(asked)
+    return LOCATED if manifest.borders or (chosen == LOCATED and has_kinks(manifest)) else STEPPED_OVER
+
+
+def stepper_for(model: LoadedModel, kinks: Kinks, *, derivatives: bool = False) -> Stepper:
     """Driver of single runs; errors as for `Model.stepper`."""
-    return model.locating_stepper if kinks == LOCATED and has_kinks(model.manifest) else model.stepper
+    located = kinks == LOCATED and has_kinks(model.manifest)
+    if derivatives:
+        return model.locating_differentiating_stepper if located else model.differentiating_stepper
+    return model.locating_stepper if located else model.stepper
 
 
 def refuse_jumps(manifest: Manifest, what: str) -> None:

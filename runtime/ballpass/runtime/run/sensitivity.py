@@ -7,7 +7,7 @@ step line by line at fixed step size, many parameters in one pass (`directions`)
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,11 +16,14 @@ from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS
 from ballpass.runtime.run.directions import Directions
-from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, check_kinks, refuse_jumps
-from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.locating import kinks_with_derivatives, refuse_jumps
+from ballpass.runtime.run.request import TOLERANCES, Request
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.show.short import ShortRepr
+
+#: Tolerance of the states in a run with derivatives, and that of the derivatives over it [1].
+RTOL, SENSITIVITY = 1e-11, 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -62,27 +65,17 @@ class Sensitivities(ShortRepr):
         return np.asarray(self.x[:, states.index(state), self.names.index(parameter)])
 
 
-def refuse_located(kinks: str | None) -> None:
-    """Raise `RequestError` where derivatives are asked for of steps that end on the kinks of the laws."""
-    if kinks is not None and check_kinks(kinks) == LOCATED:
-        raise RequestError(
-            f"kinks = {kinks!r}: derivatives are those of steps that go over the kinks of the laws; the place of a "
-            f"located one is not differentiated. Allowed: {STEPPED_OVER}. Leave kinks out, or take differences of "
-            f"runs: `Model.simulate` and `Model.simulate_many` have kinks = {LOCATED!r}."
-        )
-
-
 def sensitivities(model: LoadedModel, numbers: Numbers, request: Request, names: Sequence[str]) -> Sensitivities:
     """Run a model with its derivatives along parameters.
 
     Raises
     ------
     RequestError
-        An unknown parameter, a method that is not the stepper's, kinks to be located, a law whose force jumps.
+        An unknown parameter, a method that is not the stepper's, a law whose force jumps.
     IntegrationError
         The computation failed.
     """
-    refuse_located(request.kinks)
+    kinks = kinks_with_derivatives(request.kinks, model.manifest)
     refuse_jumps(model.manifest, "sensitivities")
     method = request.method or model.manifest.run.method
     if method not in ("auto", *METHODS):
@@ -93,10 +86,12 @@ def sensitivities(model: LoadedModel, numbers: Numbers, request: Request, names:
     if not names:
         raise RequestError("sensitivities: no parameter was named. Give the names of one or more parameters.")
     made: list[Directions] = []
+    rtol = RTOL if request.rtol is None else request.rtol
+    own = min(SENSITIVITY * rtol, TOLERANCES[1]) if request.sensitivity_rtol is None else request.sensitivity_rtol
 
     def prepare(samples: int) -> Directions:
-        made.append(Directions(model, numbers, names, samples))
+        made.append(Directions(model, numbers, names, samples, kinks))
         return made[0]
 
-    solution = simulate(model, numbers, request, prepare)
+    solution = simulate(model, numbers, replace(request, rtol=rtol, sensitivity_rtol=own), prepare)
     return Sensitivities(solution=solution, names=tuple(names), x=made[0].states(len(solution)))

@@ -29,7 +29,7 @@ from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.run.failure_location import whereabouts
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.limits import refuse_crawl
-from ballpass.runtime.run.locating import STEPPED_OVER, choose_kinks
+from ballpass.runtime.run.locating import choose_kinks, kinks_with_derivatives
 from ballpass.runtime.run.magnitudes import model_scales, stepper_magnitudes
 from ballpass.runtime.run.pieces import integrate
 from ballpass.runtime.run.reductions import joined, reduced_channels, reductions_of
@@ -71,8 +71,11 @@ def simulate(
         model, numbers, plan.times, plan.initial, interval, plan.turn, even=plan.even, start=start
     )
     method, reason, magnitude = _choose(model, numbers, request.method, plan, trajectory)
-    # derivatives are those of steps that go over kinks
-    kinks = choose_kinks(request.kinks, method, model.manifest, plan.rtol) if prepare is None else STEPPED_OVER
+    kinks = (
+        choose_kinks(request.kinks, method, model.manifest, plan.rtol)
+        if prepare is None
+        else kinks_with_derivatives(request.kinks, model.manifest)
+    )
     channels = reduced_channels(model.manifest, plan.outputs)
     # the edge at the start may lie a rounding before it
     rows = reduction_rows(model.manifest).empty(2, [start - trajectory.near, 0.0], channels)

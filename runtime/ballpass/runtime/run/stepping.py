@@ -65,7 +65,7 @@ def step_through(
         The stepper could not reach the end.
     """
     cost.kinks, cost.located = kinks, 0 if kinks == LOCATED else None
-    stepper = stepper_for(model, kinks) if directions is None else model.differentiating_stepper
+    stepper = stepper_for(model, kinks, derivatives=directions is not None)
     inputs = model.manifest.inputs
     state = trajectory.initial.copy()
     span = trajectory.end - trajectory.begin

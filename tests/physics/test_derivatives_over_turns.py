@@ -1,0 +1,161 @@
+"""Derivatives of runs in which an input comes back with the turn, over many turns, against differences of tight runs.
+
+By a speed or an angle all that happens moves in time, and by more in every turn; a table and a window are met again in
+each.  Differences are of runs at a tolerance of their own, or those of the certificate, and extrapolated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from ballpass.runtime import Model, QuantityFunction
+
+#: What a derivative may be off, over the largest of its state, or over its size.
+AGREEMENT = 1e-4
+
+SPEED, START = "mechanism.driver.speed", "mechanism.driver.start_angle"
+SHAFT, CLEARANCE, ANGLE = "shaft.speed", "bearing.clearance", "bearing.ball_angle"
+
+TABLE = (
+    (
+        'force = ["1500 N", "0 N"]',
+        'direction = "10 deg"\ntable = { angle = { values = [-20, 30, 130, 190, 250], unit = "deg" }, '
+        'force = { values = [0, 1200, 1700, 900, -60], unit = "N" } }',
+    ),
+    ('window = { start = "350 deg", end = "190 deg" }\n', ""),
+)
+EFFECTS = (
+    (
+        "[bearing.inner_ring]",
+        """[bearing.cage]
+slip = { time = { values = [0.0, 0.05, 0.13, 0.3], unit = "s" }, value = [0.0, 0.03, 0.01, 0.02] }
+[bearing.outer_waviness.9]
+amplitude = "0.5 um"
+[bearing.defects.spall]
+on = "inner"
+angle = "30 deg"
+chord = "1 mm"
+depth = "5 um"
+profile = "half-sine"
+[bearing.inner_ring]""",
+    ),
+)
+SPEEDS = (
+    (
+        'speed = "500 rpm"                       # [paper]; positive is counter-clockwise',
+        'table = { time = { values = [0, 0.2, 0.5], unit = "s" }, speed = { values = [500, 430, 620], unit = "rpm" } }',
+    ),
+)
+
+CASES = {
+    "window": ("crank_shaper", (), 5.5, (SPEED, START, "mechanism.forces.cut.window.end", CLEARANCE)),
+    "window, light damping": ("offset_slider", (), 5.5, (SPEED, "mechanism.forces.tool.window.start", ANGLE)),
+    "table over the angle": (
+        "crank_shaper",
+        TABLE,
+        5.5,
+        (SPEED, "mechanism.forces.cut.table.force.3", "mechanism.forces.cut.table.angle.2", START),
+    ),
+    "slip, waviness, spall": (
+        "varying_compliance",
+        EFFECTS,
+        1.6,  # later it multiplies what is changed by so much that differences show nothing
+        (SHAFT, "bearing.cage.slip.value.2", "bearing.defects.spall.chord", ANGLE),
+    ),
+    "table of the speed": (
+        "punching_press_two_way",
+        SPEEDS,
+        2.5,
+        ("mechanism.driver.table.speed.2", "mechanism.driver.table.time.2", "mechanism.forces.punch.window.end"),
+    ),
+    "motor": ("punching_press_motor", (), 2.5, ("mechanism.driver.torque.synchronous_speed", SPEED, CLEARANCE)),
+    "rotating load": ("rotor", (), 5.5, (SHAFT, "loads.unbalance.angle", CLEARANCE)),
+}
+
+
+def scale_of(model: Model, name: str) -> float:
+    """A large change of a parameter."""
+    unit = next(info.unit for info in model.manifest.parameters if info.name == name)
+    return 1.0 if unit == "rad" else abs(model.parameters[name])
+
+
+def extrapolated(run: Callable[[float], np.ndarray], step: float) -> np.ndarray:
+    """Central differences of four runs."""
+    wide, narrow = ((run(s) - run(-s)) / (2.0 * s) for s in (step, 0.5 * step))
+    return np.asarray((4.0 * narrow - wide) / 3.0)
+
+
+#: Those of which `make test` makes the first claim, and the second.
+STATES, QUANTITIES = ("window", "table over the angle", "slip, waviness, spall"), ("window", "table over the angle")
+
+
+@pytest.mark.parametrize(
+    "case", [case if case in STATES else pytest.param(case, marks=pytest.mark.long) for case in CASES]
+)
+def test_derivatives_of_states_are_those_of_differences_in_every_turn(
+    make_model: Callable[..., Model], case: str
+) -> None:
+    scene, changes, turns, names = CASES[case]
+    model = make_model(scene, *changes)
+    found = model.sensitivities(list(names), turns, samples_per_cycle=40)
+    times = found.solution.t
+    run = {"duration": float(times[-1]), "times": times, "transient": 0, "rtol": 1e-12, "kinks": "located"}
+    for k, name in enumerate(names):
+        value = model.parameters[name]
+
+        def states(change: float, name: str = name, value: float = value) -> np.ndarray:
+            return model.simulate(**run, method="stepper-dop853", parameters={name: value + change}).x  # type: ignore[arg-type]
+
+        large = scale_of(model, name)
+        # a driver that follows its table is moved by its table alone
+        nothing = 1e-3 * np.max(np.abs(found.solution.x), axis=0) / large
+        best = math.inf
+        for step in (
+            1e-6,
+            1e-5,
+            1e-4,
+        ):  # a weak parameter shows little of a small step, a strong one turns in a large one
+            difference = extrapolated(states, step * large)
+            off = np.abs(found.x[:, :, k] - difference) / np.maximum(np.max(np.abs(difference), axis=0), nothing)
+            # at an edge that moves velocities have two derivatives: a few samples lie on one
+            best = min(best, float(np.sort(np.max(off, axis=1))[-1 - 2 * math.ceil(turns)]))
+            if best < AGREEMENT:
+                break
+        assert best < AGREEMENT, name
+
+
+@pytest.mark.filterwarnings("ignore::ballpass.runtime.KinkWarning")
+@pytest.mark.parametrize(
+    ("case", "turns"),
+    [
+        pytest.param(case, turns, marks=() if case in QUANTITIES and turns == 2.2 else pytest.mark.long)
+        for case in CASES
+        for turns in (0.6, 2.2, 5.4)
+        if turns < CASES[case][2] + 2.0
+    ],
+)
+def test_gradients_of_quantities_are_those_of_differences(
+    make_model: Callable[..., Model], case: str, turns: float
+) -> None:
+    scene, changes, most, names = CASES[case]
+    model = make_model(scene, *changes)
+    of = ("rms:inner.y", "max:ball.force", "range:inner.x")
+    function = QuantityFunction(model, of, names, min(turns, most), transient=0.0)
+    gradient, report = function.jacobian(function.start), function.certify()
+    compared = 0
+    for row, quantity in enumerate(of):
+        for column, name in enumerate(names):
+            pair = report[quantity, name]
+            assert pair.check.value is not None
+            assert pair.check.uncertainty is not None
+            # what a large change brings, below a tenth of the quantity, is nothing
+            size = max(abs(pair.check.value), 0.1 * abs(pair.value) / pair.scale)
+            if pair.check.sides is not None or pair.check.uncertainty > AGREEMENT * size:
+                continue  # a kink, or differences tell too little
+            compared += 1
+            assert abs(gradient[row, column] - pair.check.value) < 2.0 * AGREEMENT * size, (quantity, name)
+    assert compared >= 0.7 * len(of) * len(names)
