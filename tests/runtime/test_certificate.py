@@ -145,9 +145,9 @@ def test_a_wrong_derivative_among_many_right_ones_does_not_hide(wrong: Mapping[i
 
 @pytest.mark.long
 def test_of_two_numbers_the_one_known_better_is_given(make_model: Callable[..., Model]) -> None:
-    """By speed the steps know the peak's derivative to a tenth, differences to a part in ten thousand."""
+    """Loose steps know the peak's derivative to a part in thirty, differences to a part in ten thousand."""
     model = make_model("punching_press_tangent")
-    report = model.sensitivity("peak_ball_force", "mechanism.driver.speed")
+    report = model.sensitivity("peak_ball_force", "mechanism.driver.speed", rtol=1e-5, sensitivity_rtol=1e-3)
     (pair,) = report.pairs
     assert pair.check.verdict is Verdict.NOT_CHECKED
     assert pair.route == "differences"

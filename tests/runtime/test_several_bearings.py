@@ -125,7 +125,9 @@ def test_derivatives_by_one_bearing_move_that_bearing_alone(pair: Model, alone: 
     columns = [pair.states.index(f"right.{state}") for state in alone["right"].states]
     scale = np.max(np.abs(own.x[-1]))
     assert np.max(np.abs(both.x[-1][columns, 1] - own.x[-1][:, 0])) < 1e-3 * scale
-    assert np.max(np.abs(both.x[-1][columns, 0])) == 0.0
+    # times that move with the left bearing's contacts leave the error of the steps in the right one
+    others = np.delete(both.x[-1][:, 0], columns)
+    assert np.max(np.abs(both.x[-1][columns, 0])) < 1e-6 * np.max(np.abs(others))
 
 
 def test_the_manifest_lists_them_and_their_coordinates(pair: Model) -> None:
