@@ -78,24 +78,28 @@ static int stretch_to_release(bp_run *run, double t, double h)
 #define stretch_to_release(run, t, h) 0
 #endif
 
+static void explicit_tangents(bp_run *run, const bp_explicit_method *plain, double t, double h)
+{
+    bp_explicit_tangent_step(plain, plain->stages, run->tangents, run->blocks, &run->plain, &run->numbers, run->result->segment, t, run->x, h,
+                             step_lead(run), run->next);
+}
+
 /* Differentiate the step tried; returns its error, with that of the derivatives where they are controlled. */
 static double tangent_step(bp_run *run, double t, double h, double error, int met)
 {
     const ballpass_tangents *tangents = run->tangents;
     const bp_explicit_method *plain = explicit_method(run->method);
     const bp_rosenbrock_method *linear = rosenbrock_method(run->method);
-    const long segment = run->result->segment;
     if (!tangents) return error;
     for (long b = 0; b < tangents->blocks; b++)
         memcpy(run->blocks[b].stretch, tangents->stretch + b * BP_LANES, sizeof run->blocks[b].stretch);
-    if (plain)
-        do {
-            bp_explicit_tangent_step(plain, plain->stages, tangents, run->blocks, &run->plain, &run->numbers, segment, t, run->x, h,
-                                     step_lead(run), run->next);
-        } while (met == CUT && stretch_to_release(run, t, h) && (met = NO_KINK, 1));
-    else
-        bp_rosenbrock_tangent_step(linear, linear->stages, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers, segment, t,
-                                   run->x, h);
+    if (plain) {
+        explicit_tangents(run, plain, t, h);
+        if (met == CUT && stretch_to_release(run, t, h)) explicit_tangents(run, plain, t, h);
+    } else {
+        bp_rosenbrock_tangent_step(linear, linear->stages, tangents, run->blocks, &run->linear, &run->matrix, &run->numbers,
+                                   run->result->segment, t, run->x, h);
+    }
     if (!tangents->weight) return error;
     const double theirs = bp_tangent_error(tangents, run->blocks, plain, linear, h);
     return theirs <= error ? error : theirs;
