@@ -12,7 +12,7 @@ from matplotlib.image import imread
 from typer.testing import CliRunner, Result
 
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.ask.study import Course, Study
+from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
 
 SCENE = Path(__file__).resolve().parent.parent / "scenes" / "punching_press_tangent.toml"
 SHORT = ["--cycles", "0.4", "--transient", "0", "--set", "bearing.clearance=-60 um"]
@@ -78,14 +78,14 @@ def test_json_is_one_object_and_nothing_else(ballpass: Callable[..., Result]) ->
 def test_a_disagreement_ends_with_exit_code_1_and_both_numbers(
     ballpass: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plain = Study.differentiate
+    plain = QuantityRun.differentiate
 
-    def wrong(self: Study, *arguments: object, **more: object) -> Course:
+    def wrong(self: QuantityRun, *arguments: object, **more: object) -> Values:
         course = plain(self, *arguments, **more)  # type: ignore[arg-type]
         return replace(course, estimates=tuple(replace(item, slope=1.05 * item.slope) for item in course.estimates))
 
     right = json.loads(ballpass(*SHORT, *ASKED, "--json").stdout)["sensitivities"][0]
-    monkeypatch.setattr(Study, "differentiate", wrong)
+    monkeypatch.setattr(QuantityRun, "differentiate", wrong)
     result = ballpass(*SHORT, *ASKED)
     assert result.exit_code == 1
     assert "disagrees" in result.stdout

@@ -22,9 +22,9 @@ from typing import Any
 from ballpass.derive import generate
 from ballpass.runtime import load
 from ballpass.runtime.app.commands.shared import Stages
+from ballpass.runtime.certify.method_choice import MethodChoice
 from ballpass.runtime.certify.trade import measure_trade
 from ballpass.runtime.certify.trade_report import Measured, Trade, percent, table, to_plain, words
-from ballpass.runtime.certify.whole_run import Way
 from ballpass.runtime.plot.style import caption_of, save
 from ballpass.runtime.plot.trade import draw_trade
 from trade.promise import ROOT, SCENES, markdown
@@ -43,7 +43,7 @@ def from_plain(data: Mapping[str, Any]) -> Trade:
 
     measured = tuple(
         Measured(
-            way=Way(**one["way"]),
+            way=MethodChoice(**one["way"]),
             time=math.inf if one["time"] is None else one["time"],
             median=finite(one["median"]),
             promised=finite(one["promised"]),

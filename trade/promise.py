@@ -20,11 +20,14 @@ from ballpass.derive import generate
 from ballpass.runtime import BallpassError, load
 from ballpass.runtime.app.commands.shared import Stages
 from ballpass.runtime.certify.error_target import MOVED, TargetMissed, meet_target
+from ballpass.runtime.certify.method_choice import compared_quantities, stepper_run
 from ballpass.runtime.certify.trade import REFERENCE, perturbed, reference
 from ballpass.runtime.certify.trade_report import percent
-from ballpass.runtime.certify.whole_run import WholeRun, check_observables, default_observables, prepare
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import Run
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "howto" / "accuracy_numbers.md"
@@ -98,29 +101,29 @@ def count(
     progress: Callable[[float], None],
 ) -> Counts:
     """Ask for every target, of the peak ball force alone and of all default quantities, on so many sets."""
-    names = default_observables(model)
-    observables = check_observables(model, names)
+    compared = compared_quantities(model, None)
+    quantities = QuantityRun(model, compared)
     found = Counts()
     done = 0
     while done < wanted:
         numbers, request = next(sets)
         try:
-            run = prepare(model, model.numbers(numbers), request)
-            values, doubt = reference(run, observables)
-            moved = run.integrate(observables, REFERENCE, MOVED).values
+            run = stepper_run(model, model.numbers(numbers), request)
+            values, doubt = reference(run, quantities)
+            moved = REFERENCE.measure(quantities, run, MOVED).values
         except BallpassError:
             continue  # a linkage that cannot be assembled, a ring without hold: no run to ask about
         with np.errstate(divide="ignore", invalid="ignore"):
             doubt = np.fmax(doubt, np.abs(moved / values - 1.0))
         if np.all(np.isfinite(doubt)):
             for columns in (slice(0, 1), slice(None)):
-                _ask(run, names[columns], values[columns], float(doubt[columns].max()), found)
+                _ask(run, compared[columns], values[columns], float(doubt[columns].max()), found)
         done += 1
         progress(done / wanted)
     return found
 
 
-def _ask(run: WholeRun, of: Sequence[str], values: np.ndarray, doubt: float, found: Counts) -> None:
+def _ask(run: Run, of: Sequence[Quantity], values: np.ndarray, doubt: float, found: Counts) -> None:
     refused = False
     for target in TARGETS:
         found.asked += 1
@@ -138,7 +141,7 @@ def _ask(run: WholeRun, of: Sequence[str], values: np.ndarray, doubt: float, fou
         if doubt > target:
             found.accepted += 1
             continue
-        true = float(np.abs(np.array([one.values[name] for name in of]) / values - 1.0).max())
+        true = float(np.abs(np.array([one.values[item.name] for item in of]) / values - 1.0).max())
         found.kept.append(true <= target)
         if true > doubt:
             found.ratios.append(true / one.estimate)

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 
 from ballpass.derive import generate, shipped_scenes
 from ballpass.runtime import load
-from ballpass.runtime.ask.characteristic import frequencies_of
+from ballpass.runtime.quantity.characteristic import frequencies_of
 
 model = load(generate(shipped_scenes()["varying-compliance"]))
 frequencies = frequencies_of(model.manifest.bearing, model.numbers().values)

@@ -96,9 +96,9 @@ def test_an_explicit_method_on_a_stiff_model_is_given_up_after_bounded_work(
     # it took a hundred million steps, and Ctrl-C was not heard meanwhile
     model = needs_stepper(make_model("punching_press"))
     numbers = {"bearing.damping.ratio": 2.5e-4, f"{OUTER}.mass": 1e-3}
-    monkeypatch.setattr("ballpass.runtime.run.stepping.step_limit", lambda duration, turn: 200_000)
-    monkeypatch.setattr("ballpass.runtime.run.stepping.STEPS_A_CALL", 100_000)
-    monkeypatch.setattr("ballpass.runtime.run.stepping.LEAST_PROGRESS", 0.0)
+    monkeypatch.setattr("ballpass.runtime.run.limits.step_limit", lambda duration, turn: 200_000)
+    monkeypatch.setattr("ballpass.runtime.run.loop.STEPS_A_CALL", 100_000)
+    monkeypatch.setattr("ballpass.runtime.run.limits.LEAST_PROGRESS", 0.0)
     with pytest.raises(IntegrationError, match=r"more steps than allowed.*explicit method crawls on a stiff") as caught:
         model.simulate(cycles=1, parameters=numbers, method="stepper-dp54", transient=0)
     assert caught.value.status is Status.TOO_MANY_STEPS

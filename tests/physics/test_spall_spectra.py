@@ -7,9 +7,9 @@ from collections.abc import Callable
 import pytest
 
 from ballpass.runtime import Model
-from ballpass.runtime.ask.characteristic import characteristic_lines, identify
 from ballpass.runtime.ask.spectrum import amplitude_spectrum
 from ballpass.runtime.ask.vibration import envelope
+from ballpass.runtime.quantity.characteristic import characteristic_lines, identify
 
 SPALLS = """
 [bearing.defects.outside]

@@ -16,12 +16,13 @@ import pytest
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, RequestError, load
-from ballpass.runtime.ask.quantities import parse_quantity
-from ballpass.runtime.ask.study import Span, Study
-from ballpass.runtime.ask.track import Stepping
-from ballpass.runtime.native.stepper import Family
+from ballpass.runtime.quantity.grammar import parse_quantity
+from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.run import request
 from ballpass.runtime.run.directions import Directions
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import Run, resolve
+from ballpass.runtime.run.sampling import Sampling
 from ballpass.runtime.run.segments import WORK, segment_edges
 from ballpass.runtime.run.trajectory import start_trajectory
 
@@ -35,6 +36,11 @@ NEXT_TO_NOTHING = 100_000_000
 def press(tmp_path_factory: pytest.TempPathFactory) -> Model:
     text = (SCENES / "punching_press.toml").read_text(encoding="utf-8")
     return load(generate(scene_from_text(text, "press"), tmp_path_factory.mktemp("limits") / "press"))
+
+
+def two_samples(run: Run) -> Sampling:
+    """Both ends of a run."""
+    return Sampling(duration=run.duration, times=np.array([run.begin, run.end]), even=False, outputs=())
 
 
 def most_memory(call: Callable[[], object]) -> int:
@@ -108,9 +114,8 @@ def test_count_of_segments_is_what_making_them_takes(
     numbers = press.numbers({"mechanism.driver.speed": speed})
     turn = 2.0 * np.pi / abs(speed)
     end = 20_000 * turn
-    taken = most_memory(
-        lambda: start_trajectory(press, numbers, np.array([0.0, end]), press.initial(), (0.0, end), turn, even=False)
-    )
+    run = resolve(press, numbers, Request(duration=end, transient_cycles=0.0))
+    taken = most_memory(lambda: start_trajectory(run, two_samples(run)))
     count = len(segment_edges(press, numbers, 0.0, end, turn)) - 1
     counted = 8 * count * (len(press.manifest.inputs) + WORK)
     assert 0.9 * counted < taken < 1.1 * counted
@@ -154,9 +159,8 @@ def test_count_of_derivatives_is_what_they_take(press: Model, monkeypatch: pytes
     # segments of one call as well: their inputs have derivatives
     monkeypatch.setattr(request, "MAX_NUMBERS", 10 * columns)
     few = Directions(press, numbers, names, 10)
-    trajectory = start_trajectory(
-        press, numbers, np.array([0.0]), press.initial(), (0.0, press.period()), press.period(), even=False
-    )
+    run = resolve(press, numbers, Request(cycles=1.0, transient_cycles=0.0))
+    trajectory = start_trajectory(run, two_samples(run))
     few.tangents(trajectory.segments, 0, 1)
     monkeypatch.setattr(request, "MAX_NUMBERS", lanes * -(-len(names) // lanes))
     with pytest.raises(RequestError, match=r"3 segments in one call, .* fewer parameters"):
@@ -165,23 +169,22 @@ def test_count_of_derivatives_is_what_they_take(press: Model, monkeypatch: pytes
 
 @pytest.mark.parametrize("count", [16, 41])
 def test_count_of_nodes_is_what_a_quantity_takes(press: Model, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    numbers, names, a_turn = press.numbers(), list(press.parameters)[:count], 9000
-    quantity = parse_quantity(press.manifest, "peak_ball_force")
-    study = Study(press, [quantity], Span(cycles=2.0, duration=None, transient=1.0), a_turn)
-    magnitude = np.array(press.simulate(1.0, samples_per_cycle=1).statistics.magnitudes)
-    stepping = Stepping(family=Family.AUTO, rtol=1e-4, magnitude=magnitude)
-    study.differentiate(numbers, names, stepping)  # what is compiled once
-    taken = most_memory(lambda: study.differentiate(numbers, names, stepping))
+    names = list(press.parameters)[:count]
+    quantities = QuantityRun(press, [parse_quantity(press.manifest, "mean:inner.y")], along_nodes=True)
+    run = resolve(press, press.numbers(), Request(cycles=2.0, transient_cycles=0.0, rtol=1e-10, kinks="stepped-over"))
+    quantities.differentiate(run, names, 1e-3)  # what is compiled once
+    taken = most_memory(lambda: quantities.differentiate(run, names, 1e-3))
+    nodes = 4 * quantities.measure(run).steps
     columns = len(press.states) * (16 + 8 * count)
     # the count is that of a whole `Model.sensitivity`, which holds one run while it makes the next
-    assert 0.5 * 8 * a_turn * columns < taken < 1.1 * 8 * a_turn * columns
-    monkeypatch.setattr(request, "MAX_NUMBERS", int(0.99 * a_turn * columns))
-    study.measure(numbers, stepping)  # values alone take less
-    with pytest.raises(RequestError, match=f"{a_turn} nodes, with states and derivatives by {count} parameters"):
-        study.differentiate(numbers, names, stepping)
-    monkeypatch.setattr(request, "MAX_NUMBERS", int(0.99 * a_turn * len(press.states) * 16))
-    with pytest.raises(RequestError, match=f"{a_turn} nodes, with states, of 128 numbers"):
-        study.measure(numbers, stepping)
+    assert 0.5 * 8 * nodes * columns < taken < 1.1 * 8 * nodes * columns
+    monkeypatch.setattr(request, "MAX_NUMBERS", int(0.99 * nodes * columns))
+    quantities.measure(run)  # values alone take less
+    with pytest.raises(RequestError, match=f"{nodes} nodes, with states and derivatives by {count} parameters"):
+        quantities.differentiate(run, names, 1e-3)
+    monkeypatch.setattr(request, "MAX_NUMBERS", int(0.99 * nodes * len(press.states) * 16))
+    with pytest.raises(RequestError, match=f"{nodes} nodes, with states, of 128 numbers"):
+        quantities.measure(run)
 
 
 def test_a_table_of_more_members_than_fit_is_refused(press: Model) -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model, RequestError, SimulationError
-from ballpass.runtime.ask.study import Course, Study
 from ballpass.runtime.certify.certificate import Verdict, by_differences, compare
+from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
 
 PRELOADED = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.0}
 
@@ -166,13 +166,13 @@ def test_a_right_derivative_is_verified_and_a_wrong_one_disagrees(
     names = ["rms:inner.y", "bearing.share"]
     right = model.sensitivity(*names, **options)  # type: ignore[arg-type]
     assert right.pairs[0].check.verdict is Verdict.VERIFIED
-    plain = Study.differentiate
+    plain = QuantityRun.differentiate
 
-    def wrong(self: Study, *arguments: object, **more: object) -> Course:
+    def wrong(self: QuantityRun, *arguments: object, **more: object) -> Values:
         course = plain(self, *arguments, **more)  # type: ignore[arg-type]
         return replace(course, estimates=tuple(replace(item, slope=1.01 * item.slope) for item in course.estimates))
 
-    monkeypatch.setattr(Study, "differentiate", wrong)
+    monkeypatch.setattr(QuantityRun, "differentiate", wrong)
     found = model.sensitivity(*names, **options)  # type: ignore[arg-type]
     (pair,) = found.disagreements
     assert pair.check.value == pytest.approx(right.pairs[0].derivative, rel=1e-5)

@@ -19,11 +19,11 @@ from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Members, Span, make_members
 from ballpass.runtime.native.ensemble_driver import EnsembleDriver, MemberArrays, MemberNumbers
 from ballpass.runtime.native.member_schedule import MOMENTS
-from ballpass.runtime.native.stepper import End
+from ballpass.runtime.native.stepper import METHODS, End
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.magnitudes import model_scales
-from ballpass.runtime.run.reduced_run import SCALED_TURNS, choose_family, edge_windows
-from ballpass.runtime.run.segments import segment_edges
+from ballpass.runtime.run.resolve import SCALED_TURNS
+from ballpass.runtime.run.segments import edge_windows, segment_edges
 
 ModelMaker = Callable[..., Model]
 OBSERVABLES = (
@@ -531,7 +531,7 @@ def test_members_with_faulty_numbers_are_refused_each_and_the_others_are_untouch
 ) -> None:
     """The driver looks at tolerances and segments as that of single runs does: no member begins that could not end."""
     model = make_model("varying_compliance")
-    driver, family = model.ensemble_driver, choose_family(method)
+    driver, family = model.ensemble_driver, METHODS[method]
     faults = [0.0, -1e-9, np.nan, 1e-320, 1e-9, 1e-9, 1e-9]
     count = len(faults)
     members = make_members(model, {"bearing.clearance": np.linspace(0.0, 2e-5, count)})

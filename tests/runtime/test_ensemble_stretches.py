@@ -21,8 +21,8 @@ from ballpass.runtime.many.chunks import PATIENCE
 from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Span, make_members
 from ballpass.runtime.native.ensemble_driver import RESULT, EnsembleDriver, MemberArrays
+from ballpass.runtime.native.stepper import METHODS
 from ballpass.runtime.run.locating import Kinks
-from ballpass.runtime.run.reduced_run import choose_family
 
 ModelMaker = Callable[..., Model]
 OBSERVABLES = ("max:ball.force", "peak_time:ball.force", "min:inner.y", "rms_inner_y", "end:inner.vx")
@@ -76,7 +76,7 @@ def test_a_run_cut_at_its_segments_is_the_run_in_one_call(make_model: ModelMaker
         reached = np.zeros(count)
         for part in parts:
             results = driver.run(
-                *(choose_family(method), part, x, tolerance, rows, ctypes.c_int(0)),
+                *(METHODS[method], part, x, tolerance, rows, ctypes.c_int(0)),
                 carried=carried,
                 reached=reached,
             )

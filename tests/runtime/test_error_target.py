@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,13 @@ import pytest
 
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.certify.error_target import LADDER, TargetMissed, meet_target
+from ballpass.runtime.certify.method_choice import MethodChoice, compared_quantities, stepper_run
 from ballpass.runtime.certify.trade import REFERENCE, perturbed
-from ballpass.runtime.certify.whole_run import Way, WholeRun, check_observables, default_observables, prepare
+from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.records import Quantity
+from ballpass.runtime.run.accuracy import Accuracy
 from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import Run
 
 PEAK = "peak_ball_force"
 SPEED, CLEARANCE = "mechanism.driver.speed", "bearing.clearance"
@@ -38,13 +42,17 @@ CONFINED = {
 }
 
 
-def run_of(model: Model, numbers: dict[str, float] | None = None, **request: float) -> WholeRun:
-    return prepare(model, model.numbers(numbers), Request(**request))  # type: ignore[arg-type]
+def run_of(model: Model, numbers: dict[str, float] | None = None, **request: float) -> Run:
+    return stepper_run(model, model.numbers(numbers), Request(**request))  # type: ignore[arg-type]
 
 
-def true_values(run: WholeRun, of: tuple[str, ...] | list[str]) -> np.ndarray:
+def target_met(run: Run, target: float, of: str) -> Accuracy:
+    return meet_target(run, target, compared_quantities(run.model, of))
+
+
+def true_values(run: Run, of: Sequence[Quantity]) -> np.ndarray:
     """By another method at a tolerance of 1e-12."""
-    return run.integrate(check_observables(run.model, of), REFERENCE).values
+    return REFERENCE.measure(QuantityRun(run.model, of), run).values
 
 
 @pytest.mark.parametrize(
@@ -57,7 +65,7 @@ def true_values(run: WholeRun, of: tuple[str, ...] | list[str]) -> np.ndarray:
 def test_true_errors_are_within_the_target_and_near_the_estimate(make_model: Callable[..., Model], scene: str) -> None:
     """A small version of the counts in the documentation."""
     model = make_model(scene)
-    of = default_observables(model)
+    of = compared_quantities(model, None)
     kept, near = [], []
     for numbers in perturbed(model, dict(model.parameters), 6, seed=11):
         run = run_of(model, numbers)
@@ -91,9 +99,9 @@ def test_errors_that_come_from_the_whole_run_are_seen(
             f"{window}.end": math.radians(265.0),
         },
     )
-    of = of or default_observables(model)
-    found = meet_target(run, 1e-4, of)
-    error = float(np.abs(np.array(list(found.values.values())) / true_values(run, of) - 1.0).max())
+    asked = compared_quantities(model, of)
+    found = meet_target(run, 1e-4, asked)
+    error = float(np.abs(np.array(list(found.values.values())) / true_values(run, asked) - 1.0).max())
     assert error <= 1e-4
     assert error <= 10.0 * found.estimate
 
@@ -114,30 +122,31 @@ def test_chaos_is_refused_with_words_at_every_target(
 ) -> None:
     run = run_of(make_model(scene), numbers, cycles=cycles)
     # starts moved by a picometre or two lead elsewhere, at any tolerance
-    observables = check_observables(run.model, [of])
-    found = [run.integrate(observables, REFERENCE, moved).values[0] for moved in (0.0, 1e-12, 2e-12, 3e-12)]
+    asked = compared_quantities(run.model, of)
+    quantities = QuantityRun(run.model, asked)
+    found = [REFERENCE.measure(quantities, run, moved).values[0] for moved in (0.0, 1e-12, 2e-12, 3e-12)]
     assert max(found) / min(found) - 1.0 > 1e-3
     for target in (0.3, 0.1, 0.03, 0.01, 0.003, 1e-3, 1e-4, 1e-6):
         with pytest.raises(TargetMissed, match=r"motion is chaotic.*statistics") as refused:
-            meet_target(run, target, [of])
+            meet_target(run, target, asked)
         assert refused.value.best is not None
         assert refused.value.best.estimate > 1e-3
 
 
 def test_what_is_added_is_a_few_runs(make_model: Callable[..., Model], monkeypatch: pytest.MonkeyPatch) -> None:
     """The chosen run, a tighter one, and one of both from a moved start."""
-    runs: list[Way] = []
+    runs: list[MethodChoice] = []
 
-    def counted(run: WholeRun, observables: Any, way: Way, *rest: Any) -> Any:
+    def counted(way: MethodChoice, quantities: QuantityRun, run: Run, *rest: Any) -> Values:
         runs.append(way)
-        return integrate(run, observables, way, *rest)
+        return measure(way, quantities, run, *rest)
 
-    integrate = WholeRun.integrate
-    monkeypatch.setattr(WholeRun, "integrate", counted)
+    measure = MethodChoice.measure
+    monkeypatch.setattr(MethodChoice, "measure", counted)
     run = run_of(make_model("punching_press_tangent"), cycles=40.0)
     for target in (0.03, 1e-3, 1e-5):
         runs.clear()
-        found = meet_target(run, target, [PEAK])
+        found = meet_target(run, target, compared_quantities(run.model, PEAK))
         assert found.tried == ()
         assert len(runs) <= 3
         assert all(way.rtol >= 0.01 * found.rtol for way in runs)
@@ -166,7 +175,7 @@ def test_the_solution_is_the_run_whose_error_was_estimated(make_model: Callable[
 @pytest.mark.parametrize("cycles", [0.3, 1.0, 2.5, 9.0])
 def test_a_run_of_any_length_has_an_estimate(make_model: Callable[..., Model], cycles: float) -> None:
     run = run_of(make_model("four_bar"), cycles=cycles, transient_cycles=0.0)
-    found = meet_target(run, 1e-3, [PEAK])
+    found = target_met(run, 1e-3, PEAK)
     error = abs(found.values[PEAK] / true_values(run, [PEAK])[0] - 1.0)
     assert error <= 1e-3
     assert error <= 10.0 * found.estimate
@@ -174,12 +183,12 @@ def test_a_run_of_any_length_has_an_estimate(make_model: Callable[..., Model], c
 
 def test_smaller_errors_take_tighter_tolerances_until_none_is_left(make_model: Callable[..., Model]) -> None:
     run = run_of(make_model("four_bar"))
-    found = [meet_target(run, target, ["rms_inner_x"]) for target in (0.1, 1e-3, 1e-6)]
+    found = [target_met(run, target, "rms_inner_x") for target in (0.1, 1e-3, 1e-6)]
     assert [one.estimate <= one.target for one in found] == [True] * 3
     assert found[0].rtol > found[1].rtol > found[2].rtol
     with pytest.raises(TargetMissed, match=r"cannot be met\. The best is") as refused:
         # at this load a ring's swing across is a few picometres: no relative error of it is that small
-        meet_target(run_of(make_model("varying_compliance"), {"load.force.x": 2.0}), 1e-8, ["range_inner_y"])
+        target_met(run_of(make_model("varying_compliance"), {"load.force.x": 2.0}), 1e-8, "range_inner_y")
     assert refused.value.best is not None
     assert refused.value.best.estimate > 1e-8
 
@@ -188,13 +197,13 @@ def test_a_stiff_model_and_a_slow_turn_do_not_crawl(make_model: Callable[..., Mo
     """Dampers a thousand times as strong, and a quarter of a million oscillations in a turn: steps are few."""
     stiff = make_model("punching_press", ('ratio = "0.25e-5 s*mm^0.5"', 'ratio = "0.25e-5 s*m^0.5"'))
     for run in (run_of(stiff), run_of(make_model("punching_press"), {SPEED: math.tau / 60.0})):
-        found = meet_target(run, 0.01, [PEAK])
+        found = target_met(run, 0.01, PEAK)
         assert abs(found.values[PEAK] / true_values(run, [PEAK])[0] - 1.0) < 0.01
         assert run.integrate((("max", "ball.force"),), LADDER[0][0]).steps < 50_000 * run.cycles
 
 
 def test_a_quantity_that_both_runs_find_zero_has_no_error(make_model: Callable[..., Model]) -> None:
-    found = meet_target(run_of(make_model("punching_press"), {"bearing.share": 0.0}), 0.01, [PEAK])
+    found = target_met(run_of(make_model("punching_press"), {"bearing.share": 0.0}), 0.01, PEAK)
     assert found.values[PEAK] == 0.0
     assert found.estimate < 1e-12
 

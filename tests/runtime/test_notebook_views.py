@@ -24,8 +24,8 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import DataSetReport, Distribution, MemberFailure, Model, QuantityFunction, Results, SignalClass
 from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
 from ballpass.runtime.ask.vibration import diagnosis, spectrogram
+from ballpass.runtime.certify.method_choice import MethodChoice
 from ballpass.runtime.certify.trade import measure_trade
-from ballpass.runtime.certify.whole_run import Way
 from ballpass.runtime.many.signals import Signals
 from ballpass.runtime.show import html
 
@@ -34,7 +34,7 @@ ROOT = Path(__file__).resolve().parents[2]
 #: What must not reach a page as it is.
 ATTACK = '<script>alert("&")</script>'
 
-WAYS = (Way(method="stepper", rtol=1e-5), Way(method="stepper-rodas4", rtol=1e-3))
+WAYS = (MethodChoice(method="stepper", rtol=1e-5), MethodChoice(method="stepper-rodas4", rtol=1e-3))
 
 CLEARANCE = "bearing.clearance"
 

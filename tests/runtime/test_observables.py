@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from ballpass.runtime import Model
 from ballpass.runtime.ask.observables import (
     drive_work,
-    kinematic_frequencies,
     orbits,
     statistics,
     stroboscopic_points,
@@ -21,6 +20,7 @@ from ballpass.runtime.ask.observables import (
 )
 from ballpass.runtime.ask.spectrum import amplitude_spectrum, whole_cycles
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.ratings.kinematic_frequencies import kinematic_frequencies
 from ballpass.runtime.run.ball_angles import ball_angles
 
 TURN = 2.0 * np.pi

@@ -175,8 +175,8 @@ def test_a_run_that_failed_has_the_peak_of_what_there_is(
 ) -> None:
     model = make_model("offset_slider")
     whole = model.simulate(2, transient=0, parameters=SPIKES[0])
-    monkeypatch.setattr("ballpass.runtime.run.stepping.STEPS_A_CALL", 2500)
-    monkeypatch.setattr("ballpass.runtime.run.stepping.step_limit", lambda *_: 5000)
+    monkeypatch.setattr("ballpass.runtime.run.loop.STEPS_A_CALL", 2500)
+    monkeypatch.setattr("ballpass.runtime.run.limits.step_limit", lambda *_: 5000)
     with pytest.raises(IntegrationError) as caught:
         model.simulate(2, transient=0, parameters=SPIKES[0])
     partial = caught.value.partial

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model, RequestError
-from ballpass.runtime.ask.kinds import KINDS
-from ballpass.runtime.ask.quantities import parse_quantity, quantity_words
+from ballpass.runtime.quantity.grammar import parse_quantity, quantity_words
+from ballpass.runtime.quantity.registry import KINDS
 
 ENSEMBLE = [
     "peak_ball_force",
@@ -239,7 +239,7 @@ def test_every_kind_is_documented_and_evaluated(make_model: Callable[..., Model]
         "static_deflection": "static_deflection@250deg",
         "static_peak_ball_force": "static_peak_ball_force@250deg",
     }
-    asked = [names.get(name, name if kind.of_loads else f"{name}:inner.y") for name, kind in KINDS.items()]
+    asked = [names.get(name, name if kind.takes == "bearing" else f"{name}:inner.y") for name, kind in KINDS.items()]
     found = values(model, asked, cycles=1, transient=0)
     assert all(np.isfinite(number) for number in found.values())
     assert all(kind.summary for kind in KINDS.values())

@@ -20,9 +20,9 @@ from ballpass.runtime.contract.status import Status
 from ballpass.runtime.many import chunks
 from ballpass.runtime.native.stepper import METHODS, End, Outcome, Stepper
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run import limits, reduced_run, stepping
+from ballpass.runtime.run import limits, loop
+from ballpass.runtime.run.loop import RunFailed, RunUnderWay
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
-from ballpass.runtime.run.reduced_run import RunFailed
 from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.segments import make_segments, segment_edges
 
@@ -95,7 +95,7 @@ def test_reduced_runs_tell_progress_within_a_turn_and_keep_their_bits(
     model = press(make_model)
     given: dict[str, Any] = {"cycles": 1.5, "transient": 0.4, "rtol": 1e-7, "method": method, "kinks": kinks}
     whole = model.reduce(**given)
-    monkeypatch.setattr(reduced_run, "STEPS_A_CALL", 20)
+    monkeypatch.setattr(loop, "STEPS_A_CALL", 20)
     told: list[float] = []
     assert model.reduce(**given, progress=told.append) == whole
     assert len(told) > 50
@@ -109,7 +109,7 @@ def test_members_one_by_one_tell_progress_within_a_turn(
 ) -> None:
     """And hear, wherever they are, that their ensemble is to stop."""
     model = press(make_model)
-    monkeypatch.setattr(reduced_run, "STEPS_A_CALL", 20)
+    monkeypatch.setattr(loop, "STEPS_A_CALL", 20)
     run = Stepper.run
     calls: list[Outcome] = []
     begun: list[chunks.Work] = []
@@ -186,7 +186,7 @@ def test_a_run_that_crawls_is_given_up_by_reduce_where_simulate_gives_it_up(
     """An explicit method on contacts damped a hundred thousand times too much: hours of steps, however long the run."""
     model = press(make_model)
     monkeypatch.setattr(limits, "STEPS_A_LOOK", 30_000)
-    monkeypatch.setattr(stepping, "STEPS_A_CALL", 30_000)
+    monkeypatch.setattr(loop, "STEPS_A_CALL", 30_000)
     given: dict[str, Any] = {
         "parameters": {"bearing.damping.ratio": 3e5 * model.parameters["bearing.damping.ratio"]},
         "method": "stepper-dp54",
@@ -210,12 +210,10 @@ def test_runs_with_samples_and_with_reductions_have_one_limit(
     model = press(make_model)
     needed = model.simulate(cycles=2, transient=0, rtol=rtol).statistics
     steps = (needed.steps or 0) + (needed.rejected or 0)
-    monkeypatch.setattr(stepping, "STEPS_A_CALL", 100)
-    monkeypatch.setattr(reduced_run, "STEPS_A_CALL", 10)
+    monkeypatch.setattr(loop, "STEPS_A_CALL", 10)
     for name in ("STEPS_A_TURN", "STEPS_A_SECOND", "BRIEF_A_TURN"):  # what is left is the limit of a run
         monkeypatch.setattr(limits, name, 1)
     monkeypatch.setattr(limits, "LEAST_PROGRESS", 0.0)
-    monkeypatch.setattr(stepping, "LEAST_PROGRESS", 0.0)
     ways: list[Callable[[], object]] = [
         lambda: model.simulate(cycles=2, transient=0, rtol=rtol, method="stepper"),
         lambda: model.reduce(cycles=2, transient=0, rtol=rtol),
@@ -249,23 +247,23 @@ def test_a_member_that_goes_on_alone_is_the_run_it_was(make_model: ModelMaker, m
     whole = model.simulate_many(columns, names, **given)
     assert whole.failures == ()
     alone = model.simulate_many({name: column[2:] for name, column in columns.items()}, names, **given).statistics
-    limit, run = limits.brief_limit, reduced_run.integrate_reduced
+    limit, go_on = limits.brief_limit, RunUnderWay.go_on
     monkeypatch.setattr(
         "ballpass.runtime.many.chunks.brief_limit",
         lambda duration, turn: alone.steps // 2 if turn > 0.2 else limit(duration, turn),
     )
-    begun: list[reduced_run.Begun] = []
+    begun: list[tuple[int, float]] = []
 
-    def noted(*arguments: Any, **more: Any) -> tuple[int, int]:
-        begun.append(more["begun"])
-        return run(*arguments, **more)
+    def noted(self: RunUnderWay) -> None:
+        begun.append((self.steps + self.rejected, self.time))
+        go_on(self)
 
-    monkeypatch.setattr("ballpass.runtime.many.chunks.integrate_reduced", noted)
+    monkeypatch.setattr(RunUnderWay, "go_on", noted)
     found = model.simulate_many(columns, names, **given)
     assert found.failures == ()
-    (there,) = begun
-    assert there.steps == alone.steps // 2
-    assert 0.1 < there.time < 0.4
+    ((steps, time),) = begun
+    assert steps == alone.steps // 2
+    assert 0.1 < time < 0.4
     assert found.statistics.steps == pytest.approx(whole.statistics.steps, rel=0.02)
     for name in names:
         assert np.array_equal(found[name][:2], whole[name][:2])

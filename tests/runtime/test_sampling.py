@@ -189,7 +189,7 @@ def test_a_run_in_several_calls_within_a_segment_is_the_same_motion(
     run = {"cycles": 1, "method": method, "rtol": 1e-9, "samples_per_cycle": 300}
     whole = rotor.simulate(**run, kinks="stepped-over")
     slope = rotor.sensitivities("bearing.clearance", **run).x
-    monkeypatch.setattr("ballpass.runtime.run.stepping.STEPS_A_CALL", 250)
+    monkeypatch.setattr("ballpass.runtime.run.loop.STEPS_A_CALL", 250)
     fractions: list[float] = []
     found = rotor.simulate(**run, kinks="stepped-over", progress=fractions.append)
     assert found.statistics.segments == whole.statistics.segments == 1
@@ -203,7 +203,7 @@ def test_a_run_in_several_calls_within_a_segment_is_the_same_motion(
 
 
 def test_an_interrupt_is_heard_within_a_segment(rotor: Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ballpass.runtime.run.stepping.STEPS_A_CALL", 200)
+    monkeypatch.setattr("ballpass.runtime.run.loop.STEPS_A_CALL", 200)
     heard: list[float] = []
 
     def interrupt(fraction: float) -> None:
@@ -231,8 +231,8 @@ def test_derivatives_do_not_depend_on_how_a_run_is_cut_into_calls(
     model = make_model("punching_press")
     name = "mechanism.forces.punch.window.start"
     whole = model.sensitivities(name, cycles=3, rtol=1e-8)
-    for segments in (1, 2, 4):  # edges of a turn: punch on, punch off, turn
-        monkeypatch.setattr("ballpass.runtime.run.stepping.SEGMENTS_A_CALL", segments)
+    for turns in (1, 2):
+        monkeypatch.setattr("ballpass.runtime.run.segments.TURNS_A_SEARCH", turns)
         cut = model.sensitivities(name, cycles=3, rtol=1e-8)
         scale = np.max(np.abs(whole.x), axis=(0, 2))[:, None]
         assert np.max(np.abs(cut.x - whole.x) / scale) < 1e-3

@@ -244,9 +244,9 @@ def test_run_of_too_many_steps_tells_and_keeps_its_samples(
     press: Model, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
     whole = press.simulate(1, method=method, samples_per_cycle=400)
-    monkeypatch.setattr("ballpass.runtime.run.stepping.STEPS_A_CALL", 600)
-    monkeypatch.setattr("ballpass.runtime.run.stepping.step_limit", lambda *_: 600)
-    with pytest.raises(IntegrationError, match="600 steps for the last") as caught:
+    monkeypatch.setattr("ballpass.runtime.run.loop.STEPS_A_CALL", 600)
+    monkeypatch.setattr("ballpass.runtime.run.limits.step_limit", lambda *_: 600)
+    with pytest.raises(IntegrationError, match="600 steps for the first") as caught:
         press.simulate(1, method=method, samples_per_cycle=400)
     assert caught.value.status is Status.TOO_MANY_STEPS
     check_message(caught.value, 401)

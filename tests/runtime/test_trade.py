@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from ballpass.runtime import Model, RequestError
+from ballpass.runtime.certify.method_choice import MethodChoice
 from ballpass.runtime.certify.trade import measure_trade, perturbed
 from ballpass.runtime.certify.trade_report import Measured, Trade, percent, table, to_plain, words
-from ballpass.runtime.certify.whole_run import Way
 from ballpass.runtime.plot.style import save
 from ballpass.runtime.plot.trade import draw_trade
 
 PEAK, SWING = "peak_ball_force", "range_inner_x"
-LOOSE, TIGHT = Way(method="stepper", rtol=1e-3), Way(method="stepper", rtol=1e-7)
+LOOSE, TIGHT = MethodChoice(method="stepper", rtol=1e-3), MethodChoice(method="stepper", rtol=1e-7)
 LOCATED = replace(TIGHT, kinks="located")
 
 

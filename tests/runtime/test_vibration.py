@@ -10,10 +10,10 @@ import pytest
 from scipy import signal as scipy_signal
 
 from ballpass.runtime import Model, RequestError
-from ballpass.runtime.ask.characteristic import characteristic_lines, frequencies_of, identify
-from ballpass.runtime.ask.observables import kinematic_frequencies
 from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
 from ballpass.runtime.ask.vibration import diagnosis, envelope, order_spectrum, spectrogram
+from ballpass.runtime.quantity.characteristic import characteristic_lines, frequencies_of, identify
+from ballpass.runtime.ratings.kinematic_frequencies import kinematic_frequencies
 
 TURN = 2.0 * np.pi
 RATE = 8192.0

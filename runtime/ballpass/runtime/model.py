@@ -22,13 +22,14 @@ from ballpass.runtime.native.compile import CompiledLibrary, compile_model
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.explain import Explanation, explain
 from ballpass.runtime.point.point_model import PointModel
+from ballpass.runtime.run.choose_method import method_names
 from ballpass.runtime.run.locating import Kinks, refuse_with_error
 from ballpass.runtime.run.reduced_run import reduce_run
 from ballpass.runtime.run.reductions import Reductions
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.sensitivity import Sensitivities, sensitivities
 from ballpass.runtime.run.settle import MOST, Settled, settle
-from ballpass.runtime.run.simulate import method_names, simulate
+from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.start import RunEnd, Start
 from ballpass.runtime.run.stream import stream_run
 from ballpass.runtime.show.progress import Progress, shown, shown_steps
@@ -370,13 +371,13 @@ class Model(PointModel):
 
         Parameters
         ----------
-        of : quantities (see `ballpass.runtime.ask.quantities`).  Default: peak ball force and motion of the rings
+        of : quantities (see `ballpass.runtime.quantity.grammar`).  Default: peak ball force and motion of the rings
         wrt : parameters.  Default: all
         cycles, duration, transient, parameters : as for `simulate`
         method : of the derivatives: ``auto``, or one of the stepper's
         check : compare with differences, the second route; False gives derivatives without certificates
         rtol, sensitivity_rtol : tolerances of states and derivatives; tight ones by default
-        samples_per_cycle : nodes of quadratures in a turn that there are at least; there are more where signals need it
+        samples_per_cycle : without effect since quadratures have their nodes in the steps of the run
         kinks : as for `sensitivities`
         agreement : relative disagreement of both routes that is allowed
         progress : called with words and a finished fraction; else as for `simulate`
@@ -411,7 +412,6 @@ class Model(PointModel):
             check=check,
             rtol=rtol,
             sensitivity_rtol=sensitivity_rtol,
-            samples_per_cycle=samples_per_cycle,
             kinks=kinks,
             agreement=agreement,
             progress=None,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, cast
 
-from ballpass.runtime.ask.characteristic import frequencies_of
+from ballpass.runtime.quantity.characteristic import frequencies_of
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model

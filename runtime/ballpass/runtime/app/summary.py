@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ballpass.runtime.ask.characteristic import frequencies_of
 from ballpass.runtime.ask.observables import drive_work, statistics, turns
 from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks
 from ballpass.runtime.contract import Manifest
@@ -29,6 +28,7 @@ from ballpass.runtime.contract.extras import is_installed
 from ballpass.runtime.contract.usual import UnusualWarning, unusual
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
+from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.run.inputs import breakpoints
 from ballpass.runtime.run.settle import MEANS, PEAKS
 

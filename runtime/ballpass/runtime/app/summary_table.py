@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 
 from ballpass.runtime.app.summary import TABLE_UNITS
-from ballpass.runtime.certify.whole_run import check_observables
-from ballpass.runtime.many.ensemble import observable_unit
+from ballpass.runtime.quantity.grammar import parse_quantity
 from ballpass.runtime.run.tables import simple_table
 
 if TYPE_CHECKING:
@@ -72,8 +71,8 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> Table:
     """Quantities of ``--error`` with their values and estimated errors, as a table for a terminal."""
     right = ("value", "estimated error")
     table = simple_table("Extremes between samples included", ("quantity", *right, "unit"), right=right)
-    for name, found in zip(accuracy.of, check_observables(model, accuracy.of), strict=True):
-        unit = observable_unit(model.manifest, *found)
+    for name in accuracy.of:
+        unit = parse_quantity(model.manifest, name).unit
         factor, unit = TABLE_UNITS.get(unit, (1.0, unit))
         table.add_row(name, f"{factor * accuracy.values[name]:z.7g}", f"{100 * accuracy.estimates[name]:.2g} %", unit)
     return table

@@ -18,11 +18,11 @@ from typing import Literal
 
 import numpy as np
 
-from ballpass.runtime.ask.track import depends
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
+from ballpass.runtime.quantity.track import depends
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.segments import make_segments, segment_edges
 from ballpass.runtime.run.solution import Solution

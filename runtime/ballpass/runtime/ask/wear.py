@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.ask.track import Outlook
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import SECTORS
+from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.ratings.of_bearing import Contact
 from ballpass.runtime.ratings.wear import depth_of_pass
 from ballpass.runtime.run import inputs as clock
@@ -64,10 +64,10 @@ def load_samples(model: LoadedModel, numbers: Numbers, request: Request) -> Mapp
     counted = run.t >= dropped * (1.0 - 1e-12)
     time, states = run.t[counted], run.x[counted]
     names = ("ball.force", "ring_force.x", "ring_force.y", "cage.in_outer", "cage.in_inner")
-    outlook = Outlook(model, [b.prefix + name for b in manifest.bearings for name in names])
+    channels = ChannelValues(model, [b.prefix + name for b in manifest.bearings for name in names])
     inputs = clock.inputs_over(manifest.inputs, numbers.values, time, time)
     given = {"t": np.zeros(len(time)), "x": states, "u": inputs, "p": numbers.p, "c": numbers.c}
-    signals = outlook.outputs_at(len(time), given)
+    signals = channels.outputs_at(len(time), given)
     crank = np.array([clock.crank_angle(manifest, numbers.values, t, x) for t, x in zip(time, states, strict=True)])
     found = {}
     for bearing in manifest.bearings:

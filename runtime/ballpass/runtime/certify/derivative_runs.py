@@ -1,96 +1,74 @@
-"""How runs with derivatives of quantities step: method, magnitudes, tolerances.
+"""How runs with derivatives of quantities step: method and tolerances; and which motion has no derivatives.
 
-In: a model, numbers, a window.  Out: a `Stepping`, and a `Course` made by it.
+In: a model, numbers, a request.  Out: a `Run`, and `Values` made by it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from ballpass.runtime.ask.nodes import Window
-from ballpass.runtime.ask.quantity_records import Quantity
-from ballpass.runtime.ask.study import Course, Span, Study
-from ballpass.runtime.ask.track import Stepping
 from ballpass.runtime.certify.growth import refuse_growth
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import METHODS, Family
+from ballpass.runtime.native.stepper import METHODS
+from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.records import Quantity
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.choose_method import STIFF_RATIO
 from ballpass.runtime.run.locating import kinks_with_derivatives
 from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.reductions import channel_names
-from ballpass.runtime.run.request import Request
-from ballpass.runtime.run.simulate import STIFF_RATIO
+from ballpass.runtime.run.request import Request, run_length
+from ballpass.runtime.run.resolve import SCALED_TURNS, Run, resolve
+from ballpass.runtime.run.start import start_state
 
 #: The derivatives' tolerance is loosened tenfold, down to this, where steps would fall below the resolution of time:
 #: under laws whose slope is infinite at contact onset derivatives have singular rates there.
 LOOSEST = 1e-6
 
 
-def stepping_with_derivatives(
-    model: LoadedModel,
-    numbers: Numbers,
-    window: Window,
-    *,
-    method: str = "auto",
-    rtol: float,
-    sensitivity_rtol: float,
-    kinks: str | None = None,
-) -> tuple[Stepping, Family]:
-    """How to step with derivatives, and the family for tight runs of difference quotients.
+def derivative_run(model: LoadedModel, numbers: Numbers, request: Request) -> tuple[Run, str]:
+    """A run with derivatives, and the method for tight runs of difference quotients.
 
     Raises
     ------
     RequestError
-        A method that does not differentiate its own steps.
+        A wrong request, or a method that does not differentiate its own steps.
     """
-    if method not in ("auto", *METHODS):
+    asked = request.method or "auto"
+    if asked not in ("auto", *METHODS):
         raise RequestError(
-            f"sensitivity: the method {method!r} was given; allowed are auto, {', '.join(METHODS)}, which "
+            f"sensitivity: the method {asked!r} was given; allowed are auto, {', '.join(METHODS)}, which "
             "differentiate their own steps."
         )
-    magnitude, family, fine = np.zeros(0), Family.AUTO, Family.AUTO
+    fine = "stepper-dop853"
     if model.states:
-        start = np.array([numbers.values[name] for name in model.manifest.initial])
-        scales = model_scales(model, numbers, start, window.duration, window.turn)
-        magnitude, stiff = scales.magnitude, scales.stiffness > STIFF_RATIO
-        family = METHODS.get(method, Family.AUTO)
-        if family is Family.AUTO:
-            family = Family.RODAS5P if stiff else Family.DOP853
-        fine = Family.RODAS5P if stiff else Family.DOP853
-    stepping = Stepping(
-        family=family,
-        rtol=rtol,
-        magnitude=magnitude,
-        kinks=kinks_with_derivatives(kinks, model.manifest),
-        sensitivity_rtol=sensitivity_rtol,
-    )
-    return stepping, fine
+        turn = clock.period(model.manifest, numbers.values)
+        looked_at = min(run_length(model, request, turn), SCALED_TURNS * turn)
+        scales = model_scales(model, numbers, start_state(model, numbers, request.initial), looked_at, turn)
+        fine = "stepper-rodas5p" if scales.stiffness > STIFF_RATIO else fine
+    method = fine if asked in ("auto", "stepper") else asked
+    run = resolve(model, numbers, replace(request, method=method, kinks=None))
+    return replace(run, kinks=kinks_with_derivatives(request.kinks, model.manifest)).check_steady(), fine
 
 
-def differentiate(study: Study, numbers: Numbers, names: Sequence[str], stepping: Stepping) -> tuple[Course, float]:
+def differentiate(
+    quantities: QuantityRun, run: Run, names: Sequence[str], sensitivity_rtol: float
+) -> tuple[Values, float]:
     """Derivatives at the tightest tolerance that the resolution of time allows; that tolerance."""
-    tolerance = stepping.sensitivity_rtol
-    assert tolerance is not None
+    tolerance = sensitivity_rtol
     while True:
         try:
-            return study.differentiate(numbers, names, replace(stepping, sensitivity_rtol=tolerance)), tolerance
+            return quantities.differentiate(run, names, tolerance), tolerance
         except SimulationError:
-            if tolerance * 10.0 > max(LOOSEST, stepping.sensitivity_rtol or 0.0):
+            if tolerance * 10.0 > max(LOOSEST, sensitivity_rtol):
                 raise
             tolerance *= 10.0
 
 
-def refuse_chaos(
-    model: LoadedModel,
-    numbers: Numbers,
-    quantities: Sequence[Quantity],
-    span: Span,
-    progress: Callable[[float], None] | None = None,
-) -> None:
+def refuse_chaos(model: LoadedModel, numbers: Numbers, quantities: Sequence[Quantity], request: Request) -> None:
     """Refuse derivatives of quantities whose motion amplifies a tiny change beyond meaning; see `refuse_growth`.
 
     Raises
@@ -100,5 +78,6 @@ def refuse_chaos(
     """
     moving = [item.name for item in quantities if item.channel in channel_names(model.manifest)]
     if moving and model.has_stepper:
-        request = Request(cycles=span.cycles, duration=span.duration, transient_cycles=0.0, progress=progress)
-        refuse_growth(model, numbers, request, moving)
+        refuse_growth(
+            model, numbers, replace(request, transient_cycles=0.0, method=None, rtol=None, kinks=None), moving
+        )

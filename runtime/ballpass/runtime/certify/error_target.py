@@ -18,36 +18,31 @@ value to within any target.  Where they do not, the tight run is one more refere
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ballpass.runtime.certify.whole_run import (
-    Integrated,
-    Observable,
-    Way,
-    WholeRun,
-    check_observables,
-    default_observables,
-    prepare,
-)
+from ballpass.runtime.certify.method_choice import MethodChoice, compared_quantities, motion_of, stepper_run
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.run.accuracy import Accuracy
 from ballpass.runtime.run.locating import LOCATED
 from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.run.segments import check_count
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution
 
 #: Ways from loose to tight, and the error that each usually keeps [1].  The last one only checks.
-LADDER: tuple[tuple[Way, float], ...] = (
-    (Way(method="stepper", rtol=1e-4), 3e-3),
-    (Way(method="stepper", rtol=1e-5), 7e-4),
-    *((Way(method="stepper", rtol=10.0**k, kinks=LOCATED), 10.0 ** (k + 2)) for k in range(-6, -11, -1)),
-    (Way(method="stepper-dp54", rtol=1e-12, kinks=LOCATED), 0.0),
+LADDER: tuple[tuple[MethodChoice, float], ...] = (
+    (MethodChoice(method="stepper", rtol=1e-4), 3e-3),
+    (MethodChoice(method="stepper", rtol=1e-5), 7e-4),
+    *((MethodChoice(method="stepper", rtol=10.0**k, kinks=LOCATED), 10.0 ** (k + 2)) for k in range(-6, -11, -1)),
+    (MethodChoice(method="stepper-dp54", rtol=1e-12, kinks=LOCATED), 0.0),
 )
 
 #: The loosest way that locates kinks.
@@ -71,7 +66,7 @@ MOVED = 1e-12
 
 #: The way that decides on chaos.  Motion that it and its moved run differ in by more than this is chaotic: a picometre,
 #: 1e-8 of a magnitude, has grown ten thousand times [1].
-JUDGE, CHAOTIC = Way(method="stepper", rtol=1e-10, kinks=LOCATED), 1e-4
+CHAOS_REFERENCE, CHAOTIC = MethodChoice(method="stepper", rtol=1e-10, kinks=LOCATED), 1e-4
 
 
 class TargetMissed(SimulationError):
@@ -101,10 +96,10 @@ def simulate_to_error(
         )
     if not model.states:
         raise RequestError("This model has no states; its outputs follow from time alone, without an error.")
-    names = default_observables(model) if of is None else (of,) if isinstance(of, str) else tuple(of)
-    run = prepare(model, numbers, request)
+    quantities = compared_quantities(model, of)
+    run = stepper_run(model, numbers, request)
     check_count(model.manifest.inputs, numbers, run.duration, run.turn)  # before a search that may take long
-    found = meet_target(run, target, names, request.progress)
+    found = meet_target(run, target, quantities)
     solution = simulate(model, numbers, replace(request, method=found.method, rtol=found.rtol, kinks=found.kinks))
     return replace(
         solution, accuracy=found, statistics=replace(solution.statistics, reason=f"for an error of {found.target:g}")
@@ -115,15 +110,14 @@ def simulate_to_error(
 class _Search:
     """What was integrated of a run so far, by way and displacement of the start."""
 
-    run: WholeRun
-    observables: tuple[Observable, ...]
-    progress: Callable[[float], None] | None
-    done: dict[tuple[Way, float], Integrated] = field(default_factory=dict)
+    run: Run
+    quantities: QuantityRun
+    done: dict[tuple[MethodChoice, float], Values] = field(default_factory=dict)
     fault: SimulationError | None = None
 
-    def __call__(self, way: Way, moved: float = 0.0) -> Integrated:
+    def __call__(self, way: MethodChoice, moved: float = 0.0) -> Values:
         if (way, moved) not in self.done:
-            self.done[way, moved] = self.run.integrate(self.observables, way, moved, self.progress)
+            self.done[way, moved] = way.measure(self.quantities, self.run, moved)
         return self.done[way, moved]
 
     @property
@@ -131,15 +125,13 @@ class _Search:
         return sum(one.seconds for one in self.done.values())
 
 
-def meet_target(
-    run: WholeRun, target: float, of: Sequence[str], progress: Callable[[float], None] | None = None
-) -> Accuracy:
+def meet_target(run: Run, target: float, quantities: Sequence[Quantity]) -> Accuracy:
     """Find a way that keeps a relative error on all quantities.
 
     Raises
     ------
     RequestError
-        A target out of bounds, or unknown quantities.
+        A target out of bounds.
     TargetMissed
         No way meets the target, or the motion is chaotic; the message says what the best one keeps.
     """
@@ -148,8 +140,8 @@ def meet_target(
             f"The error asked for is {target!r:.80}. Allowed: a relative error from {SMALLEST:g} to {LARGEST:g}. "
             "Example: error=0.01 for 1 %."
         )
-    target, names = real(target), tuple(of)
-    search = _Search(run=run, observables=check_observables(run.model, names), progress=progress)
+    target, names = real(target), tuple(item.name for item in quantities)
+    search = _Search(run=run, quantities=QuantityRun(run.model, quantities, motion=True))
     tried: list[tuple[str, float]] = []
     best: Accuracy | None = None
     place = min(next(k for k, (_, usual) in enumerate(LADDER) if usual <= target), len(LADDER) - 2)
@@ -190,7 +182,7 @@ def meet_target(
     raise TargetMissed(_refusal(target, names, best, search.fault), best)
 
 
-def _compare(search: _Search, way: Way, check: Way) -> tuple[list[float], bool]:
+def _compare(search: _Search, way: MethodChoice, check: MethodChoice) -> tuple[list[float], bool]:
     """Estimates of the errors of a way from a tighter one, and whether the motion is chaotic.
 
     Raises
@@ -209,19 +201,20 @@ def _compare(search: _Search, way: Way, check: Way) -> tuple[list[float], bool]:
         changes = _relative(search(*other), search(*one))
         estimates = [max(pair) for pair in zip(estimates, changes, strict=True)]
         noise = 1.0 if one[0].kinks == LOCATED else STEPPED_OVER_NOISE
-        if _apart(search(*one), search(*other)) <= noise * SUSPECT and max(changes) <= noise * SUSPECT_QUANTITY:
+        if _apart(search, one, other) <= noise * SUSPECT and max(changes) <= noise * SUSPECT_QUANTITY:
             return estimates, False
-    judge, moved = search(JUDGE), search(JUDGE, MOVED)
+    judge, moved = search(CHAOS_REFERENCE), search(CHAOS_REFERENCE, MOVED)
     spread = zip(estimates, _relative(loose, judge), _relative(moved, judge), strict=True)
-    return [max(one) for one in spread], _apart(judge, moved) > CHAOTIC
+    return [max(one) for one in spread], _apart(search, (CHAOS_REFERENCE, 0.0), (CHAOS_REFERENCE, MOVED)) > CHAOTIC
 
 
-def _apart(one: Integrated, other: Integrated) -> float:
+def _apart(search: _Search, one: tuple[MethodChoice, float], other: tuple[MethodChoice, float]) -> float:
     """How far the extremes of all states are apart, in magnitudes [1]."""
-    return float(np.abs(one.motion - other.motion).max())
+    first, second = (motion_of(search.run, search(*which)) for which in (one, other))
+    return float(np.abs(first - second).max())
 
 
-def _relative(one: Integrated, other: Integrated, least: float = 0.0) -> list[float]:
+def _relative(one: Values, other: Values, least: float = 0.0) -> list[float]:
     """Relative differences of quantities, at least `least`; infinite where one is zero or no number.
 
     Where both runs say zero, and where they agree to the last bit, it is a rounding.

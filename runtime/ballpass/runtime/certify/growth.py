@@ -16,15 +16,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ballpass.runtime.certify.whole_run import Way, WholeRun, prepare
+from ballpass.runtime.certify.method_choice import MethodChoice, stepper_run
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.many.ensemble import EnsembleResult
 from ballpass.runtime.many.members import Table
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.quantity.grammar import channels_of, parse_quantity, quantities_of
+from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.quantity.records import Quantity
+from ballpass.runtime.quantity.registry import KINDS as KINDS_OF_QUANTITIES
 from ballpass.runtime.run.locating import LOCATED, choose_kinks
-from ballpass.runtime.run.reductions import channel_names, observable_aliases
-from ballpass.runtime.run.request import Request, make_plan
+from ballpass.runtime.run.reductions import channel_names
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import Run, resolve
 from ballpass.runtime.show.short import ShortRepr
 
 #: Relative change of a number that four printed digits do not bear [1].
@@ -90,14 +95,13 @@ def find_growth(model: LoadedModel, numbers: Numbers, request: Request) -> Growt
     SimulationError
         The computation failed.
     """
-    request = replace(request, samples_per_cycle=1, outputs=[])  # none are kept
-    run = prepare(model, numbers, request)
-    rtol = min(make_plan(model, numbers, request).rtol, LOOSEST)
+    run = stepper_run(model, numbers, request)
+    rtol = min(run.rtol, LOOSEST)
     kinks = choose_kinks(request.kinks, "stepper", model.manifest, rtol)
-    found = _compare(run, Way(method="stepper", rtol=rtol, kinks=kinks), request.progress)
+    found = _compare(run, MethodChoice(method="stepper", rtol=rtol, kinks=kinks))
     if not found.uncertain or kinks == LOCATED:
         return found
-    return _compare(run, Way(method="stepper", rtol=rtol, kinks=LOCATED), request.progress)
+    return _compare(run, MethodChoice(method="stepper", rtol=rtol, kinks=LOCATED))
 
 
 def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quantities: Sequence[str]) -> None:
@@ -119,14 +123,16 @@ def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quanti
         )
 
 
-def _compare(run: WholeRun, way: Way, progress: Callable[[float], None] | None) -> Growth:
+def _compare(run: Run, way: MethodChoice) -> Growth:
     channels = [name for name in channel_names(run.model.manifest) if not name.endswith("ball.deflection")]
-    observables = [(kind, name) for name in channels for kind in KINDS]
+    names = [f"{kind}:{name}" for name in channels for kind in KINDS]
+    quantities = QuantityRun(run.model, quantities_of(run.model, names))
     moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
 
     def integrate(start: float | np.ndarray, before: float) -> np.ndarray:
-        tell = None if progress is None else lambda done: progress(before + 0.5 * done)
-        return run.integrate(observables, way, start, tell).values.reshape(-1, len(KINDS))
+        tell = run.progress
+        told = replace(run, progress=None if tell is None else lambda done: tell(before + 0.5 * done))
+        return way.measure(quantities, told, start).values.reshape(-1, len(KINDS))
 
     one, other = integrate(0.0, 0.0), integrate(moved, 0.5)
     tolerated = dict(zip(run.model.states, TOLERATED * way.rtol * run.magnitude, strict=True))
@@ -150,16 +156,17 @@ def simulate_members(
     """
     manifest = model.manifest
     asked = [observables] if isinstance(observables, str) else list(observables)
-    aliases = observable_aliases(channel_names(manifest))
-    looked_at = {name: aliases[name] for name in asked if name in aliases and aliases[name][0] not in PLACES}
-    ranges = {channel: f"range:{channel}" for _, channel in looked_at.values()}
+    quantities = {name: parse_quantity(manifest, name) for name in asked}
+    looked_at = {name: item for name, item in quantities.items() if not (item.kind in PLACES or _at_rest(item))}
+    # a force that crosses zero has no digits of its size, but of its range
+    ranges = {name: f"range:{item.channel}" for name, item in looked_at.items() if _has_range(model, item)}
     names = list(dict.fromkeys((*asked, *ranges.values())))
     result = run(table, names)
     count = len(next(iter(result.parameters.values())))
     uncertain = {name: np.zeros(count, dtype=bool) for name in asked}
     rtol = min(result.statistics.rtol, LOOSEST)
     numbers = model.numbers(None)
-    magnitude = prepare(model, numbers, Request()).magnitude
+    magnitude = resolve(model, numbers, Request()).magnitude
     tolerated = dict(zip(model.states, TOLERATED * rtol * magnitude, strict=True))
     positions = dict(zip(manifest.initial[: len(magnitude) // 2], magnitude.tolist(), strict=False))
     left = np.setdiff1d(np.arange(count), [failure.member for failure in result.failures])
@@ -173,10 +180,24 @@ def simulate_members(
         other = run({**rows, **moved}, names, **ways) if not again.interrupted else again
         result = replace(result, interrupted=other.interrupted)
         one = {name: again[name] if ways else result[name][left] for name in names}
-        for name, (_, channel) in looked_at.items():
-            scale = np.fmax(np.abs(one[name]), one[ranges[channel]])
+        for name, item in looked_at.items():
+            scale = np.abs(one[name])
+            if name in ranges:
+                scale = np.fmax(scale, one[ranges[name]])
             # a run that fails from the moved start, or was interrupted, has no digits either
-            bears = np.abs(one[name] - other[name]) <= np.fmax(DIGITS * scale, tolerated.get(channel, 0.0))
+            bears = np.abs(one[name] - other[name]) <= np.fmax(
+                DIGITS * scale, tolerated.get(item.channel, 0.0) if name in ranges else 0.0
+            )
             uncertain[name][left] = ~bears
         left = left[np.any([uncertain[name][left] for name in looked_at], axis=0)]
     return replace(result, observables={name: result[name] for name in asked}, uncertain=uncertain)
+
+
+def _at_rest(quantity: Quantity) -> bool:
+    return KINDS_OF_QUANTITIES[quantity.kind].at_rest is not None
+
+
+def _has_range(model: LoadedModel, quantity: Quantity) -> bool:
+    """Whether a quantity is in the unit of its channel, so that it compares with the channel's range."""
+    columns = channels_of(model.manifest)
+    return quantity.channel in columns and columns[quantity.channel][1] == quantity.unit

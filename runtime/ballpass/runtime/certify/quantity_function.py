@@ -20,13 +20,8 @@ from typing import Literal, NoReturn, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ballpass.runtime.ask.kinds import KINDS
-from ballpass.runtime.ask.quantities import parse_quantity
-from ballpass.runtime.ask.quantity_records import Estimate
-from ballpass.runtime.ask.study import Study
-from ballpass.runtime.certify.derivative_runs import differentiate, refuse_chaos, stepping_with_derivatives
-from ballpass.runtime.certify.member_runs import reduced_by_ensembles
-from ballpass.runtime.certify.sensitivity_query import NODES, Query, answer, make_span
+from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate, refuse_chaos
+from ballpass.runtime.certify.sensitivity_query import Query, answer, length_request
 from ballpass.runtime.certify.sensitivity_report import SensitivityReport
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
@@ -34,8 +29,13 @@ from ballpass.runtime.many.ensemble import simulate_many
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.slopes import KinkWarning
+from ballpass.runtime.quantity.grammar import quantities_of
+from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.quantity.records import Estimate
+from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.run.locating import STEPPED_OVER, refuse_jumps
 from ballpass.runtime.run.request import TOLERANCES, tolerance
+from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.sensitivity import SENSITIVITY
 from ballpass.runtime.show.progress import shown, shown_steps
 
@@ -124,15 +124,14 @@ class QuantityFunction:
             if name not in numbers.parameters:
                 raise RequestError(unknown_name("parameter", name, numbers.parameters))
         self.start = np.array([numbers.parameters[name] for name in self.wrt])
-        self._quantities = [parse_quantity(model.manifest, name) for name in self.of]
-        self._span = make_span(model.manifest, cycles, duration, transient)
-        # a study is not for two threads at once: each takes one that is free, and puts it back
-        self._free: defaultdict[tuple[int, ...], list[Study]] = defaultdict(list)
+        self._quantities = quantities_of(model, self.of)
+        self._request = length_request(model.manifest, cycles, duration, transient)
+        # they are not for two threads at once: each takes one that is free, and puts it back
+        self._free: defaultdict[tuple[int, ...], list[QuantityRun]] = defaultdict(list)
         self._slope_rtol = max(FINER * self._rtol, TOLERANCES[0])
-        self._reduced = reduced_by_ensembles(model, self._quantities)
         self._all = tuple(range(len(self.of)))
         self._said: set[tuple[type[BallpassWarning], str]] = set()
-        self._study(self._all).window(numbers)  # a wrong length is told now
+        resolve(model, numbers, self._request).check_steady()  # a wrong length is refused now
 
     def __repr__(self) -> str:
         return f"QuantityFunction({self._model.manifest.scene}: {_some(self.of)} by {_some(self.wrt)})"
@@ -161,13 +160,9 @@ class QuantityFunction:
         """
         rows, able, batch = self._rows(x)
         found = np.full((len(rows), len(self.of)), np.nan)
-        others = tuple(k for k in self._all if k not in self._reduced)
-        with shown("simulating") as tell:
-            if self._reduced and len(able):
-                found[able[:, None], list(self._reduced)] = self._by_ensemble(rows[able], tell)
-            if others and len(able):
-                each = self._each(rows[able], others, tell, slopes=False)
-                found[able[:, None], others] = [[item.value for item in one] for one in each]
+        if len(able):
+            with shown("simulating") as tell:
+                found[able] = self._by_ensemble(rows[able], tell)
         return found.reshape((*batch, *self.shape))
 
     def jacobian(self, x: ArrayLike) -> Array:
@@ -198,7 +193,7 @@ class QuantityFunction:
         found = np.full((len(rows), len(self.of), len(self.wrt)), np.nan)
         if len(able):
             with shown("differentiating") as tell:
-                each = self._each(rows[able], self._all, tell, slopes=True)
+                each = self._differentiated(rows[able], tell)
             found[able] = [[item.slope for item in one] for one in each]
         return found.reshape((*batch, *self.shape, len(self.wrt)))
 
@@ -239,7 +234,7 @@ class QuantityFunction:
         query = Query(
             of=self.of,
             wrt=self.wrt,
-            span=self._span,
+            request=self._request,
             rtol=self._slope_rtol,
             sensitivity_rtol=SENSITIVITY * self._slope_rtol,
         )
@@ -305,15 +300,15 @@ class QuantityFunction:
         return numbers
 
     def _by_ensemble(self, rows: Array, tell: Callable[[float], None] | None) -> Array:
-        """Values of the quantities that ensembles reduce, shape (rows, quantities)."""
+        """Values of the quantities, shape (rows, quantities)."""
         table: dict[str, object] = {name: np.full(len(rows), value) for name, value in self._fixed.items()}
         result = simulate_many(
             self._model,
             table | dict(zip(self.wrt, rows.T, strict=True)),
-            list(dict.fromkeys(self._reduced.values())),
-            cycles=self._span.cycles,
-            duration=self._span.duration,
-            transient=self._span.transient,
+            list(self.of),
+            cycles=self._request.cycles,
+            duration=self._request.duration,
+            transient=self._request.transient_cycles,
             rtol=self._rtol,
             method=None,
             kinks=None if self._model.manifest.borders else STEPPED_OVER,
@@ -327,17 +322,20 @@ class QuantityFunction:
             failure = result.failures[0]
             kind = RequestError if failure.status == "REFUSED" else SimulationError
             raise kind(f"{self._told(rows[failure.member])}: {failure.message}")
-        failed = [(rows[failure.member], failure.message) for failure in result.failures]
-        self._warn(UnknownValueWarning, [(self.of[k], *one) for one in failed for k in self._reduced])
-        return np.array([result[name] for name in self._reduced.values()]).T
+        failed = [
+            (name, rows[failure.member], failure.message)
+            for failure in result.failures
+            for name in self.of
+            if np.isnan(result[name][failure.member])
+        ]
+        self._warn(UnknownValueWarning, failed)
+        return np.array([result[name] for name in self.of]).T
 
-    def _each(
-        self, rows: Array, of: tuple[int, ...], tell: Callable[[float], None] | None, *, slopes: bool
-    ) -> list[list[Estimate]]:
-        """Quantities of rows that are run one by one, in threads."""
+    def _differentiated(self, rows: Array, tell: Callable[[float], None] | None) -> list[list[Estimate]]:
+        """Quantities of rows with their derivatives, each run by itself, in threads."""
         found: list[dict[int, Estimate]] = []
         with ThreadPoolExecutor(os.cpu_count()) as threads:
-            for one in threads.map(lambda row: self._known(row, of, slopes=slopes), rows):
+            for one in threads.map(lambda row: self._known(row, self._all), rows):
                 found.append(one)
                 if tell is not None:
                     tell(len(found) / len(rows))
@@ -345,42 +343,37 @@ class QuantityFunction:
         nan = [(name, row, " ".join(item.notes)) for name, row, item in each if np.isnan(item.value)]
         self._warn(UnknownValueWarning, nan)
         self._warn(KinkWarning, [(name, row, item.kink) for name, row, item in each if item.kink])
-        return [[one[k] for k in of] for one in found]
+        return [[one[k] for k in self._all] for one in found]
 
-    def _known(self, row: Array, of: tuple[int, ...], *, slopes: bool) -> dict[int, Estimate]:
+    def _known(self, row: Array, of: tuple[int, ...]) -> dict[int, Estimate]:
         """Quantities of a row; where NaN is asked for, of those that fail together each that is known by itself."""
         try:
-            return dict(zip(of, self._course(row, of, slopes=slopes), strict=True))
+            return dict(zip(of, self._row(row, of), strict=True))
         except (RequestError, SimulationError) as error:
             if self._failed == "raise":
                 kind = RequestError if isinstance(error, RequestError) else SimulationError
                 raise kind(f"{self._told(row)}: {error}") from error
             # a run that fails has nothing to give, but rings at rest need none
-            at_rest = any(KINDS[self._quantities[k].kind].static for k in of)
+            at_rest = any(KINDS[self._quantities[k].kind].at_rest is not None for k in of)
             if len(of) > 1 and (at_rest or isinstance(error, RequestError)):
-                return {k: item for one in of for k, item in self._known(row, (one,), slopes=slopes).items()}
+                return {k: item for one in of for k, item in self._known(row, (one,)).items()}
             unknown = Estimate(value=np.nan, slope=np.full(len(self.wrt), np.nan), notes=(str(error),))
             return dict.fromkeys(of, unknown)
 
-    def _course(self, row: Array, of: tuple[int, ...], *, slopes: bool) -> tuple[Estimate, ...]:
+    def _row(self, row: Array, of: tuple[int, ...]) -> tuple[Estimate, ...]:
         """A run of its own."""
         numbers = self._numbers(row)
-        if slopes and self._chaos == "refuse":
-            refuse_chaos(self._model, numbers, [self._quantities[k] for k in of], self._span)
+        quantities = [self._quantities[k] for k in of]
+        if self._chaos == "refuse":
+            refuse_chaos(self._model, numbers, quantities, self._request)
         try:
-            study = self._free[of].pop()
+            along = self._free[of].pop()
         except IndexError:
-            study = self._study(of)
-        rtol = self._slope_rtol if slopes else self._rtol
-        stepping, _ = stepping_with_derivatives(
-            self._model, numbers, study.window(numbers), rtol=rtol, sensitivity_rtol=SENSITIVITY * rtol
-        )
-        course = differentiate(study, numbers, self.wrt, stepping)[0] if slopes else study.measure(numbers, stepping)
-        self._free[of].append(study)
-        return course.estimates
-
-    def _study(self, of: tuple[int, ...]) -> Study:
-        return Study(self._model, [self._quantities[k] for k in of], self._span, NODES)
+            along = QuantityRun(self._model, quantities)
+        run, _ = derivative_run(self._model, numbers, replace(self._request, rtol=self._slope_rtol))
+        found, _ = differentiate(along, run, self.wrt, SENSITIVITY * self._slope_rtol)
+        self._free[of].append(along)
+        return found.estimates
 
     def _warn(self, kind: type[BallpassWarning], told: Sequence[tuple[str, Array, str]]) -> None:
         """Say what there is to mind, once of each quantity."""

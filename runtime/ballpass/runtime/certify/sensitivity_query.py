@@ -17,12 +17,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.ask.kinks import DEFLECTION
-from ballpass.runtime.ask.nodes import Window
-from ballpass.runtime.ask.panels import ROUGH
-from ballpass.runtime.ask.quantities import default_quantities, parse_quantity, quantity_words
-from ballpass.runtime.ask.study import Course, Span, Study
-from ballpass.runtime.ask.track import Outlook
 from ballpass.runtime.certify.certificate import (
     AGREEMENT,
     CAUTION,
@@ -32,7 +26,7 @@ from ballpass.runtime.certify.certificate import (
     by_differences,
     compare,
 )
-from ballpass.runtime.certify.derivative_runs import differentiate, refuse_chaos, stepping_with_derivatives
+from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate, refuse_chaos
 from ballpass.runtime.certify.grazing import TOLERANCE, Grazing, find_grazing
 from ballpass.runtime.certify.member_runs import MemberRuns
 from ballpass.runtime.certify.sensitivity_report import (
@@ -44,19 +38,22 @@ from ballpass.runtime.certify.sensitivity_report import (
 )
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.parameters import Numbers, real, unknown_name
+from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.quantity.grammar import default_quantities, quantities_of, quantity_words
+from ballpass.runtime.quantity.kinks import DEFLECTION
+from ballpass.runtime.quantity.panels import ROUGH
+from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.direction_scales import ANGLE
 from ballpass.runtime.run.locating import check_kinks, refuse_jumps
-from ballpass.runtime.run.request import TOLERANCES, asked_length
+from ballpass.runtime.run.request import TOLERANCES, Request, asked_length
+from ballpass.runtime.run.resolve import Run, check_transient
 from ballpass.runtime.run.sensitivity import RTOL, SENSITIVITY
 
 Array = NDArray[np.float64]
-
-#: Nodes of quadratures in a turn to begin with.  They have nothing to do with the samples of a run.
-NODES = 4096
 
 #: How much rougher panels of quadratures may be in the looser run beside.
 COARSER = 4.0
@@ -72,12 +69,11 @@ class Query:
     Attributes
     ----------
     of, wrt : names, in `wrt` shell-style patterns too; None for the sensible ones, and for all parameters
-    span : how long to run
+    request : how long to run
     method : of the derivatives: ``auto``, one of the stepper's, ``erk``
     direction : of ``erk``: "forward" or "adjoint"
     check : True (differences), False, or one of `CHECKS`
     rtol, sensitivity_rtol : tolerances of states and derivatives
-    samples_per_cycle : nodes of quadratures in a turn that there are at least
     kinks : what the steps do at the kinks of the laws; None locates them
     agreement : relative disagreement that is allowed [1]
     progress : called with words and a finished fraction
@@ -85,18 +81,19 @@ class Query:
 
     of: Sequence[str] | None
     wrt: Sequence[str] | None
-    span: Span
+    request: Request
     method: str = "auto"
     check: bool = True
     rtol: float = RTOL
     sensitivity_rtol: float = SENSITIVITY * RTOL
-    samples_per_cycle: int | None = None
     kinks: str | None = None
     agreement: float = AGREEMENT
     progress: Callable[[str, float], None] | None = None
 
 
-def make_span(manifest: Manifest, cycles: float | None, duration: float | None, transient: float | None) -> Span:
+def length_request(
+    manifest: Manifest, cycles: float | None, duration: float | None, transient: float | None
+) -> Request:
     """How long to run: as given, else as the scene's run settings say.
 
     Raises
@@ -105,10 +102,8 @@ def make_span(manifest: Manifest, cycles: float | None, duration: float | None, 
         Both cycles and duration, or numbers that are none.
     """
     turns, time = asked_length(manifest.run, cycles, duration)
-    dropped = manifest.run.transient_cycles if transient is None else real(transient)
-    if not 0.0 <= dropped < math.inf:
-        raise RequestError(f"transient: a number of cycles from 0 on is expected, not {transient!r}.")
-    return Span(cycles=turns, duration=time, transient=dropped)
+    dropped = manifest.run.transient_cycles if transient is None else transient
+    return Request(cycles=turns, duration=time, transient_cycles=check_transient(dropped))
 
 
 def make_query(
@@ -123,7 +118,6 @@ def make_query(
     check: bool,
     rtol: float | None,
     sensitivity_rtol: float | None,
-    samples_per_cycle: int | None,
     kinks: str | None,
     agreement: float | None,
     progress: Callable[[str, float], None] | None,
@@ -140,8 +134,6 @@ def make_query(
             raise RequestError(
                 f"{name}: a number from {TOLERANCES[0]:g} to {TOLERANCES[1]:g} is expected, not {given!r}."
             )
-    if samples_per_cycle is not None and not (int(samples_per_cycle) == samples_per_cycle >= 8):
-        raise RequestError(f"samples_per_cycle: a whole number from 8 on is expected, not {samples_per_cycle!r}.")
     if agreement is not None and not 0.0 < agreement < 1.0:
         raise RequestError(f"agreement: a number between 0 and 1 is expected, not {agreement!r}.")
     if not isinstance(check, bool):
@@ -149,12 +141,11 @@ def make_query(
     return Query(
         of=[of] if isinstance(of, str) else of,
         wrt=[wrt] if isinstance(wrt, str) else wrt,
-        span=make_span(manifest, cycles, duration, transient),
+        request=length_request(manifest, cycles, duration, transient),
         method=method,
         check=check,
         rtol=RTOL if rtol is None else rtol,
         sensitivity_rtol=SENSITIVITY * RTOL if sensitivity_rtol is None else sensitivity_rtol,
-        samples_per_cycle=samples_per_cycle,
         kinks=None if kinks is None else check_kinks(kinks),
         agreement=AGREEMENT if agreement is None else agreement,
         progress=progress,
@@ -174,51 +165,30 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     manifest = model.manifest
     refuse_jumps(manifest, "sensitivity")
     check_assembly(model, numbers)
-    quantities = [parse_quantity(manifest, name) for name in _listed("of", query.of, default_quantities(manifest))]
+    quantities = quantities_of(model, _listed("of", query.of, default_quantities(manifest)))
     names = _chosen(_listed("wrt", query.wrt, tuple(numbers.parameters)), numbers.parameters)
-    study = Study(model, quantities, query.span, 4)
-    window = study.window(numbers)
-    stepping, fine = stepping_with_derivatives(
-        model,
-        numbers,
-        window,
-        method=query.method,
-        rtol=query.rtol,
-        sensitivity_rtol=query.sensitivity_rtol,
-        kinks=query.kinks,
-    )
-    magnitude = stepping.magnitude
-    study.per_turn = max(query.samples_per_cycle or 0, NODES)
+    request = replace(query.request, method=query.method, rtol=query.rtol, kinks=query.kinks)
+    run, fine = derivative_run(model, numbers, request)
     tell = query.progress or (lambda _words, _fraction: None)
-    refuse_chaos(model, numbers, quantities, query.span, partial(tell, "looking for growth"))
+    refuse_chaos(model, numbers, quantities, replace(request, progress=partial(tell, "looking for growth")))
     tell("differentiating", 0.0)
-    course, tolerance = differentiate(study, numbers, names, stepping)
+    course, tolerance = differentiate(QuantityRun(model, quantities), run, names, query.sensitivity_rtol)
     values = np.array([item.value for item in course.estimates])
     slopes = np.array([item.slope for item in course.estimates])
     own = np.zeros_like(slopes)
     if query.check and model.states:
         tell("differentiating", 0.5)
-        looser = replace(stepping, rtol=min(10.0 * query.rtol, 1e-3), sensitivity_rtol=10.0 * tolerance)
-        study.rough = COARSER * ROUGH
-        found, _ = differentiate(study, numbers, names, looser)
+        looser = replace(run, rtol=min(10.0 * query.rtol, 1e-3))
+        coarser = QuantityRun(model, quantities, rough=COARSER * ROUGH)
+        found, _ = differentiate(coarser, looser, names, 10.0 * tolerance)
         own = np.abs(slopes - np.array([item.slope for item in found.estimates]))
-    difference_scales = _difference_scales(manifest, numbers, names, magnitude, window)
+    difference_scales = _difference_scales(run, names)
     with np.errstate(invalid="ignore", divide="ignore"):
         quantum = FLOOR * np.abs(values)[:, None] / difference_scales[None, :]
     second = None
     if query.check:
         tell("checking", 0.0)
-        members = partial(
-            MemberRuns,
-            model,
-            numbers,
-            quantities,
-            query.span,
-            family=fine,
-            per_turn=study.per_turn,
-            magnitude=magnitude,
-            progress=partial(tell, "checking"),
-        )
+        members = partial(MemberRuns, run, query.request, quantities, fine=fine, progress=partial(tell, "checking"))
         second = by_differences(
             members(closer=False),
             {name: numbers.parameters[name] for name in names},
@@ -296,14 +266,14 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
         pairs=tuple(pairs),
         grazing=_grazing(model, numbers, course),
         settings={
-            "cycles": query.span.cycles,
-            "duration": window.duration,
-            "transient_cycles": query.span.transient,
+            "cycles": query.request.cycles,
+            "duration": run.duration,
+            "transient_cycles": run.transient_cycles,
             "method": query.method,
             "rtol": query.rtol,
             "sensitivity_rtol": tolerance,
             "agreement": query.agreement,
-            "steps": 0 if course.track is None else course.track.steps,
+            "steps": course.steps,
             "parameters": {name: numbers.parameters[name] for name in names},
         },
     )
@@ -327,13 +297,12 @@ def _chosen(patterns: Sequence[str], known: Mapping[str, float]) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _difference_scales(
-    manifest: Manifest, numbers: Numbers, names: Sequence[str], magnitude: Array, window: Window
-) -> Array:
+def _difference_scales(run: Run, names: Sequence[str]) -> Array:
     """Change of each parameter that is a large one: its value; a radian, or what the run turns through; what its state
     or length is measured in."""
+    manifest, numbers, magnitude = run.model.manifest, run.numbers, run.magnitude
     units = {info.name: info.unit for info in manifest.parameters}
-    at_start = dict(zip(manifest.initial, magnitude.tolist(), strict=True))
+    at_start = dict(zip(manifest.initial, magnitude.tolist(), strict=False))
     position = float(np.max(magnitude[: len(magnitude) // 2])) if len(magnitude) else 1e-3
     scales = []
     for name in names:
@@ -341,7 +310,7 @@ def _difference_scales(
         if name in at_start:
             value = max(value, START_SHARE * at_start[name])
         elif units[name] == ANGLE:
-            value = min(1.0, clock.TURN * window.duration / window.turn) if math.isfinite(window.turn) else 1.0
+            value = min(1.0, clock.TURN * run.duration / run.turn) if math.isfinite(run.turn) else 1.0
         elif value == 0.0:
             alike = [abs(numbers.parameters[other]) for other, unit in units.items() if unit == units[name]]
             value = position if units[name] == "m" else max(alike, default=0.0)
@@ -349,15 +318,15 @@ def _difference_scales(
     return np.array(scales)
 
 
-def _grazing(model: LoadedModel, numbers: Numbers, course: Course, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:
+def _grazing(model: LoadedModel, numbers: Numbers, course: Values, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:
     """Where the run grazes a kink, whether or not the scene's outputs name the balls' deflections."""
     manifest, track = model.manifest, course.track
     # without a step the quantities need no motion
-    if track is None or track.steps == 0 or not manifest.bearings:
+    if track is None or course.steps == 0 or not manifest.bearings:
         return ()
     names = [bearing.prefix + DEFLECTION for bearing in manifest.bearings]
     state = manifest.mechanism.angle if manifest.mechanism is not None else ""
-    signals = Outlook(model, [*names, *([state] if state else [])]).look(track, numbers)
+    signals = ChannelValues(model, [*names, *([state] if state else [])]).along(track, numbers)
     order = np.lexsort((track.nodes.t, track.nodes.segment))
     times = track.nodes.t[order]
     if state:

@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from ballpass.runtime.certify.method_choice import MethodChoice, compared_quantities, default_compared, stepper_run
 from ballpass.runtime.certify.trade import MEMBERS, SPREAD, perturbed, reference
 from ballpass.runtime.certify.trade_report import PROMISED, milliseconds, percent
-from ballpass.runtime.certify.whole_run import Way, check_observables, default_observables, prepare
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour
+from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.show.progress import Progress, shown
 
@@ -138,8 +139,9 @@ def measure_simplification(
             "model. Allowed: parameters of both scenes. Change it in the files."
         )
     names = tuple(of) if of is not None else _common(model, simpler)
-    observables = [check_observables(one, names) for one in (model, simpler)]
-    way = Way(method="stepper", rtol=model.manifest.run.rtol)
+    compared = [compared_quantities(one, names) for one in (model, simpler)]
+    quantities = [QuantityRun(one, items) for one, items in zip((model, simpler), compared, strict=True)]
+    way = MethodChoice(method="stepper", rtol=model.manifest.run.rtol)
     user = model.numbers(parameters)
     shared = {info.name for info in model.manifest.parameters} & others
     base = simpler.numbers({name: user.parameters[name] for name in shared})
@@ -153,13 +155,13 @@ def measure_simplification(
                 neighbour(model, user, {**user.parameters, **varied}),
                 neighbour(simpler, base, {**base.parameters, **varied}),
             )
-            runs = [prepare(model, numbers[0], Request())]
+            runs = [stepper_run(model, numbers[0], Request())]
             cycles = runs[0].cycles
             length = Request(duration=runs[0].duration, transient_cycles=runs[0].start / runs[0].turn)
-            runs.append(prepare(simpler, numbers[1], length))
+            runs.append(stepper_run(simpler, numbers[1], length))
             for k, run in enumerate(runs):
-                values[k, member], doubt[k, member] = reference(run, observables[k])
-                times[k, member] = run.integrate(observables[k], way).seconds / cycles
+                values[k, member], doubt[k, member] = reference(run, quantities[k])
+                times[k, member] = way.measure(quantities[k], run).seconds / cycles
             if tell is not None:
                 tell((member + 1) / members)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -169,9 +171,6 @@ def measure_simplification(
     known = np.quantile(np.max(doubt, axis=0), PROMISED, axis=0)
     largest = np.maximum(np.quantile(np.abs(changes), PROMISED, axis=0, method="higher"), known)
 
-    units = {info.name: info.unit for info in model.manifest.states}
-    units |= {info.name: info.unit for info in model.manifest.quantities}
-
     def by_name(numbers: np.ndarray) -> dict[str, float]:
         return dict(zip(names, numbers.tolist(), strict=True))
 
@@ -179,7 +178,7 @@ def measure_simplification(
         title=model.manifest.title,
         simpler_title=simpler.manifest.title,
         quantities=names,
-        units={name: units[channel] for name, (_, channel) in zip(names, observables[0], strict=True)},
+        units={item.name: item.unit for item in compared[0]},
         values=by_name(both[0]),
         simpler_values=by_name(both[1]),
         change=by_name(np.median(changes, axis=0)),
@@ -195,8 +194,8 @@ def measure_simplification(
 
 
 def _common(model: LoadedModel, simpler: LoadedModel) -> tuple[str, ...]:
-    theirs = default_observables(simpler)
-    names = tuple(name for name in default_observables(model) if name in theirs)
+    theirs = default_compared(simpler.manifest)
+    names = tuple(name for name in default_compared(model.manifest) if name in theirs)
     if not names:
         raise RequestError(
             "The two scenes have no quantity in common: their bearings have other names. Give both the same names "

@@ -16,26 +16,21 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ballpass.runtime.certify.method_choice import MethodChoice, compared_quantities, stepper_run
 from ballpass.runtime.certify.trade_report import PROMISED, Measured, Trade
-from ballpass.runtime.certify.whole_run import (
-    Observable,
-    Way,
-    WholeRun,
-    check_observables,
-    default_observables,
-    prepare,
-)
 from ballpass.runtime.contract.bounds import outside, violations
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import neighbour
+from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.run.locating import LOCATED, has_kinks
 from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.show.progress import Progress, shown
 
 #: The reference and the second opinion on it.
-REFERENCE = Way(method="stepper-rodas5p", rtol=1e-12, kinks=LOCATED)
-SECOND = Way(method="stepper-dp54", rtol=1e-12, kinks=LOCATED)
+REFERENCE = MethodChoice(method="stepper-rodas5p", rtol=1e-12, kinks=LOCATED)
+SECOND = MethodChoice(method="stepper-dp54", rtol=1e-12, kinks=LOCATED)
 
 #: Half the width of the interval that parameters are drawn from, relative to the user's value [1].
 SPREAD = 0.005
@@ -44,7 +39,7 @@ SPREAD = 0.005
 MEMBERS = 40
 
 
-def ways_of(model: LoadedModel) -> tuple[Way, ...]:
+def ways_of(model: LoadedModel) -> tuple[MethodChoice, ...]:
     """Methods and tolerances that are measured; those that locate kinks where the motion has some."""
     stepped = {
         "stepper": range(-8, -1),
@@ -54,9 +49,9 @@ def ways_of(model: LoadedModel) -> tuple[Way, ...]:
     }
     located = {"stepper": range(-10, -2), "stepper-rodas5p": range(-8, -2)} if has_kinks(model.manifest) else {}
     return (
-        *(Way(method=method, rtol=10.0**decade) for method, decades in stepped.items() for decade in decades),
+        *(MethodChoice(method=method, rtol=10.0**decade) for method, decades in stepped.items() for decade in decades),
         *(
-            Way(method=method, rtol=10.0**decade, kinks=LOCATED)
+            MethodChoice(method=method, rtol=10.0**decade, kinks=LOCATED)
             for method, decades in located.items()
             for decade in decades
         ),
@@ -89,15 +84,15 @@ def perturbed(
     return [{**around, **{name: float(values[k]) for name, values in sets.items()}} for k in range(count)]
 
 
-def reference(run: WholeRun, observables: Sequence[Observable]) -> tuple[np.ndarray, np.ndarray]:
-    """Quantities by one method, and their relative differences to another; each of shape (observables,).
+def reference(run: Run, quantities: QuantityRun) -> tuple[np.ndarray, np.ndarray]:
+    """Quantities by one method, and their relative differences to another; each of shape (quantities,).
 
     Raises
     ------
     SimulationError
         Either method could not finish.
     """
-    values, second = (run.integrate(observables, way).values for way in (REFERENCE, SECOND))
+    values, second = (way.measure(quantities, run).values for way in (REFERENCE, SECOND))
     with np.errstate(divide="ignore", invalid="ignore"):
         return values, np.abs(second / values - 1.0)
 
@@ -109,7 +104,7 @@ def measure_trade(
     parameters: Mapping[str, float] | None = None,
     members: int = MEMBERS,
     spread: float = SPREAD,
-    ways: Sequence[Way] | None = None,
+    ways: Sequence[MethodChoice] | None = None,
     progress: Progress = None,
 ) -> Trade:
     """Measure errors and times.
@@ -133,8 +128,8 @@ def measure_trade(
         raise RequestError(
             "This scene has no bearing: its outputs follow from time alone, without a tolerance. Add a [bearing]."
         )
-    names = tuple(of) if of is not None else default_observables(model)
-    observables = check_observables(model, names)
+    compared = compared_quantities(model, of)
+    names, quantities = tuple(item.name for item in compared), QuantityRun(model, compared)
     if members < 2:
         raise RequestError(f"members: at least 2 are needed for a 95 % point, not {members!r}.")
     ways = ways_of(model) if ways is None else ways
@@ -147,12 +142,12 @@ def measure_trade(
     around = dict(user.parameters)
     with shown("measuring", progress) as tell:
         for member, numbers in enumerate(perturbed(model, around, members, spread)):
-            run = prepare(model, neighbour(model, user, numbers), Request())
+            run = stepper_run(model, neighbour(model, user, numbers), Request())
             turns = run.cycles
-            true[member], doubt[member] = reference(run, observables)
+            true[member], doubt[member] = reference(run, quantities)
             for k in order.permutation(len(ways)):
                 try:
-                    done = run.integrate(observables, ways[k])
+                    done = ways[k].measure(quantities, run)
                 except SimulationError:
                     continue  # infinitely wrong: quantiles of the method "higher" keep that
                 with np.errstate(divide="ignore", invalid="ignore"):
@@ -174,7 +169,9 @@ def measure_trade(
     )
 
 
-def _summary(way: Way, errors: np.ndarray, times: np.ndarray, known: np.ndarray, names: Sequence[str]) -> Measured:
+def _summary(
+    way: MethodChoice, errors: np.ndarray, times: np.ndarray, known: np.ndarray, names: Sequence[str]
+) -> Measured:
     median, promised = np.quantile(errors, (0.5, PROMISED), axis=0, method="higher")
     failed = np.isnan(times)
     return Measured(

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from ballpass.runtime.certify.whole_run import Way
+from ballpass.runtime.certify.method_choice import MethodChoice
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.run.locating import LOCATED
@@ -40,7 +40,7 @@ class Measured(ShortRepr):
     failures : members it could not finish
     """
 
-    way: Way
+    way: MethodChoice
     time: float
     median: Mapping[str, float]
     promised: Mapping[str, float]
@@ -149,7 +149,7 @@ def _located(trade: Trade) -> list[str]:
     known = {one.way: one for one in trade.measured}
     pairs = []
     for way, one in known.items():
-        plain = known.get(Way(method=way.method, rtol=way.rtol)) if way.kinks == LOCATED else None
+        plain = known.get(MethodChoice(method=way.method, rtol=way.rtol)) if way.kinks == LOCATED else None
         if plain is not None and math.isfinite(one.time) and math.isfinite(plain.time):
             pairs.append((one, plain))
     if not pairs:

@@ -1,4 +1,4 @@
-/* What a run gives while it goes on: states at output times, and reductions (reductions.h). */
+/* What a run gives while it goes on: states at output times, ends of steps, and reductions (reductions.h). */
 #ifndef BALLPASS_OBSERVE_H
 #define BALLPASS_OBSERVE_H
 
@@ -28,6 +28,16 @@ static void write_outputs(bp_run *run, double start, double t, double h, double 
         tangents_prepared = tangents_prepared || theta < 1.0;
         result->written++;
     }
+}
+
+/* The end of an accepted step [s], and whether it lies on a kink. */
+static void note_end(const bp_run *run, double time, int on_kink)
+{
+    const ballpass_options *options = run->options;
+    if (options->ends == NULL) return;
+    double *place = options->ends + 2 * (*options->ended)++;
+    place[0] = time;
+    place[1] = on_kink;
 }
 
 #ifdef BALLPASS_REDUCTIONS

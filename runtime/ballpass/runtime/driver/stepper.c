@@ -115,6 +115,7 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
     }
     if (taken.met == NO_KINK) remember_touch(run, h, taken.factor);
     const double reached = *time = taken.last ? length : t + h;
+    note_end(run, taken.last ? end : start + reached, taken.met == CUT);
     if (taken.met == CUT) {
         tangent_switch(run, reached);
         tangent_onset(run, reached, 1);

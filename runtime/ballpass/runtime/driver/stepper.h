@@ -46,6 +46,8 @@ typedef struct {
     int resume;              /* nonzero: go on with the run kept there */
     double *before;          /* reductions of the time before the one where `reduction` begins; NULL: none */
     int pause;               /* nonzero, with `work`: end with the step that passes the last output time, before x moves on */
+    double *ends;            /* filled with the end of each accepted step [s] and 1 where it lies on a kink, else 0; NULL: not told */
+    long *ended;             /* how many there are so far, which the caller sets to zero: room for max_steps of a call */
 } ballpass_options;
 
 typedef struct {

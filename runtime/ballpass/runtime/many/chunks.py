@@ -11,7 +11,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,10 +19,11 @@ from ballpass.runtime.many.member_segments import moments, stretches
 from ballpass.runtime.many.members import Members, Span
 from ballpass.runtime.native.ensemble_driver import STOPPED, EnsembleDriver, MemberNumbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import End, Family
+from ballpass.runtime.native.stepper import METHODS, End
 from ballpass.runtime.run.limits import brief_limit
-from ballpass.runtime.run.reduced_run import Begun, RunFailed, integrate_reduced
-from ballpass.runtime.run.stepping import STATUS_OF_END
+from ballpass.runtime.run.locating import Kinks
+from ballpass.runtime.run.loop import STATUS_OF_END, ReductionRow, RunFailed, RunUnderWay
+from ballpass.runtime.run.resolve import Run
 
 #: Most members of a chunk: enough that lanes which run out of members at its end do not count.
 CHUNK = 128
@@ -69,6 +70,8 @@ class Work:
 
     Attributes
     ----------
+    driver : None for a model without states
+    method, rtol, kinks : how to integrate
     lanes : whether members advance in lanes, or one by one
     end : states of all members, at the start and then at the end, shape (members, states)
     rows : reductions of all members, shape (members, .)
@@ -79,11 +82,12 @@ class Work:
     """
 
     model: LoadedModel
-    driver: EnsembleDriver
+    driver: EnsembleDriver | None
     members: Members
     span: Span
-    family: Family
+    method: str
     rtol: float
+    kinks: Kinks
     lanes: bool
     reducing: bool
     end: np.ndarray
@@ -163,31 +167,59 @@ def _note(work: Work, members: np.ndarray, status: str, message: str) -> None:
         work.results[member] = MemberFailure(member=member, status=status, time=0.0, message=message)
 
 
-def _tolerance(work: Work, which: np.ndarray) -> np.ndarray:
-    """Error allowed in a step of some members, relative to their own magnitudes, shape (members, states)."""
+def _magnitudes(work: Work, which: np.ndarray) -> np.ndarray:
+    """Magnitudes of the states of some members, shape (members, states)."""
+    if work.driver is None:
+        return np.zeros((len(which), 0))
     numbers = MemberNumbers(p=work.members.p[which], c=work.members.c[which])
     first, inputs, horizons = moments(work.model, work.members, work.span, which)
-    return work.rtol * work.driver.magnitudes(numbers, work.members.initial[which], first, inputs, horizons)
+    return work.driver.magnitudes(numbers, work.members.initial[which], first, inputs, horizons)
+
+
+def member_run(work: Work, member: int, magnitude: np.ndarray | None = None) -> Run:
+    """The run of one member.
+
+    Parameters
+    ----------
+    magnitude : of the states, where it is known, shape (states,)
+    """
+    duration, turn, start = (float(of[member]) for of in (work.span.durations, work.span.turns, work.span.starts))
+    return Run(
+        model=work.model,
+        numbers=work.members.numbers(work.model, member),
+        begin=0.0,
+        end=duration,
+        turn=turn,
+        turns=None,
+        transient_cycles=start / turn,
+        start=start,
+        initial=work.members.initial[member],
+        method=work.method,
+        rtol=work.rtol,
+        kinks=work.kinks,
+        magnitude=_magnitudes(work, np.array([member]))[0] if magnitude is None else magnitude,
+    )
 
 
 def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
     """Integrate a chunk's members, several together; one that takes too many steps for that goes on alone."""
-    which = chunk.members
-    tolerance = _tolerance(work, which)
+    which, driver = chunk.members, work.driver
+    assert driver is not None  # there are states
+    magnitude = _magnitudes(work, which)
     x = work.members.initial[which]
     rows = work.rows[which] if work.reducing else None
     durations = work.span.durations[which]
     limits = np.array(list(map(brief_limit, durations.tolist(), work.span.turns[which].tolist())))
-    carried = work.driver.carry(len(which))
+    carried = driver.carry(len(which))
     results = carried.results
     for arrays in stretches(work.model, work.members, work.span, which):
         if work.stop.value:
             break
-        work.driver.run(
-            work.family,
+        driver.run(
+            METHODS[work.method],
             arrays,
             x,
-            tolerance,
+            work.rtol * magnitude,
             rows,
             work.stop,
             max_steps=limits,
@@ -202,9 +234,7 @@ def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
         work.rows[which] = rows
     counts = {name: int(results[name].sum()) for name in COUNTS}
     for place in np.flatnonzero(results["status"] == End.TOO_MANY_STEPS).tolist():
-        told = results[place]
-        begun = Begun(time=float(told["time"]), steps=int(told["steps"] + told["rejected"]))
-        _alone(work, chunk, place, tolerance[place], counts, begun)
+        _alone(work, chunk, place, magnitude[place], counts, results[place])
     others = results["status"] != End.TOO_MANY_STEPS
     failed = others & ((results["status"] != End.DONE) | (results["time"] < durations))
     for place in np.flatnonzero(failed).tolist():
@@ -221,47 +251,53 @@ def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
 
 def _one_by_one(work: Work, chunk: _Chunk) -> dict[str, int]:
     """Integrate a chunk's members by the driver of single runs."""
-    tolerance = _tolerance(work, chunk.members)
+    magnitude = _magnitudes(work, chunk.members)
     counts = dict.fromkeys(COUNTS, 0)
     for place in range(len(chunk.members)):
         if work.stop.value:
             _note(work, chunk.members[place:], "INTERRUPTED", "Interrupted before it began.")
             break
-        _alone(work, chunk, place, tolerance[place], counts, Begun())
+        _alone(work, chunk, place, magnitude[place], counts)
     return counts
 
 
-def _alone(work: Work, chunk: _Chunk, place: int, tolerance: np.ndarray, counts: dict[str, int], begun: Begun) -> None:
-    """Integrate one member of a chunk by the driver of single runs, from where it is; adds its steps to `counts`."""
+def _alone(
+    work: Work, chunk: _Chunk, place: int, magnitude: np.ndarray, counts: dict[str, int], begun: np.void | None = None
+) -> None:
+    """Integrate one member of a chunk by the driver of single runs, from where it is; adds its steps to `counts`.
+
+    Parameters
+    ----------
+    begun : how far it has come in lanes
+    """
     member = int(chunk.members[place])
-    duration, turn, start = (float(of[member]) for of in (work.span.durations, work.span.turns, work.span.starts))
+    duration = float(work.span.durations[member])
 
     def tell(fraction: float) -> None:
         chunk.reached[place] = fraction * duration
 
+    run = replace(member_run(work, member, magnitude), progress=tell)
+    going = RunUnderWay(
+        run=run,
+        sinks=[ReductionRow(row=work.rows[member])],
+        state=work.end[member],
+        time=0.0 if begun is None else float(begun["time"]),
+        stop=work.stop,
+        stepper=None if work.driver is None else work.driver.stepper,
+        steps=0 if begun is None else int(begun["steps"]),
+        rejected=0 if begun is None else int(begun["rejected"]),
+    )
+    before = going.steps, going.rejected
     try:
-        steps, rejected = integrate_reduced(
-            work.model,
-            work.driver.stepper,
-            work.members.numbers(work.model, member),
-            work.family,
-            tolerance,
-            work.end[member],
-            work.rows[member],
-            (duration, turn, start),
-            progress=tell,
-            stop=work.stop,
-            begun=begun,
-        )
+        going.go_on()
     except RunFailed as fault:
         work.results[member] = MemberFailure(
             member=member, status=fault.status.name, time=fault.time, message=str(fault)
         )
         return
-    counts["steps"] += steps
-    counts["rejected"] += rejected
-    reached = float(chunk.reached[place])
-    if reached < duration:
+    counts["steps"] += going.steps - before[0]
+    counts["rejected"] += going.rejected - before[1]
+    if going.time < duration:
         work.results[member] = MemberFailure(
-            member=member, status="INTERRUPTED", time=reached, message="Interrupted on its way."
+            member=member, status="INTERRUPTED", time=going.time, message="Interrupted on its way."
         )

@@ -12,29 +12,36 @@ from __future__ import annotations
 import ctypes
 import math
 import os
+import threading
 import time as clocks
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ballpass.runtime.contract import Manifest
-from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import real, unknown_name
-from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, run_chunks
+from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, member_run, run_chunks
 from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
 from ballpass.runtime.native.ensemble_driver import LANE_FAMILIES
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.ratings.of_bearing import refuse_swinging
-from ballpass.runtime.ratings.readings import KINDS as LIFE
+from ballpass.runtime.native.reduction_rows import reduction_rows
+from ballpass.runtime.native.stepper import METHODS
+from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
+from ballpass.runtime.quantity.quantity_run import QuantityRun, is_reduced, needs
+from ballpass.runtime.quantity.records import Quantity, ReducedRuns
+from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.choose_method import stepper_method
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
-from ballpass.runtime.run.reduced_run import check_span, choose_family
-from ballpass.runtime.run.reductions import channel_names, channels_needed, observable_aliases, observe
-from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, check_memory, on_request
+from ballpass.runtime.run.loop import RunFailed
+from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, check_memory
 from ballpass.runtime.run.request import tolerance as relative_tolerance
+from ballpass.runtime.run.resolve import check_span
 from ballpass.runtime.run.tables import printed, simple_table
 from ballpass.runtime.show import html
 
@@ -179,12 +186,9 @@ class EnsembleResult(Mapping[str, np.ndarray]):
         """``units`` and ``long_name`` of varied parameters and observables, by name."""
         infos = {info.name: info for info in self.manifest.parameters}
         found = {name: {"units": infos[name].unit, "long_name": infos[name].description} for name in self.parameters}
-        aliases = observable_aliases(channel_names(self.manifest))
         for name in self.observables:
-            kind, channel = aliases[name]
-            found[name] = {
-                "units": observable_unit(self.manifest, kind, channel), "long_name": f"{kind} of {channel}"
-            }  # fmt: skip
+            quantity = parse_quantity(self.manifest, name)
+            found[name] = {"units": quantity.unit, "long_name": quantity_words(self.manifest, quantity)}
         return found
 
 
@@ -212,12 +216,10 @@ def simulate_many(
     """
     started = clocks.perf_counter()
     manifest = model.manifest
-    aliases = observable_aliases(channel_names(manifest))
-    chosen = _observables(manifest, observables, aliases)
-    asked = method or manifest.run.method
-    family = choose_family(asked)
+    chosen = _quantities(model, observables)
+    chosen_method = stepper_method(method or manifest.run.method)
     tolerance = relative_tolerance("rtol", manifest.run.rtol if rtol is None else rtol)
-    at_kinks = choose_kinks(kinks, "stepper" if asked == "auto" else asked, manifest, tolerance)
+    at_kinks = choose_kinks(kinks, chosen_method, manifest, tolerance)
     workers = _threads(threads)
     # the table first: a wrong one is told before the driver is compiled
     columns = read_table(manifest, table)
@@ -229,26 +231,28 @@ def simulate_many(
         3 * (len(manifest.parameters) + len(manifest.constants)) + 10,
         "Run the table in parts of some millions of members: they do not depend on each other.",
     )
-    driver = model.ensemble_driver
-    if at_kinks == LOCATED and has_kinks(manifest):
+    driver = model.ensemble_driver if model.states else None
+    if driver is not None and at_kinks == LOCATED and has_kinks(manifest):
         driver = driver.with_stepper(model.locating_stepper)
     members = make_members(model, columns, bounded=bounded)
-    _refuse_lives(model, chosen)
     skipped = manifest.run.transient_cycles if transient is None else real(transient)
     span = _span(model, members, cycles, duration, skipped)
-    in_lanes = lanes and at_kinks != LOCATED and family in LANE_FAMILIES
-    reduced = {name for observable in chosen.values() for name in channels_needed(*observable)}
+    in_lanes = driver is not None and lanes and at_kinks != LOCATED and METHODS[chosen_method] in LANE_FAMILIES
+    by_steps = [item for item in chosen if is_reduced(model, item)]
+    others = [item for item in chosen if not is_reduced(model, item)]
+    reduced = {name for item in by_steps for name in needs(item)}
     work = Work(
         model=model,
         driver=driver,
         members=members,
         span=span,
-        family=family,
+        method=chosen_method,
         rtol=tolerance,
+        kinks=at_kinks,
         lanes=in_lanes,
         reducing=bool(reduced),
         end=members.initial.copy(),
-        rows=driver.rows.empty(len(members), span.starts, reduced),
+        rows=reduction_rows(manifest).empty(len(members), span.starts, reduced),
         results={
             member: MemberFailure(member=member, status="REFUSED", time=0.0, message=message)
             for member, message in members.refused.items()
@@ -257,15 +261,26 @@ def simulate_many(
         stop=ctypes.c_int(0),
     )
     able = np.array([m for m in range(len(members)) if m not in members.refused], dtype=np.int_)
-    size = chunk_size(len(able), driver.lanes)
-    interrupted = run_chunks(work, able, size, workers, progress)
-
+    lanes_of = driver.lanes if driver is not None and in_lanes else 1
+    size = chunk_size(len(able), driver.lanes if driver is not None else 1)
+    tell = progress or (lambda _done: None)
+    parts = [0.0, *([0.5] if by_steps and others else []), 1.0]  # of the progress
+    interrupted, found = False, {}
+    if by_steps:
+        interrupted = run_chunks(work, able, size, workers, lambda done: tell(done * parts[1]))
+        runs = ReducedRuns(manifest=manifest, rows=work.rows, end=work.end, values=members.columns)
+        with np.errstate(invalid="ignore", divide="ignore"):  # a member that never started has no duration
+            found = {item.name: np.array(_reduced(runs, item)) for item in by_steps}
+        for values in found.values():
+            values[sorted(work.results)] = np.nan
+    if others:
+        table = np.full((len(members), len(others)), np.nan)
+        if not interrupted:
+            first = parts[-2]
+            interrupted = _measure(work, others, able, table, workers, lambda done: tell(first + done * (1.0 - first)))
+        found |= {item.name: table[:, k] for k, item in enumerate(others)}
     failed = sorted(work.results)
-    found = {}
-    for name, (kind, channel) in chosen.items():
-        values = observe(manifest, kind, channel, work.rows, work.end, members.columns)
-        values[failed] = np.nan
-        found[name] = values
+    found = {item.name: found[item.name] for item in chosen}
     return EnsembleResult(
         observables=found,
         parameters=members.varied,
@@ -274,7 +289,7 @@ def simulate_many(
         statistics=EnsembleStatistics(
             **work.counts,
             chunk=size,
-            lanes=driver.lanes if in_lanes else 1,
+            lanes=lanes_of,
             kinks=at_kinks,
             threads=workers,
             rtol=tolerance,
@@ -284,40 +299,78 @@ def simulate_many(
     )
 
 
-def _observables(
-    manifest: Manifest, names: str | Sequence[str], aliases: Mapping[str, tuple[str, str]]
-) -> dict[str, tuple[str, str]]:
+def _quantities(model: LoadedModel, names: str | Sequence[str]) -> tuple[Quantity, ...]:
     names = [names] if isinstance(names, str) else list(names)
     if not names:
         raise RequestError(
             "observables: one name or more is expected, none was given. Example: ['max:ball.force', 'rms:inner.y']."
         )
-    faults = [_fault(manifest, name, aliases) for name in names if name not in aliases]
-    if faults:
-        raise RequestError("\n".join(faults))
-    return {name: aliases[name] for name in names}
+    return quantities_of(model, names)
 
 
-def _refuse_lives(model: LoadedModel, chosen: Mapping[str, tuple[str, str]]) -> None:
-    """RequestError for the life of a bearing that does not turn, whatever the numbers of a member are."""
-    asked = {channel.removesuffix("ball.force") for kind, channel in chosen.values() if kind in LIFE}
-    values = model.numbers({}).values if asked else {}
-    for bearing in model.manifest.bearings:
-        if bearing.prefix in asked:
-            refuse_swinging(bearing, values, clock.shaft_speed(model.manifest, values))
+def _reduced(runs: ReducedRuns, quantity: Quantity) -> np.ndarray:
+    reduced = KINDS[quantity.kind].reduced
+    assert reduced is not None  # `is_reduced`
+    return reduced(runs, quantity)
 
 
-def _fault(manifest: Manifest, name: str, aliases: Mapping[str, tuple[str, str]]) -> str:
-    """Why a name is no observable: the steps reduce states and forces of balls, not what follows from them."""
-    channel = str(name).rpartition(":")[2].partition("[")[0].partition("@")[0]
-    reduced = channel_names(manifest)
-    computed = channel in {info.name for info in manifest.quantities} or bool(on_request(channel))
-    if computed and channel not in reduced:
-        return (
-            f"{name!r}: ensembles and sweeps reduce what steps give: {', '.join(reduced)}; {channel} is not among "
-            "them. Ask Model.sensitivity or ballpass sensitivity for it, member by member."
-        )
-    return unknown_name("observable", name, aliases)
+def _measure(
+    work: Work,
+    quantities: Sequence[Quantity],
+    able: np.ndarray,
+    found: np.ndarray,
+    threads: int,
+    progress: Callable[[float], None],
+) -> bool:
+    """Evaluate quantities that steps do not reduce, member by member; whether the user interrupted.
+
+    Parameters
+    ----------
+    found : filled, NaN for a quantity that is not known, shape (members, quantities)
+    """
+    own = threading.local()  # a `QuantityRun` is not for several threads
+
+    def measure(member: int, which: tuple[int, ...]) -> tuple[dict[int, float], RequestError | SimulationError | None]:
+        """Values by their place, and why some are not known."""
+        runs = own.__dict__.setdefault("runs", {})
+        if which not in runs:
+            runs[which] = QuantityRun(work.model, [quantities[k] for k in which])
+        try:
+            values = runs[which].measure(member_run(work, member)).values.tolist()
+            return dict(zip(which, values, strict=True)), None
+        except (RequestError, SimulationError) as fault:
+            known: dict[int, float] = {}
+            if len(which) > 1:  # each that is known by itself
+                for k in which:
+                    known |= measure(member, (k,))[0]
+            return known, fault
+
+    every = tuple(range(len(quantities)))
+    with ThreadPoolExecutor(max_workers=threads, thread_name_prefix="ballpass") as pool:
+        pending = [pool.submit(measure, member, every) for member in able.tolist()]
+        done = 0
+        try:
+            for member, future in zip(able.tolist(), pending, strict=True):
+                values, fault = future.result()
+                done += 1
+                found[member, list(values)] = list(values.values())
+                if fault is not None and member not in work.results:
+                    work.results[member] = MemberFailure(
+                        member=member,
+                        status=fault.status.name if isinstance(fault, RunFailed) else "REFUSED",
+                        time=fault.time if isinstance(fault, RunFailed) else 0.0,
+                        message=str(fault),
+                    )
+                progress(done / len(pending))
+        except KeyboardInterrupt:
+            for future in pending:
+                future.cancel()
+            for member in able[done:].tolist():
+                work.results[member] = MemberFailure(
+                    member=member, status="INTERRUPTED", time=0.0, message="Interrupted before it was done."
+                )
+            return True
+    return False
 
 
 def _threads(given: int | None) -> int:
@@ -382,22 +435,9 @@ def _render(result: EnsembleResult) -> Any:
         f"{statistic.wall_time:.3g} s",
     )
     units = {info.name: info.unit for info in result.manifest.parameters}
-    aliases = observable_aliases(channel_names(result.manifest))
-    units |= {name: observable_unit(result.manifest, *aliases[name]) for name in result.observables}
+    units |= {name: parse_quantity(result.manifest, name).unit for name in result.observables}
     for name, values in (*result.parameters.items(), *result.observables.items()):
         known = values[np.isfinite(values)]
         cells = [f"{f(known):z.6g}" for f in (np.min, np.median, np.max)] if len(known) else ["", "", ""]
         table.add_row(name, *cells, units[name])
     return table
-
-
-def observable_unit(manifest: Manifest, kind: str, channel: str) -> str:
-    """SI unit of an observable."""
-    if kind in ("peak_time", "min_time"):
-        return "s"
-    if kind == "peak_ball":
-        return "1"
-    if kind in LIFE:
-        return "turns"
-    units = {state.name: state.unit for state in manifest.states}
-    return units.get(channel, "m" if channel.endswith("ball.deflection") else "N")

@@ -14,8 +14,8 @@ import numpy as np
 from ballpass.runtime.many.members import Members, Span
 from ballpass.runtime.native.ensemble_driver import MemberArrays
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run.reduced_run import SCALED_TURNS
 from ballpass.runtime.run.request import check_memory
+from ballpass.runtime.run.resolve import SCALED_TURNS
 from ballpass.runtime.run.segments import TURNS_A_SEARCH, WORK
 
 #: Windows of `TURNS_A_SEARCH` turns that edges are sought in at a time, over all members of a chunk: about a second's

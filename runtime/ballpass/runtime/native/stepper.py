@@ -75,6 +75,8 @@ class _Options(ctypes.Structure):
         ("resume", ctypes.c_int),
         ("before", ctypes.c_void_p),
         ("pause", ctypes.c_int),
+        ("ends", ctypes.c_void_p),
+        ("ended", ctypes.c_void_p),
     )
 
 
@@ -131,6 +133,7 @@ class Outcome:
     steps, rejected, evaluations, factorizations, pivoted, switches, kinks : counts
     time : reached [s]
     step : last step size tried [s]
+    ends : ends of steps noted in this call
     """
 
     end: End
@@ -146,10 +149,11 @@ class Outcome:
     kinks: int
     time: float
     step: float
+    ends: int
 
 
 #: Fields of an outcome that are those of C.
-_TOLD = tuple(field.name for field in fields(Outcome) if field.name not in ("end", "family"))
+_TOLD = tuple(field.name for field in fields(Outcome) if field.name not in ("end", "family", "ends"))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -255,6 +259,7 @@ class Stepper:
         smallest_step: float = 0.0,
         largest_step: float = np.inf,
         held: Held | None = None,
+        ends: np.ndarray | None = None,
     ) -> Outcome:
         """Integrate over all segments.
 
@@ -272,12 +277,17 @@ class Stepper:
         held : from `hold`; where a call with it has taken all its steps, another goes on with the same arguments and
             more `max_steps`, which then count those of all calls, as the counts told do.  The bits are those of one
             call.  Not with `tangents`
+        ends : filled with the end of each accepted step [s] and 1.0 where it lies on a kink, else 0.0, shape (steps, 2)
+            with room for those of this call; `Outcome.ends` says how many they are
         """
         inputs = padded(segments.inputs, self._inputs)
         restarts = np.ascontiguousarray(segments.restarts, dtype=np.uint8)
+        ended = ctypes.c_long(0)
         options = _Options(
             *(family, max_steps, first_step, smallest_step, largest_step, address(tolerance), address(reduction)),
             before=address(before),
+            ends=address(ends),
+            ended=ctypes.addressof(ended),
         )
         result = _Result()
         if held is not None:
@@ -301,7 +311,7 @@ class Stepper:
             )
             self._code.ballpass_run_tangents(*given, ctypes.byref(directions), ctypes.byref(result))
         told = {name: getattr(result, name) for name in _TOLD}
-        return Outcome(end=End(result.status), family=Family(result.method), **told)
+        return Outcome(end=End(result.status), family=Family(result.method), ends=ended.value, **told)
 
     def magnitudes(
         self, p: np.ndarray, c: np.ndarray, initial: np.ndarray, inputs: np.ndarray, horizon: float

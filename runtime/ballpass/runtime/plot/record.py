@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.ask.characteristic import frequencies_of
-from ballpass.runtime.ask.observables import KinematicFrequencies, turns
+from ballpass.runtime.ask.observables import turns
 from ballpass.runtime.contract import force_components, table_direction
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.quantity.characteristic import frequencies_of
+from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.run.ball_angles import ball_angles
 
 if TYPE_CHECKING:

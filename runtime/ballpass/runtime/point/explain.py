@@ -25,8 +25,8 @@ from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.point.slopes import jacobian
 from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.choose_method import STIFF_RATIO, choose_method
 from ballpass.runtime.run.scales import Scales
-from ballpass.runtime.run.simulate import STIFF_RATIO, choose_method
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 

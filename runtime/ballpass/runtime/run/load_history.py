@@ -24,6 +24,7 @@ from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
 from ballpass.runtime.run.reductions import Reduction, load_powers, reduction_of
 from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.settle import LEAST, MOST, PEAKS
 
 #: Change of a life, relative to itself, that counts as none [1].
@@ -75,17 +76,18 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
     doubles = not given and not timed and math.isfinite(turn)
     if doubles:
         request = replace(request, cycles=transient + LEAST)
-    going = start_reducing(model, numbers, request, _channels(model))
+    going = start_reducing(resolve(model, numbers, request), _channels(model))
+    start, end = going.run.start, going.run.end
     if not doubles:
-        going.on_to((going.start + going.end) / 2.0)
+        going.go_on((start + end) / 2.0)
         before = _history(going)
-        going.on_to(going.end)
+        going.go_on(end)
         return _compared(going, before)
-    going.on_to(going.end)
+    going.go_on(end)
     before, turns = _history(going), LEAST
     while True:
         turns *= 2
-        going.on_to(going.start + turns * turn)
+        going.go_on(start + turns * turn)
         found = _compared(going, before)
         if found.settled or 2 * turns > MOST:
             return found
@@ -102,9 +104,9 @@ def _channels(model: LoadedModel) -> list[str]:
 
 def _history(going: ReducedRun) -> LoadHistory:
     """Loads so far."""
-    manifest, layout = going.model.manifest, reduction_rows(going.model.manifest)
+    manifest, layout = going.run.model.manifest, reduction_rows(going.run.model.manifest)
     duration = float(going.row[HEAD.index("duration")])
-    speed = clock.shaft_speed(manifest, going.numbers.values)
+    speed = clock.shaft_speed(manifest, going.run.numbers.values)
     if manifest.mechanism is not None and manifest.mechanism.rate:
         speed = reduction_of(layout, going.row, manifest.mechanism.rate, duration).mean
     powers, peaks = {}, {}
@@ -131,9 +133,9 @@ def _history(going: ReducedRun) -> LoadHistory:
 def _compared(going: ReducedRun, before: LoadHistory) -> LoadHistory:
     """Loads so far, with what has changed since."""
     found = _history(going)
-    values = going.numbers.values
+    values = going.run.numbers.values
     life, peak = 0.0, 0.0
-    for bearing in going.model.manifest.bearings:
+    for bearing in going.run.model.manifest.bearings:
         prefix = bearing.prefix
         now, then = (h.peaks[prefix].maximum for h in (found, before))
         peak = max(peak, abs(1.0 - then / now) if now > 0.0 else 0.0)

@@ -13,7 +13,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.casadi_integrators import Frozen, VirtualIntegrator
 from ballpass.runtime.native.kernel import EvaluationError
-from ballpass.runtime.run.trajectory import Cost, Interrupted, Trajectory
+from ballpass.runtime.run.trajectory import Interrupted, Trajectory
 
 
 def integrate(
@@ -21,10 +21,9 @@ def integrate(
     integrator: VirtualIntegrator | None,
     scale: np.ndarray,
     trajectory: Trajectory,
-    cost: Cost,
     progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Fill the samples of `trajectory`, and note the cost; without integrator there are no states, nothing to fill.
+    """Fill the samples of `trajectory`, and note what it took; without integrator there are no states, nothing to fill.
 
     Parameters
     ----------
@@ -48,7 +47,7 @@ def integrate(
         try:
             state = _segment(integrator, frozen, trajectory, state, interval, (int(stops[k]), int(stops[k + 1])))
         finally:
-            cost.steps, cost.rejected = integrator.steps, integrator.rejected
+            trajectory.steps, trajectory.rejected = integrator.steps, integrator.rejected
         if progress is not None:
             progress((interval[1] - trajectory.begin) / (trajectory.end - trajectory.begin))
 

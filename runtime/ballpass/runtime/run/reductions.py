@@ -1,8 +1,8 @@
 """On-line reductions of a run: extremes with their times, mean and rms of channels.
 
-In: rows that the driver has written (`ballpass.runtime.native.reduction_rows`).  Out: `Reductions`, or observables of
-many rows.  The driver looks at every accepted step in its quarters and refines extremes from its own dense output, so
-that what is found does not depend on samples, and a run of any length takes the same memory.
+In: rows that the driver has written (`ballpass.runtime.native.reduction_rows`).  Out: `Reductions`.  The
+driver evaluates every accepted step in its quarters and refines extremes from its own dense output, so that what is
+found does not depend on samples, and a run of any length takes the same memory.
 """
 
 from __future__ import annotations
@@ -25,9 +25,7 @@ from ballpass.runtime.native.reduction_rows import (
     ReductionRows,
     reduction_rows,
 )
-from ballpass.runtime.ratings.of_bearing import ratings_of
-from ballpass.runtime.ratings.readings import KINDS as LIFE
-from ballpass.runtime.ratings.readings import LoadPowers, lives
+from ballpass.runtime.ratings.readings import LoadPowers
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 
@@ -231,39 +229,6 @@ def _joined(first: Reduction, second: Reduction, share: float, rest: float) -> R
     )
 
 
-def observable_aliases(channels: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Every name of an observable: ``max:ball.force``, and ``peak_ball_force`` or ``life`` for people; -> (kind,
-    channel)."""
-    found: dict[str, tuple[str, str]] = {}
-    for channel in channels:
-        plain = channel.replace(".", "_")
-        for kind in KINDS:
-            if kind == "end" and channel.endswith(BALL_CHANNELS):
-                continue
-            found[f"{kind}:{channel}"] = (kind, channel)
-            found[f"{kind}_{plain}"] = (kind, channel)
-        found[f"peak:{channel}"] = found[f"peak_{plain}"] = ("max", channel)
-        if channel.endswith("ball.force"):
-            prefix = channel.removesuffix("ball.force")
-            # as the summary names it, with the bearing first
-            found[f"{prefix}peak_ball_force"] = ("max", channel)
-            found |= {name: (kind, channel) for kind in LIFE for name in (f"{kind}:{channel}", f"{prefix}{kind}")}
-    return found
-
-
-#: Kinds of observables.
-KINDS = ("max", "min", "mean", "rms", "range", "peak_time", "peak_ball", "min_time", "end")
-
-
-def channels_needed(kind: str, channel: str) -> tuple[str, ...]:
-    """Channels that are reduced for an observable."""
-    if kind in LIFE:
-        # what every place of the raceways has met needs no root of a load
-        powers = LOAD_POWERS[:1] if LIFE[kind] == ("sectors",) else LOAD_POWERS
-        return tuple(channel.removesuffix("ball.force") + name for name in powers)
-    return () if kind == "end" else (channel,)
-
-
 def load_powers(manifest: Manifest, bearing: BearingInfo, rows: np.ndarray) -> LoadPowers:
     """Mean powers of a bearing's ball loads from reductions, shape (members, .)."""
     layout = reduction_rows(manifest)
@@ -272,39 +237,3 @@ def load_powers(manifest: Manifest, bearing: BearingInfo, rows: np.ndarray) -> L
     length = duration[:, None, None] * bearing.balls / SECTORS
     places = layout.raceways(rows, bearing.prefix) / length
     return LoadPowers(cubes=cubes, ten_thirds=more, outer_damage=damage, raceways=places)
-
-
-def observe(
-    manifest: Manifest, kind: str, channel: str, rows: np.ndarray, end: np.ndarray, values: Mapping[str, Any]
-) -> np.ndarray:
-    """Values of an observable from reductions.
-
-    Parameters
-    ----------
-    rows : reductions, shape (members, .)
-    end : states at the end, shape (members, states)
-    values : parameters by name, numbers or of shape (members,)
-    """
-    layout = reduction_rows(manifest)
-    if kind == "end":
-        return end[:, layout.states.index(channel)].copy()
-
-    def of(row: str, name: str = channel) -> np.ndarray:
-        values: np.ndarray = rows[:, layout.column(row, name)]
-        return values
-
-    duration = rows[:, HEAD.index("duration")]
-    found: np.ndarray
-    with np.errstate(invalid="ignore", divide="ignore"):  # a member that never started has no duration
-        if kind in LIFE:
-            prefix = channel.removesuffix("ball.force")
-            bearing = next(item for item in manifest.bearings if item.prefix == prefix)
-            by_reading = lives(ratings_of(bearing, values), load_powers(manifest, bearing, rows))
-            return np.asarray(np.min([by_reading[reading] for reading in LIFE[kind]], axis=0))
-        if kind in ("mean", "rms"):
-            return np.asarray(of("integral") / duration if kind == "mean" else np.sqrt(of("square") / duration))
-    if kind == "range":
-        found = of("max") - of("min")
-    else:
-        found = of({"peak_time": "max_time", "peak_ball": "max_ball"}.get(kind, kind)).copy()
-    return found

@@ -8,7 +8,7 @@ well.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain, pairwise
 
 import numpy as np
@@ -58,16 +58,24 @@ def segment_edges(model: LoadedModel, numbers: Numbers, begin: float, end: float
 
 
 def edge_windows(
-    model: LoadedModel, numbers: Numbers, duration: float, turn: float, start: float
+    model: LoadedModel, numbers: Numbers, end: float, turn: float, start: float, begin: float = 0.0
 ) -> Iterator[np.ndarray]:
-    """Begin, breakpoints, whole turns, `start` and end of a run, some turns at a time, increasing [s].
+    """Edges of a run, some turns at a time, increasing [s]: breakpoints, whole turns, `start`, and the ends.
 
     Memory does not grow with the run; each window begins with the last edge of the one before.
+
+    Parameters
+    ----------
+    end, begin : of the run; the first window is the one that holds `begin`, and may begin before it [s]
+    turn : time of a turn, infinite where nothing turns [s]
+    start : time from which on the run counts, an edge where it lies within [s]
     """
-    near = 1e-9 * min(turn, duration)
-    wholes = range(TURNS_A_SEARCH, math.ceil(duration / turn), TURNS_A_SEARCH) if math.isfinite(turn) else ()
-    stops = (k * turn for k in wholes if k * turn < duration - near)
-    for left, right in pairwise(chain((0.0,), stops, (duration,))):
+    near = 1e-9 * min(turn, end)
+    first = TURNS_A_SEARCH * math.floor((begin + near) / turn / TURNS_A_SEARCH) if math.isfinite(turn) else 0
+    wholes = range(first + TURNS_A_SEARCH, math.ceil(end / turn), TURNS_A_SEARCH) if math.isfinite(turn) else ()
+    stops = (k * turn for k in wholes if k * turn < end - near)
+    origin = first * turn if math.isfinite(turn) else begin
+    for left, right in pairwise(chain((origin,), stops, (end,))):
         if left + near < start < right - near:
             # not a window of its own: a window's first step size is estimated anew
             before, behind = (segment_edges(model, numbers, a, b, turn) for a, b in ((left, start), (start, right)))
@@ -75,6 +83,46 @@ def edge_windows(
         else:
             edges = segment_edges(model, numbers, left, right, turn)
             yield np.where(np.abs(edges - start) <= near, start, edges)
+
+
+def run_windows(
+    model: LoadedModel, numbers: Numbers, interval: tuple[float, float], turn: float, start: float
+) -> Iterator[Segments]:
+    """Segments of a run, some turns at a time; else as `edge_windows`.
+
+    Parameters
+    ----------
+    interval : begin and end of the run [s]
+    """
+    begin, end = interval
+    inputs, before = model.manifest.inputs, None
+    for edges in edge_windows(model, numbers, end, turn, start, begin):
+        before = segments = make_segments(inputs, numbers, edges, before)
+        rest = segments if edges[0] >= begin else rest_of(segments, begin, inputs, numbers)
+        if rest is not None:
+            yield rest
+
+
+def joined_segments(windows: Iterable[Segments], *, all_: bool = False) -> Iterator[Segments]:
+    """Windows, joined with the next ones as long as a load jumps where these begin; or all of them."""
+    held: list[Segments] = []
+    for window in windows:
+        if held and not (all_ or window.restarts[0]):
+            yield _joined(held)
+            held = []
+        held.append(window)
+    if held:
+        yield _joined(held)
+
+
+def _joined(parts: Sequence[Segments]) -> Segments:
+    if len(parts) == 1:
+        return parts[0]
+    return Segments(
+        times=np.concatenate([parts[0].times, *(part.times[1:] for part in parts[1:])]),
+        inputs=np.concatenate([part.inputs for part in parts]),
+        restarts=np.concatenate([part.restarts for part in parts]),
+    )
 
 
 def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, turn: float, columns: int = WORK) -> None:

@@ -18,9 +18,10 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.reduced_run import reduce_run
-from ballpass.runtime.run.reductions import Reductions
+from ballpass.runtime.run.reduced_run import reduce_run, start_reducing
+from ballpass.runtime.run.reductions import Reductions, channel_names
 from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.run.start import RunEnd, start_time
 from ballpass.runtime.show import html
@@ -88,14 +89,19 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
         raise RequestError("settle: the number of turns is what it finds; give neither cycles nor duration.")
     if not (real(most) >= 2 * LEAST and int(most) == most):
         raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * LEAST} on is expected.")
-    run = model.manifest.run
-    transient = run.transient_cycles if request.transient_cycles is None else request.transient_cycles
+    settings = model.manifest.run
+    transient = settings.transient_cycles if request.transient_cycles is None else request.transient_cycles
     turns = LEAST
-    dropped = _dropped(transient, start_time(request.initial), clock.period(model.manifest, numbers.values))
-    before = reduce_run(model, numbers, replace(request, cycles=dropped + turns))
+    turn = clock.period(model.manifest, numbers.values)
+    dropped = _dropped(transient, start_time(request.initial), turn)
+    run = resolve(model, numbers, replace(request, cycles=dropped + turns))
+    going = start_reducing(run, channel_names(model.manifest))
+    going.go_on()
+    before = going.reductions()
     while True:
         turns *= 2
-        found = reduce_run(model, numbers, replace(request, cycles=dropped + turns))
+        going.go_on(run.begin + (dropped + turns) * turn)
+        found = going.reductions()
         changes = changed(before, found, _counter(model))
         settled = _settled(changes)
         if settled or 2 * turns > most:

@@ -2,51 +2,42 @@
 
 In: a model, numbers, a request.  Out: a `Solution`.
 
-1. The request is checked, and what it leaves open taken from the scene (`request`).
-2. The run is split where a load switches and at every whole turn (`segments`).
-3. A method is chosen; tolerances are relative to the magnitudes of the states (`magnitudes`).
-4. The method fills the samples (`stepping`: the project's own; `pieces`: CasADi's).
-5. The outputs asked for are evaluated at all samples at once (`trajectory`).
+1. The request is checked, and what it leaves open taken from the scene (`resolve`, `sampling`).
+2. The method fills the samples (`loop`: the project's own stepper; `pieces`: CasADi's).
+3. The outputs asked for are evaluated at all samples at once (`trajectory`).
 """
 
 from __future__ import annotations
 
 import math
 import time as clocks
-import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.parameters import Numbers, unknown_name
+from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.casadi_integrators import METHODS
-from ballpass.runtime.native.loaded_model import LoadedModel, NoKernelsWarning
+from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
+from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.failure_location import whereabouts
 from ballpass.runtime.run.integration_error import IntegrationError
-from ballpass.runtime.run.limits import refuse_crawl
-from ballpass.runtime.run.locating import choose_kinks, kinks_with_derivatives
-from ballpass.runtime.run.magnitudes import model_scales, stepper_magnitudes
+from ballpass.runtime.run.locating import LOCATED, kinks_with_derivatives
+from ballpass.runtime.run.loop import ReductionRow, RunFailed, RunUnderWay, Samples, Sink, start_run
 from ballpass.runtime.run.pieces import integrate
 from ballpass.runtime.run.reductions import joined, reduced_channels, reductions_of
-from ballpass.runtime.run.request import Plan, Request, make_plan
-from ballpass.runtime.run.scales import Scales
+from ballpass.runtime.run.request import Request, tolerance
+from ballpass.runtime.run.resolve import Run, resolve
+from ballpass.runtime.run.sampling import sampling_of
 from ballpass.runtime.run.solution import Solution, Statistics
-from ballpass.runtime.run.stall import stall_words
-from ballpass.runtime.run.stepping import step_through
-from ballpass.runtime.run.trajectory import Cost, Interrupted, Trajectory, evaluate_outputs, start_trajectory
+from ballpass.runtime.run.trajectory import Interrupted, Trajectory, evaluate_outputs, start_trajectory
 
 if TYPE_CHECKING:
     from ballpass.runtime.run.directions import Directions
-
-#: `auto` takes ``rosenbrock`` above this ratio of fastest decay to fastest natural frequency.  Measured on a press with
-#: four degrees of freedom and eight balls at rtol 1e-6: both take equal time at a ratio of 2, ``erk`` twice as long at
-#: 7, because its steps are bounded by 3.3 / decay while each of ``rosenbrock`` costs three of its steps.
-STIFF_RATIO = 3.0
 
 
 def simulate(
@@ -62,171 +53,101 @@ def simulate(
         The computation failed; the samples so far are in its attribute ``partial``.
     """
     started = clocks.perf_counter()
-    plan = make_plan(model, numbers, request)
+    sampling = sampling_of(model, request, clock.period(model.manifest, numbers.values))
     # derivatives first: what would not fit into memory is told before there is memory for the rest
-    directions = prepare(len(plan.times)) if prepare is not None else None
-    interval = (plan.begin, plan.end)
-    start = max(plan.begin, plan.transient_cycles * plan.turn if plan.transient_cycles > 0.0 else 0.0)
-    trajectory = start_trajectory(
-        model, numbers, plan.times, plan.initial, interval, plan.turn, even=plan.even, start=start
-    )
-    method, reason, magnitude = _choose(model, numbers, request.method, plan, trajectory)
-    kinks = (
-        choose_kinks(request.kinks, method, model.manifest, plan.rtol)
-        if prepare is None
-        else kinks_with_derivatives(request.kinks, model.manifest)
-    )
-    channels = reduced_channels(model.manifest, plan.outputs)
-    # the edge at the start may lie a rounding before it
-    rows = reduction_rows(model.manifest).empty(2, [start - trajectory.near, 0.0], channels)
-    failure = None
-    cost = Cost()
+    directions = prepare(len(sampling.times)) if prepare is not None else None
+    run = resolve(model, numbers, request, duration=sampling.duration, stepper=False)
+    if directions is not None:
+        run = replace(run, kinks=kinks_with_derivatives(request.kinks, model.manifest))
+        if request.sensitivity_rtol is not None:
+            directions.control(tolerance("sensitivity_rtol", request.sensitivity_rtol), run.magnitude)
+    trajectory = start_trajectory(run, sampling)
+    channels = reduced_channels(model.manifest, sampling.outputs)
+    rows = reduction_rows(model.manifest).empty(2, [run.start, 0.0], channels)
+    by_stepper = run.method in STEPPERS
+    going: RunUnderWay | None = None
+    failure: RunFailed | Interrupted | None = None
     try:
-        if directions is not None and plan.sensitivity_rtol is not None:
-            directions.control(plan.sensitivity_rtol, magnitude)
-        if method in STEPPERS:
-            step_through(
-                *(model, numbers, STEPPERS[method], plan.rtol * magnitude, trajectory, cost),
-                progress=request.progress,
-                directions=directions,
-                kinks=kinks,
-                reductions=rows if channels and directions is None else None,
+        if by_stepper:
+            samples = Samples(
+                times=trajectory.t, x=trajectory.x, near=trajectory.near, end=run.end, directions=directions
             )
+            reducing = channels and directions is None
+            sinks: list[Sink] = [samples, *([ReductionRow(row=rows[0], before=rows[1])] if reducing else [])]
+            going = start_run(run, sinks)
+            try:
+                going.go_on()
+            finally:
+                _note(trajectory, samples, going)
         else:
-            integrator = METHODS[method](model.virtual_integrator) if method != "none" else None
-            integrate(numbers, integrator, plan.rtol * magnitude, trajectory, cost, request.progress)
-    except Interrupted as end:
+            integrator = METHODS[run.method](model.virtual_integrator) if run.method != "none" else None
+            integrate(numbers, integrator, run.tolerance, trajectory, run.progress)
+    except (RunFailed, Interrupted) as end:
         failure = end
-    if cost.families:
-        reason = f"{reason}; {', '.join(dict.fromkeys(cost.families))} at the end"
-
-    done = trajectory.finished
+    last = trajectory.x[max(trajectory.finished - 1, 0)] if len(trajectory.x) else trajectory.initial
     counted, before = (
         reductions_of(
             model.manifest,
             row,
             channels,
-            end=trajectory.x[max(done - 1, 0)] if len(trajectory.x) else trajectory.initial,
-            steps=cost.steps,
-            rejected=cost.rejected,
-            turn=trajectory.turn,
+            end=last,
+            steps=trajectory.steps,
+            rejected=trajectory.rejected,
+            turn=run.turn,
         )
         for row in rows
     )
+    done = trajectory.finished
     solution = Solution(
         t=trajectory.t[:done],
         x=trajectory.x[:done],
-        outputs=evaluate_outputs(model, numbers, trajectory, plan.outputs),
+        outputs=evaluate_outputs(model, numbers, trajectory, sampling.outputs),
         parameters=numbers.parameters,
         constants={info.name: numbers.values[info.name] for info in model.manifest.constants},
-        cycle_length=plan.turn if math.isfinite(plan.turn) else None,
-        transient_cycles=plan.transient_cycles,
+        cycle_length=run.turn if math.isfinite(run.turn) else None,
+        transient_cycles=run.transient_cycles,
         manifest=model.manifest,
-        statistics=Statistics(
-            method=method,
-            reason=reason,
-            rtol=plan.rtol,
-            magnitudes=tuple(magnitude.tolist()),
-            steps=cost.steps,
-            rejected=cost.rejected,
-            kinks=cost.kinks,
-            located=cost.located,
-            initial=tuple(plan.initial.tolist()),
-            begin=plan.begin,
-            duration=plan.duration,
-            segments=trajectory.passed,
-            calls=trajectory.calls,
-            wall_time=clocks.perf_counter() - started,
-            compiled=model.compiled and method not in METHODS,
-        ),
+        statistics=_statistics(run, trajectory, going, clocks.perf_counter() - started),
         status=Status.DONE if failure is None else failure.status,
         model=model,
         reductions=joined(before, counted),
         steady_reductions=counted,
     )
     if failure is not None:
-        state = trajectory.x[max(done - 1, 0)] if failure.state is None else failure.state
+        state = failure.state if isinstance(failure, RunFailed) else last
         place = whereabouts(model, numbers, failure.time, state)
-        if failure.status is Status.STALLED:
-            failure.detail += f" {stall_words(model, numbers, state)}"
         raise IntegrationError(
-            failure.status, time=failure.time, place=place, method=method, detail=failure.detail, partial=solution
+            failure.status, time=failure.time, place=place, method=run.method, detail=failure.detail, partial=solution
         )
     return solution
 
 
-def _choose(
-    model: LoadedModel, numbers: Numbers, asked: str | None, plan: Plan, trajectory: Trajectory
-) -> tuple[str, str, np.ndarray]:
-    """Method, the reason for it, and the magnitudes of the states."""
-    if not len(plan.initial):
-        return "none", "the model has no states: its outputs follow from time alone", np.zeros(0)
-    name = asked or model.manifest.run.method
-    scales = None
-    if not (model.has_stepper and name in ("auto", *STEPPERS)):
-        scales = model_scales(model, numbers, plan.initial, plan.duration, plan.turn, plan.begin)
-    method, reason = choose_method(model, name, scales)
-    if scales is not None:
-        if method == "erk":
-            refuse_crawl(method, scales, plan.duration, plan.turn)
-        return method, reason, scales.magnitude
-    edges = trajectory.segments.times
-    magnitude = stepper_magnitudes(
-        model, model.stepper, numbers, plan.initial, plan.duration, plan.turn, plan.begin, edges
+def _note(trajectory: Trajectory, samples: Samples, going: RunUnderWay) -> None:
+    """How far the stepper has filled a trajectory."""
+    trajectory.finished, trajectory.calls = samples.finished, going.calls
+    trajectory.steps, trajectory.rejected = going.steps, going.rejected
+    edges = trajectory.segments.times[:-1]
+    trajectory.passed = max(int(np.searchsorted(edges, going.reached - trajectory.near)), 1)
+
+
+def _statistics(run: Run, trajectory: Trajectory, going: RunUnderWay | None, wall_time: float) -> Statistics:
+    reason = run.reason
+    if going is not None and going.families:
+        reason = f"{reason}; {', '.join(dict.fromkeys(going.families))} at the end"
+    return Statistics(
+        method=run.method,
+        reason=reason,
+        rtol=run.rtol,
+        magnitudes=tuple(run.magnitude.tolist()),
+        steps=trajectory.steps,
+        rejected=trajectory.rejected,
+        kinks=run.kinks if going is not None else None,
+        located=going.located if going is not None and run.kinks == LOCATED else None,
+        initial=tuple(run.initial.tolist()),
+        begin=run.begin,
+        duration=run.duration,
+        segments=trajectory.passed,
+        calls=trajectory.calls,
+        wall_time=wall_time,
+        compiled=run.model.compiled and run.method not in METHODS,
     )
-    return method, reason, magnitude
-
-
-def method_names(model: LoadedModel) -> tuple[str, ...]:
-    """Integration methods of a model, besides ``auto``."""
-    return (*(STEPPERS if model.has_stepper else ()), *_virtual_methods(model))
-
-
-def _virtual_methods(model: LoadedModel) -> tuple[str, ...]:
-    """CasADi's methods: all, where the model has a right-hand side."""
-    return tuple(METHODS) if model.has("rhs") else ()
-
-
-def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tuple[str, str]:
-    """Name of the method and the reason for it.
-
-    Parameters
-    ----------
-    scales : what the choice between CasADi's methods depends on; None where the stepper is there to be taken
-
-    Raises
-    ------
-    RequestError
-        No such method, or the model was generated without it.
-    """
-    if asked == "auto" and model.has_stepper:
-        return "stepper", "the fastest method that a compiler allows"
-    if asked in STEPPERS and model.has_stepper:
-        return asked, "asked for"
-    available = _virtual_methods(model)
-    if asked == "auto" and model.compiled:
-        reason = f" ({model.manifest.unfit})" if model.manifest.unfit else ""
-        warnings.warn(
-            f"{model.manifest.scene}: the generated folder has no kernels for the project's own stepper, which does "
-            f"not take such a scene{reason}. CasADi's functions and integrators run instead: results are the same "
-            "within the tolerance, a simulation takes some ten times as long, and there are no ensembles, reductions "
-            "and derivatives of runs. Name the method to run it without this warning.",
-            NoKernelsWarning,
-            stacklevel=4,
-        )
-    if asked == "auto" and scales is not None:
-        ratio = f"fastest decay {scales.decay:.3g} 1/s, fastest natural frequency {scales.frequency:.3g} rad/s"
-        name, why = ("rosenbrock", "stiff") if scales.stiffness > STIFF_RATIO else ("erk", "not stiff")
-        if name in available:
-            return name, f"{why}: {ratio}"
-        raise RequestError("The model has no right-hand side to integrate. Generate it again with `ballpass derive`.")
-    if asked in STEPPERS:
-        missing = (
-            "the generated folder has no kernels for it; write it again with `ballpass derive`"
-            if model.compiled
-            else "it needs a C compiler, and none was found; install gcc or clang, or `pip install ziglang`"
-        )
-        raise RequestError(f"method {asked}: {missing}. Or take one of {', '.join(('auto', *available))}.")
-    if asked not in available:
-        raise RequestError(unknown_name("method", asked, ("auto", *method_names(model))))
-    return asked, "asked for"

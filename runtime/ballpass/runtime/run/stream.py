@@ -27,7 +27,8 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.netcdf import seal
-from ballpass.runtime.run.request import Request, check_length, checked_rate, run_length
+from ballpass.runtime.run.request import Request, check_length, run_length
+from ballpass.runtime.run.sampling import checked_rate
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution, Statistics, contents
 from ballpass.runtime.run.start import start_time

@@ -7,7 +7,7 @@ samples.  A sample that meets an edge shows the state there with the loads behin
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments
-from ballpass.runtime.run.segments import make_segments, segment_edges, time_resolution
+from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.run.sampling import Sampling
+from ballpass.runtime.run.segments import check_count, joined_segments, run_windows, time_resolution
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -25,7 +27,6 @@ class Trajectory:
     Attributes
     ----------
     begin, end : of the run [s]
-    turn : time of a turn, infinite where nothing turns [s]
     initial : state at its begin, shape (states,)
     t : times of the samples, increasing, shape (samples,) [s]
     even : whether they are the ends of equal intervals of the whole run
@@ -36,11 +37,11 @@ class Trajectory:
     finished : samples filled
     passed : segments integrated, at least in part
     calls : calls of the integrator
+    steps, rejected : it took
     """
 
     begin: float
     end: float
-    turn: float
     initial: np.ndarray
     t: np.ndarray
     even: bool
@@ -51,72 +52,34 @@ class Trajectory:
     finished: int = 0
     passed: int = 0
     calls: int = 0
-
-
-@dataclass(slots=True, kw_only=True)
-class Cost:
-    """What an integration took.
-
-    Attributes
-    ----------
-    steps, rejected : accepted and rejected steps
-    kinks, located : what it did at kinks, and how many of them it located
-    families : those the stepper ended with
-    """
-
     steps: int = 0
     rejected: int = 0
-    kinks: str | None = None
-    located: int | None = None
-    families: list[str] = field(default_factory=list)
 
 
 class Interrupted(Exception):
-    """The integration ended early, in `state` where that is known; the trajectory holds `finished` samples."""
+    """The integration ended early; the trajectory holds `finished` samples."""
 
-    def __init__(self, status: Status, time: float, detail: str, state: np.ndarray | None = None) -> None:
+    def __init__(self, status: Status, time: float, detail: str) -> None:
         super().__init__(detail)
-        self.status, self.time, self.detail, self.state = status, time, detail, state
+        self.status, self.time, self.detail = status, time, detail
 
 
-def start_trajectory(
-    model: LoadedModel,
-    numbers: Numbers,
-    times: np.ndarray,
-    initial: np.ndarray,
-    interval: tuple[float, float],
-    turn: float,
-    *,
-    even: bool,
-    start: float = 0.0,
-) -> Trajectory:
-    """Memory for samples, and the segments they lie in.
-
-    Parameters
-    ----------
-    times : of the samples, increasing, shape (samples,) [s]
-    initial : state at the start, shape (states,)
-    interval : begin and end of the run [s]
-    turn : time of a turn, infinite where nothing turns [s]
-    even : whether the samples are the ends of equal intervals of the whole run
-    start : time from which on the run counts, an edge where it lies within [s]
-    """
-    begin, end = interval
-    near = time_resolution(begin, end, turn)
-    edges = segment_edges(model, numbers, begin, end, turn)
-    if begin < start < end and np.min(np.abs(edges - start)) > near:
-        edges = np.sort(np.append(edges, start))
-    segments = make_segments(model.manifest.inputs, numbers, edges)
-    stops = np.searchsorted(times, segments.times - near)
-    stops[0], stops[-1] = 0, len(times)
+def start_trajectory(run: Run, sampling: Sampling) -> Trajectory:
+    """Memory for the samples of a run, and the segments they lie in."""
+    near = time_resolution(run.begin, run.end, run.turn)
+    interval = (run.begin, run.end)
+    check_count(run.model.manifest.inputs, run.numbers, run.duration, run.turn)
+    windows = run_windows(run.model, run.numbers, interval, run.turn, run.start)
+    (segments,) = joined_segments(windows, all_=True)
+    stops = np.searchsorted(sampling.times, segments.times - near)
+    stops[0], stops[-1] = 0, len(sampling.times)
     return Trajectory(
-        begin=begin,
-        end=end,
-        turn=turn,
-        initial=initial,
-        t=times,
-        even=even,
-        x=np.empty((len(times), len(initial))),
+        begin=run.begin,
+        end=run.end,
+        initial=run.initial,
+        t=sampling.times,
+        even=sampling.even,
+        x=np.empty((len(sampling.times), len(run.initial))),
         segments=segments,
         stops=stops,
         near=near,

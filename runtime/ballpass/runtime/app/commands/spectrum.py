@@ -31,7 +31,7 @@ from ballpass.runtime.run.tables import show_tables, simple_table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.runtime.ask.characteristic import CharacteristicLine
+    from ballpass.runtime.quantity.characteristic import CharacteristicLine
     from ballpass.runtime.run.solution import Solution
 
 SCALINGS = ("amplitude", "power", "density")
@@ -115,8 +115,8 @@ def spectrum(
 
             solution = replace(solution, transient_cycles=transient)
         stages("spectrum")
-        from ballpass.runtime.ask.characteristic import characteristic_lines, identify
         from ballpass.runtime.ask.vibration import diagnosis
+        from ballpass.runtime.quantity.characteristic import characteristic_lines, identify
 
         steady = solution.steady()
         signal = _signal(steady, of)
@@ -303,8 +303,8 @@ def _draw(
     what = f"envelope of {of}, {band[0]:g} to {band[1]:g} Hz" if band else of
     title = f"{solution.manifest.title}: {what}"
     if as_map:
-        from ballpass.runtime.ask.characteristic import characteristic_lines
         from ballpass.runtime.ask.vibration import envelope, spectrogram
+        from ballpass.runtime.quantity.characteristic import characteristic_lines
 
         values = envelope(solution.t, signal, band) if band else signal
         length = float(solution.t[-1] - solution.t[0])

@@ -111,8 +111,9 @@ def sweep(
 
     from ballpass.runtime.app.commands.ranges import grid, read_ranges
     from ballpass.runtime.app.commands.sweep_results import TABLE, Sweep
-    from ballpass.runtime.certify.whole_run import default_observables
+    from ballpass.runtime.certify.method_choice import default_compared
     from ballpass.runtime.many.cluster import connected
+    from ballpass.runtime.quantity.grammar import default_quantities
 
     with command(scene) as stages:
         stages("read")
@@ -132,11 +133,6 @@ def sweep(
             read, source, overrides = read_with_settings(scene, set_, seconds, transient)
             usual = read.run.method
         ranges = read_ranges(source, vary or [], overrides)
-        if source.bearing is None:
-            raise RequestError(
-                "This scene has no bearing: nothing is integrated, and there are no quantities of an ensemble. Add a "
-                "[bearing], or loop over `Model.simulate` in Python."
-            )
         at_kinks = checked_kinks(kinks, method or usual)
         folder = results_folder(out, scene)
         figures, formats = figures and can_draw(), read_formats(format_)
@@ -145,11 +141,12 @@ def sweep(
         fixed = {path: np.full(count, value) for path, value in overrides.items()}
         with connected(scheduler, workers) as client:
             model = load_model(scene, stages, method or usual, at_kinks, rtol, overrides=overrides)
-            _ = model.ensemble_driver  # compiled here, where it is announced
+            if model.states:
+                _ = model.ensemble_driver  # compiled here, where it is announced
             stages("simulate")
             result = model.simulate_many(
                 {**varied, **fixed},
-                of or default_observables(model),
+                of or default_compared(model.manifest) or default_quantities(model.manifest),
                 cycles=cycles,
                 duration=seconds,
                 transient=transient,

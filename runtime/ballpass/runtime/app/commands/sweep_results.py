@@ -18,7 +18,6 @@ from rich.table import Table
 from ballpass.runtime.app.commands.ranges import Range
 from ballpass.runtime.app.commands.shared import json_text
 from ballpass.runtime.app.summary import TABLE_UNITS
-from ballpass.runtime.ask.quantities import channel_words
 from ballpass.runtime.contract.folders import replace_files
 from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.plot import FORMATS
@@ -190,13 +189,10 @@ class Sweep:
         for name in self.result.observables:
             values, unit = self.shown(name)
             if np.any(np.isfinite(values)):
-                figure = draw_sweep(self.result.manifest.title, axes, name, self._words(name), unit, values, text)
+                figure = draw_sweep(
+                    self.result.manifest.title, axes, name, self._attributes[name]["long_name"], unit, values, text
+                )
                 yield f"sweep_{re.sub(r'[^a-z0-9]+', '_', name)}", figure
-
-    def _words(self, quantity: str) -> str:
-        """What a quantity is: "Position of the centre of the inner ring along y, rms"."""
-        kind, _, channel = self._attributes[quantity]["long_name"].partition(" of ")
-        return channel_words(self.result.manifest, kind, channel)
 
     def _cell(self, quantity: str, value: float, member: int) -> str:
         """A number with the digits that it has."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ballpass.runtime.ask.observables import KinematicFrequencies
 from ballpass.runtime.contract import BearingInfo, Manifest
+from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.run import inputs as clock
 
 #: Multiples that are looked for: of the shaft, of ball passes, of the cage (more are ball passes); and the most shafts

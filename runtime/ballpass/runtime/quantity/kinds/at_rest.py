@@ -1,17 +1,14 @@
-"""Quantities of the rings at rest: nothing is run for them.
-
-In: a model, numbers, a `Quantity` of a static kind.  Out: its `Estimate`.
-"""
+"""Quantities of the rings at rest under the load of one instant: nothing is run for them."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ballpass.runtime.ask.quantity_location import named_place, place_slope
-from ballpass.runtime.ask.quantity_records import Estimate, Quantity
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.equilibrium import instant, static_equilibrium
+from ballpass.runtime.quantity.location import FIRST_TURN, check_first_turns, named_place, place_slope
+from ballpass.runtime.quantity.records import Estimate, Kind, Quantity
 from ballpass.runtime.run.directions import Chain
 
 
@@ -54,3 +51,25 @@ def at_rest(model: LoadedModel, numbers: Numbers, quantity: Quantity, chain: Cha
         value, ball = float(forces[best]), best + 1
         slope = rest.derivative(f"{quantity.channel}ball.elastic_force", names)[best] if names else np.zeros(1)
     return Estimate(value=value, slope=slope[:-1] + slope[-1] * moved, time=time, ball=ball)
+
+
+KINDS = (
+    Kind(
+        name="static_deflection",
+        summary="distance of the inner ring's centre from its unloaded place, at rest under the load of one instant",
+        takes="bearing at rest",
+        place=FIRST_TURN,
+        unit="m",
+        check=check_first_turns,
+        at_rest=at_rest,
+    ),
+    Kind(
+        name="static_peak_ball_force",
+        summary="largest elastic force of any ball, at rest under the load of one instant",
+        takes="bearing at rest",
+        place=FIRST_TURN,
+        unit="N",
+        check=check_first_turns,
+        at_rest=at_rest,
+    ),
+)

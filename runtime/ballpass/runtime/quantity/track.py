@@ -1,6 +1,6 @@
 """Follow a run along nodes: states and outputs there, with their derivatives along parameters.
 
-In: a model, numbers, edges and nodes.  Out: a `Track`, and `Signal` for each channel asked for.
+In: a run, edges and nodes.  Out: a `Track`, and `Signal` for each channel asked for.
 
 Derivatives are taken along the moving nodes: with x' at fixed time and the node's own t', that of the state is
 ``x' + f t'``.  Across an edge where a load switches x' jumps by ``(f_before - f_behind) t_edge'``, and the sum does
@@ -18,18 +18,18 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.ask.nodes import Edges, Nodes
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.kernel import Loop
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.native.stepper import End, Family
+from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.point.jacobian import rows_of
+from ballpass.runtime.quantity.nodes import Edges, Nodes
 from ballpass.runtime.run.directions import Directions
-from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, stepper_for
-from ballpass.runtime.run.reduced_run import RunFailed
+from ballpass.runtime.run.loop import Samples, start_run
 from ballpass.runtime.run.request import no_output
-from ballpass.runtime.run.segments import make_segments
+from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.run.segments import time_resolution
 
 if TYPE_CHECKING:
     from ballpass.runtime.run.directions import Chain
@@ -38,25 +38,6 @@ Array = NDArray[np.float64]
 
 #: Nodes whose derivatives are held in memory at once.
 BLOCK = 4096
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stepping:
-    """How to step.
-
-    Attributes
-    ----------
-    family : method of the driver
-    rtol, magnitude : error allowed in a step: relative, and the states' magnitudes, shape (states,)
-    sensitivity_rtol : tolerance of the derivatives in the choice of step sizes [1]
-    kinks : what is done at the kinks of the laws
-    """
-
-    family: Family
-    rtol: float
-    magnitude: Array
-    sensitivity_rtol: float | None = None
-    kinks: Kinks = STEPPED_OVER
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,7 +51,7 @@ class Track:
     slope : their derivatives along the moving nodes, shape (nodes, states, directions)
     local : time since the segment's start, shape (nodes,) [s]
     u : inputs, shape (nodes, inputs)
-    steps : accepted steps
+    segments : of the driver
     """
 
     nodes: Nodes
@@ -79,7 +60,7 @@ class Track:
     slope: Array
     local: Array
     u: Array
-    steps: int
+    segments: Segments
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -97,74 +78,56 @@ class Signal:
 
 
 def follow(
-    model: LoadedModel,
-    numbers: Numbers,
+    run: Run,
+    segments: Segments,
     edges: Edges,
     nodes: Nodes,
-    stepping: Stepping,
     chain: Chain | None = None,
+    sensitivity_rtol: float | None = None,
     *,
-    reduction: Array | None = None,
     still: bool = False,
 ) -> Track:
     """States at the nodes; with derivatives along the directions of `chain`.
 
     Parameters
     ----------
-    reduction : row that the run is reduced to; not with derivatives
-    still : nothing that is looked at depends on the states, which stay zero
+    segments : all of the run
+    sensitivity_rtol : tolerance of the derivatives in the choice of step sizes [1]
+    still : nothing that is evaluated depends on the states, which stay zero
 
     Raises
     ------
     RunFailed
         The driver could not reach the end.
     """
-    inputs, count = model.manifest.inputs, len(model.states)
-    directions = 0 if chain is None else len(chain.names)
-    segments = make_segments(inputs, numbers, edges.times)
-    u = segments.inputs
-    local, held = nodes.t - edges.times[nodes.segment], u[nodes.segment]
+    model, numbers = run.model, run.numbers
+    count, directions = len(model.states), 0 if chain is None else len(chain.names)
+    local, u = nodes.t - segments.times[nodes.held], segments.inputs[nodes.held]
+    slope = np.zeros((len(nodes), count, directions))
     if still:
         empty = np.zeros((len(nodes), count))
-        slope = np.zeros((len(nodes), count, directions))
-        return Track(nodes=nodes, edges=edges, x=empty, slope=slope, local=local, u=held, steps=0)
+        return Track(nodes=nodes, edges=edges, x=empty, slope=slope, local=local, u=u, segments=segments)
     times, back = np.unique(nodes.t, return_inverse=True)
-    states = np.empty((len(times), count))
-    start = np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
-    made = None if chain is None else Directions(model, numbers, chain.names, len(times), stepping.kinks)
-    if made is not None and stepping.sensitivity_rtol is not None:
-        made.control(stepping.sensitivity_rtol, stepping.magnitude)
-    stepper = stepper_for(model, stepping.kinks, derivatives=made is not None)
-    outcome = stepper.run(
-        family=stepping.family,
-        tolerance=stepping.rtol * stepping.magnitude,
-        p=numbers.p,
-        c=numbers.c,
-        x=start,
-        segments=segments,
-        output_times=times,
-        output_states=states,
-        tangents=None if made is None else made.tangents(segments, 0, len(times)),
-        reduction=reduction,
-    )
-    if outcome.end is not End.DONE:
-        raise RunFailed(outcome.end, outcome.time, outcome.step)
-    slope = np.zeros((len(nodes), count, directions))
+    made = None if chain is None else Directions(model, numbers, chain.names, len(times), run.kinks)
+    if made is not None and sensitivity_rtol is not None:
+        made.control(sensitivity_rtol, run.magnitude)
+    near = time_resolution(run.begin, run.end, run.turn)
+    samples = Samples(times=times, x=np.empty((len(times), count)), near=near, end=run.end, directions=made)
+    start_run(run, [samples]).go_on()
+    states = samples.x
     if made is not None:
         # the driver gives an edge's derivative as it is before the edge
-        before = np.clip(np.searchsorted(edges.times, times, side="left") - 1, 0, None)
-        given = {"t": times - edges.times[before], "x": states, "u": u[before], "p": numbers.p, "c": numbers.c}
+        before = np.clip(np.searchsorted(segments.times, times, side="left") - 1, 0, None)
+        given = {
+            "t": times - segments.times[before],
+            "x": states,
+            "u": segments.inputs[before],
+            "p": numbers.p,
+            "c": numbers.c,
+        }
         rate = next(iter(model.loop("rhs", ("t", "x", "u"))(len(times), given).values()))
         slope = made.states(len(times))[back] + rate[back][:, :, None] * nodes.slope[:, None, :]
-    return Track(
-        nodes=nodes,
-        edges=edges,
-        x=states[back],
-        slope=slope,
-        local=local,
-        u=held,
-        steps=outcome.steps,
-    )
+    return Track(nodes=nodes, edges=edges, x=states[back], slope=slope, local=local, u=u, segments=segments)
 
 
 def depends(model: LoadedModel, output: str, argument: str) -> list[int]:
@@ -177,7 +140,7 @@ def depends(model: LoadedModel, output: str, argument: str) -> list[int]:
     return list(dict.fromkeys(sparsity.get_col()))
 
 
-class Outlook:
+class ChannelValues:
     """Channels of a model along tracks: states by themselves, outputs through the generated function.
 
     Parameters
@@ -207,7 +170,7 @@ class Outlook:
         self._own = threading.local()  # a loop is not for several threads, and differences run in several
         self._derivatives: Loop | None = None
 
-    def look(self, track: Track, numbers: Numbers, chain: Chain | None = None) -> Mapping[str, Signal]:
+    def along(self, track: Track, numbers: Numbers, chain: Chain | None = None) -> Mapping[str, Signal]:
         """Every channel along a track."""
         states = self._model.states
         found: dict[str, Signal] = {}
@@ -252,11 +215,11 @@ class Outlook:
     def _differentiated(self, track: Track, numbers: Numbers, chain: Chain) -> dict[str, Signal]:
         if self._derivatives is None:
             self._derivatives = self._loop()
-        moved = chain.inputs(track.edges.times)
+        moved = chain.inputs(track.segments.times)
         values, slopes = [], []
         for first in range(0, len(track.nodes), BLOCK):
             part = slice(first, first + BLOCK)
-            value, slope = self._block(track, numbers, chain, moved[track.nodes.segment[part]], part)
+            value, slope = self._block(track, numbers, chain, moved[track.nodes.held[part]], part)
             values.append(value)
             slopes.append(slope)
         value, slope = np.concatenate(values), np.concatenate(slopes)
@@ -305,7 +268,7 @@ class Outlook:
         if derivatives:
             results += [casadi.vec(casadi.densify(casadi.jacobian(wanted, symbol))) for symbol in inputs.values()]
             names += [f"g_{name}" for name in inputs]
-        return casadi.Function("outlook", list(inputs.values()), results, list(inputs), names)
+        return casadi.Function("channels", list(inputs.values()), results, list(inputs), names)
 
     def _all_rows(self, inputs: Mapping[str, casadi.SX]) -> list[casadi.SX]:
         found = []
@@ -330,5 +293,5 @@ def jumps(model: LoadedModel, channel: str) -> bool:
     windows = {k for k in model.manifest.borders if model.manifest.inputs[k].windows}
     if not windows or channel in model.states:
         return False
-    outlook = Outlook(model, [channel])
-    return bool(windows & set(outlook._function(outlook._all_rows).jac_sparsity(0, 2).get_col()))
+    channels = ChannelValues(model, [channel])
+    return bool(windows & set(channels._function(channels._all_rows).jac_sparsity(0, 2).get_col()))

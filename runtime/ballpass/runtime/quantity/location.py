@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.ask.characteristic import frequencies_of
-from ballpass.runtime.ask.nodes import Window
-from ballpass.runtime.ask.quantity_records import Array, Quantity, View
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
+from ballpass.runtime.quantity.characteristic import frequencies_of
+from ballpass.runtime.quantity.records import Array, Place, Quantity, View
 from ballpass.runtime.run import inputs as clock
 
 _PLACE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|s|Hz|x)")
@@ -35,25 +34,25 @@ _FREQUENCIES = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Of what kind a place is: "angle" [rad], "time" [s] or "end"."""
+class Moment:
+    """Of what kind a moment is: "angle" [rad], "time" [s] or "end"."""
 
     kind: str
     number: float
 
 
-def named_place(quantity: Quantity) -> Place:
+def named_place(quantity: Quantity) -> Moment:
     """The place written behind ``@``: an angle or a time."""
     form = _PLACE.fullmatch(quantity.place)
     assert form is not None  # checked when read
     number = float(form["number"])
     if form["unit"] == "s":
-        return Place(kind="time", number=number)
-    return Place(kind="angle", number=math.radians(number) if form["unit"] == "deg" else number)
+        return Moment(kind="time", number=number)
+    return Moment(kind="angle", number=math.radians(number) if form["unit"] == "deg" else number)
 
 
-def place_of(manifest: Manifest, numbers: Numbers, window: Window, quantity: Quantity) -> tuple[float, Place]:
-    """Time at which a quantity with a place is taken, in the last turn [s], and the place.
+def place_of(manifest: Manifest, numbers: Numbers, end: float, quantity: Quantity) -> tuple[float, Moment]:
+    """Time at which a quantity with a place is taken, in the last turn before the end [s], and the moment.
 
     Raises
     ------
@@ -61,26 +60,38 @@ def place_of(manifest: Manifest, numbers: Numbers, window: Window, quantity: Qua
         The run does not reach it, or nothing turns.
     """
     if quantity.kind == "end":
-        return window.duration, Place(kind="end", number=0.0)
+        return end, Moment(kind="end", number=0.0)
     asked = named_place(quantity)
     if asked.kind == "time":
         number = asked.number
-        if not 0.0 <= number <= window.duration:
-            raise RequestError(f"{quantity.name}: the run ends at {window.duration:g} s. Run longer, or ask earlier.")
+        if not 0.0 <= number <= end:
+            raise RequestError(f"{quantity.name}: the run ends at {end:g} s. Run longer, or ask earlier.")
         return number, asked
     angle = asked.number
-    _refuse_driven(manifest, quantity, "passes an angle when its motion does. Name a time instead, as in @0.41s")
+    check_instant(manifest, numbers.values, quantity)
     speed = clock.shaft_speed(manifest, numbers.values)
     if speed == 0.0:
         raise RequestError(f"{quantity.name}: nothing turns (its speed is zero). Name a time instead, as in @0.41s.")
     start = numbers.values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
-    turns = (start + speed * window.duration - angle) / clock.TURN
+    turns = (start + speed * end - angle) / clock.TURN
     # the last turn before the end, an angle at the very end included; 1e-9 of a turn is rounding
     whole = math.floor(turns + 1e-9) if speed > 0.0 else math.ceil(turns - 1e-9)
     time = (angle + clock.TURN * whole - start) / speed
     if time < 0.0:
         raise RequestError(f"{quantity.name}: the run is over before that angle is passed. Run longer.")
-    return min(time, window.duration), asked
+    return min(time, end), asked
+
+
+def check_instant(manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
+    """Raise `RequestError` for an angle where the driver's speed changes."""
+    if quantity.place and named_place(quantity).kind == "angle":
+        _refuse_driven(manifest, quantity, "passes an angle when its motion does. Name a time instead, as in @0.41s")
+
+
+def check_frequency(manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
+    """Raise `RequestError` for a frequency that counts on the speed where the driver's changes."""
+    if not quantity.place.endswith("Hz"):
+        _refuse_driven(manifest, quantity, "has no one speed. Name a frequency instead, as in @250Hz")
 
 
 def _refuse_driven(manifest: Manifest, quantity: Quantity, words: str) -> None:
@@ -90,7 +101,7 @@ def _refuse_driven(manifest: Manifest, quantity: Quantity, words: str) -> None:
 
 
 def place_slope(
-    manifest: Manifest, numbers: Numbers, place: Place, time: float, end: Array, slopes: Callable[[str], Array]
+    manifest: Manifest, numbers: Numbers, place: Moment, time: float, end: Array, slopes: Callable[[str], Array]
 ) -> Array:
     """Derivative of the time of a place along the directions, shape (directions,) [s/unit].
 
@@ -120,7 +131,7 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     form = _PLACE.fullmatch(place)
     if form is not None and form["unit"] == "Hz":
         return float(form["number"]), np.zeros(view.directions)
-    _refuse_driven(manifest, quantity, "has no one speed. Name a frequency instead, as in @250Hz")
+    check_frequency(manifest, values, quantity)
     speed = clock.shaft_speed(manifest, values)
     name = clock.speed_name(manifest)
     assert name is not None  # something turns
@@ -162,7 +173,7 @@ def is_instant(manifest: Manifest, place: str) -> bool:
     return form is not None and (form["unit"] == "s" or (form["unit"] in ("deg", "rad") and turning))
 
 
-def check_first_turns(quantity: Quantity) -> None:
+def check_first_turns(_manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
     """Raise `RequestError`, in the unit that was given, where the angle of a quantity at rest is beyond two turns."""
     if not quantity.place:
         return
@@ -173,3 +184,19 @@ def check_first_turns(quantity: Quantity) -> None:
             f"{quantity.name}: {quantity.place} is more than two turns, while the angle is one of the first turn. "
             f"Allowed: {allowed}. Or name a time instead, as in @0.41s."
         )
+
+
+#: What kinds expect behind ``@``.
+INSTANT = Place(
+    words="a crank angle (240deg, 4.19rad) or a time (0.41s)", example="value:inner.y@240deg", is_valid=is_instant
+)
+FIRST_TURN = Place(
+    words="a crank angle of the first turn (240deg, 4.19rad) or a time (0.41s)",
+    example="static_deflection@240deg",
+    is_valid=is_instant,
+)
+FREQUENCY = Place(
+    words="a frequency (250Hz), an order of the shaft (2x), or shaft, cage, bpfo, bpfi or bsf",
+    example="amplitude:inner.y@2x",
+    is_valid=is_frequency,
+)

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.ask.nodes import Edges, Nodes
-from ballpass.runtime.ask.track import Signal, Track
+from ballpass.runtime.quantity.nodes import Edges, Nodes
+from ballpass.runtime.quantity.track import Signal, Track
 
 Array = NDArray[np.float64]
 
@@ -104,7 +104,8 @@ def find_extremes(
     for _ in range(ROUNDS):
         for bracket in every:
             bracket.times = np.linspace(bracket.low, bracket.high, GRID)
-        seen = look(_nodes(np.concatenate([b.times for b in every]), np.repeat([b.segment for b in every], GRID)))
+        times = np.concatenate([bracket.times for bracket in every])
+        seen = look(_nodes(edges, times, np.repeat([bracket.segment for bracket in every], GRID)))
         for k, bracket in enumerate(every):
             bracket.values = seen[bracket.wanted.channel].value[k * GRID : (k + 1) * GRID]
             best = _top(_height(bracket))
@@ -140,10 +141,11 @@ def _brackets(wanted: Wanted, track: Track, values: Array) -> list[_Bracket]:
     return [_Bracket(wanted=wanted, segment=s, low=a, high=b, times=empty, values=empty) for s, a, b in found]
 
 
-def _nodes(t: Array, segment: NDArray[np.int_]) -> Nodes:
+def _nodes(edges: Edges, t: Array, segment: NDArray[np.int_]) -> Nodes:
     """Nodes that stand still and carry no weight."""
     still = np.zeros((len(t), 0))
-    return Nodes(t=t, weight=np.zeros(len(t)), segment=segment, slope=still, weight_slope=still)
+    held = edges.segment[segment]
+    return Nodes(t=t, weight=np.zeros(len(t)), segment=segment, held=held, slope=still, weight_slope=still)
 
 
 def _height(bracket: _Bracket) -> Array:
@@ -200,4 +202,4 @@ def _ranked(wanted: Wanted, found: list[Extreme], edges: Edges) -> list[Extreme]
     """The best of several, and those elsewhere."""
     found.sort(key=lambda item: -wanted.sign * item.value)
     first = found[0]
-    return [first, *(item for item in found[1:] if abs(item.time - first.time) > APART * edges.window.duration)]
+    return [first, *(item for item in found[1:] if abs(item.time - first.time) > APART * edges.length)]

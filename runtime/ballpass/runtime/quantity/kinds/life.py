@@ -5,19 +5,21 @@ In: what a kind of quantity sees of a run.  Out: an `Estimate` in turns of the i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.ask.quantity_records import Estimate, Quantity, View
-from ballpass.runtime.contract import BearingInfo
-from ballpass.runtime.native.reduction_rows import SECTORS
+from ballpass.runtime.contract import BearingInfo, Manifest
+from ballpass.runtime.native.reduction_rows import LOAD_POWERS, SECTORS
+from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, ReducedRuns, View
 from ballpass.runtime.ratings.of_bearing import Ratings, ratings_of, refuse_swinging
 from ballpass.runtime.ratings.readings import KILO, LoadPowers, lives
+from ballpass.runtime.ratings.readings import KINDS as READINGS_OF
 from ballpass.runtime.run.inputs import TURN, shaft_speed
+from ballpass.runtime.run.reductions import load_powers
 
 Array = NDArray[np.float64]
 
@@ -40,9 +42,8 @@ def life(view: View, quantity: Quantity, readings: Sequence[str]) -> Estimate:
     RequestError
         The bearing does not turn.
     """
-    prefix = quantity.channel.removesuffix("ball.force")
-    bearing = next(bearing for bearing in view.manifest.bearings if bearing.prefix == prefix)
-    refuse_swinging(bearing, view.numbers.values, shaft_speed(view.manifest, view.numbers.values))
+    _check(view.manifest, view.numbers.values, quantity)
+    bearing, prefix = _bearing(view.manifest, quantity), quantity.channel.removesuffix("ball.force")
     ratings, moved_ratings = _ratings(view, bearing)
     powers, moved_powers = _powers(view, quantity, prefix, raceways="sectors" in readings)
     found = lives(ratings, powers)
@@ -52,6 +53,14 @@ def life(view: View, quantity: Quantity, readings: Sequence[str]) -> Estimate:
     if np.isfinite(value):
         slope = np.imag(lives(moved_ratings, moved_powers)[shortest]) / IMAGINARY
     return Estimate(value=value, slope=slope, notes=notes)
+
+
+def _bearing(manifest: Manifest, quantity: Quantity) -> BearingInfo:
+    return next(one for one in manifest.bearings if one.prefix + "ball.force" == quantity.channel)
+
+
+def _check(manifest: Manifest, values: Mapping[str, float], quantity: Quantity) -> None:
+    refuse_swinging(_bearing(manifest, quantity), values, shaft_speed(manifest, values))
 
 
 def _moved(dual: Dual) -> NDArray[np.complex128]:
@@ -125,3 +134,37 @@ def _raceway(view: View, load: Array, moved: Array, channel: str) -> tuple[Array
         shift = given * (SECTORS / TURN * angle.slope[:, :, k])
         slope[:, k] = scale * summed(amount * (1.0 - part) - shift, amount * part + shift) - field * longer[k] / length
     return field, slope
+
+
+def _reduced(runs: ReducedRuns, quantity: Quantity, readings: Sequence[str]) -> Array:
+    bearing = _bearing(runs.manifest, quantity)
+    found = lives(ratings_of(bearing, runs.values), load_powers(runs.manifest, bearing, runs.rows))
+    return np.asarray(np.min([found[reading] for reading in readings], axis=0))
+
+
+def _needs(channel: str, readings: Sequence[str]) -> tuple[str, ...]:
+    # what every place of the raceways has met needs no root of a load
+    powers = LOAD_POWERS[:1] if tuple(readings) == ("sectors",) else LOAD_POWERS
+    return tuple(channel.removesuffix("ball.force") + name for name in powers)
+
+
+def _kind(name: str) -> Kind:
+    readings = READINGS_OF[name]
+    reading = f"reading {readings[0]}" if len(readings) == 1 else "shortest reading"
+    which = reading if len(readings) == 1 else "by the reading that gives the shortest"
+    return Kind(
+        name=name,
+        summary=f"rating life of the bearing in turns, ISO 16281, {which}",
+        words=f"Rating life, {reading}",
+        takes="bearing",
+        unit="turns",
+        check=_check,
+        evaluate=lambda view, quantity: life(view, quantity, readings),
+        steep=True,
+        beside=PLACES if "sectors" in readings else (),
+        reduced=lambda runs, quantity: _reduced(runs, quantity, readings),
+        needs=lambda channel: _needs(channel, readings),
+    )
+
+
+KINDS = tuple(_kind(name) for name in READINGS_OF)

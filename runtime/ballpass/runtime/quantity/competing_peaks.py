@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ballpass.runtime.ask.quantity_records import Mark, Quantity, View
+from ballpass.runtime.quantity.records import Mark, Quantity, View
 
 #: A change of a parameter by this share of its value, or of a radian, is a small one [1].
 NEAR = 1e-3
@@ -21,14 +21,14 @@ NEAR = 1e-3
 ALIKE, FLOOR = 0.1, 1e-3
 
 
-def nearest_rival(view: View, quantity: Quantity, mark: Mark) -> str:
+def competing_peak(view: View, quantity: Quantity, mark: Mark) -> str:
     """The extreme that the smallest change of a parameter puts in place of this one."""
     signal = view.signals[quantity.channel]
     best, slope = signal.value[mark.node, mark.ball], signal.slope[mark.node, mark.ball]
     scales = np.array([_scale(view, name) for name in view.names])
     nearest, words = NEAR, ""
     together = range(signal.value.shape[1] if quantity.ball is None else 0)  # balls that share the load of that moment
-    for other in (*(replace(mark, ball=ball) for ball in together if ball != mark.ball), *mark.rivals):
+    for other in (*(replace(mark, ball=ball) for ball in together if ball != mark.ball), *mark.competing):
         value, its = signal.value[other.node, other.ball], signal.slope[other.node, other.ball]
         apart = np.abs(its - slope) * scales
         least = np.maximum(ALIKE * np.maximum(np.abs(its), np.abs(slope)) * scales, FLOOR * abs(best))

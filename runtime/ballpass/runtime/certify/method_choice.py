@@ -1,0 +1,87 @@
+"""A way to integrate that the tool chooses or measures: method, tolerance, kinks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import reduction_rows
+from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.quantity.grammar import channels_of, quantities_of
+from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.records import Quantity
+from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, Kinks
+from ballpass.runtime.run.request import Request
+from ballpass.runtime.run.resolve import Run, resolve
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MethodChoice:
+    """How to integrate: a method of the stepper, its tolerance [1], what it does at kinks."""
+
+    method: str
+    rtol: float
+    kinks: Kinks = STEPPED_OVER
+
+    @property
+    def words(self) -> str:
+        """For people: method, tolerance, and kinks where they are located."""
+        return f"{self.method}, rtol {self.rtol:g}" + (", kinks located" if self.kinks == LOCATED else "")
+
+    def measure(self, quantities: QuantityRun, run: Run, moved: float | np.ndarray = 0.0) -> Values:
+        """Quantities of a run that is integrated this way.
+
+        Parameters
+        ----------
+        moved : added to the positions at the start, a number or shape (states / 2,) [m]
+
+        Raises
+        ------
+        RunFailed
+            The method could not reach the end.
+        """
+        initial = run.initial.copy()
+        initial[: len(initial) // 2] += moved
+        return quantities.measure(replace(run.by(self.method, self.rtol, self.kinks), initial=initial))
+
+
+def stepper_run(model: LoadedModel, numbers: Numbers, request: Request) -> Run:
+    """A run by the project's own stepper.  What the request leaves open is taken from the scene's run settings.
+
+    Raises
+    ------
+    RequestError
+        A wrong request, a linkage that cannot be assembled, or no compiler for the stepper.
+    """
+    check_assembly(model, numbers)
+    return resolve(model, numbers, replace(request, method="stepper", kinks=None)).check_steady()
+
+
+def compared_quantities(model: LoadedModel, of: str | Sequence[str] | None) -> tuple[Quantity, ...]:
+    """Quantities whose errors are asked for; by default peak ball force, rms and range of the inner ring's motion."""
+    names = default_compared(model.manifest) if of is None else (of,) if isinstance(of, str) else tuple(of)
+    if not names:
+        raise RequestError("of: at least one quantity is expected. Example: peak_ball_force.")
+    return quantities_of(model, names)
+
+
+def default_compared(manifest: Manifest) -> tuple[str, ...]:
+    """Peak ball force, rms and range of the inner ring's motion."""
+    channels = [name.replace(".", "_") for name in channels_of(manifest)]
+    peaks = [name for name in channels if name.endswith("ball_force")]
+    rings = [name for name in channels if name.endswith(("inner_x", "inner_y"))]
+    return (*(f"peak_{name}" for name in peaks), *(f"{kind}_{name}" for kind in ("rms", "range") for name in rings))
+
+
+def motion_of(run: Run, values: Values) -> np.ndarray:
+    """Largest and smallest value of each state, over its magnitude, shape (2 * states,)."""
+    layout = reduction_rows(run.model.manifest)
+    assert values.row is not None  # `QuantityRun` with `motion`
+    extremes = [values.row[layout.column(kind, name)] for kind in ("max", "min") for name in run.model.states]
+    return np.asarray(np.array(extremes) / np.tile(run.magnitude, 2))

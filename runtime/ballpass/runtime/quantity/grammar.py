@@ -1,0 +1,201 @@
+"""Names of quantities: numbers that a run is asked for, in every command and call.
+
+In: a name, `parse_quantity`.  Out: a `Quantity`, which `ballpass.runtime.quantity.quantity_run` evaluates along a run.
+
+A name is ``kind:output``, with ``[ball]`` for one ball and ``@place`` where a kind wants one::
+
+    max:ball.force          rms:inner.y        value:inner.y@240deg      amplitude:inner.y@bpfo
+    max:ball.force[3]       range:inner.x      value:inner.y@0.41s       amplitude:inner.y@2x
+
+Without ``[ball]`` an output of the balls is that of the most loaded ball at each moment.  Underscores may stand for
+colon and points, ``peak_ball_force`` and ``rms_inner_y``.  What each kind does stands in its file in `kinds`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.quantity.records import Kind, Quantity
+from ballpass.runtime.quantity.registry import ALSO, KINDS
+from ballpass.runtime.run.reductions import channel_names
+from ballpass.runtime.run.request import no_output
+
+#: What is asked for of each bearing when nothing is named.
+DEFAULTS = (
+    *(("max", "ball.force"), ("rms", "inner.x"), ("rms", "inner.y")),
+    *(("range", "inner.y"), ("rms", "outer.y")),
+)
+
+_FORM = re.compile(r"(?P<kind>[a-z_]+):(?P<channel>[^\[\]@\s]+)(?:\[(?P<ball>\d+)\])?(?:@(?P<place>\S+))?")
+
+
+def quantities_of(model: LoadedModel, names: Sequence[str]) -> tuple[Quantity, ...]:
+    """Read names of quantities of a model, and refuse what cannot be evaluated, before anything runs.
+
+    Raises
+    ------
+    RequestError
+        Unknown names; or what has no value with the scene's numbers.  All faults at once.
+    """
+    values = model.numbers(None).values
+    found, faults = [], []
+    for name in dict.fromkeys(names):
+        try:
+            quantity = parse_quantity(model.manifest, name)
+            check = KINDS[quantity.kind].check
+            if check is not None:
+                check(model.manifest, values, quantity)
+            found.append(quantity)
+        except RequestError as fault:
+            faults.append(str(fault))
+    if faults:
+        raise RequestError("\n".join(faults))
+    if not found:
+        raise RequestError("of: at least one quantity is expected. Example: peak_ball_force.")
+    return tuple(found)
+
+
+def parse_quantity(manifest: Manifest, text: str) -> Quantity:
+    """Read the name of a quantity.
+
+    Raises
+    ------
+    RequestError
+        No such kind, output, ball or place; the nearest known names are told.
+    """
+    channels = channels_of(manifest)
+    whole, _, place = str(text).partition("@")
+    names = _names(manifest, channels)
+    if whole in names:
+        kind, channel = names[whole]
+        _check_place(manifest, text, kind, place)
+        unit = kind.unit or (kind.unit_of(channels[channel][1]) if kind.unit_of else channels[channel][1])
+        return Quantity(name=text, kind=kind.name, channel=channel, ball=None, place=place, unit=unit)
+    form = _FORM.fullmatch(str(text))
+    if form is None:
+        _explain_alone(manifest, channels, text, whole)
+        known = _usable(manifest, channels)
+        raise RequestError(f"{unknown_name('quantity', text, known)} Its form is kind:output, as in max:ball.force.")
+    found = KINDS.get(ALSO.get(form["kind"], form["kind"]))
+    if found is None or found.takes in ("nothing", "bearing at rest"):
+        allowed = [name for name, kind in KINDS.items() if kind.takes in ("channel", "bearing")]
+        raise RequestError(f"{text}: {unknown_name('kind of quantity', form['kind'], [*allowed, *ALSO])}")
+    if found.takes == "bearing":
+        words = " or ".join(name for name, (kind, _) in names.items() if kind is found and ":" not in name)
+        raise RequestError(f"{text}: {found.name} is of a bearing. Write {words or 'it for a scene with one'}.")
+    if form["channel"] not in channels:
+        raise RequestError(f"{text}: {no_output(manifest, form['channel'], list(channels))}")
+    columns, unit = channels[form["channel"]]
+    ball = None if form["ball"] is None else int(form["ball"])
+    if ball is not None and not (columns > 1 and 1 <= ball <= columns):
+        allowed_balls = f"1 to {columns}" if columns > 1 else "none, for it has no balls"
+        raise RequestError(f"{text}: ball {ball} was given; {form['channel']} allows {allowed_balls}.")
+    place = form["place"] or ""
+    _check_place(manifest, text, found, place)
+    unit = found.unit or (found.unit_of(unit) if found.unit_of else unit)
+    return Quantity(name=text, kind=found.name, channel=form["channel"], ball=ball, place=place, unit=unit)
+
+
+def channels_of(manifest: Manifest) -> dict[str, tuple[int, str]]:
+    """What quantities can be of: states, outputs, and what the steps give of the balls; columns and unit of each."""
+    known = {info.name: (info.size, info.unit) for info in (*manifest.states, *manifest.outputs)}
+    every = {info.name: (info.size, info.unit) for info in manifest.quantities}
+    balls = [name for name in channel_names(manifest) if name not in known]
+    return known | {name: every[name] for name in balls if name in every}
+
+
+def _names(manifest: Manifest, channels: Mapping[str, tuple[int, str]]) -> dict[str, tuple[Kind, str]]:
+    """What can be written without a ball, in front of a place: -> kind and channel."""
+    found: dict[str, tuple[Kind, str]] = {}
+    for kind in KINDS.values():
+        for written, channel in _written(manifest, channels, kind):
+            found.setdefault(written, (kind, channel))
+    for channel in channels:
+        if channel.endswith(".ball.force"):  # as the summary names it, with the bearing first
+            found[f"{channel.removesuffix('ball.force')}peak_ball_force"] = (KINDS["max"], channel)
+    return found
+
+
+def _written(manifest: Manifest, channels: Mapping[str, tuple[int, str]], kind: Kind) -> Iterator[tuple[str, str]]:
+    if kind.takes == "channel":
+        for name in (kind.name, *kind.also):
+            for channel in channels:
+                yield f"{name}:{channel}", channel
+                if kind.place is None:
+                    yield f"{name}_{channel.replace('.', '_')}", channel
+    elif kind.takes == "nothing":
+        if kind.channel in channels:
+            yield kind.name, kind.channel
+    else:
+        for bearing in manifest.bearings:
+            if kind.takes == "bearing":
+                yield f"{bearing.prefix}{kind.name}", f"{bearing.prefix}ball.force"
+                yield f"{kind.name}:{bearing.prefix}ball.force", f"{bearing.prefix}ball.force"
+            else:
+                # ``static_left_deflection`` of one bearing of several
+                yield kind.name.replace("_", f"_{bearing.name}_", 1) if bearing.name else kind.name, bearing.prefix
+
+
+def _explain_alone(manifest: Manifest, channels: Mapping[str, tuple[int, str]], text: str, name: str) -> None:
+    """Raise `RequestError` for a kind that this scene has not, or of which it has several."""
+    kind = KINDS.get(name)
+    if kind is None:
+        return
+    if kind.takes == "nothing":
+        raise RequestError(f"{text}: {no_output(manifest, kind.channel, list(channels))}")
+    if kind.takes in ("bearing", "bearing at rest"):
+        if not manifest.bearings:
+            raise RequestError(f"{text}: this scene has no bearing. Ask for another quantity.")
+        allowed = " or ".join(written for written, _ in _written(manifest, channels, kind) if ":" not in written)
+        raise RequestError(f"{text}: the scene has several bearings, and this names none. Write {allowed}.")
+
+
+def _check_place(manifest: Manifest, text: str, kind: Kind, place: str) -> None:
+    if kind.place is None:
+        if place:
+            raise RequestError(f"{text}: {kind.name} takes nothing behind @. Leave @{place} away.")
+        return
+    # rings at rest stand where the run starts, unless an instant is named
+    if kind.takes == "bearing at rest" and not place:
+        return
+    if not kind.place.is_valid(manifest, place):
+        raise RequestError(
+            f"{text}: behind @ {kind.place.words} is expected, not {place!r}. Example: {kind.place.example}."
+        )
+
+
+def _usable(manifest: Manifest, channels: Mapping[str, tuple[int, str]]) -> list[str]:
+    """Names that can be asked for as they stand, for suggestions."""
+    return [name for name, (kind, _) in _names(manifest, channels).items() if kind.place is None or kind.at_rest]
+
+
+def quantity_words(manifest: Manifest, quantity: Quantity) -> str:
+    """What a quantity is, for figures: "Position of the centre of the inner ring along y, rms"."""
+    kind = KINDS[quantity.kind]
+    if kind.takes != "channel":
+        named = (one.name for one in manifest.bearings if one.name and quantity.channel.startswith(one.prefix))
+        return ", ".join(
+            [kind.words or kind.summary, *(f"bearing {name}" for name in named), *filter(None, [quantity.place])]
+        )
+    described = {info.name: info.description for info in manifest.quantities}
+    described |= {info.name: info.description for info in (*manifest.states, *manifest.outputs)}
+    which = "any ball" if quantity.ball is None else f"ball {quantity.ball}"
+    channel = described[quantity.channel].replace("each ball", which)
+    return f"{channel}, {kind.words or kind.name} {quantity.place}".rstrip()
+
+
+def default_quantities(manifest: Manifest) -> tuple[str, ...]:
+    """What is asked for when nothing is named: ball forces and motion of the rings, else loads of the mechanism."""
+    channels = channels_of(manifest)
+    wanted = [(kind, f"{bearing.prefix}{channel}") for bearing in manifest.bearings for kind, channel in DEFAULTS]
+    found = [f"{kind}:{channel}" for kind, channel in wanted if channel in channels]
+    found = ["peak_ball_force" if name == "max:ball.force" else name for name in found]
+    if not found:
+        found = [f"max:{name}" for name in channels if name.startswith("reaction.")]
+        found += ["max:drive_torque"] if "drive_torque" in channels else []
+    return tuple(found)

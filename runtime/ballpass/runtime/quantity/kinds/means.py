@@ -1,0 +1,58 @@
+"""Means and integrals over time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ballpass.runtime.quantity.records import Array, Estimate, Kind, Quantity, ReducedRuns, View
+
+#: Units of integrals over time that have names.
+_OVER_TIME = {"W": "J", "m/s": "m", "m/s^2": "m/s", "rad/s": "rad", "rad/s^2": "rad/s"}
+
+
+def _mean(view: View, quantity: Quantity) -> Estimate:
+    value, slope = view.mean(*view.channel(quantity))
+    return Estimate(value=value, slope=slope)
+
+
+def _integral(view: View, quantity: Quantity) -> Estimate:
+    value, slope = view.integral(*view.channel(quantity))
+    return Estimate(value=value, slope=slope)
+
+
+def _rms(view: View, quantity: Quantity) -> Estimate:
+    value, slope = view.channel(quantity)
+    square, moved = view.mean(value**2, 2.0 * value[:, None] * slope)
+    root = math.sqrt(square)
+    if root == 0.0:
+        return zero(view, "zero throughout", slope)
+    return Estimate(value=root, slope=moved / (2.0 * root))
+
+
+def zero(view: View, note: str, moved: Array) -> Estimate:
+    """A size that is zero; `moved` are derivatives of what it is the size of."""
+    kink = "it is zero and has a corner there; the derivative given is zero" if np.any(moved) else ""
+    return Estimate(value=0.0, slope=np.zeros(view.directions), notes=(note,), kink=kink)
+
+
+def _reduced_mean(runs: ReducedRuns, quantity: Quantity) -> Array:
+    return runs.entry("integral", quantity.channel) / runs.duration
+
+
+def _reduced_rms(runs: ReducedRuns, quantity: Quantity) -> Array:
+    return np.sqrt(runs.entry("square", quantity.channel) / runs.duration)
+
+
+KINDS = (
+    Kind(name="mean", summary="mean over time", evaluate=_mean, reduced=_reduced_mean),
+    Kind(
+        name="integral",
+        summary="integral over time; of a power the work",
+        unit_of=lambda unit: _OVER_TIME.get(unit, f"{unit}*s"),
+        evaluate=_integral,
+        reduced=lambda runs, quantity: runs.entry("integral", quantity.channel),
+    ),
+    Kind(name="rms", summary="root mean square over time, with the mean in it", evaluate=_rms, reduced=_reduced_rms),
+)

@@ -1,0 +1,88 @@
+"""Moments at which a driver whose speed changes passes edges of windows, and how these move with the parameters.
+
+In: a run along nodes.  Out: `Passages`.  A load begins or ends there: rates of states jump, and so may outputs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.quantity.kinks import APART, crossings
+from ballpass.runtime.quantity.nodes import Nodes
+from ballpass.runtime.quantity.track import Track, follow
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.directions import Chain
+from ballpass.runtime.run.resolve import Run
+
+Array = NDArray[np.float64]
+
+#: What is given of an edge holds so much before it, in parts of a turn: well above rounding, so that states and rates
+#: there are of one side.
+BEFORE = 1e-8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Passages:
+    """Moments just before edges, in order.
+
+    Attributes
+    ----------
+    times : shape (passages,) [s]
+    edges : parameter that is the angle of each edge
+    near : what is so near to one of the times is there [s]
+    """
+
+    times: Array
+    edges: tuple[str, ...]
+    near: float
+
+
+def find_passages(run: Run, track: Track) -> Passages:
+    """Passages of all edges along a track; none where no window counts on an angle that is a state."""
+    manifest, nodes = run.model.manifest, track.nodes
+    before = BEFORE * min(run.turn, run.duration)
+    found: list[tuple[float, str]] = []
+    if manifest.edges and manifest.mechanism is not None:
+        driver = run.model.states.index(manifest.mechanism.angle)
+        for edge in dict.fromkeys(manifest.edges):
+            behind = np.sin(0.5 * (track.x[:, driver] - run.numbers.values[edge]))
+            found += [(time, edge) for time in crossings(nodes.t, nodes.segment, behind).tolist()]
+    apart = max(APART * run.duration, 10.0 * before)
+    found = [item for item in sorted(found) if np.min(np.abs(track.edges.times - item[0])) > apart]
+    times = np.array([time for time, _ in found])
+    if found:
+        # by Newton from where the nodes tell
+        seen = _there(run, track, times)
+        angle, speed = seen.x[:, driver], seen.x[:, len(run.model.states) // 2 + driver]
+        left = [
+            math.remainder(run.numbers.values[edge] - a, clock.TURN) for (_, edge), a in zip(found, angle, strict=True)
+        ]
+        times = times + np.array(left) / speed - before
+    return Passages(times=times, edges=tuple(edge for _, edge in found), near=10.0 * before)
+
+
+def passage_slopes(run: Run, track: Track, passages: Passages, chain: Chain, sensitivity_rtol: float) -> Array:
+    """Derivatives of the times of passages along the directions, shape (passages, directions) [s/unit]."""
+    if not passages.edges:
+        return np.zeros((0, len(chain.names)))
+    assert run.model.manifest.mechanism is not None  # its angle passes the edges
+    driver = run.model.states.index(run.model.manifest.mechanism.angle)
+    seen = _there(run, track, passages.times, chain, sensitivity_rtol)
+    # angle and speed do not jump at an edge: either side gives them
+    moved = np.array([chain.derivative(edge) for edge in passages.edges])
+    speed = seen.x[:, len(run.model.states) // 2 + driver]
+    return np.asarray((moved - seen.slope[:, driver]) / speed[:, None])
+
+
+def _there(
+    run: Run, track: Track, times: Array, chain: Chain | None = None, sensitivity_rtol: float | None = None
+) -> Track:
+    """The run at these times, which stand still."""
+    still = np.zeros((len(times), 0 if chain is None else len(chain.names)))
+    held = np.searchsorted(track.segments.times, times) - 1
+    nodes = Nodes(t=times, weight=np.zeros(len(times)), segment=held, held=held, slope=still, weight_slope=still)
+    return follow(run, track.segments, track.edges, nodes, chain, sensitivity_rtol)

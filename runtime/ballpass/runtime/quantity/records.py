@@ -1,0 +1,257 @@
+"""What a quantity is, what its kind declares, what it sees of a run, and what it gives: records alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import HEAD, ReductionRows, reduction_rows
+from ballpass.runtime.quantity.nodes import Nodes
+from ballpass.runtime.run.resolve import Run
+
+if TYPE_CHECKING:
+    from ballpass.runtime.quantity.track import Signal
+    from ballpass.runtime.run.directions import Chain
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """A quantity of interest as asked for.
+
+    Attributes
+    ----------
+    name : as written
+    kind : name of its `Kind`
+    channel : state or output, "" for a quantity that names none; of one at rest the prefix of its bearing
+    ball : which ball, counted from 1; None for the most loaded one, and for outputs without balls
+    place : what stands behind ``@``
+    unit : of the value
+    """
+
+    name: str
+    kind: str
+    channel: str
+    ball: int | None
+    place: str
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """What a kind expects behind ``@``.
+
+    Attributes
+    ----------
+    words, example : for messages
+    is_valid : whether a text is one, for a model
+    """
+
+    words: str
+    example: str
+    is_valid: Callable[[Manifest, str], bool]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """A kind of quantity: all that the rest of the program knows of it.
+
+    Attributes
+    ----------
+    name : in front of the colon
+    summary : one line for people
+    words : for figures, behind those of the channel; "" for the name
+    also : other names
+    takes : what follows the name: a state or output, nothing, or the bearing that it is of, in motion or at rest
+    channel : output that a kind which takes nothing is made of
+    place : what is expected behind ``@``; None for nothing
+    unit : of the value; "" for that of the channel
+    unit_of : unit of the value from that of the channel, where it is another
+    check : raises `RequestError` where it cannot be evaluated for a model with its default numbers, whatever the run
+    evaluate : value and derivative along the nodes of a run; None for rings at rest
+    at_rest : value and derivative where nothing is run
+    extremes : extremes of the channel that it needs
+    around : whether it looks at nodes around its extreme as well
+    at_moment : whether it looks at one moment, wherever nodes lie
+    steep : whether the third power of the channel is integrated, which has to be resolved
+    beside : channels that it looks at as well, behind the bearing's prefix
+    reduced : value from the reductions of runs, shape (runs,); None where they do not hold it
+    needs : channels that are reduced for it, from its own; None for that one
+    """
+
+    name: str
+    summary: str
+    words: str = ""
+    also: tuple[str, ...] = ()
+    takes: Literal["channel", "nothing", "bearing", "bearing at rest"] = "channel"
+    channel: str = ""
+    place: Place | None = None
+    unit: str = ""
+    unit_of: Callable[[str], str] | None = None
+    check: Callable[[Manifest, Mapping[str, float], Quantity], None] | None = None
+    evaluate: Callable[[View, Quantity], Estimate] | None = None
+    at_rest: Callable[[LoadedModel, Numbers, Quantity, Chain | None], Estimate] | None = None
+    extremes: tuple[str, ...] = ()
+    around: bool = False
+    at_moment: bool = False
+    steep: bool = False
+    beside: tuple[str, ...] = ()
+    reduced: Callable[[ReducedRuns, Quantity], Array] | None = None
+    needs: Callable[[str], tuple[str, ...]] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Mark:
+    """A moment of a run at which a quantity is taken: an extreme, or a place.
+
+    Attributes
+    ----------
+    node : its node
+    time : [s]
+    value : of the channel there
+    ball : column of the channel
+    other : column that the channel's most loaded ball changes to or from at this very moment; None elsewhere
+    rate, other_rate : time derivatives of both columns there, where there is another
+    at_edge : whether the extreme lies at an edge of a load or of the window
+    around : nodes at equal distances before and behind it, the same number of both
+    competing : the next extremes elsewhere in the run
+    """
+
+    node: int
+    time: float
+    value: float
+    ball: int
+    other: int | None = None
+    rate: float = 0.0
+    other_rate: float = 0.0
+    at_edge: bool = False
+    around: tuple[int, ...] = ()
+    competing: tuple[Mark, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class View:
+    """What a kind sees of a run.
+
+    Attributes
+    ----------
+    run, nodes : the run, and where it is evaluated
+    signals : channels along the nodes
+    marks : moments by quantity, and "max", "min" or "place"
+    slopes : derivative of a parameter or constant by name, shape (directions,)
+    names : parameters, one direction each
+    """
+
+    run: Run
+    nodes: Nodes
+    signals: Mapping[str, Signal]
+    marks: Mapping[tuple[str, str], Mark]
+    slopes: Callable[[str], Array]
+    names: tuple[str, ...]
+
+    @property
+    def manifest(self) -> Manifest:
+        """Of the model."""
+        return self.run.model.manifest
+
+    @property
+    def numbers(self) -> Numbers:
+        """Of the run."""
+        return self.run.numbers
+
+    @property
+    def directions(self) -> int:
+        """How many there are."""
+        return len(self.names)
+
+    def channel(self, quantity: Quantity) -> tuple[Array, Array]:
+        """The quantity's channel along the nodes, and its derivative: shapes (nodes,), (nodes, directions)."""
+        signal = self.signals[quantity.channel]
+        if quantity.ball is not None or signal.value.shape[1] == 1:
+            column = 0 if quantity.ball is None else quantity.ball - 1
+            return signal.value[:, column], signal.slope[:, column]
+        rows, best = np.arange(len(signal.value)), np.argmax(signal.value, axis=1)
+        return signal.value[rows, best], signal.slope[rows, best]
+
+    def integral(self, values: Array, slopes: Array) -> tuple[float, Array]:
+        """Integral over the time that counts, and its derivative, shape (directions,).
+
+        Parameters
+        ----------
+        values, slopes : integrand at the nodes and its derivative, shapes (nodes,), (nodes, directions)
+        """
+        nodes = self.nodes
+        return float(nodes.weight @ values), nodes.weight @ slopes + values @ nodes.weight_slope
+
+    def mean(self, values: Array, slopes: Array) -> tuple[float, Array]:
+        """Mean over the time that counts, and its derivative; as `integral`."""
+        total, moved = self.integral(values, slopes)
+        length, longer = self.length
+        mean = total / length
+        return mean, (moved - mean * longer) / length
+
+    @property
+    def length(self) -> tuple[float, Array]:
+        """Length of the time that counts [s], and its derivative, shape (directions,) [s/unit]."""
+        return float(np.sum(self.nodes.weight)), np.sum(self.nodes.weight_slope, axis=0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReducedRuns:
+    """Reductions of one run or of many.
+
+    Attributes
+    ----------
+    manifest : of the model
+    rows : reductions, shape (runs, .)
+    end : states at the end, shape (runs, states)
+    values : parameters and constants by name, numbers or of shape (runs,)
+    """
+
+    manifest: Manifest
+    rows: Array
+    end: Array
+    values: Mapping[str, float | Array]
+
+    @property
+    def layout(self) -> ReductionRows:
+        """Of the rows."""
+        return reduction_rows(self.manifest)
+
+    @property
+    def duration(self) -> Array:
+        """Time that was reduced, shape (runs,) [s]."""
+        return np.asarray(self.rows[:, HEAD.index("duration")])
+
+    def entry(self, row: str, channel: str) -> Array:
+        """An entry of `ROWS` of a channel, shape (runs,)."""
+        return np.asarray(self.rows[:, self.layout.column(row, channel)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Estimate:
+    """A quantity's value and derivative.
+
+    Attributes
+    ----------
+    value : in the quantity's unit
+    slope : derivative along the directions, shape (directions,)
+    time, ball : of an extreme: when [s], and which ball, counted from 1
+    notes : what to mind
+    kink : why the derivative is that of one side, or of none; empty where there is one
+    """
+
+    value: float
+    slope: Array
+    time: float | None = None
+    ball: int | None = None
+    notes: tuple[str, ...] = ()
+    kink: str = ""

@@ -1,0 +1,284 @@
+"""The loop around the project's own stepper, for all that runs a model by it.
+
+In: a `Run`, and sinks that take what it passes: samples, reductions, ends of steps.  Out: the sinks, filled.
+
+A run is cut into windows of some turns (`segments.edge_windows`), each of them one run of the driver, made in calls of
+so many steps: between calls progress is shown, and an interrupt or the wish of an ensemble to stop is heard.  What
+sinks there are, and how many steps a call takes, changes no bit of the motion.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.contract.status import Status
+from ballpass.runtime.native.stepper import End, Family, Outcome, Segments, Stepper
+from ballpass.runtime.run.failure_location import Whereabouts, whereabouts
+from ballpass.runtime.run.limits import allowance
+from ballpass.runtime.run.locating import LOCATED, stepper_for
+from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.run.segments import joined_segments, rest_of, run_windows
+from ballpass.runtime.run.stall import stall_words
+
+if TYPE_CHECKING:
+    from ballpass.runtime.run.directions import Directions
+
+#: Steps, accepted and rejected, that one call of the stepper takes: a fraction of a second.
+STEPS_A_CALL = 50_000
+
+#: What the ways of the stepper to end mean to people.
+STATUS_OF_END = {
+    End.TOO_MANY_STEPS: Status.TOO_MANY_STEPS,
+    End.STEP_TOO_SMALL: Status.STEP_TOO_SMALL,
+    End.NOT_FINITE: Status.NOT_FINITE,
+    End.BAD_ARGUMENT: Status.INTEGRATOR_FAILED,
+    End.STALLED: Status.STALLED,
+}
+
+
+class RunFailed(SimulationError):
+    """The stepper could not reach the end of a run.
+
+    Attributes
+    ----------
+    end, time, step, state : how it ended, when [s], the last step size [s], the state there, shape (states,)
+    place : where the machine stood
+    detail : what else there is to say
+    """
+
+    def __init__(self, end: End, time: float, step: float, state: np.ndarray, place: Whereabouts, detail: str) -> None:
+        self.end, self.time, self.step, self.state, self.place, self.detail = end, time, step, state, place, detail
+        self.status = STATUS_OF_END[end]
+        angle = f", crank angle {math.degrees(place.crank_angle):.4f} deg"
+        super().__init__(f"{self.status.value}\nt = {time:.9g} s{angle}. {detail} {place.words}".rstrip())
+
+
+class Sink(Protocol):
+    """What takes something of a run."""
+
+    def arguments(self, segments: Segments, goes_on: bool) -> dict[str, Any]:
+        """What `Stepper.run` is given for it.
+
+        Parameters
+        ----------
+        segments : of the call
+        goes_on : whether the call goes on with the one before, whose segments were the same
+        """
+
+    def take(self, outcome: Outcome) -> None:
+        """Note what a call gave."""
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Samples:
+    """States at times, and their derivatives.
+
+    Attributes
+    ----------
+    times : increasing, shape (samples,) [s]
+    x : states there, shape (samples, states)
+    near : times closer than this are one time [s]
+    end : of the run [s]
+    directions : to differentiate along
+    finished : samples filled
+    """
+
+    times: np.ndarray
+    x: np.ndarray
+    near: float
+    end: float
+    directions: Directions | None = None
+    finished: int = 0
+    _first: int = 0
+    _given: dict[str, Any] = field(default_factory=dict)
+
+    def arguments(self, segments: Segments, goes_on: bool) -> dict[str, Any]:
+        """Those samples that lie in the segments; one at their end is the next call's."""
+        if goes_on:
+            return self._given
+        left, right = float(segments.times[0]), float(segments.times[-1])
+        stop = len(self.times) if right >= self.end else int(np.searchsorted(self.times, right - self.near))
+        first = self._first = self.finished
+        stop = max(stop, first)
+        # a sample that rounding puts beside an edge lies on it
+        self._given = {
+            "output_times": np.clip(self.times[first:stop], left, right),
+            "output_states": self.x[first:stop],
+        }
+        if self.directions is not None:
+            self._given["tangents"] = self.directions.tangents(segments, first, stop - first)
+        return self._given
+
+    def take(self, outcome: Outcome) -> None:
+        """Note how many are filled."""
+        self.finished = self._first + outcome.written
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReductionRow:
+    """A row of reductions that a run adds to, and one for the time before that one begins."""
+
+    row: np.ndarray
+    before: np.ndarray | None = None
+
+    def arguments(self, segments: Segments, goes_on: bool) -> dict[str, Any]:
+        """The rows themselves."""
+        return {"reduction": self.row, "before": self.before}
+
+    def take(self, outcome: Outcome) -> None:
+        """Nothing: the driver has added to the rows."""
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class StepEnds:
+    """Ends of the accepted steps.
+
+    Attributes
+    ----------
+    parts : ends [s], and 1.0 where they lie on a kink, else 0.0; shape (steps, 2) each
+    """
+
+    parts: list[np.ndarray] = field(default_factory=list)
+    _room: np.ndarray = field(default_factory=lambda: np.empty((STEPS_A_CALL, 2)))
+
+    def arguments(self, segments: Segments, goes_on: bool) -> dict[str, Any]:
+        """Room for those of a call."""
+        return {"ends": self._room}
+
+    def take(self, outcome: Outcome) -> None:
+        """Keep those of a call."""
+        self.parts.append(self._room[: outcome.ends].copy())
+
+    @property
+    def all(self) -> np.ndarray:
+        """Those of the whole run, shape (steps, 2)."""
+        return np.concatenate([np.empty((0, 2)), *self.parts])
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class RunUnderWay:
+    """A run by the stepper, as far as it has come.
+
+    Attributes
+    ----------
+    run : what runs
+    sinks : what takes what it passes
+    state : at `time`, shape (states,)
+    time : from where it can go on [s]
+    reached : how far it has come [s]
+    stop : ends it between calls when it becomes nonzero
+    stepper : a driver that is there already; None for the one that the run needs
+    steps, rejected, located, calls : counts; `located` of kinks
+    families : what an automatic choice ended with, call by call
+    """
+
+    run: Run
+    sinks: Sequence[Sink] = ()
+    state: np.ndarray
+    time: float
+    stop: ctypes.c_int | None = None
+    stepper: Stepper | None = None
+    steps: int = 0
+    rejected: int = 0
+    located: int = 0
+    calls: int = 0
+    reached: float = 0.0
+    families: list[str] = field(default_factory=list)
+
+    def go_on(self, until: float | None = None) -> None:
+        """Integrate to the end of the run, or to a time, which may lie behind it [s].
+
+        Raises
+        ------
+        RunFailed
+            The driver could not reach the end, or crawls.
+        """
+        run, until = self.run, self.run.end if until is None else until
+        directions = next((sink.directions for sink in self.sinks if isinstance(sink, Samples)), None)
+        stepper = self.stepper or stepper_for(run.model, run.kinks, derivatives=directions is not None)
+        allowed = allowance(until - run.begin, run.turn, self.time, self.steps + self.rejected)
+        windows = run_windows(run.model, run.numbers, (self.time, until), run.turn, run.start)
+        # a derivative at fixed time jumps with a load, and a call knows no rate from before its start
+        for left in joined_segments(windows) if directions is not None else windows:
+            held, taken, first_step = (stepper.hold() if directions is None else None), 0, 0.0
+            goes_on = False
+            while True:
+                arguments = {key: value for sink in self.sinks for key, value in sink.arguments(left, goes_on).items()}
+                arguments.setdefault("output_times", np.zeros(0))
+                arguments.setdefault("output_states", None)
+                more = min(STEPS_A_CALL, allowed.left)
+                outcome = stepper.run(
+                    family=run.family,
+                    tolerance=run.tolerance,
+                    p=run.numbers.p,
+                    c=run.numbers.c,
+                    x=self.state,
+                    segments=left,
+                    max_steps=(taken if held is not None else 0) + more,
+                    held=held,
+                    first_step=first_step,
+                    **arguments,
+                )
+                for sink in self.sinks:
+                    sink.take(outcome)
+                before = taken if held is not None else 0  # with `held` an outcome counts those of all its calls
+                taken = outcome.steps + outcome.rejected
+                self.calls += 1
+                self.reached = outcome.time
+                gives_up = allowed.spend(taken - before, outcome.time)
+                if outcome.end is not End.DONE and (gives_up or outcome.end is not End.TOO_MANY_STEPS):
+                    self._count(outcome)
+                    raise self._failure(outcome, directions)
+                if run.progress is not None:
+                    run.progress((outcome.time - run.begin) / (until - run.begin))
+                done = outcome.end is End.DONE
+                stopped = self.stop is not None and bool(self.stop.value)
+                if done or stopped or held is None:
+                    self._count(outcome)
+                    self.time = outcome.time
+                if stopped:
+                    return
+                if done:
+                    break
+                goes_on = held is not None
+                if held is None:
+                    rest = rest_of(left, outcome.time, run.model.manifest.inputs, run.numbers)
+                    if rest is None:
+                        break
+                    left, first_step = rest, outcome.step
+        self.time = until
+
+    def _count(self, outcome: Outcome) -> None:
+        self.steps += outcome.steps
+        self.rejected += outcome.rejected
+        self.located += outcome.kinks if self.run.kinks == LOCATED else 0
+        if self.run.family is Family.AUTO:
+            self.families.append(outcome.family.name.lower())
+
+    def _failure(self, outcome: Outcome, directions: Directions | None) -> RunFailed:
+        run = self.run
+        detail = f"Step size {outcome.step:.3g} s"
+        if outcome.state >= 0:
+            detail += f", worst state {run.model.states[outcome.state]}"
+        if outcome.end is End.TOO_MANY_STEPS:
+            past = outcome.time - run.begin
+            detail += f", {self.steps + self.rejected} steps for the first {past:.3g} s of {run.duration:.6g} s"
+        detail += "."
+        if directions is not None and directions.controlled:
+            detail += " The derivatives took part in the choice of steps: a looser sensitivity_rtol may come through."
+        if outcome.end is End.STALLED:
+            detail += f" {stall_words(run.model, run.numbers, self.state)}"
+        place = whereabouts(run.model, run.numbers, outcome.time, self.state)
+        return RunFailed(outcome.end, outcome.time, outcome.step, self.state, place, detail)
+
+
+def start_run(run: Run, sinks: Sequence[Sink]) -> RunUnderWay:
+    """A run before its first step."""
+    return RunUnderWay(run=run, sinks=sinks, state=run.initial.copy(), time=run.begin)

@@ -1,0 +1,175 @@
+"""When a run is sampled, and which outputs are evaluated there.
+
+In: a `Request` and the `Run` made of it.  Out: a `Sampling`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import real, vector
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.request import (
+    Request,
+    check_length,
+    check_memory,
+    no_output,
+    run_length,
+)
+from ballpass.runtime.run.start import start_time
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sampling:
+    """Samples of a run.
+
+    Attributes
+    ----------
+    duration : of the run, which sample times may give [s]
+    times : increasing, from the start of the run on, shape (samples,) [s]
+    even : whether they are the ends of equal intervals of the whole run
+    outputs : names of the outputs to evaluate
+    """
+
+    duration: float
+    times: np.ndarray
+    even: bool
+    outputs: tuple[str, ...]
+
+
+def sampling_of(model: LoadedModel, request: Request, turn: float) -> Sampling:
+    """Check what a request says of samples and outputs.
+
+    Parameters
+    ----------
+    turn : time of a turn, infinite where nothing turns [s]
+
+    Raises
+    ------
+    RequestError
+        What was asked for is wrong, with what is allowed.
+    """
+    outputs = output_names(model, request.outputs)
+    duration, times = _sample_times(model, request, turn, outputs)
+    even = request.times is None and request.sample_rate is None
+    return Sampling(duration=duration, times=times, even=even, outputs=outputs)
+
+
+def _sample_times(
+    model: LoadedModel, request: Request, turn: float, outputs: Sequence[str]
+) -> tuple[float, np.ndarray]:
+    """Length of the run, and the times of its samples."""
+    begin = start_time(request.initial)
+    given = ("samples_per_cycle", "times", "sample_rate")
+    several = [f"{name} = {getattr(request, name)!r:.40}" for name in given if getattr(request, name) is not None]
+    if len(several) > 1:
+        raise RequestError(f"{' and '.join(several)} were both given: give one of them.")
+    if request.sample_rate is not None:
+        duration = run_length(model, request, turn)
+        check_length(begin + duration, turn)
+        rate = checked_rate(request.sample_rate)
+        _check_memory(model, duration * rate, outputs)
+        times = times_at(rate, begin, begin + duration)
+        if not times.size:
+            raise RequestError(
+                f"sample_rate: {rate:g} Hz has no sample within the run of {duration:g} s. Give a higher rate, or run "
+                "longer."
+            )
+        return duration, times
+    if request.times is None:
+        duration = run_length(model, request, turn)
+        check_length(begin + duration, turn)
+        per_cycle = _whole("samples_per_cycle", request.samples_per_cycle, model.manifest.run.samples_per_cycle)
+        wanted = np.rint(float(per_cycle) * duration / turn) if math.isfinite(turn) else float(per_cycle)
+        _check_memory(model, wanted, outputs)
+        count = max(1, int(wanted))
+        return duration, begin + duration * (np.arange(count + 1) / count)
+    times = vector(request.times)
+    if times.ndim != 1 or not times.size or not np.all(np.isfinite(times)):
+        raise RequestError(
+            f"times: one or more finite times [s] in a row are expected, not an array of shape {times.shape}"
+            f"{' with NaN or inf' if times.size and not np.all(np.isfinite(times)) else ''}."
+        )
+    falls = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(falls):
+        k = int(falls[0])
+        raise RequestError(
+            f"times: they must increase, but {float(times[k + 1])!r} s follows {float(times[k])!r} s "
+            f"(places {k} and {k + 1}). Sort them, each once: numpy.unique does."
+        )
+    if request.cycles is None and request.duration is None:
+        duration = float(times[-1]) - begin
+        if not duration > 0.0:
+            raise RequestError(
+                f"times: the run ends at the last one, which must be above {begin:g} s, not {float(times[-1])!r}. Or "
+                "give cycles."
+            )
+    else:
+        duration = run_length(model, request, turn)
+        if times[-1] > (begin + duration) * (1.0 + clock.TIME_RESOLUTION):
+            raise RequestError(
+                f"times: the run ends at {begin + duration!r} s, and {float(times[-1])!r} s lies behind it. Run "
+                "longer, or leave cycles and duration out: the run then ends at the last time."
+            )
+    check_length(begin + duration, turn)
+    if times[0] < begin:
+        raise RequestError(
+            f"times: the run starts at {begin:g} s, and {float(times[0])!r} s lies before it. Leave earlier times out."
+        )
+    _check_memory(model, len(times), outputs)
+    return duration, times
+
+
+def checked_rate(given: float) -> float:
+    """A sampling rate above zero [Hz]; RequestError for another."""
+    if not 0.0 < real(given) < math.inf:
+        raise RequestError(f"sample_rate: a frequency above 0 Hz is expected, not {given!r:.80}.")
+    return float(given)
+
+
+def times_at(rate: float, begin: float, end: float) -> np.ndarray:
+    """Whole multiples of one over a rate [Hz] within a run, shape (samples,) [s]."""
+    return np.maximum(np.arange(math.ceil(begin * rate - 1e-6), math.floor(end * rate + 1e-6) + 1) / rate, begin)
+
+
+def _check_memory(model: LoadedModel, count: float, outputs: Sequence[str]) -> None:
+    wanted = set(outputs)
+    columns = len(model.states) + sum(info.size for info in model.manifest.outputs if info.name in wanted)
+    columns += len(model.manifest.inputs)
+    check_memory(
+        f"{count:.10g} samples of",
+        count,
+        columns,
+        "Take fewer samples a cycle or a shorter run, or keep extremes and means only: `Model.reduce` runs without "
+        "samples.",
+    )
+
+
+def output_names(model: LoadedModel, asked: Sequence[str] | None) -> tuple[str, ...]:
+    """Names of outputs, each once; None: all of the scene.
+
+    Raises
+    ------
+    RequestError
+        There is no such output.
+    """
+    if asked is None:
+        return model.outputs
+    names = (asked,) if isinstance(asked, str) else tuple(dict.fromkeys(asked))
+    faults = [no_output(model.manifest, name, model.outputs) for name in names if name not in model.outputs]
+    if faults:
+        raise RequestError("\n".join(faults))
+    return names
+
+
+def _whole(name: str, given: int | None, default: int) -> int:
+    value = default if given is None else given
+    if not (1.0 <= real(value) < math.inf and int(value) == value):
+        raise RequestError(f"{name}: a whole number from 1 on is expected, not {value!r:.80}.")
+    return int(value)
