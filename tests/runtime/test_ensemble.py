@@ -21,6 +21,7 @@ from ballpass.runtime.native.ensemble_driver import EnsembleDriver, MemberArrays
 from ballpass.runtime.native.member_schedule import MOMENTS
 from ballpass.runtime.native.stepper import METHODS, End
 from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run.choose_method import stepper_method
 from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.resolve import SCALED_TURNS
 from ballpass.runtime.run.segments import edge_windows, segment_edges
@@ -334,8 +335,8 @@ def test_wrong_tables_are_refused_before_anything_runs(
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"observables": ["max:ball.forces"]}, "Did you mean 'max:ball.force'"),
-        ({"observables": ["end:ball.force"]}, "no observable"),
+        ({"observables": ["max:ball.forces"]}, "Did you mean 'ball.force'"),
+        ({"observables": ["value:ball.force"]}, "behind @ a crank angle"),
         ({"observables": []}, "one name or more"),
         ({"threads": 0}, "threads"),
         ({"transient": 1}, "nothing is left"),
@@ -531,7 +532,7 @@ def test_members_with_faulty_numbers_are_refused_each_and_the_others_are_untouch
 ) -> None:
     """The driver looks at tolerances and segments as that of single runs does: no member begins that could not end."""
     model = make_model("varying_compliance")
-    driver, family = model.ensemble_driver, METHODS[method]
+    driver, family = model.ensemble_driver, METHODS[stepper_method(method)]
     faults = [0.0, -1e-9, np.nan, 1e-320, 1e-9, 1e-9, 1e-9]
     count = len(faults)
     members = make_members(model, {"bearing.clearance": np.linspace(0.0, 2e-5, count)})

@@ -244,5 +244,5 @@ def test_wrong_requests_are_refused_with_a_remedy(
 
 def test_a_run_that_diverges_says_when(make_model: ModelMaker, boundless: Callable[[Model], Model]) -> None:
     model = boundless(press(make_model, "one-sided"))
-    with pytest.raises(SimulationError, match=r"t = [0-9.e-]+ s, crank angle [0-9.]+ deg, step size"):
+    with pytest.raises(SimulationError, match=r"t = [0-9.e-]+ s, crank angle [0-9.]+ deg. Step size"):
         model.reduce(cycles=2, transient=1, parameters={"bearing.outer_ring.stiffness": -1e13})

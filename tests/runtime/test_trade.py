@@ -107,5 +107,3 @@ def test_wrong_requests_are_refused(make_model: Callable[..., Model]) -> None:
         measure_trade(model, [PEAK], members=1)
     with pytest.raises(RequestError, match="peak_ball_force"):
         measure_trade(model, ["peak_ball_forse"])
-    with pytest.raises(RequestError, match="no error of integration"):
-        measure_trade(model, ["max:drive_torque"])
