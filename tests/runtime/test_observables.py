@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from ballpass.runtime import Model
 from ballpass.runtime.ask.observables import (
-    drive_work,
     orbits,
     statistics,
     stroboscopic_points,
@@ -162,30 +161,6 @@ class TestOrbits:
         time = even(3, 200)
         found = orbits(time, np.cos(1.1 * TURN * time), np.sin(1.1 * TURN * time), cycle_length=1.0)
         assert found[0].gap == pytest.approx(2.0 * np.sin(0.1 * TURN / 2.0))
-
-
-class TestDriveWork:
-    def test_constant_torque_does_its_angle_times_itself(self) -> None:
-        time = even(3, 100, length=0.12)
-        work = drive_work(time, np.full(time.size, 2.0), speed=-TURN / 0.12, cycle_length=0.12)
-        assert work == pytest.approx([-2.0 * TURN] * 3)
-
-    def test_drive_work_equals_work_of_the_punch(self) -> None:
-        # a massless crank-slider: M_d = -F dy_C/d(theta) by virtual work; 9.0784 J is F times the stroke in the window
-        crank, rod, force = 6e-3, 100e-3, 8964.8
-        length = 0.12
-        time = even(2, 2000, length)
-        angle = TURN * time / length
-        across = crank * np.cos(angle)
-        slope = crank * np.cos(angle) - across * crank * np.sin(angle) / np.sqrt(rod**2 - across**2)
-        pressed = (np.degrees(angle) % 360.0 >= 237.0) & (np.degrees(angle) % 360.0 < 267.0)
-        torque = np.where(pressed, -force * slope, 0.0)
-        steps = [length * (turn + degree / 360.0) for turn in (0, 1) for degree in (237.0, 267.0)]
-        work = drive_work(time, torque, speed=TURN / length, cycle_length=length, steps=steps)
-        assert work == pytest.approx([9.0784, 9.0784], abs=6e-5)
-        # and naming the steps is what makes it so
-        rough = drive_work(time, torque, speed=TURN / length, cycle_length=length)
-        assert abs(rough[0] - 9.0784) > 5e-3
 
 
 class TestAmplitudeSpectrum:

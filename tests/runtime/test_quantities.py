@@ -258,3 +258,14 @@ def test_every_kind_is_documented_and_evaluated(make_model: Callable[..., Model]
 def test_quantities_have_words_for_figures(make_model: Callable[..., Model], name: str, words: str) -> None:
     manifest = make_model("punching_press").manifest
     assert quantity_words(manifest, parse_quantity(manifest, name)) == words
+
+
+def test_drive_work_equals_the_work_of_the_punch(make_model: Callable[..., Model]) -> None:
+    """By virtual work: force times the slider's way within the window; masses take as much as they give in a turn."""
+    model = make_model("punching_press")
+    at = {name.rpartition("mechanism.")[2]: value for name, value in model.parameters.items()}
+    crank, rod = 6e-3, 100e-3
+    window = [at[f"forces.punch.window.{end}"] for end in ("start", "end")]
+    high, low = (crank * np.sin(angle) + np.sqrt(rod**2 - (crank * np.cos(angle)) ** 2) for angle in window)
+    work = at["forces.punch.force.magnitude"] * abs(high - low)
+    assert values(model, ["drive_work"], cycles=3, transient=1)["drive_work"] == pytest.approx(work, rel=1e-9)

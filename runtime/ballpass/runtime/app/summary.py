@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import platform
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.metadata import version
 from math import isfinite
@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ballpass.runtime.ask.observables import drive_work, statistics, turns
-from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks
+from ballpass.runtime.ask.observables import statistics, turns
+from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks, run_of
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.extras import is_installed
@@ -29,7 +29,10 @@ from ballpass.runtime.contract.usual import UnusualWarning, unusual
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.quantity.characteristic import frequencies_of
-from ballpass.runtime.run.inputs import breakpoints
+from ballpass.runtime.quantity.grammar import quantities_of
+from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.quantity.track import depends
+from ballpass.runtime.run.inputs import TURN
 from ballpass.runtime.run.settle import MEANS, PEAKS
 
 if TYPE_CHECKING:
@@ -63,7 +66,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
     Parameters
     ----------
     growth : of perturbations, where it was looked for; numbers whose digits the tolerance does not bear then get the
-        mean and the standard deviation over the steady turns of their samples (``over_turns``)
+        mean and the standard deviation over moved starts (``over_starts``)
 
     Returns
     -------
@@ -100,7 +103,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
         summary["cycle_length"] = _numbers("cycle_length", "s", value=steady.period)
         summary["steady_cycles"] = _numbers("steady_cycles", "1", value=turns_run)
     peaks = _peaks(model, steady)
-    summary |= _forces(steady, peaks)
+    summary |= _forces(model, steady, peaks)
     summary |= _conditioning(model, steady)
     summary |= _balls(manifest, peaks)
     summary |= _motions(steady)
@@ -108,7 +111,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
     if growth is not None:
         summary["growth"] = _numbers("growth", "1", value=growth.worst, moved=growth.moved)
         for name in growth.uncertain:
-            _add_spread(summary, steady, name)
+            _add_spread(summary, growth, name)
     summary["versions"] = _versions(steady)
     found = _unusual(steady)
     for text in found:
@@ -132,13 +135,16 @@ def _unusual(sol: Solution) -> list[str]:
                 f"of its diameter: unusual. Usual is at most {100.0 * MOST_DEFLECTION:g} %: contacts are not elastic "
                 "beyond. Check loads, stiffness and their units."
             )
-    length, mechanism = sol.period, sol.manifest.mechanism
-    if mechanism is not None and "drive_torque" in sol.outputs and length is not None and turns(sol.t, length):
-        work, gross = (_work(sol, torque) for torque in (sol["drive_torque"], np.abs(sol["drive_torque"])))
-        if work < -LEAST_WORK * abs(gross):
+    if "drive_torque" in sol.outputs and _has_turn(sol):
+        assert sol.manifest.mechanism is not None  # it turns
+        sense = math.copysign(1.0, sol.parameters[sol.manifest.mechanism.speed])
+        mean, gross = (
+            statistics(sol.t, torque).mean for torque in (sense * sol["drive_torque"], abs(sol["drive_torque"]))
+        )
+        if mean < -LEAST_WORK * gross:
             said.append(
-                f"the drive takes {-work:.4g} J a turn out of the mechanism: unusual. Usual is a drive that gives "
-                "work. Check the directions of forces and speed, and the windows."
+                f"the drive takes {-mean * TURN:.4g} J a turn out of the mechanism: unusual. Usual is a drive that "
+                "gives work. Check the directions of forces and speed, and the windows."
             )
     return said
 
@@ -208,27 +214,19 @@ def _moments(of: Reduction | Statistics) -> dict[str, float]:
     return {"min": of.minimum, "max": of.maximum, "mean": of.mean, "rms": of.rms, "std": of.std}
 
 
-def _add_spread(summary: dict[str, Any], steady: Solution, name: str) -> None:
-    """Mean and standard deviation over the turns, beside the numbers of a channel that have no digits."""
+def _add_spread(summary: dict[str, Any], growth: Growth, name: str) -> None:
+    """Mean and standard deviation over moved starts, beside the numbers of a channel that have no digits."""
     prefix, of_ball, force = name.rpartition("ball.")
-    kinds: dict[str, Callable[[np.ndarray], float]] = {"min": np.min, "max": np.max, "rms": _rms}
+    keys = {kind: kind for kind in ("min", "max", "rms")}
+    entry = summary.get(name)
     if of_ball:
         key = {path: key for key, path in _BALL_FORCES.items()}.get(f"ball.{force}")
-        entry, kinds = summary.get(f"{prefix}peak_ball_force"), {key: np.max} if key is not None else {}
-    else:
-        entry = summary.get(name)
-    if entry is None or not kinds or name not in steady:
-        return
-    length = steady.period
-    parts = (turns(steady.t, length) if length is not None else ()) or (slice(None),)
-    for kind, of in kinds.items():
-        found = [of(steady[name][part]) for part in parts]
-        spread = _numbers(name, entry["unit"], mean=np.mean(found), std=np.std(found))
-        entry.setdefault("over_turns", {})[kind] = spread
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+        entry, keys = summary.get(f"{prefix}peak_ball_force"), {"max": key} if key is not None else {}
+    for kind, key in keys.items():
+        if entry is not None and key in entry:
+            mean, deviation = growth.spread[kind, name]
+            spread = _numbers(name, entry["unit"], mean=mean, std=deviation)
+            entry.setdefault("over_starts", {})[key] = spread
 
 
 def _peaks(model: Model, sol: Solution) -> dict[tuple[str, Kind], Peak]:
@@ -245,36 +243,33 @@ def _peaks(model: Model, sol: Solution) -> dict[tuple[str, Kind], Peak]:
     return dict(zip(wanted, refine_peaks(model, model.numbers(sol.parameters), sol, wanted), strict=True))
 
 
-def _forces(sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
+def _forces(model: Model, sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
     """Extremes of reactions, load and drive torque; the work of the drive."""
     found: dict[str, Any] = {}
     for info in sol.manifest.outputs:
         if (info.name, "min") in peaks:
             low, high = peaks[info.name, "min"], peaks[info.name, "max"]
             found[info.name] = _numbers(info.name, info.unit, min=low.value, max=high.value)
-    mechanism = sol.manifest.mechanism
-    length = sol.period
-    if mechanism is not None and "drive_torque" in found and length is not None and turns(sol.t, length):
-        found["drive_work"] = _numbers("drive_torque", "J", value=_work(sol, sol["drive_torque"]))
+    if "drive_torque" in found and _has_turn(sol):
+        found["drive_work"] = _numbers("drive_torque", "J", value=_drive_work(model, sol))
     return found
 
 
-def _work(sol: Solution, torque: np.ndarray) -> float:
-    """Work of a torque on the driven body, the mean over the turns of a run [J]."""
-    assert sol.manifest.mechanism is not None
-    assert sol.period is not None
-    values = {**sol.parameters, **sol.constants}
-    return float(
-        np.mean(
-            drive_work(
-                sol.t,
-                torque,
-                speed=sol.parameters[sol.manifest.mechanism.speed],
-                cycle_length=sol.period,
-                steps=breakpoints(sol.manifest.inputs, values, float(sol.t[0]), float(sol.t[-1])),
-            )
-        )
-    )
+def _has_turn(sol: Solution) -> bool:
+    """Whether the driver makes a whole turn at constant speed."""
+    mechanism, length = sol.manifest.mechanism, sol.period
+    return mechanism is not None and not mechanism.angle and length is not None and bool(turns(sol.t, length))
+
+
+def _drive_work(model: Model, sol: Solution) -> float:
+    """Work of the drive in a turn [J]: the quantity, where the output follows from time or from steps."""
+    numbers = model.numbers(sol.parameters)
+    if model.has_stepper or not depends(model, "drive_torque", "x"):
+        quantities = quantities_of(model, ["drive_work"])
+        return float(QuantityRun(model, quantities).measure(run_of(model, numbers, sol)).values[0])
+    assert sol.manifest.mechanism is not None  # it has a torque
+    angle = math.copysign(TURN, sol.parameters[sol.manifest.mechanism.speed])
+    return angle * statistics(sol.t, sol["drive_torque"]).mean
 
 
 def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:

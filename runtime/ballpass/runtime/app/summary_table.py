@@ -60,10 +60,10 @@ def render_summary(summary: Mapping[str, Any]) -> Table:
 
 
 def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
-    """A number of the table; where it has no digits, mean and standard deviation over the turns."""
-    spread = item.get("over_turns", {}).get(key)
+    """A number of the table; where it has no digits, with twice its standard deviation over moved starts."""
+    spread = item.get("over_starts", {}).get(key)
     if spread is not None:
-        return f"{factor * spread['mean']:z.3g} ± {factor * spread['std']:.1g}"
+        return f"{factor * item[key]:z.3g} ± {2.0 * factor * spread['std']:.1g}"
     return f"{factor * item[key]:z.4g}" if key in item else ""
 
 
@@ -90,8 +90,8 @@ def _caption(summary: Mapping[str, Any]) -> str:
         if key == "damping_law" or key.endswith(".damping_law")
     )
     law = [f"damping law {laws}"] if laws else []
-    if any("over_turns" in item for item in summary.values() if isinstance(item, Mapping)):
-        law.append("± mean and standard deviation over the steady turns")
+    if any("over_starts" in item for item in summary.values() if isinstance(item, Mapping)):
+        law.append("± twice the standard deviation over moved starts")
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
     sampled = [] if summary["method"].startswith("stepper") else ["extremes of the samples alone"]
     return f"{', '.join(run + sampled + law)}.\n{', '.join(tools)}."

@@ -1,4 +1,4 @@
-"""What people ask of a run: turns, statistics, stroboscopic points, orbit, work of the drive.
+"""What people ask of a run: turns, statistics, stroboscopic points, orbit.
 
 In: plain numpy arrays in SI.  Out: numbers, arrays and small frozen records in SI.  Spectra are in `spectrum`.
 """
@@ -177,42 +177,6 @@ def orbits(t: ArrayLike, x: ArrayLike, y: ArrayLike, *, cycle_length: float) -> 
         )
         for turn in turns(time, cycle_length)
     )
-
-
-def drive_work(t: ArrayLike, torque: ArrayLike, *, speed: float, cycle_length: float, steps: ArrayLike = ()) -> Array:
-    """Work of the drive in each whole turn, the integral of M_d d(theta) [J].
-
-    Trapezoidal rule.  Where the torque steps, it is continued in a straight line from both sides up to the step: second
-    order with loads that act within windows as well.  A step not named in `steps` costs up to half of it times the
-    angle of a sampling step.
-
-    Parameters
-    ----------
-    t : (n,) increasing times [s]
-    torque : (n,) torque of the drive on the driven body, counter-clockwise [N*m]
-    speed : angular speed of the driven body, counter-clockwise [rad/s]
-    cycle_length : length of a turn [s]
-    steps : (k,) times at which the torque steps; a sample at such a time holds the value behind the step [s]
-
-    Returns
-    -------
-    (turns,) oldest first [J]
-    """
-    time = _increasing(t)
-    moment = _like(time, torque, "torque")
-    parts = np.diff(time) * (moment[1:] + moment[:-1]) / 2.0
-    for step in np.asarray(steps, dtype=float):
-        k = int(np.searchsorted(time, step, side="left")) - 1  # time[k] < step <= time[k + 1]
-        if 1 <= k < time.size - 2:
-            parts[k] = _continued(time, moment, k, k - 1, step) - _continued(time, moment, k + 1, k + 2, step)
-    return np.array([speed * np.sum(parts[turn.start : turn.stop - 1]) for turn in turns(time, cycle_length)])
-
-
-def _continued(time: Array, values: Array, near: int, far: int, end: float) -> float:
-    """Integral from sample `near` to the time `end` of the straight line through the samples `far` and `near`."""
-    slope = (values[near] - values[far]) / (time[near] - time[far])
-    span = end - time[near]
-    return float(span * (values[near] + slope * span / 2.0))
 
 
 def _increasing(t: ArrayLike) -> Array:

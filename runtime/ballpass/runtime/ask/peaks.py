@@ -4,16 +4,15 @@ Ball forces have spikes narrower than a sample interval; samples alone read them
 
 - States, and the largest ball forces, are reduced in every step of a run of the project's own stepper
   (`Solution.reductions`): their extremes are there.
-- Outputs that follow from time alone are evaluated on a grid in every segment between load switches, both its ends
-  included, and on finer ones around the best point.
-- Of all others, the smallest force of any ball or whatever a run of CasADi's integrators gives, the samples are told.
+- All other outputs are evaluated along nodes within those steps, as any quantity is (`ballpass.runtime.quantity`);
+  those that follow from time alone without a run.
+- Of the rest, the smallest force of any ball or what depends on a run of CasADi's integrators, the samples are given.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -22,9 +21,13 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
+from ballpass.runtime.native.stepper import METHODS as STEPPERS
+from ballpass.runtime.quantity.grammar import quantities_of
+from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.track import depends
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.segments import make_segments, segment_edges
+from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER
+from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.run.solution import Solution
 
 Kind = Literal["max", "min"]
@@ -34,15 +37,6 @@ SIGNS: Mapping[Kind, float] = {"max": 1.0, "min": -1.0}
 
 #: How a peak was looked for between the samples.
 Searched = Literal["every step", "dense samples", "samples"]
-
-#: Points of the first grid in a turn, the fewest in a segment, and segments that are evaluated at once.
-POINTS, FEWEST, TOGETHER = 512, 16, 256
-
-#: Grids around the best point, each 32 times as fine as the one before, and the intervals of each.
-ROUNDS, FINER = 3, 64
-
-#: What turns so many times in a turn, to this fraction, comes back with it [1].
-ALIKE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,10 +49,10 @@ class Peak:
     time : when [s]
     ball : which ball, counted from 1; None for outputs without balls
     sampled : the value that the samples alone show
-    searched : where was looked for it.  ``every step``: in each step of the run, looked at in its quarters (those of
-        ``stepper-dop853`` in eighths); what begins and ends between two of them, as a brief contact, is not seen.
-        ``dense samples``: on a grid of its own, for the output follows from time alone.  ``samples``: nowhere else;
-        more samples may show more
+    searched : where it was searched.  ``every step``: in each step of the run, evaluated in its quarters (those of
+        ``stepper-dop853`` in eighths) or at Gauss's nodes; what begins and ends between two of them, as a brief
+        contact, is not seen.  ``dense samples``: on a grid of its own, for the output follows from time alone.
+        ``samples``: nowhere else; more samples may show more
 
     Examples
     --------
@@ -99,18 +93,49 @@ def refine_peaks(
     """Several peaks of one run; else as `refine_peak`."""
     sampled = [_of_samples(solution, name, kind) for name, kind in wanted]
     found = [_of_steps(solution, name, kind, peak) for (name, kind), peak in zip(wanted, sampled, strict=True)]
-    of_time = {
-        name
-        for (name, _), peak in zip(wanted, found, strict=True)
-        if peak.searched == "samples" and name not in model.states and not depends(model, name, "x")
-    }
-    if of_time and len(solution) > 1:
-        grid = _TimeGrid(model, numbers, solution, sorted(of_time))
-        found = [
-            grid.peak(name, kind, peak) if name in of_time else peak
-            for (name, kind), peak in zip(wanted, found, strict=True)
-        ]
+    left = [
+        k
+        for k, ((name, kind), peak) in enumerate(zip(wanted, found, strict=True))
+        if peak.searched == "samples" and name not in model.states and not _of_any_ball(solution, name, kind)
+    ]
+    if left and len(solution) > 1 and (model.has_stepper or all(_is_of_time(model, wanted[k][0]) for k in left)):
+        quantities = quantities_of(model, [f"{kind}:{name}" for name, kind in (wanted[k] for k in left)])
+        estimates = QuantityRun(model, quantities).measure(run_of(model, numbers, solution)).estimates
+        for k, one in zip(left, estimates, strict=True):
+            assert one.time is not None  # it is an extreme
+            searched: Searched = "dense samples" if _is_of_time(model, wanted[k][0]) else "every step"
+            found[k] = replace(found[k], value=one.value, time=one.time, ball=one.ball, searched=searched)
     return found
+
+
+def run_of(model: LoadedModel, numbers: Numbers, solution: Solution) -> Run:
+    """The run that a solution is of, from its first sample to its last."""
+    statistics = solution.statistics
+    kinks = LOCATED if statistics.kinks == LOCATED else STEPPED_OVER
+    return Run(
+        model=model,
+        numbers=numbers,
+        begin=statistics.begin,
+        end=float(solution.t[-1]),
+        turn=clock.period(model.manifest, numbers.values),
+        turns=None,
+        transient_cycles=solution.transient_cycles,
+        start=float(solution.t[0]),
+        initial=np.array(statistics.initial),
+        method=statistics.method if statistics.method in STEPPERS else "stepper",
+        rtol=statistics.rtol,
+        kinks=kinks,
+        magnitude=np.array(statistics.magnitudes),
+    )
+
+
+def _is_of_time(model: LoadedModel, name: str) -> bool:
+    return not depends(model, name, "x")
+
+
+def _of_any_ball(solution: Solution, name: str, kind: Kind) -> bool:
+    """Whether the smallest force of any ball is asked for, where steps give that of the most loaded one."""
+    return kind == "min" and solution[name].ndim == 2
 
 
 def _of_samples(solution: Solution, name: str, kind: Kind) -> Peak:
@@ -141,68 +166,3 @@ def _of_steps(solution: Solution, name: str, kind: Kind, peak: Peak) -> Peak:
         else (entry.minimum, entry.minimum_time, entry.minimum_ball)
     )
     return Peak(value=value, time=time, ball=ball, sampled=peak.sampled, searched="every step")
-
-
-class _TimeGrid:
-    """Outputs that follow from time alone, on a grid over the samples' time that ends on both sides of every edge."""
-
-    def __init__(self, model: LoadedModel, numbers: Numbers, solution: Solution, names: Sequence[str]) -> None:
-        self._model, self._numbers, self._names = model, numbers, names
-        begin, end = float(solution.t[0]), float(solution.t[-1])
-        turn = clock.period(model.manifest, numbers.values)
-        if _comes_back(model, numbers, names, turn):
-            end = min(end, begin + turn)
-        self._segments = make_segments(model.manifest.inputs, numbers, segment_edges(model, numbers, begin, end, turn))
-        self._lengths = np.diff(self._segments.times)
-        self._counts = np.maximum(FEWEST, np.ceil(POINTS * self._lengths / min(turn, end - begin))).astype(int)
-        #: Value, segment, time since its start and column of the best point of each output.
-        self._best: dict[tuple[str, Kind], tuple[float, int, float, int]] = {}
-        for first in range(0, len(self._lengths), TOGETHER):
-            some = range(first, min(first + TOGETHER, len(self._lengths)))
-            segment = np.repeat(some, self._counts[some] + 1)
-            self._look(segment, np.concatenate([np.linspace(0.0, self._lengths[k], self._counts[k] + 1) for k in some]))
-
-    def peak(self, name: str, kind: Kind, sampled: Peak) -> Peak:
-        """The extreme of one output, closely."""
-        _, segment, _, _ = self._best[name, kind]
-        length, width = self._lengths[segment], self._lengths[segment] / self._counts[segment]
-        for _ in range(ROUNDS):
-            middle = self._best[name, kind][2]
-            around = np.clip(np.linspace(middle - width, middle + width, FINER + 1), 0.0, length)
-            self._look(np.full(len(around), segment), around)
-            width *= 2.0 / FINER
-        value, _, local, column = self._best[name, kind]
-        return Peak(
-            value=value,
-            time=float(self._segments.times[segment]) + local,
-            ball=None if sampled.ball is None else column + 1,
-            sampled=sampled.sampled,
-            searched="dense samples",
-        )
-
-    def _look(self, segment: np.ndarray, local: np.ndarray) -> None:
-        """Evaluate the outputs at times within segments, and keep the best point of each."""
-        given = {
-            "t": local,
-            "x": np.zeros((len(local), len(self._model.states))),
-            "u": self._segments.inputs[segment],
-            "p": self._numbers.p,
-            "c": self._numbers.c,
-        }
-        found = self._model.sample_outputs(len(local), given, list(self._names))
-        for name in self._names:
-            for kind, sign in SIGNS.items():
-                k, column = divmod(int(np.argmax(sign * found[name])), found[name].shape[1])
-                value, known = float(found[name][k, column]), self._best.get((name, kind))
-                if known is None or sign * value > sign * known[0]:
-                    self._best[name, kind] = (value, int(segment[k]), float(local[k]), column)
-
-
-def _comes_back(model: LoadedModel, numbers: Numbers, names: Sequence[str], turn: float) -> bool:
-    """Whether what these outputs depend on comes back with each turn."""
-    places = dict.fromkeys(k for name in names for k in depends(model, name, "u"))
-    inputs = [model.manifest.inputs[k] for k in places]
-    if not math.isfinite(turn) or not all(item.rate for item in inputs):
-        return False
-    turns = np.array([numbers.values[item.rate] * turn / clock.TURN for item in inputs])
-    return bool(np.all(np.abs(turns - np.rint(turns)) <= ALIKE))

@@ -38,9 +38,6 @@ FIRST_STEP, LARGER, SMALLER = 1e-3, 10.0, 0.1
 #: Most triangles of a parameter, and steps of each.
 TRIANGLES, HALVINGS = 3, 3
 
-#: Most parameters that what is slow and less noisy is asked about.
-FEW = 4
-
 #: Slopes on both sides of a parameter's value that differ by so many times what is allowed are those of a kink.
 KINK = 5.0
 
@@ -208,7 +205,6 @@ def by_differences(
     quantum: Array,
     agreement: float = AGREEMENT,
     slopes: Array | None = None,
-    closer: Callable[[], Measure] | None = None,
 ) -> Second:
     """Derivatives of quantities by Richardson-extrapolated central differences, with step control.
 
@@ -225,7 +221,6 @@ def by_differences(
     quantum : derivatives that count as nothing, shape (quantities, parameters)
     agreement : relative disagreement that will be allowed [1]
     slopes : the derivatives that are to be checked, shape (quantities, parameters)
-    closer : makes what measures slowly and with less noise, for the last triangle of a few parameters
     """
     names, centre = list(at), np.array(list(at.values()))
     jitter = measure(_jittered(at, scales))
@@ -243,10 +238,6 @@ def by_differences(
     for tried in range(1, TRIANGLES + 1):
         if not len(left):
             break
-        if tried == TRIANGLES and closer is not None and len(left) <= FEW:
-            measure = closer()
-            jitter = measure(_jittered(at, scales))
-            noise, quantities = _noise(jitter), jitter[len(jitter) // 2]
         halves = 0.5 ** np.arange(HALVINGS)
         reach = (step * scales)[left, None] * halves
         upper, lower = centre[left, None] + reach, centre[left, None] - reach

@@ -12,7 +12,7 @@ jumps are seen as others are.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,7 +44,10 @@ LOOSEST = 1e-6
 #: Change of a start that derivatives are to be good for [1].
 TINY = 1e-10
 
-#: What is looked at of each channel.
+#: Moved starts over which the numbers of an uncertain channel are spread.
+STARTS = 20
+
+#: What is compared of each channel.
 KINDS = ("min", "max", "rms")
 
 #: Observables that name a moment or a ball: they may jump from one peak to another as high.
@@ -60,11 +63,13 @@ class Growth(ShortRepr):
     moved : how far each position was moved at the start, in its magnitudes [1]
     changes : largest change of minimum, maximum and rms of each channel, relative to the largest of them [1]
     uncertain : channels whose digits the tolerance does not bear
+    spread : of each of these, by "min", "max" and "rms": mean and standard deviation over `STARTS` moved starts
     """
 
     moved: float
     changes: Mapping[str, float]
     uncertain: tuple[str, ...]
+    spread: Mapping[tuple[str, str], tuple[float, float]] = field(default_factory=dict)
 
     @property
     def worst(self) -> float:
@@ -85,8 +90,12 @@ class Growth(ShortRepr):
         )
 
 
-def find_growth(model: LoadedModel, numbers: Numbers, request: Request) -> Growth:
+def find_growth(model: LoadedModel, numbers: Numbers, request: Request, *, spread: bool = True) -> Growth:
     """Compare a run with one from a moved start, both by the project's own stepper.
+
+    Parameters
+    ----------
+    spread : run more moved starts where digits are uncertain, for `Growth.spread`
 
     Raises
     ------
@@ -98,10 +107,12 @@ def find_growth(model: LoadedModel, numbers: Numbers, request: Request) -> Growt
     run = stepper_run(model, numbers, request)
     rtol = min(run.rtol, LOOSEST)
     kinks = choose_kinks(request.kinks, "stepper", model.manifest, rtol)
-    found = _compare(run, MethodChoice(method="stepper", rtol=rtol, kinks=kinks))
-    if not found.uncertain or kinks == LOCATED:
-        return found
-    return _compare(run, MethodChoice(method="stepper", rtol=rtol, kinks=LOCATED))
+    way = MethodChoice(method="stepper", rtol=rtol, kinks=kinks)
+    found = _compare(run, way)
+    if found.uncertain and kinks != LOCATED:
+        way = replace(way, kinks=LOCATED)
+        found = _compare(run, way)
+    return replace(found, spread=_spread(run, way, found)) if found.uncertain and spread else found
 
 
 def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quantities: Sequence[str]) -> None:
@@ -112,7 +123,7 @@ def refuse_growth(model: LoadedModel, numbers: Numbers, request: Request, quanti
     SimulationError
         A start moved by `TINY` changes an extreme of the motion by more than four digits bear.
     """
-    found = find_growth(model, numbers, replace(request, rtol=TINY))
+    found = find_growth(model, numbers, replace(request, rtol=TINY), spread=False)
     if found.uncertain:
         worst = max(found.uncertain, key=lambda name: found.changes[name])
         raise SimulationError(
@@ -143,6 +154,20 @@ def _compare(run: Run, way: MethodChoice) -> Growth:
         if change > max(DIGITS * largest, tolerated.get(name, 0.0)):
             uncertain.append(name)
     return Growth(moved=way.rtol, changes=changes, uncertain=tuple(uncertain))
+
+
+def _spread(run: Run, way: MethodChoice, found: Growth) -> dict[tuple[str, str], tuple[float, float]]:
+    """Mean and standard deviation of uncertain numbers over starts that are moved by one tolerance, two, ..."""
+    names = [(kind, channel) for channel in found.uncertain for kind in KINDS]
+    quantities = QuantityRun(run.model, quantities_of(run.model, [f"{kind}:{channel}" for kind, channel in names]))
+    moved = way.rtol * run.magnitude[: len(run.magnitude) // 2]
+    every = []
+    for k in range(STARTS):
+        every.append(way.measure(quantities, replace(run, progress=None), (k + 1) * moved).values)
+        if run.progress is not None:
+            run.progress((k + 1) / STARTS)
+    mean, deviation = np.mean(every, axis=0).tolist(), np.std(every, axis=0).tolist()
+    return dict(zip(names, zip(mean, deviation, strict=True), strict=True))
 
 
 def simulate_members(

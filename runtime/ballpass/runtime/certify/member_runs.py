@@ -46,7 +46,6 @@ class MemberRuns:
     request : what was asked for
     quantities : as well
     fine : method for tight runs
-    closer : take what the balls carry along nodes too: slower, but integrals are cut where balls change rank
     progress : told the finished part of each call
     """
 
@@ -57,20 +56,16 @@ class MemberRuns:
         quantities: Sequence[Quantity],
         *,
         fine: str,
-        closer: bool = False,
         progress: Callable[[float], None] = lambda _done: None,
     ) -> None:
         self._run, self._request, self._progress = run, request, progress
         model = run.model
         self._count = len(quantities)
         self._reduced = {
-            k: item.name for k, item in enumerate(quantities) if is_reduced(model, item) and _is_near(run, item, closer)
+            k: item.name for k, item in enumerate(quantities) if is_reduced(model, item) and _is_near(run, item)
         }
         self._others = {k: item for k, item in enumerate(quantities) if k not in self._reduced}
-        # steps do not end where two balls change rank; the shorter ones of a lower order take less noise from there
-        ranked = any(not KINDS[item.kind].extremes and item.channel not in model.states for item in quantities)
-        self._method = "stepper-dp54" if ranked and fine == "stepper-dop853" else fine
-        self._fine = fine
+        self._method = fine
         self._along = QuantityRun(model, list(self._others.values()), rough=ROUGHNESS * ROUGH, along_nodes=True)
 
     def __call__(self, changes: Sequence[Mapping[str, float]]) -> Array:
@@ -105,7 +100,7 @@ class MemberRuns:
 
     def _along_nodes(self, change: Mapping[str, float]) -> Array:
         model = self._run.model
-        request = replace(self._request, method=self._fine, rtol=RTOL, kinks=LOCATED, progress=None)
+        request = replace(self._request, method=self._method, rtol=RTOL, kinks=LOCATED, progress=None)
         try:
             run = resolve(model, neighbour(model, self._run.numbers, change), request)
             # the magnitudes of the run itself: a tolerance that changes with the parameters is noise
@@ -114,7 +109,7 @@ class MemberRuns:
             return np.full(len(self._others), np.nan)
 
 
-def _is_near(run: Run, quantity: Quantity, closer: bool) -> bool:
+def _is_near(run: Run, quantity: Quantity) -> bool:
     """Whether the reductions of steps are as near as the values along nodes.
 
     The most loaded ball carries least where two change rank, which the driver's steps do not end on; its integrals have
@@ -122,6 +117,4 @@ def _is_near(run: Run, quantity: Quantity, closer: bool) -> bool:
     """
     if quantity.channel in run.model.states:
         return True
-    if KINDS[quantity.kind].takes != "channel":
-        return False
-    return quantity.kind in ("max", "peak_time", "peak_ball") or (quantity.kind in ("mean", "rms") and not closer)
+    return KINDS[quantity.kind].extremes == ("max",)

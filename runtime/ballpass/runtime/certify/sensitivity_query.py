@@ -188,15 +188,14 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
     second = None
     if query.check:
         tell("checking", 0.0)
-        members = partial(MemberRuns, run, query.request, quantities, fine=fine, progress=partial(tell, "checking"))
+        members = MemberRuns(run, query.request, quantities, fine=fine, progress=partial(tell, "checking"))
         second = by_differences(
-            members(closer=False),
+            members,
             {name: numbers.parameters[name] for name in names},
             difference_scales,
             quantum=quantum,
             agreement=query.agreement,
             slopes=slopes,
-            closer=partial(members, closer=True),
         )
         with np.errstate(invalid="ignore", divide="ignore"):
             # what the routes differ in tells how well quadratures and extremes are known

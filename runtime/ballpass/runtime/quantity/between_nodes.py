@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ballpass.runtime.quantity.nodes import Edges, Nodes
+from ballpass.runtime.quantity.nodes import Edges, Nodes, find
 from ballpass.runtime.quantity.track import Signal, Track
 
 Array = NDArray[np.float64]
@@ -41,12 +41,14 @@ class Wanted:
     ball : column to look at; None for the most loaded ball at each moment
     sign : 1 for the largest value, -1 for the smallest
     seen : when the reductions saw it [s]; None where they do not hold it
+    exact : whether that is the moment itself
     """
 
     channel: str
     ball: int | None
     sign: float
     seen: float | None
+    exact: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,9 +101,9 @@ def find_extremes(
     look : the channels of the same run along other nodes
     """
     edges = track.edges
-    brackets = [_brackets(item, track, signals[item.channel].value) for item in wanted]
+    brackets = [[] if item.exact else _brackets(item, track, signals[item.channel].value) for item in wanted]
     every = [bracket for some in brackets for bracket in some]
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDS if every else 0):
         for bracket in every:
             bracket.times = np.linspace(bracket.low, bracket.high, GRID)
         times = np.concatenate([bracket.times for bracket in every])
@@ -112,19 +114,52 @@ def find_extremes(
             bracket.low, bracket.high = bracket.times[max(best - 1, 0)], bracket.times[min(best + 1, GRID - 1)]
     return [
         _ranked(item, [_extreme(bracket, edges) for bracket in some], edges)
+        if some
+        else _seen(item, track, signals[item.channel].value)
         for item, some in zip(wanted, brackets, strict=True)
     ]
+
+
+def _seen(wanted: Wanted, track: Track, values: Array) -> list[Extreme]:
+    """The moment that the reductions saw, and the best nodes elsewhere, as they are: they only show what competes."""
+    nodes, edges = track.nodes, track.edges
+    assert wanted.seen is not None  # it is exact
+    height = wanted.sign * np.max(values, axis=1)
+    found = [_at_node(nodes, values, int(k), wanted.sign) for k in _tops(nodes, height)[:CANDIDATES]]
+    k = int(np.argmin(np.abs(nodes.t - wanted.seen)))
+    segment, fraction = find(edges, wanted.seen)
+    near = 1e-9 * edges.length / float(edges.times[segment + 1] - edges.times[segment])
+    fraction = 0.0 if fraction < near else 1.0 if 1.0 - fraction < near else fraction
+    best = replace(_at_node(nodes, values, k, wanted.sign), time=wanted.seen, segment=segment, fraction=fraction)
+    apart = 4.0 * edges.length / len(nodes)
+    return [best, *(item for item in found if abs(item.time - best.time) > apart)]
+
+
+def _at_node(nodes: Nodes, values: Array, k: int, sign: float) -> Extreme:
+    column = int(np.argmax(sign * values[k])) if sign > 0.0 else int(np.argmax(values[k]))
+    return Extreme(
+        value=float(values[k, column]),
+        time=float(nodes.t[k]),
+        segment=int(nodes.segment[k]),
+        fraction=float(nodes.fraction[k]),
+        column=column,
+    )
+
+
+def _tops(nodes: Nodes, height: Array) -> NDArray[np.int_]:
+    """Nodes that no neighbour in the same interval exceeds, the best first."""
+    same = np.diff(nodes.segment) == 0
+    before = np.concatenate([[-np.inf], np.where(same, height[:-1], -np.inf)])
+    behind = np.concatenate([np.where(same, height[1:], -np.inf), [-np.inf]])
+    tops = np.flatnonzero((height >= before) & (height >= behind))
+    return tops[np.argsort(-height[tops], kind="stable")]
 
 
 def _brackets(wanted: Wanted, track: Track, values: Array) -> list[_Bracket]:
     """Times around the best nodes that no neighbour in the same segment exceeds, and around the moment seen."""
     nodes, edges = track.nodes, track.edges
     height = wanted.sign * (values[:, wanted.ball] if wanted.ball is not None else np.max(values, axis=1))
-    same = np.diff(nodes.segment) == 0
-    before = np.concatenate([[-np.inf], np.where(same, height[:-1], -np.inf)])
-    behind = np.concatenate([np.where(same, height[1:], -np.inf), [-np.inf]])
-    tops = np.flatnonzero((height >= before) & (height >= behind))
-    ranked = tops[np.argsort(-height[tops], kind="stable")]
+    same, ranked = np.diff(nodes.segment) == 0, _tops(nodes, height)
     found = []
     for k in [_top(height), *ranked[:CANDIDATES].tolist()]:
         low, high = (k - 1 if k and same[k - 1] else k), (k + 1 if k < len(same) and same[k] else k)
@@ -145,7 +180,8 @@ def _nodes(edges: Edges, t: Array, segment: NDArray[np.int_]) -> Nodes:
     """Nodes that stand still and carry no weight."""
     still = np.zeros((len(t), 0))
     held = edges.segment[segment]
-    return Nodes(t=t, weight=np.zeros(len(t)), segment=segment, held=held, slope=still, weight_slope=still)
+    zeros = np.zeros(len(t))
+    return Nodes(t=t, weight=zeros, segment=segment, fraction=zeros, held=held, slope=still, weight_slope=still)
 
 
 def _height(bracket: _Bracket) -> Array:

@@ -74,7 +74,7 @@ class Nodes:
     ----------
     t : shape (nodes,) [s]
     weight : weights of integrals over time, shape (nodes,) [s]
-    segment : interval between edges, shape (nodes,)
+    segment, fraction : interval between edges, and place within it, shape (nodes,)
     held : segment of the driver whose inputs hold, shape (nodes,)
     slope, weight_slope : derivatives of both along the directions, shape (nodes, directions)
     """
@@ -82,6 +82,7 @@ class Nodes:
     t: Array
     weight: Array
     segment: NDArray[np.int_]
+    fraction: Array
     held: NDArray[np.int_]
     slope: Array
     weight_slope: Array
@@ -146,6 +147,11 @@ def turn_slope(run: Run, chain: Chain) -> Array:
     return np.asarray(-run.turn / speed * chain.derivative(name))
 
 
+def no_nodes() -> NodePlan:
+    """A plan without nodes."""
+    return NodePlan(segment=np.zeros(0, dtype=np.int_), fraction=np.zeros(0), weight=np.zeros(0))
+
+
 def with_points(plan: NodePlan, points: Sequence[tuple[int, float]]) -> NodePlan:
     """A plan with further nodes (segment, fraction) that carry no weight, in order of time."""
     if not points:
@@ -167,6 +173,7 @@ def place(plan: NodePlan, edges: Edges) -> Nodes:
         t=t,
         weight=plan.weight * (right - left),
         segment=plan.segment,
+        fraction=plan.fraction,
         held=edges.segment[plan.segment],
         slope=left_slope + inner * (right_slope - left_slope),
         weight_slope=plan.weight[:, None] * (right_slope - left_slope),

@@ -137,7 +137,7 @@ def panels_between(edges: Edges, cuts: Array, kinks: NDArray[np.bool_]) -> Panel
 def split(panels: Panels, parts: NDArray[np.int_]) -> Panels:
     """Each panel in so many equal parts."""
     if np.all(parts == 1):
-        return panels
+        return panels  # itself
     first = np.repeat(np.cumsum(parts) - parts, parts)
     place = np.arange(int(np.sum(parts))) - first
     begin, end, of = (np.repeat(item, parts) for item in (panels.begin, panels.end, parts))

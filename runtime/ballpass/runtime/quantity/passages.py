@@ -84,5 +84,6 @@ def _there(
     """The run at these times, which stand still."""
     still = np.zeros((len(times), 0 if chain is None else len(chain.names)))
     held = np.searchsorted(track.segments.times, times) - 1
-    nodes = Nodes(t=times, weight=np.zeros(len(times)), segment=held, held=held, slope=still, weight_slope=still)
+    zeros = np.zeros(len(times))
+    nodes = Nodes(t=times, weight=zeros, segment=held, fraction=zeros, held=held, slope=still, weight_slope=still)
     return follow(run, track.segments, track.edges, nodes, chain, sensitivity_rtol)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import time as clocks
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,17 @@ from ballpass.runtime.native.stepper import Segments
 from ballpass.runtime.quantity.between_nodes import Extreme, Wanted, find_extremes
 from ballpass.runtime.quantity.kinks import DEFLECTION, find_kinks
 from ballpass.runtime.quantity.location import Moment, place_of, place_slope
-from ballpass.runtime.quantity.nodes import Edges, NodePlan, Nodes, find, make_edges, place, with_passages, with_points
+from ballpass.runtime.quantity.nodes import (
+    Edges,
+    NodePlan,
+    Nodes,
+    find,
+    make_edges,
+    no_nodes,
+    place,
+    with_passages,
+    with_points,
+)
 from ballpass.runtime.quantity.panels import (
     GAUSS,
     ROUGH,
@@ -145,7 +155,7 @@ class QuantityRun:
     ) -> None:
         self.model = model
         self.quantities = tuple(quantities)
-        self._rough, self._motion = rough, motion
+        self._rough, self._motion, self._along_nodes = rough, motion, along_nodes
         self._moving = [item for item in quantities if _kind(item).at_rest is None]
         self._reduced = {} if along_nodes else {item.name: item for item in self._moving if is_reduced(model, item)}
         self._noded = [item for item in self._moving if item.name not in self._reduced]
@@ -210,7 +220,8 @@ class QuantityRun:
         }
         extremes = [(item.segment, item.fraction) for some in laid.extremes.values() for item in some]
         points = list(dict.fromkeys([*extremes, *(point for some in around.values() for point in some)]))
-        plan = with_points(laid.plan, points)
+        integrated = any(not (_kind(item).extremes or _kind(item).at_moment) for item in self._moving)
+        plan = with_points(laid.plan if integrated else no_nodes(), points)
         nodes, marks = self._nodes(run, laid, edges, plan, chain)
         track = follow(run, laid.segments, edges, nodes, chain, sensitivity_rtol, still=self._still)
         for key, some in laid.extremes.items():
@@ -278,29 +289,40 @@ class QuantityRun:
         return Values(estimates=estimates, track=track, row=row, seconds=seconds, steps=steps, rejected=rejected), laid
 
     def _lay(self, run: Run, ends: Array, row: Array, noded: Sequence[Quantity]) -> _Laid:
-        """Lay nodes within the steps of a run, and follow it along them."""
-        (segments,) = joined_segments(
-            run_windows(run.model, run.numbers, (run.begin, run.end), run.turn, run.start), all_=True
-        )
+        """Lay nodes within the steps of a run, as fine as the signals need, and follow it along them."""
+        windows = run_windows(run.model, run.numbers, (run.begin, run.end), run.turn, run.start)
+        (segments,) = joined_segments(windows, all_=True)
         edges = make_edges(run, segments, None)
+        # what is resolved: integrals, and extremes that the reductions do not hold
+        channels = dict.fromkeys(item.channel for item in noded if not self._is_found(item))
+        steep = [item.channel for item in noded if _kind(item).steep]
+        # states are smooth where contacts begin
+        kinks = (ends[:, 1] > 0.0) & any(name not in self.model.states for name in channels)
+        panels = uniform_panels(edges, run.turn) if self._still else panels_between(edges, ends[:, 0], kinks)
         passages = Passages(times=np.zeros(0), edges=(), near=0.0)
-        summed = list(dict.fromkeys(item.channel for item in noded if not _kind(item).at_moment))
-        by_steps = panels_between(edges, ends[:, 0], ends[:, 1] > 0.0)
-        panels = uniform_panels(edges, run.turn) if self._still else by_steps
-        track, signals, panels, plan = self._resolve(run, segments, edges, panels, noded)
-        changed = False
-        if self.model.manifest.edges and summed:
-            passages = find_passages(run, track)
-            if len(passages.times):
-                edges = with_passages(edges, passages.times, np.zeros((len(passages.times), 0)))
-                panels, changed = panels_between(edges, ends[:, 0], ends[:, 1] > 0.0), True
-        times = self._kinks(track, signals, noded, run)
-        if len(times):
-            panels, changed = cut_at(panels, edges, times), True
-        if changed:
+        for _ in range(PASSES):
             plan = plan_of(panels, edges)
             track = follow(run, segments, edges, place(plan, edges), still=self._still)
             signals = self._channels.along(track, run.numbers)
+            if not channels or passages.edges:
+                break
+            parts = self._parts(panels, signals, track.nodes, channels, steep)
+            finer = split(panels, parts)
+            found = find_passages(run, track)
+            times = self._kinks(track, signals, noded, run)
+            if found.edges:
+                passages = found
+                edges = with_passages(edges, passages.times, np.zeros((len(passages.times), 0)))
+                finer = panels_between(edges, ends[:, 0], kinks)
+            finer = cut_at(finer, edges, times)
+            if finer is panels:
+                break
+            panels = finer
+            if not self._still:  # steps are fine enough to tell how fine they have to be
+                plan = plan_of(panels, edges)
+                track = follow(run, segments, edges, place(plan, edges))
+                signals = self._channels.along(track, run.numbers)
+                break
         asked = [(item, kind) for item in noded for kind in _kind(item).extremes]
         extremes = self._extremes(run, asked, track, signals, row)
         if passages.edges:
@@ -316,29 +338,35 @@ class QuantityRun:
             extremes=extremes,
         )
 
-    def _resolve(
-        self, run: Run, segments: Segments, edges: Edges, panels: Panels, noded: Sequence[Quantity]
-    ) -> tuple[Track, Mapping[str, Signal], Panels, NodePlan]:
-        """Panels as fine as the signals need, and the run along their nodes."""
-        names = dict.fromkeys(item.channel for item in noded if not _kind(item).at_moment)
-        steep = dict.fromkeys(item.channel for item in noded if _kind(item).steep)
-        most = max(MOST, 2 * len(GAUSS) * len(panels))
-        for _ in range(PASSES):
-            plan = plan_of(panels, edges)
-            nodes = place(plan, edges)
-            track = follow(run, segments, edges, nodes, still=self._still)
-            signals = self._channels.along(track, run.numbers)
-            within = np.flatnonzero(nodes.weight)
-            each = [signals[name].value[within] for name in names]
-            # what is integrated of loads is steeper than they are
-            each += [np.maximum(signals[name].value[within], 0.0) ** 3 for name in steep]
-            if not each:
-                break
-            parts = parts_needed(each, self._rough)
-            if np.all(parts == 1) or len(GAUSS) * np.sum(parts) > most:
-                break
-            panels = split(panels, parts)
-        return track, signals, panels, plan
+    def _parts(
+        self,
+        panels: Panels,
+        signals: Mapping[str, Signal],
+        nodes: Nodes,
+        channels: Iterable[str],
+        steep: Iterable[str],
+    ) -> NDArray[np.int_]:
+        """Into how many parts each panel is to be split; none where there would be too many."""
+        within = np.flatnonzero(nodes.weight)
+        each = [signals[name].value[within] for name in channels]
+        # what is integrated of loads is steeper than they are
+        each += [np.maximum(signals[name].value[within], 0.0) ** 3 for name in steep]
+        parts = parts_needed(each, self._rough)
+        return parts if len(GAUSS) * np.sum(parts) <= max(MOST, 2 * len(GAUSS) * len(panels)) else np.ones_like(parts)
+
+    def _is_found(self, quantity: Quantity) -> bool:
+        """Whether its moments are known before nodes are laid: places, and extremes that the steps hold.
+
+        The most loaded ball carries least where two change rank, which steps do not end on.
+        """
+        kind = _kind(quantity)
+        if kind.at_moment:
+            return True
+        top = set(kind.extremes) <= {"max"} or quantity.channel in self.model.states
+        return bool(kind.extremes) and top and self._is_held(quantity)
+
+    def _is_held(self, quantity: Quantity) -> bool:
+        return is_reduced(self.model, quantity) and not (self._still or self._along_nodes)
 
     def _check_memory(self, nodes: int, directions: int) -> None:
         """Refuse nodes that would not fit into memory, before any is laid."""
@@ -426,10 +454,10 @@ class QuantityRun:
         rows = reduction_rows(self.model.manifest)
 
         def wanted(item: Quantity, kind: str) -> Wanted:
-            held = is_reduced(self.model, item) and not self._still
-            seen = float(row[rows.column(f"{kind}_time", item.channel)]) if held else None
+            seen = float(row[rows.column(f"{kind}_time", item.channel)]) if self._is_held(item) else None
             ball = None if item.ball is None else item.ball - 1
-            return Wanted(channel=item.channel, ball=ball, sign=1.0 if kind == "max" else -1.0, seen=seen)
+            sign = 1.0 if kind == "max" else -1.0
+            return Wanted(channel=item.channel, ball=ball, sign=sign, seen=seen, exact=self._is_found(item))
 
         def look(nodes: Nodes) -> Mapping[str, Signal]:
             seen = follow(run, track.segments, track.edges, nodes, still=self._still)
@@ -480,6 +508,7 @@ def _appended(nodes: Nodes, edges: Edges, time: float, slope: Array, moment: Mom
         t=np.append(nodes.t, edges.times[-1] if moment.kind == "end" else time),
         weight=np.append(nodes.weight, 0.0),
         segment=np.append(nodes.segment, segment),
+        fraction=np.append(nodes.fraction, math.nan),
         held=np.append(nodes.held, edges.segment[segment]),
         slope=np.vstack([nodes.slope, slope[None, :]]),
         weight_slope=np.vstack([nodes.weight_slope, np.zeros((1, len(slope)))]),
