@@ -266,6 +266,6 @@ def test_drive_work_equals_the_work_of_the_punch(make_model: Callable[..., Model
     at = {name.rpartition("mechanism.")[2]: value for name, value in model.parameters.items()}
     crank, rod = 6e-3, 100e-3
     window = [at[f"forces.punch.window.{end}"] for end in ("start", "end")]
-    high, low = (crank * np.sin(angle) + np.sqrt(rod**2 - (crank * np.cos(angle)) ** 2) for angle in window)
-    work = at["forces.punch.force.magnitude"] * abs(high - low)
+    high, low = (crank * np.sin(angle) - np.sqrt(rod**2 - (crank * np.cos(angle)) ** 2) for angle in window)
+    work = at["forces.punch.force.y"] * abs(high - low)
     assert values(model, ["drive_work"], cycles=3, transient=1)["drive_work"] == pytest.approx(work, rel=1e-9)
