@@ -102,9 +102,9 @@ def test_an_error_that_nothing_keeps_is_refused_with_exit_code_1(place: Path) ->
 
 
 def test_percent_signs_and_plain_numbers_mean_the_same() -> None:
-    assert read_error("1%", None, None, None) == read_error(" 1 % ", None, None, None) == 0.01
-    assert read_error("0.01", None, None, None) == 0.01
-    assert read_error(None, None, None, None) is None
+    assert read_error("1%", None, None) == read_error(" 1 % ", None, None) == 0.01
+    assert read_error("0.01", None, None) == 0.01
+    assert read_error(None, None, None) is None
 
 
 def test_a_scene_without_a_bearing_has_nothing_to_trade(place: Path) -> None:

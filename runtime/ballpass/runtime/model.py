@@ -22,6 +22,7 @@ from ballpass.runtime.native.compile import CompiledLibrary, compile_model
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.explain import Explanation, explain
 from ballpass.runtime.point.point_model import PointModel
+from ballpass.runtime.quantity.values import QuantityValue, quantity_values
 from ballpass.runtime.run.choose_method import method_names
 from ballpass.runtime.run.locating import Kinks, refuse_with_error
 from ballpass.runtime.run.reduced_run import reduce_run
@@ -419,6 +420,50 @@ class Model(PointModel):
         numbers = self._runnable(parameters)
         with shown_steps("differentiating", progress) as tell:
             return answer(self, numbers, replace(query, progress=tell))
+
+    def quantities(
+        self,
+        of: str | Sequence[str],
+        cycles: float | None = None,
+        *,
+        duration: float | None = None,
+        transient: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+        method: str | None = None,
+        rtol: float | None = None,
+        initial: Initial = None,
+        kinks: Kinks | None = None,
+        progress: Progress = None,
+    ) -> dict[str, QuantityValue]:
+        """Quantities of a run, each with time and ball where it has some (see `ballpass.runtime.quantity.grammar`).
+
+        Parameters are those of `reduce`; at equal ones the values are the same bits in every call and command.
+
+        Raises
+        ------
+        RequestError
+            Unknown names, a wrong request, or a linkage that cannot be assembled.
+        SimulationError
+            The computation failed.
+
+        Examples
+        --------
+        >>> found = model.quantities(["drive_work", "peak_ball_force"], cycles=3, transient=2)
+        >>> f"{found['drive_work'].value:.3f} {found['drive_work'].unit}, ball {found['peak_ball_force'].ball}"
+        '9.078 J, ball 3'
+        """
+        numbers = self._runnable(parameters)
+        request = Request(
+            cycles=cycles,
+            duration=duration,
+            method=method,
+            rtol=rtol,
+            initial=self._start(numbers, initial),
+            transient_cycles=transient,
+            kinks=kinks,
+        )
+        with shown("simulating", progress) as tell:
+            return quantity_values(self, numbers, replace(request, progress=tell), [of] if isinstance(of, str) else of)
 
     def reduce(
         self,

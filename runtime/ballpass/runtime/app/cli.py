@@ -7,6 +7,7 @@ to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 t
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
@@ -151,7 +152,11 @@ def run(
     ] = None,
     of: Annotated[
         list[str] | None,
-        typer.Option("--of", metavar="Q", help="Quantity that --error is about: peak_ball_force. May be repeated."),
+        typer.Option(
+            "--of",
+            metavar="Q",
+            help="Quantity to give, and that --error is about: peak_ball_force, drive_work. May be repeated.",
+        ),
     ] = None,
     out: options.ResultsFolder = None,
     json_: options.Json = False,
@@ -165,7 +170,7 @@ def run(
     with command(scene) as stages:
         # within: an interrupt while they are imported is one of the command
         from ballpass.runtime.app.summary import add_turns, summarize
-        from ballpass.runtime.app.summary_table import render_accuracy, render_summary
+        from ballpass.runtime.app.summary_table import render_accuracy, render_quantities, render_summary
         from ballpass.runtime.run.settle import look_further
         from ballpass.runtime.run.tables import show_tables
 
@@ -178,7 +183,7 @@ def run(
         rate = read_quantity("--sample-rate", sample_rate, "Hz")
         _check_request(asked, cycles, transient, rtol, method, goes_on=start not in (None, "equilibrium"))
         at_kinks = checked_kinks(kinks, method or asked.run.method, error)
-        target = read_error(error, of, method, rtol)
+        target = read_error(error, method, rtol)
         folder = results_folder(out, scene)
         figures = figures and can_draw()
         model = load_model(scene, stages, method or asked.run.method, kinks, rtol, overrides=asked.overrides)
@@ -194,7 +199,7 @@ def run(
             sample_rate=rate,
             progress=stages.fraction,
             error=target,
-            of=of,
+            of=of if target is not None else None,
             initial=start,
         )
         if solution.nbytes > LARGE:
@@ -228,8 +233,26 @@ def run(
                 warn(longer.words)
         else:
             longer = look_further(model, model.numbers(asked.overrides), solution)
+        taken = solution.statistics
+        asked_for = (
+            model.quantities(
+                of,
+                cycles,
+                duration=seconds,
+                transient=transient,
+                parameters=asked.overrides,
+                method=taken.method,
+                rtol=taken.rtol,
+                initial=start,
+                kinks=cast("Kinks | None", taken.kinks),
+            )
+            if of
+            else {}
+        )
         stages("write")
         summary = summarize(model, solution, growth)
+        if asked_for:
+            summary["quantities"] = {name: asdict(one) for name, one in asked_for.items()}
         turned = add_turns(summary, longer, instead=settles) if longer is not None else ""
         if solution.accuracy is not None:
             summary["accuracy"] = solution.accuracy.plain()
@@ -239,6 +262,8 @@ def run(
         return
     table = render_summary(summary)
     show_tables(table)
+    if asked_for and solution.accuracy is None:
+        show_tables(render_quantities(asked_for))
     if turned:
         show(turned)
     if solution.accuracy is not None:

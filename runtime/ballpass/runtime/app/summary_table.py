@@ -5,6 +5,7 @@ In: what `summarize` gave.  Out: tables of `rich`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from ballpass.runtime.run.tables import simple_table
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
+    from ballpass.runtime.quantity.values import QuantityValue
     from ballpass.runtime.run.accuracy import Accuracy
 
 #: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
@@ -67,6 +69,17 @@ def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
     return f"{factor * item[key]:z.4g}" if key in item else ""
 
 
+def render_quantities(found: Mapping[str, QuantityValue]) -> Table:
+    """Quantities of ``--of`` as a table for a terminal."""
+    table = simple_table("Quantities", ("quantity", "value", "unit", "at"), right=("value",))
+    for name, one in found.items():
+        factor, unit = TABLE_UNITS.get(one.unit, (1.0, one.unit))
+        time = "" if one.time is None else f"t = {one.time:.6g} s"
+        ball = "" if one.ball is None else f"ball {one.ball}"
+        table.add_row(name, f"{factor * one.value:z.6g}", unit, ", ".join(filter(None, [time, ball])))
+    return table
+
+
 def render_accuracy(model: Model, accuracy: Accuracy) -> Table:
     """Quantities of ``--error`` with their values and estimated errors, as a table for a terminal."""
     right = ("value", "estimated error")
@@ -74,7 +87,10 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> Table:
     for name in accuracy.of:
         unit = parse_quantity(model.manifest, name).unit
         factor, unit = TABLE_UNITS.get(unit, (1.0, unit))
-        table.add_row(name, f"{factor * accuracy.values[name]:z.7g}", f"{100 * accuracy.estimates[name]:.2g} %", unit)
+        value, error = accuracy.values[name], accuracy.estimates[name]
+        # no more digits than the error leaves
+        digits = min(max(math.ceil(-math.log10(max(error, 1e-16))), 1), 9) if math.isfinite(error) else 1
+        table.add_row(name, f"{factor * value:z.{digits}g}", f"{100 * error:.2g} %", unit)
     return table
 
 

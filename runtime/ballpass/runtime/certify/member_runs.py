@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.many.ensemble import simulate_many
 from ballpass.runtime.point.evaluate import neighbour
+from ballpass.runtime.quantity.layout import is_reduced
 from ballpass.runtime.quantity.panels import ROUGH
-from ballpass.runtime.quantity.quantity_run import QuantityRun, is_reduced
+from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.run.locating import LOCATED

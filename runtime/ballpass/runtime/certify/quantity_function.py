@@ -33,7 +33,7 @@ from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Estimate
 from ballpass.runtime.quantity.registry import KINDS
-from ballpass.runtime.run.locating import STEPPED_OVER, refuse_jumps
+from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, refuse_jumps
 from ballpass.runtime.run.request import TOLERANCES, tolerance
 from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.sensitivity import SENSITIVITY
@@ -62,6 +62,8 @@ class QuantityFunction:
     cycles, duration, transient : as for `Model.simulate`
     parameters : values of other parameters, SI.  Default: the scene's
     rtol : error allowed per step of the states [1].  Runs with derivatives have a hundredth
+    kinks : what steps of values do at the kinks of the laws.  By default they go over them, in lanes; ``located`` gives
+        the very bits of `Model.quantities` with the same options
     failed : what stands for a value or derivative that is not known: ``raise`` an error, or ``nan``, with a warning
     chaos : ``refuse`` derivatives of a motion that amplifies a tiny change beyond meaning, which takes two more runs
         each; or ``ignore`` that
@@ -106,6 +108,7 @@ class QuantityFunction:
         transient: float | None = None,
         parameters: Mapping[str, float] | None = None,
         rtol: float = RTOL,
+        kinks: Kinks | None = None,
         failed: Literal["raise", "nan"] = "raise",
         chaos: Literal["refuse", "ignore"] = "refuse",
     ) -> None:
@@ -115,6 +118,7 @@ class QuantityFunction:
         self.wrt = (wrt,) if isinstance(wrt, str) else tuple(wrt)
         self.shape = () if isinstance(of, str) else (len(self.of),)
         self._model, self._failed, self._chaos, self._rtol = model, failed, chaos, tolerance("rtol", rtol)
+        self._kinks = STEPPED_OVER if kinks is None and not model.manifest.borders else kinks
         self._fixed = dict(parameters or {})
         numbers = model.numbers(self._fixed)
         for what, names in (("of", self.of), ("wrt", self.wrt)):
@@ -311,7 +315,7 @@ class QuantityFunction:
             transient=self._request.transient_cycles,
             rtol=self._rtol,
             method=None,
-            kinks=None if self._model.manifest.borders else STEPPED_OVER,
+            kinks=self._kinks,
             threads=None,
             lanes=True,
             progress=tell,

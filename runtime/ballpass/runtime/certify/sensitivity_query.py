@@ -31,7 +31,6 @@ from ballpass.runtime.certify.grazing import TOLERANCE, Grazing, find_grazing
 from ballpass.runtime.certify.member_runs import MemberRuns
 from ballpass.runtime.certify.sensitivity_report import (
     STEPS,
-    QuantityValue,
     Sensitivity,
     SensitivityReport,
     ratio_unit,
@@ -46,6 +45,7 @@ from ballpass.runtime.quantity.kinks import DEFLECTION
 from ballpass.runtime.quantity.panels import ROUGH
 from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
 from ballpass.runtime.quantity.track import ChannelValues
+from ballpass.runtime.quantity.values import value_of
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.direction_scales import ANGLE
 from ballpass.runtime.run.locating import check_kinks, refuse_jumps
@@ -246,17 +246,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
             )
     return SensitivityReport(
         scene=manifest.scene,
-        quantities=tuple(
-            QuantityValue(
-                name=item.name,
-                value=found.value,
-                unit=item.unit,
-                time=found.time,
-                ball=found.ball,
-                notes=(*found.notes, found.kink) if found.kink else found.notes,
-            )
-            for item, found in zip(quantities, course.estimates, strict=True)
-        ),
+        quantities=tuple(value_of(item, found) for item, found in zip(quantities, course.estimates, strict=True)),
         parameters=tuple(names),
         words={
             **{item.name: quantity_words(manifest, item) for item in quantities},

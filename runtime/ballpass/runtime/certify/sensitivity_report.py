@@ -21,6 +21,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.contract.parameters import unknown_name
+from ballpass.runtime.quantity.values import QuantityValue
 from ballpass.runtime.run.tables import printed, simple_table
 from ballpass.runtime.show import html
 
@@ -35,18 +36,6 @@ STEPS = "steps"
 
 #: Styles of the verdicts.
 _STYLES = {Verdict.VERIFIED: "green", Verdict.DISAGREES: "bold red", Verdict.NOT_CHECKED: "yellow"}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class QuantityValue:
-    """A quantity's value: name, number, unit; time and ball of an extreme; what to mind."""
-
-    name: str
-    value: float
-    unit: str
-    time: float | None
-    ball: int | None
-    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

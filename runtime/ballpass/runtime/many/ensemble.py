@@ -32,7 +32,8 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import METHODS
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
-from ballpass.runtime.quantity.quantity_run import QuantityRun, is_reduced, needs
+from ballpass.runtime.quantity.layout import is_reduced, needs
+from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Quantity, ReducedRuns
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.run import inputs as clock

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,6 +178,11 @@ def place(plan: NodePlan, edges: Edges) -> Nodes:
         slope=left_slope + inner * (right_slope - left_slope),
         weight_slope=plan.weight[:, None] * (right_slope - left_slope),
     )
+
+
+def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
+    """Nodes of several plans, one behind the other."""
+    return Nodes(**{item.name: np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Nodes)})
 
 
 def find(edges: Edges, time: float) -> tuple[int, float]:

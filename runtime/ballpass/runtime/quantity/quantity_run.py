@@ -3,15 +3,15 @@
 In: a model and quantities (`QuantityRun`); a `Run`.  Out: `Values`.
 
 A plain run reduces what its steps give: extremes, means and life of states and ball forces are there, the same bits in
-every command.  All else is evaluated along nodes within the very steps of that run (`panels`); extremes are searched
-between them.  A run with derivatives along the same nodes gives those.
+every command.  All else is evaluated along nodes within the very steps of that run (`layout`).  A run with derivatives
+along the same nodes gives those.
 """
 
 from __future__ import annotations
 
 import math
 import time as clocks
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,42 +20,30 @@ from numpy.typing import NDArray
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
-from ballpass.runtime.native.stepper import Segments
-from ballpass.runtime.quantity.between_nodes import Extreme, Wanted, find_extremes
-from ballpass.runtime.quantity.kinks import DEFLECTION, find_kinks
+from ballpass.runtime.quantity.between_nodes import Extreme
+from ballpass.runtime.quantity.layout import Layout, NodeLayer, around, is_reduced, kind_of, needs
 from ballpass.runtime.quantity.location import Moment, place_of, place_slope
 from ballpass.runtime.quantity.nodes import (
     Edges,
     NodePlan,
     Nodes,
     find,
+    joined_nodes,
     make_edges,
     no_nodes,
     place,
     with_passages,
     with_points,
 )
-from ballpass.runtime.quantity.panels import (
-    GAUSS,
-    ROUGH,
-    Panels,
-    cut_at,
-    panels_between,
-    parts_needed,
-    plan_of,
-    split,
-    uniform_panels,
-)
-from ballpass.runtime.quantity.passages import Passages, find_passages, passage_slopes
-from ballpass.runtime.quantity.records import Estimate, Kind, Mark, Quantity, ReducedRuns, View
-from ballpass.runtime.quantity.registry import KINDS
-from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow, jumps
+from ballpass.runtime.quantity.panels import GAUSS, ROUGH
+from ballpass.runtime.quantity.passages import passage_slopes
+from ballpass.runtime.quantity.records import Estimate, Mark, Quantity, ReducedRuns, View
+from ballpass.runtime.quantity.track import ChannelValues, Track, follow, jumps, part_of_track
 from ballpass.runtime.run.directions import Chain
-from ballpass.runtime.run.locating import LOCATED, stepper_for
+from ballpass.runtime.run.locating import stepper_for
 from ballpass.runtime.run.loop import ReductionRow, Sink, StepEnds, start_run
 from ballpass.runtime.run.request import check_memory
 from ballpass.runtime.run.resolve import Run
-from ballpass.runtime.run.segments import joined_segments, run_windows
 
 Array = NDArray[np.float64]
 
@@ -65,15 +53,6 @@ AT_EDGE = 1e-12
 #: Numbers that a node takes for each state, and those that each direction adds: states, channels, and what they are
 #: made of, on the way from the driver to the quantities.  Lanes without a direction are counted where they are made.
 VALUES, SLOPES = 16, 8
-
-#: Passes that make panels finer, and the most nodes that they may come to.
-PASSES, MOST = 6, 2**17
-
-#: Distance of the nodes around an extreme, as a share of its panel; what is nearer to its end is at a kink [1].
-AROUND, NEAREST = 0.1, 1e-3
-
-#: Nodes on either side of such an extreme.
-BESIDE = 3
 
 #: Time of this thread on its processor where the system counts it finely: other programs do not enter.
 _now = clocks.thread_time if clocks.get_clock_info("thread_time").resolution < 1e-5 else clocks.perf_counter
@@ -86,7 +65,7 @@ class Values:
     Attributes
     ----------
     estimates : one for each quantity
-    track : states along the nodes; None where the reductions of the steps give all
+    track : states along nodes of the whole run; None where there are none
     row : reductions, None where nothing was run
     seconds : of the plain integration alone [s]
     steps, rejected : it took
@@ -108,28 +87,6 @@ class Values:
     def slopes(self) -> Array:
         """Shape (quantities, directions)."""
         return np.array([item.slope for item in self.estimates])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Laid:
-    """Nodes of a run.
-
-    Attributes
-    ----------
-    segments : of the driver
-    edges, passages, panels, plan : where nodes lie
-    track, signals : states and channels along them
-    extremes : by quantity and "max" or "min", the best first
-    """
-
-    segments: Segments
-    edges: Edges
-    passages: Passages
-    panels: Panels
-    plan: NodePlan
-    track: Track
-    signals: Mapping[str, Signal]
-    extremes: Mapping[tuple[str, str], list[Extreme]]
 
 
 class QuantityRun:
@@ -155,18 +112,18 @@ class QuantityRun:
     ) -> None:
         self.model = model
         self.quantities = tuple(quantities)
-        self._rough, self._motion, self._along_nodes = rough, motion, along_nodes
-        self._moving = [item for item in quantities if _kind(item).at_rest is None]
-        self._reduced = {} if along_nodes else {item.name: item for item in self._moving if is_reduced(model, item)}
-        self._noded = [item for item in self._moving if item.name not in self._reduced]
+        self._motion = motion
+        self._moving = [item for item in quantities if kind_of(item).at_rest is None]
+        self._reduced = [] if along_nodes else [item for item in self._moving if is_reduced(model, item)]
+        self._noded = [item for item in self._moving if item not in self._reduced]
         channels = [item.channel for item in self._moving]
         channels += [
-            item.channel.removesuffix("ball.force") + name for item in self._moving for name in _kind(item).beside
+            item.channel.removesuffix("ball.force") + name for item in self._moving for name in kind_of(item).beside
         ]
         self._channels = ChannelValues(model, channels)
-        every = self._channels.channels
+        self._layer = NodeLayer(model, self._channels, rough=rough, along_nodes=along_nodes)
         # outputs that follow from time alone need no integration
-        self._still = all(name not in model.states and not depends(model, name, "x") for name in every)
+        self._runs = motion or not all(self._layer.is_still(item) for item in self._moving)
 
     def measure(self, run: Run) -> Values:
         """Values of all quantities.
@@ -196,7 +153,7 @@ class QuantityRun:
             The computation failed.
         """
         for item in self._moving:
-            if _kind(item).extremes and jumps(self.model, item.channel):
+            if kind_of(item).extremes and jumps(self.model, item.channel):
                 raise RequestError(
                     f"{item.name}: the driver's angle is a state, and {item.channel} jumps where a load within a "
                     "window of that angle begins or ends; on which side of the jump the extreme is, is not followed. "
@@ -204,60 +161,52 @@ class QuantityRun:
                     "of all. Or give the load as a table over the angle, with flanks as steep as they are."
                 )
         chain = Chain(self.model, run.numbers, names)
-        if not self._moving:
-            return Values(estimates=tuple(self._estimate(None, item, run, chain) for item in self.quantities))
-        found, laid = self._measure(run, self._moving, len(names))
-        assert laid is not None  # something moves
-        edges = make_edges(run, laid.segments, chain)
-        if len(laid.passages.times):
-            slopes = passage_slopes(run, laid.track, laid.passages, chain, sensitivity_rtol)
-            edges = with_passages(edges, laid.passages.times, slopes)
-        around = {
-            item.name: _around(laid, laid.extremes[item.name, kind][0])
-            for item in self._moving
-            for kind in _kind(item).extremes
-            if _kind(item).around
-        }
-        extremes = [(item.segment, item.fraction) for some in laid.extremes.values() for item in some]
-        points = list(dict.fromkeys([*extremes, *(point for some in around.values() for point in some)]))
-        integrated = any(not (_kind(item).extremes or _kind(item).at_moment) for item in self._moving)
-        plan = with_points(laid.plan if integrated else no_nodes(), points)
-        nodes, marks = self._nodes(run, laid, edges, plan, chain)
-        track = follow(run, laid.segments, edges, nodes, chain, sensitivity_rtol, still=self._still)
-        for key, some in laid.extremes.items():
-            first, *others = (_mark(item, plan) for item in some)
-            beside = tuple(_node(plan, point) for point in around.get(key[0], ()))
-            marks[key] = replace(first, competing=tuple(others), around=beside)
-        view = View(
-            run=run,
-            nodes=nodes,
-            signals=self._channels.along(track, run.numbers, chain),
-            marks=marks,
-            slopes=chain.derivative,
-            names=chain.names,
-        )
+        found, layouts = self._measure(run, self._moving, len(names))
+        laid = [_Differentiated(run, layout, chain, sensitivity_rtol) for layout in layouts]
+        slopes: dict[str, Estimate] = {}
+        for still in (False, True):
+            some = [one for one in laid if one.layout.still is still]
+            if not some:
+                continue
+            segments, nodes = some[0].layout.segments, joined_nodes([one.nodes for one in some])
+            # in one run for all
+            track = follow(run, segments, some[0].edges, nodes, chain, sensitivity_rtol, still=still)
+            first = 0
+            for one in some:
+                count = len(one.nodes)
+                signals = self._channels.along(part_of_track(track, first, first + count), run.numbers, chain)
+                first += count
+                view = View(
+                    run=run,
+                    nodes=one.nodes,
+                    signals=signals,
+                    marks=one.marks,
+                    slopes=chain.derivative,
+                    names=chain.names,
+                )
+                slopes |= {item.name: _evaluated(view, item) for item in one.layout.items}
         estimates = []
         for item, plain in zip(self.quantities, found.estimates, strict=True):
-            one = self._estimate(view, item, run, chain)
-            estimates.append(replace(one, value=plain.value, time=plain.time, ball=plain.ball))
-        return replace(found, estimates=tuple(estimates), track=track)
+            if item.name in slopes:
+                estimates.append(replace(slopes[item.name], value=plain.value, time=plain.time, ball=plain.ball))
+            else:
+                estimates.append(self._at_rest(item, run, chain))
+        return replace(found, estimates=tuple(estimates))
 
-    def _measure(self, run: Run, noded: Sequence[Quantity], directions: int = 0) -> tuple[Values, _Laid | None]:
-        """Values, and the nodes on which `noded` are evaluated; those that reductions hold are taken from there.
+    def _measure(self, run: Run, noded: Sequence[Quantity], directions: int = 0) -> tuple[Values, list[Layout]]:
+        """Values, and the nodes of `noded`; what reductions hold is taken from there.
 
         Parameters
         ----------
         directions : along which derivatives are taken at these nodes
         """
-        if not self._moving and not self._motion:
-            found = tuple(self._estimate(None, item, run, None) for item in self.quantities)
-            return Values(estimates=found), None
-        run.check_steady()
-        row = self._row(run)
-        ends = StepEnds()
+        row, ends = np.zeros(0), StepEnds()
         steps = rejected = 0
         seconds, state = 0.0, run.initial
-        if not self._still or self._motion:
+        if self._moving or self._motion:
+            run.check_steady()
+            row = self._row(run)
+        if self._runs:
             sinks: list[Sink] = [ReductionRow(row=row), *([ends] if noded else [])]
             going = start_run(run, sinks)
             stepper_for(run.model, run.kinks)  # compiled before it is timed
@@ -265,108 +214,39 @@ class QuantityRun:
             going.go_on()
             seconds, steps, rejected, state = _now() - begin, going.steps, going.rejected, going.state
         run = replace(run, progress=None)
-        view, laid = None, None
+        found: dict[str, Estimate] = {}
+        layouts: list[Layout] = []
         if noded:
             every = ends.all
             self._check_memory(len(GAUSS) * max(len(every), math.ceil(run.cycles)), directions)
-            laid = self._lay(run, every, row, noded)
-            nodes, marks = self._nodes(run, laid, laid.edges, laid.plan, None)
-            signals = laid.signals
-            if len(nodes) > len(laid.plan):
-                there = follow(run, laid.segments, laid.edges, nodes, still=self._still)
-                signals = self._channels.along(there, run.numbers)
-            for key, some in laid.extremes.items():
-                marks[key] = _plain_mark(some[0])
-            view = View(run=run, nodes=nodes, signals=signals, marks=marks, slopes=lambda _: np.zeros(0), names=())
-        runs = ReducedRuns(
-            manifest=self.model.manifest, rows=row[None, :], end=state[None, :], values=run.numbers.values
-        )
-        estimates = tuple(
-            _of_reductions(runs, item) if item.name in self._reduced else self._estimate(view, item, run, None)
-            for item in self.quantities
-        )
-        track = None if laid is None else laid.track
-        return Values(estimates=estimates, track=track, row=row, seconds=seconds, steps=steps, rejected=rejected), laid
-
-    def _lay(self, run: Run, ends: Array, row: Array, noded: Sequence[Quantity]) -> _Laid:
-        """Lay nodes within the steps of a run, as fine as the signals need, and follow it along them."""
-        windows = run_windows(run.model, run.numbers, (run.begin, run.end), run.turn, run.start)
-        (segments,) = joined_segments(windows, all_=True)
-        edges = make_edges(run, segments, None)
-        # what is resolved: integrals, and extremes that the reductions do not hold
-        channels = dict.fromkeys(item.channel for item in noded if not self._is_found(item))
-        steep = [item.channel for item in noded if _kind(item).steep]
-        # states are smooth where contacts begin
-        kinks = (ends[:, 1] > 0.0) & any(name not in self.model.states for name in channels)
-        panels = uniform_panels(edges, run.turn) if self._still else panels_between(edges, ends[:, 0], kinks)
-        passages = Passages(times=np.zeros(0), edges=(), near=0.0)
-        for _ in range(PASSES):
-            plan = plan_of(panels, edges)
-            track = follow(run, segments, edges, place(plan, edges), still=self._still)
-            signals = self._channels.along(track, run.numbers)
-            if not channels or passages.edges:
-                break
-            parts = self._parts(panels, signals, track.nodes, channels, steep)
-            finer = split(panels, parts)
-            found = find_passages(run, track)
-            times = self._kinks(track, signals, noded, run)
-            if found.edges:
-                passages = found
-                edges = with_passages(edges, passages.times, np.zeros((len(passages.times), 0)))
-                finer = panels_between(edges, ends[:, 0], kinks)
-            finer = cut_at(finer, edges, times)
-            if finer is panels:
-                break
-            panels = finer
-            if not self._still:  # steps are fine enough to tell how fine they have to be
-                plan = plan_of(panels, edges)
-                track = follow(run, segments, edges, place(plan, edges))
-                signals = self._channels.along(track, run.numbers)
-                break
-        asked = [(item, kind) for item in noded for kind in _kind(item).extremes]
-        extremes = self._extremes(run, asked, track, signals, row)
-        if passages.edges:
-            extremes = {key: [_beside(one, edges, passages) for one in some] for key, some in extremes.items()}
-        return _Laid(
-            segments=segments,
-            edges=edges,
-            passages=passages,
-            panels=panels,
-            plan=plan,
+            layouts = self._layer.lay(run, every, row, noded)
+            for layout in layouts:
+                view = self._plain_view(run, layout)
+                found |= {item.name: _evaluated(view, item) for item in layout.items if item not in self._reduced}
+        rows, end = row[None, :], state[None, :]
+        runs = ReducedRuns(manifest=self.model.manifest, rows=rows, end=end, values=run.numbers.values)
+        found |= {item.name: _of_reductions(runs, item) for item in self._reduced}
+        estimates = tuple(found.get(item.name) or self._at_rest(item, run, None) for item in self.quantities)
+        track = next((one.track for one in layouts if not one.still and one.track is not None), None)
+        values = Values(
+            estimates=estimates,
             track=track,
-            signals=signals,
-            extremes=extremes,
+            row=row if len(row) else None,
+            seconds=seconds,
+            steps=steps,
+            rejected=rejected,
         )
+        return values, layouts
 
-    def _parts(
-        self,
-        panels: Panels,
-        signals: Mapping[str, Signal],
-        nodes: Nodes,
-        channels: Iterable[str],
-        steep: Iterable[str],
-    ) -> NDArray[np.int_]:
-        """Into how many parts each panel is to be split; none where there would be too many."""
-        within = np.flatnonzero(nodes.weight)
-        each = [signals[name].value[within] for name in channels]
-        # what is integrated of loads is steeper than they are
-        each += [np.maximum(signals[name].value[within], 0.0) ** 3 for name in steep]
-        parts = parts_needed(each, self._rough)
-        return parts if len(GAUSS) * np.sum(parts) <= max(MOST, 2 * len(GAUSS) * len(panels)) else np.ones_like(parts)
-
-    def _is_found(self, quantity: Quantity) -> bool:
-        """Whether its moments are known before nodes are laid: places, and extremes that the steps hold.
-
-        The most loaded ball carries least where two change rank, which steps do not end on.
-        """
-        kind = _kind(quantity)
-        if kind.at_moment:
-            return True
-        top = set(kind.extremes) <= {"max"} or quantity.channel in self.model.states
-        return bool(kind.extremes) and top and self._is_held(quantity)
-
-    def _is_held(self, quantity: Quantity) -> bool:
-        return is_reduced(self.model, quantity) and not (self._still or self._along_nodes)
+    def _plain_view(self, run: Run, layout: Layout) -> View:
+        """What kinds see of a run without derivatives."""
+        nodes, marks = _with_moments(run, layout, layout.edges, place(layout.plan, layout.edges), None)
+        signals = layout.signals
+        if layout.track is None:
+            track = follow(run, layout.segments, layout.edges, nodes, still=layout.still)
+            signals = self._channels.along(track, run.numbers)
+        marks |= {key: _plain_mark(some[0]) for key, some in layout.extremes.items()}
+        return View(run=run, nodes=nodes, signals=signals, marks=marks, slopes=lambda _: np.zeros(0), names=())
 
     def _check_memory(self, nodes: int, directions: int) -> None:
         """Refuse nodes that would not fit into memory, before any is laid."""
@@ -385,112 +265,65 @@ class QuantityRun:
             needed |= set(self.model.states)
         return np.asarray(reduction_rows(self.model.manifest).empty(1, run.start, needed)[0])
 
-    def _estimate(self, view: View | None, quantity: Quantity, run: Run, chain: Chain | None) -> Estimate:
-        kind = _kind(quantity)
-        if kind.at_rest is not None:
-            return kind.at_rest(self.model, run.numbers, quantity, chain)
-        assert kind.evaluate is not None
-        assert view is not None  # something moves
-        return kind.evaluate(view, quantity)
-
-    def _nodes(
-        self, run: Run, laid: _Laid, edges: Edges, plan: NodePlan, chain: Chain | None
-    ) -> tuple[Nodes, dict[tuple[str, str], Mark]]:
-        """Nodes of a plan and of the places asked for."""
-        nodes = place(plan, edges)
-        marks: dict[tuple[str, str], Mark] = {}
-        manifest = self.model.manifest
-        for item in self._moving if chain is not None else self._noded:
-            if not _kind(item).at_moment:
-                continue
-            time, moment = place_of(manifest, run.numbers, run.end, item)
-            slope = edges.slopes[-1]
-            if chain is not None:
-                slope = place_slope(manifest, run.numbers, moment, time, slope, chain.derivative)
-            marks[item.name, "place"] = Mark(node=len(nodes), time=time, value=math.nan, ball=0)
-            nodes = _appended(nodes, edges, time, slope, moment)
-        return nodes, marks
-
-    def _kinks(self, track: Track, signals: Mapping[str, Signal], noded: Sequence[Quantity], run: Run) -> Array:
-        """Times of kinks of channels that are integrated, beside those that steps end on [s]."""
-        summed = [item for item in noded if not (_kind(item).extremes or _kind(item).at_moment)]
-        channels = [item.channel for item in summed if item.channel not in self.model.states]
-        if self._still or not channels:
-            return np.zeros(0)
-        of_balls = [item for item in summed if ".ball." in f".{item.channel}"]
-        ranked = dict.fromkeys(item.channel for item in of_balls if item.ball is None and not _kind(item).steep)
-        tables = [signals[name].value for name in ranked]
-        bearings, stops = self.model.manifest.bearings, self.model.manifest.stops
-        # a corner of the damping at rest is in the force of each ball, and not in the motion
-        corner = bool(of_balls) and any(bearing.damping.corner_at_rest for bearing in bearings)
-        deflections: list[Array] = []
-        if run.kinks != LOCATED or corner:
-            # among the quantities of every bearing, whether or not the scene's outputs name it
-            names = [bearing.prefix + DEFLECTION for bearing in bearings] + [*stops]
-            found = ChannelValues(self.model, names).along(track, run.numbers)
-            deflections = [found[name].value for name in names]
-        nodes = track.nodes
-        return np.array(
-            find_kinks(
-                nodes.t,
-                nodes.segment,
-                deflections,
-                tables,
-                one_sided=corner,
-                length=run.duration,
-                edges=track.edges.times,
-            )
-        )
-
-    def _extremes(
-        self,
-        run: Run,
-        asked: Sequence[tuple[Quantity, str]],
-        track: Track,
-        signals: Mapping[str, Signal],
-        row: Array,
-    ) -> dict[tuple[str, str], list[Extreme]]:
-        """Extremes of all quantities that need some, and the next ones."""
-        rows = reduction_rows(self.model.manifest)
-
-        def wanted(item: Quantity, kind: str) -> Wanted:
-            seen = float(row[rows.column(f"{kind}_time", item.channel)]) if self._is_held(item) else None
-            ball = None if item.ball is None else item.ball - 1
-            sign = 1.0 if kind == "max" else -1.0
-            return Wanted(channel=item.channel, ball=ball, sign=sign, seen=seen, exact=self._is_found(item))
-
-        def look(nodes: Nodes) -> Mapping[str, Signal]:
-            seen = follow(run, track.segments, track.edges, nodes, still=self._still)
-            return self._channels.along(seen, run.numbers)
-
-        if not asked:
-            return {}
-        each = [wanted(item, kind) for item, kind in asked]
-        distinct = list(dict.fromkeys(each))
-        found = dict(zip(distinct, find_extremes(distinct, track, signals, look), strict=True))
-        return {(item.name, kind): found[one] for (item, kind), one in zip(asked, each, strict=True)}
+    def _at_rest(self, quantity: Quantity, run: Run, chain: Chain | None) -> Estimate:
+        at_rest = kind_of(quantity).at_rest
+        assert at_rest is not None  # all others are evaluated along the run
+        return at_rest(self.model, run.numbers, quantity, chain)
 
 
-def _kind(quantity: Quantity) -> Kind:
-    return KINDS[quantity.kind]
+class _Differentiated:
+    """Nodes of a layout that move with the parameters, and the moments among them."""
+
+    def __init__(self, run: Run, layout: Layout, chain: Chain, sensitivity_rtol: float) -> None:
+        self.layout = layout
+        self.edges = make_edges(run, layout.segments, chain)
+        if layout.passages.edges:
+            assert layout.track is not None
+            slopes = passage_slopes(run, layout.track, layout.passages, chain, sensitivity_rtol)
+            self.edges = with_passages(self.edges, layout.passages.times, slopes)
+        beside = {
+            (item.name, kind): around(layout, layout.extremes[item.name, kind][0])
+            for item in layout.items
+            for kind in kind_of(item).extremes
+            if kind_of(item).around
+        }
+        points = [(one.segment, one.fraction) for some in layout.extremes.values() for one in some]
+        points += [point for some in beside.values() for point in some]
+        integrated = any(not (kind_of(item).extremes or kind_of(item).at_moment) for item in layout.items)
+        plan = with_points(layout.plan if integrated else no_nodes(), list(dict.fromkeys(points)))
+        self.nodes, self.marks = _with_moments(run, layout, self.edges, place(plan, self.edges), chain)
+        for key, some in layout.extremes.items():
+            best, *others = (_mark(one, plan) for one in some)
+            nodes = tuple(_node(plan, point) for point in beside.get(key, ()))
+            self.marks[key] = replace(best, competing=tuple(others), around=nodes)
 
 
-def needs(quantity: Quantity) -> tuple[str, ...]:
-    """Channels that are reduced for a quantity."""
-    kind = _kind(quantity)
-    return kind.needs(quantity.channel) if kind.needs is not None else (quantity.channel,)
+def _evaluated(view: View, quantity: Quantity) -> Estimate:
+    evaluate = kind_of(quantity).evaluate
+    assert evaluate is not None  # all others are at rest
+    return evaluate(view, quantity)
 
 
-def is_reduced(model: LoadedModel, quantity: Quantity) -> bool:
-    """Whether the reductions of a run hold a quantity."""
-    if _kind(quantity).reduced is None or quantity.ball is not None or not model.states:
-        return False
-    known = reduction_rows(model.manifest)
-    return set(needs(quantity) or (quantity.channel,)) <= set(known.channels if needs(quantity) else known.states)
+def _with_moments(
+    run: Run, layout: Layout, edges: Edges, nodes: Nodes, chain: Chain | None
+) -> tuple[Nodes, dict[tuple[str, str], Mark]]:
+    """Nodes, and those of the moments asked for."""
+    marks: dict[tuple[str, str], Mark] = {}
+    manifest = run.model.manifest
+    for item in layout.items:
+        if not kind_of(item).at_moment:
+            continue
+        time, moment = place_of(manifest, run.numbers, run.end, item)
+        slope = edges.slopes[-1]
+        if chain is not None:
+            slope = place_slope(manifest, run.numbers, moment, time, slope, chain.derivative)
+        marks[item.name, "place"] = Mark(node=len(nodes), time=time, value=math.nan, ball=0)
+        nodes = _appended(nodes, edges, time, slope, moment)
+    return nodes, marks
 
 
 def _of_reductions(runs: ReducedRuns, quantity: Quantity) -> Estimate:
-    kind = _kind(quantity)
+    kind = kind_of(quantity)
     assert kind.reduced is not None
     time = ball = None
     if kind.extremes:
@@ -537,26 +370,3 @@ def _plain_mark(extreme: Extreme) -> Mark:
         other_rate=extreme.other_rate,
         at_edge=min(extreme.fraction, 1.0 - extreme.fraction) < AT_EDGE,
     )
-
-
-def _around(laid: _Laid, extreme: Extreme) -> tuple[tuple[int, float], ...]:
-    """Points before and behind an extreme, within its panel; none where that ends beside it."""
-    panels = laid.panels
-    ends = panels.at(np.array([0.0, 1.0]))[0]
-    inside = (panels.segment == extreme.segment) & (ends[:, 0] <= extreme.fraction) & (extreme.fraction <= ends[:, 1])
-    if not np.any(inside) or extreme.other is not None:
-        return ()
-    low, high = ends[int(np.flatnonzero(inside)[0])].tolist()
-    distance = min(AROUND * (high - low), min(extreme.fraction - low, high - extreme.fraction) / (BESIDE + 0.1))
-    if distance < NEAREST * (high - low):
-        return ()
-    return tuple((extreme.segment, extreme.fraction + j * distance) for j in range(-BESIDE, BESIDE + 1) if j)
-
-
-def _beside(extreme: Extreme, edges: Edges, passages: Passages) -> Extreme:
-    """An extreme where a load begins or ends is at the corner of what the load drives, and moves with it."""
-    beside = np.flatnonzero(np.abs(passages.times - extreme.time) < passages.near)
-    if not len(beside):
-        return extreme
-    edge = int(np.searchsorted(edges.times, passages.times[beside[0]]))
-    return replace(extreme, segment=edge - 1, fraction=1.0)

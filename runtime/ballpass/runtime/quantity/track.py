@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import casadi
@@ -128,6 +128,14 @@ def follow(
         rate = next(iter(model.loop("rhs", ("t", "x", "u"))(len(times), given).values()))
         slope = made.states(len(times))[back] + rate[back][:, :, None] * nodes.slope[:, None, :]
     return Track(nodes=nodes, edges=edges, x=states[back], slope=slope, local=local, u=u, segments=segments)
+
+
+def part_of_track(track: Track, first: int, last: int) -> Track:
+    """Nodes `first` ... `last` of a track, the last one excluded."""
+    part = slice(first, last)
+    nodes = Nodes(**{item.name: getattr(track.nodes, item.name)[part] for item in fields(Nodes)})
+    names = ("x", "slope", "local", "u")
+    return replace(track, nodes=nodes, **{name: getattr(track, name)[part] for name in names})
 
 
 def depends(model: LoadedModel, output: str, argument: str) -> list[int]:

@@ -113,7 +113,7 @@ def _show_simplification(found: Simplification, *, json_: bool) -> None:
     show(found.words)
 
 
-def read_error(text: str | None, of: list[str] | None, method: str | None, rtol: float | None) -> float | None:
+def read_error(text: str | None, method: str | None, rtol: float | None) -> float | None:
     """A relative error as people write it: 1%, 1 %, 0.01.
 
     Raises
@@ -122,8 +122,6 @@ def read_error(text: str | None, of: list[str] | None, method: str | None, rtol:
         It is no such thing, or asked for together with a method or a tolerance.
     """
     if text is None:
-        if of:
-            raise RequestError("--of names what --error is about, and no --error was given. Add --error 1%.")
         return None
     if method is not None or rtol is not None:
         raise RequestError(

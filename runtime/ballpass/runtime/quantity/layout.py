@@ -1,0 +1,314 @@
+"""Where in the steps of a run each quantity is evaluated.
+
+In: a run, the ends of its steps, quantities.  Out: `Layout` of all that share their nodes.
+
+A quantity's nodes depend on nothing but itself and the run, so that its value is the same bits whatever else is asked.
+Integrals have Gauss's nodes in every step, and finer ones where their channel needs it; extremes that the steps do not
+hold are searched between such nodes; a moment is a node of its own.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.native.reduction_rows import reduction_rows
+from ballpass.runtime.native.stepper import Segments
+from ballpass.runtime.quantity.between_nodes import Extreme, Wanted, find_extremes
+from ballpass.runtime.quantity.kinks import DEFLECTION, find_kinks
+from ballpass.runtime.quantity.nodes import Edges, NodePlan, Nodes, make_edges, no_nodes, place, with_passages
+from ballpass.runtime.quantity.panels import (
+    GAUSS,
+    Panels,
+    cut_at,
+    panels_between,
+    parts_needed,
+    plan_of,
+    split,
+    uniform_panels,
+)
+from ballpass.runtime.quantity.passages import Passages, find_passages
+from ballpass.runtime.quantity.records import Kind, Quantity
+from ballpass.runtime.quantity.registry import KINDS
+from ballpass.runtime.quantity.track import ChannelValues, Signal, Track, depends, follow
+from ballpass.runtime.run.locating import LOCATED
+from ballpass.runtime.run.resolve import Run
+from ballpass.runtime.run.segments import joined_segments, run_windows
+
+Array = NDArray[np.float64]
+
+#: Passes that make panels of outputs of time alone finer, and the most nodes that panels may come to.
+PASSES, MOST = 6, 2**17
+
+#: Distance of the nodes around an extreme, as a share of its panel; what is nearer to its end is at a kink [1].
+AROUND, NEAREST = 0.1, 1e-3
+
+#: Nodes on either side of such an extreme.
+BESIDE = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Layout:
+    """Nodes of a run, of the quantities that share them.
+
+    Attributes
+    ----------
+    items : the quantities
+    still : whether they follow from time alone, so that no state has to be known
+    segments : of the driver
+    edges, passages, panels, plan : where nodes lie; no panels where moments alone are asked for
+    track, signals : states and channels along them
+    extremes : by quantity and "max" or "min", the best first
+    """
+
+    items: tuple[Quantity, ...]
+    still: bool
+    segments: Segments
+    edges: Edges
+    passages: Passages
+    panels: Panels | None
+    plan: NodePlan
+    track: Track | None
+    signals: Mapping[str, Signal]
+    extremes: Mapping[tuple[str, str], list[Extreme]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sort:
+    """What decides about the first nodes of a quantity.
+
+    Attributes
+    ----------
+    moment : whether it has none but a moment
+    still : whether it follows from time alone
+    graded : whether panels get finer towards kinks; states are smooth where contacts begin
+    """
+
+    moment: bool
+    still: bool
+    graded: bool
+
+
+class NodeLayer:
+    """Lays nodes for quantities of one model.
+
+    Parameters
+    ----------
+    model : the model
+    channels : those of the quantities
+    rough : see `panels.parts_needed` [1]
+    along_nodes : search extremes between nodes also where reductions hold them
+    """
+
+    def __init__(self, model: LoadedModel, channels: ChannelValues, *, rough: float, along_nodes: bool) -> None:
+        self.model = model
+        self._channels, self._rough, self._along_nodes = channels, rough, along_nodes
+
+    def is_still(self, quantity: Quantity) -> bool:
+        """Whether a quantity follows from time alone."""
+        names = [quantity.channel, *(quantity.channel.removesuffix("ball.force") + n for n in kind_of(quantity).beside)]
+        return all(name not in self.model.states and not depends(self.model, name, "x") for name in names)
+
+    def lay(self, run: Run, ends: Array, row: Array, noded: Sequence[Quantity]) -> list[Layout]:
+        """Nodes of all quantities, and the run along them.
+
+        Parameters
+        ----------
+        ends : of the steps, and whether they lie on a kink, shape (steps, 2)
+        row : reductions of the run
+        """
+        windows = run_windows(run.model, run.numbers, (run.begin, run.end), run.turn, run.start)
+        (segments,) = joined_segments(windows, all_=True)
+        first = Layout(
+            items=(),
+            still=False,
+            segments=segments,
+            edges=make_edges(run, segments, None),
+            passages=Passages(times=np.zeros(0), edges=(), near=0.0),
+            panels=None,
+            plan=no_nodes(),
+            track=None,
+            signals={},
+            extremes={},
+        )
+        sorts: dict[_Sort, list[Quantity]] = defaultdict(list)
+        for item in noded:
+            moment, resolved = kind_of(item).at_moment, not self._is_found(item)
+            graded = resolved and item.channel not in self.model.states
+            sorts[_Sort(moment=moment, still=self.is_still(item), graded=graded and not moment)].append(item)
+        found: list[Layout] = []
+        for sort, items in sorts.items():
+            here = replace(first, items=tuple(items), still=sort.still)
+            if sort.moment:
+                found.append(here)
+                continue
+            kinks = (ends[:, 1] > 0.0) & sort.graded
+            steps = panels_between(here.edges, ends[:, 0], kinks)
+            here = self._along(run, here, uniform_panels(here.edges, run.turn) if sort.still else steps)
+            found += self._refined(run, here, ends[:, 0], kinks)
+        return [self._with_extremes(run, one, row) for one in found]
+
+    def _along(self, run: Run, layout: Layout, panels: Panels) -> Layout:
+        """The run along the nodes of panels."""
+        plan = plan_of(panels, layout.edges)
+        track = follow(run, layout.segments, layout.edges, place(plan, layout.edges), still=layout.still)
+        signals = self._channels.along(track, run.numbers)
+        return replace(layout, panels=panels, plan=plan, track=track, signals=signals)
+
+    def _refined(
+        self, run: Run, layout: Layout, ends: Array, kinks: NDArray[np.bool_], passes: int = PASSES
+    ) -> list[Layout]:
+        """Each quantity on nodes as fine as it needs: those that need the same ones share them."""
+        assert layout.panels is not None
+        assert layout.track is not None
+        passages = find_passages(run, layout.track) if not layout.still else layout.passages
+        shared: dict[bytes, tuple[Panels, list[Quantity]]] = {}
+        edges = layout.edges
+        if passages.edges:
+            edges = with_passages(edges, passages.times, np.zeros((len(passages.times), 0)))
+        for item in layout.items:
+            panels = layout.panels
+            if not self._is_found(item):
+                parts = self._parts(layout, item)
+                panels = panels_between(edges, ends, kinks) if passages.edges else split(panels, parts)
+                panels = cut_at(panels, edges, self._kinks(run, layout.track, layout.signals, item))
+            key = panels.low.tobytes() + panels.begin.tobytes()
+            shared.setdefault(key, (panels, []))[1].append(item)
+        found = []
+        for panels, items in shared.values():
+            here = replace(layout, items=tuple(items))
+            if panels is layout.panels:
+                found.append(here)
+                continue
+            here = self._along(run, replace(here, edges=edges, passages=passages), panels)
+            # steps say at once how fine nodes have to be; a grid of its own is refined again
+            found += self._refined(run, here, ends, kinks, passes - 1) if layout.still and passes > 1 else [here]
+        return found
+
+    def _parts(self, layout: Layout, item: Quantity) -> NDArray[np.int_]:
+        """Into how many parts each panel is to be split; none where there would be too many."""
+        assert layout.track is not None
+        assert layout.panels is not None
+        within = np.flatnonzero(layout.track.nodes.weight)
+        signal = layout.signals[item.channel].value[within]
+        # what is integrated of loads is steeper than they are
+        each = [signal, *([np.maximum(signal, 0.0) ** 3] if kind_of(item).steep else [])]
+        parts, most = parts_needed(each, self._rough), max(MOST, 2 * len(GAUSS) * len(layout.panels))
+        return parts if len(GAUSS) * np.sum(parts) <= most else np.ones_like(parts)
+
+    def _kinks(self, run: Run, track: Track, signals: Mapping[str, Signal], item: Quantity) -> Array:
+        """Times of kinks of a channel that is integrated, beside those that steps end on [s]."""
+        if kind_of(item).extremes or item.channel in self.model.states:
+            return np.zeros(0)
+        of_balls = ".ball." in f".{item.channel}"
+        ranked = of_balls and item.ball is None and not kind_of(item).steep
+        tables = [signals[item.channel].value] if ranked else []
+        bearings, stops = self.model.manifest.bearings, self.model.manifest.stops
+        # a corner of the damping at rest is in the force of each ball, and not in the motion
+        corner = of_balls and any(bearing.damping.corner_at_rest for bearing in bearings)
+        deflections: list[Array] = []
+        if run.kinks != LOCATED or corner:
+            # among the quantities of every bearing, whether or not the scene's outputs name it
+            names = [bearing.prefix + DEFLECTION for bearing in bearings] + [*stops]
+            found = ChannelValues(self.model, names).along(track, run.numbers)
+            deflections = [found[name].value for name in names]
+        nodes = track.nodes
+        return np.array(
+            find_kinks(
+                nodes.t,
+                nodes.segment,
+                deflections,
+                tables,
+                one_sided=corner,
+                length=run.duration,
+                edges=track.edges.times,
+            )
+        )
+
+    def _with_extremes(self, run: Run, layout: Layout, row: Array) -> Layout:
+        """The same with the extremes of its quantities, and the next ones."""
+        asked = [(item, kind) for item in layout.items for kind in kind_of(item).extremes]
+        track = layout.track
+        if not asked or track is None:
+            return layout
+        rows = reduction_rows(self.model.manifest)
+
+        def wanted(item: Quantity, kind: str) -> Wanted:
+            seen = float(row[rows.column(f"{kind}_time", item.channel)]) if self._is_held(item) else None
+            ball = None if item.ball is None else item.ball - 1
+            sign = 1.0 if kind == "max" else -1.0
+            return Wanted(channel=item.channel, ball=ball, sign=sign, seen=seen, exact=self._is_found(item))
+
+        def look(nodes: Nodes) -> Mapping[str, Signal]:
+            seen = follow(run, layout.segments, layout.edges, nodes, still=layout.still)
+            return self._channels.along(seen, run.numbers)
+
+        each = [wanted(item, kind) for item, kind in asked]
+        distinct = list(dict.fromkeys(each))
+        found = dict(zip(distinct, find_extremes(distinct, track, layout.signals, look), strict=True))
+        extremes = {(item.name, kind): found[one] for (item, kind), one in zip(asked, each, strict=True)}
+        if layout.passages.edges:
+            extremes = {key: [_beside(one, layout) for one in some] for key, some in extremes.items()}
+        return replace(layout, extremes=extremes)
+
+    def _is_found(self, quantity: Quantity) -> bool:
+        """Whether its moments are known before nodes are laid: places, and extremes that the steps hold.
+
+        The most loaded ball carries least where two change rank, which steps do not end on.
+        """
+        kind = kind_of(quantity)
+        top = set(kind.extremes) <= {"max"} or quantity.channel in self.model.states
+        return kind.at_moment or (bool(kind.extremes) and top and self._is_held(quantity))
+
+    def _is_held(self, quantity: Quantity) -> bool:
+        return is_reduced(self.model, quantity) and not self._along_nodes
+
+
+def kind_of(quantity: Quantity) -> Kind:
+    """The kind of a quantity."""
+    return KINDS[quantity.kind]
+
+
+def needs(quantity: Quantity) -> tuple[str, ...]:
+    """Channels that are reduced for a quantity."""
+    kind = kind_of(quantity)
+    return kind.needs(quantity.channel) if kind.needs is not None else (quantity.channel,)
+
+
+def is_reduced(model: LoadedModel, quantity: Quantity) -> bool:
+    """Whether the reductions of a run hold a quantity."""
+    if kind_of(quantity).reduced is None or quantity.ball is not None or not model.states:
+        return False
+    known = reduction_rows(model.manifest)
+    return set(needs(quantity) or (quantity.channel,)) <= set(known.channels if needs(quantity) else known.states)
+
+
+def around(layout: Layout, extreme: Extreme) -> tuple[tuple[int, float], ...]:
+    """Points before and behind an extreme, within its panel; none where that ends beside it."""
+    panels = layout.panels
+    if panels is None:
+        return ()
+    ends = panels.at(np.array([0.0, 1.0]))[0]
+    inside = (panels.segment == extreme.segment) & (ends[:, 0] <= extreme.fraction) & (extreme.fraction <= ends[:, 1])
+    if not np.any(inside) or extreme.other is not None:
+        return ()
+    low, high = ends[int(np.flatnonzero(inside)[0])].tolist()
+    distance = min(AROUND * (high - low), min(extreme.fraction - low, high - extreme.fraction) / (BESIDE + 0.1))
+    if distance < NEAREST * (high - low):
+        return ()
+    return tuple((extreme.segment, extreme.fraction + j * distance) for j in range(-BESIDE, BESIDE + 1) if j)
+
+
+def _beside(extreme: Extreme, layout: Layout) -> Extreme:
+    """An extreme where a load begins or ends is at the corner of what the load drives, and moves with it."""
+    edges, passages = layout.edges, layout.passages
+    beside = np.flatnonzero(np.abs(passages.times - extreme.time) < passages.near)
+    if not len(beside):
+        return extreme
+    edge = int(np.searchsorted(edges.times, passages.times[beside[0]]))
+    return replace(extreme, segment=edge - 1, fraction=1.0)
