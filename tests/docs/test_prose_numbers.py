@@ -183,8 +183,8 @@ NAMED: dict[str, dict[str, str]] = {
     "docs/theory/linkage.md": {"(16 times the squared area": "Heron"},
     "docs/theory/reactions.md": {"8×8 matrix": "Eq. (1)", "is 8×8 and not 9×9": "Eq. (1)"},
     "docs/theory/sensitivities.md": {
-        "By default `rtol` is 1e-11 and": "run/sensitivity.py",
-        "at a tolerance of 1e-11": "member_runs.py",
+        "By default `rtol` is 1e-11 and": "contract/defaults.py",
+        "at a tolerance of 1e-11": "contract/defaults.py",
         "moving all parameters by 1e-7": "certificate.py",
         "(1e-3 of the derivative, plus 1e-5": "certificate.py",
         "exceeds 1e-3 of the derivative": "certificate.py",
@@ -197,6 +197,7 @@ NAMED: dict[str, dict[str, str]] = {
     },
     "docs/reference/cli.md": {
         "up to 64 steady turns or 100 000 steps": "settle.py",
+        "over 20 such starts": "certify/growth.py",
         "from 64 on": "settle.py",
         "At 4096 turns": "settle.py",
         "from 64 steady ones on": "settle.py",

@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ballpass.runtime.contract.defaults import DIFFERENCE_RTOL
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.many.ensemble import simulate_many
 from ballpass.runtime.point.evaluate import neighbour
@@ -30,9 +31,6 @@ from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run, resolve
 
 Array = NDArray[np.float64]
-
-#: Tolerance of the states.
-RTOL = 1e-11
 
 #: Roughness of a panel, relative to that of the derivatives' own run, whose nodes are not to be shared.
 ROUGHNESS = 0.3
@@ -80,7 +78,7 @@ class MemberRuns:
                 cycles=self._request.cycles,
                 duration=self._request.duration,
                 transient=self._request.transient_cycles,
-                rtol=RTOL,
+                rtol=DIFFERENCE_RTOL,
                 method=self._method,
                 kinks=LOCATED,
                 threads=None,
@@ -101,7 +99,7 @@ class MemberRuns:
 
     def _along_nodes(self, change: Mapping[str, float]) -> Array:
         model = self._run.model
-        request = replace(self._request, method=self._method, rtol=RTOL, kinks=LOCATED, progress=None)
+        request = replace(self._request, method=self._method, rtol=DIFFERENCE_RTOL, kinks=LOCATED, progress=None)
         try:
             run = resolve(model, neighbour(model, self._run.numbers, change), request)
             # the magnitudes of the run itself: a tolerance that changes with the parameters is noise

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate, refuse_chaos
 from ballpass.runtime.certify.sensitivity_query import Query, answer, length_request
 from ballpass.runtime.certify.sensitivity_report import SensitivityReport
+from ballpass.runtime.contract.defaults import FUNCTION_RTOL, FUNCTION_SLOPES, SENSITIVITY
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.many.ensemble import simulate_many
@@ -36,15 +37,10 @@ from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, refuse_jumps
 from ballpass.runtime.run.request import TOLERANCES, tolerance
 from ballpass.runtime.run.resolve import resolve
-from ballpass.runtime.run.sensitivity import SENSITIVITY
 from ballpass.runtime.show.progress import shown, shown_steps
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-
-#: Tolerance of values [1], and that of runs with derivatives over it: these lose digits, and end on kinks, which costs
-#: little.
-RTOL, FINER = 1e-9, 1e-2
 
 
 class UnknownValueWarning(BallpassWarning):
@@ -107,7 +103,7 @@ class QuantityFunction:
         duration: float | None = None,
         transient: float | None = None,
         parameters: Mapping[str, float] | None = None,
-        rtol: float = RTOL,
+        rtol: float = FUNCTION_RTOL,
         kinks: Kinks | None = None,
         failed: Literal["raise", "nan"] = "raise",
         chaos: Literal["refuse", "ignore"] = "refuse",
@@ -132,7 +128,7 @@ class QuantityFunction:
         self._request = length_request(model.manifest, cycles, duration, transient)
         # they are not for two threads at once: each takes one that is free, and puts it back
         self._free: defaultdict[tuple[int, ...], list[QuantityRun]] = defaultdict(list)
-        self._slope_rtol = max(FINER * self._rtol, TOLERANCES[0])
+        self._slope_rtol = max(FUNCTION_SLOPES * self._rtol, TOLERANCES[0])
         self._all = tuple(range(len(self.of)))
         self._said: set[tuple[type[BallpassWarning], str]] = set()
         resolve(model, numbers, self._request).check_steady()  # a wrong length is refused now

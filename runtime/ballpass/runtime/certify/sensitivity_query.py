@@ -36,6 +36,7 @@ from ballpass.runtime.certify.sensitivity_report import (
     ratio_unit,
 )
 from ballpass.runtime.contract import Manifest
+from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -51,7 +52,6 @@ from ballpass.runtime.run.direction_scales import ANGLE
 from ballpass.runtime.run.locating import check_kinks, refuse_jumps
 from ballpass.runtime.run.request import TOLERANCES, Request, asked_length
 from ballpass.runtime.run.resolve import Run, check_transient
-from ballpass.runtime.run.sensitivity import RTOL, SENSITIVITY
 
 Array = NDArray[np.float64]
 
@@ -84,8 +84,8 @@ class Query:
     request: Request
     method: str = "auto"
     check: bool = True
-    rtol: float = RTOL
-    sensitivity_rtol: float = SENSITIVITY * RTOL
+    rtol: float = DERIVATIVE_RTOL
+    sensitivity_rtol: float = SENSITIVITY * DERIVATIVE_RTOL
     kinks: str | None = None
     agreement: float = AGREEMENT
     progress: Callable[[str, float], None] | None = None
@@ -144,8 +144,8 @@ def make_query(
         request=length_request(manifest, cycles, duration, transient),
         method=method,
         check=check,
-        rtol=RTOL if rtol is None else rtol,
-        sensitivity_rtol=SENSITIVITY * RTOL if sensitivity_rtol is None else sensitivity_rtol,
+        rtol=DERIVATIVE_RTOL if rtol is None else rtol,
+        sensitivity_rtol=SENSITIVITY * DERIVATIVE_RTOL if sensitivity_rtol is None else sensitivity_rtol,
         kinks=None if kinks is None else check_kinks(kinks),
         agreement=AGREEMENT if agreement is None else agreement,
         progress=progress,

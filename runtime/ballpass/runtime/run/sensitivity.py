@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -21,9 +22,6 @@ from ballpass.runtime.run.request import TOLERANCES, Request
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.show.short import ShortRepr
-
-#: Tolerance of the states in a run with derivatives, and that of the derivatives over it [1].
-RTOL, SENSITIVITY = 1e-11, 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -86,7 +84,7 @@ def sensitivities(model: LoadedModel, numbers: Numbers, request: Request, names:
     if not names:
         raise RequestError("sensitivities: no parameter was named. Give the names of one or more parameters.")
     made: list[Directions] = []
-    rtol = RTOL if request.rtol is None else request.rtol
+    rtol = DERIVATIVE_RTOL if request.rtol is None else request.rtol
     own = min(SENSITIVITY * rtol, TOLERANCES[1]) if request.sensitivity_rtol is None else request.sensitivity_rtol
 
     def prepare(samples: int) -> Directions:
