@@ -22,6 +22,7 @@ from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.request import Request, run_length
 from ballpass.runtime.run.resolve import SCALED_TURNS, Run, resolve
+from ballpass.runtime.run.segments import check_count
 from ballpass.runtime.run.start import start_state
 
 #: The derivatives' tolerance is loosened tenfold, down to this, where steps would fall below the resolution of time:
@@ -51,6 +52,7 @@ def derivative_run(model: LoadedModel, numbers: Numbers, request: Request) -> tu
         fine = "stepper-rodas5p" if scales.stiffness > STIFF_RATIO else fine
     method = fine if asked in ("auto", "stepper") else asked
     run = resolve(model, numbers, replace(request, method=method, kinks=None))
+    check_count(model.manifest.inputs, numbers, run.duration, run.turn)  # before anything that takes long
     return replace(run, kinks=kinks_with_derivatives(request.kinks, model.manifest)).check_steady(), fine
 
 

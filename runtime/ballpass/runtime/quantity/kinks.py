@@ -28,28 +28,28 @@ APART = 1e-9
 HALVINGS = 45
 
 
-def crossings(t: Array, segment: NDArray[np.int_], signal: Array) -> Array:
-    """Times at which a signal changes sign within a segment, increasing.
+def crossings(t: Array, segment: NDArray[np.int_], *signals: Array) -> Array:
+    """Times at which signals change sign within a segment, those of the first signal first, each increasing.
 
     Parameters
     ----------
     t : times that increase within each segment, shape (n,) [s]
     segment : shape (n,)
-    signal : shape (n,)
+    signals : shape (n,) each
     """
     same = (np.diff(segment) == 0) & (np.diff(t) > 0.0)
-    found = np.flatnonzero(same & (signal[:-1] * signal[1:] < 0.0))
+    places = [np.flatnonzero(same & (signal[:-1] * signal[1:] < 0.0)) for signal in signals]
+    found = np.concatenate([np.zeros(0, dtype=np.int_), *places])
     if not len(found):
         return np.zeros(0)
     # four nodes around, all of the same segment; where there are too few, those at its end twice removed
-    first = np.clip(found - 1, 0, len(t) - 4)
-    rows = first[:, None] + np.arange(4)
+    rows = np.clip(found - 1, 0, len(t) - 4)[:, None] + np.arange(4)
     whole = np.all(segment[rows] == segment[found][:, None], axis=1) & np.all(np.diff(t[rows], axis=1) > 0.0, axis=1)
-    low, high = t[found].copy(), t[found + 1].copy()
-    start = np.sign(signal[found])
-    nodes, values = t[rows], signal[rows]
-    line = np.stack([t[found], t[found + 1]], axis=1)
-    ends = np.stack([signal[found], signal[found + 1]], axis=1)
+    low, high, nodes = t[found].copy(), t[found + 1].copy(), t[rows]
+    of = np.repeat(np.arange(len(signals)), [len(place) for place in places])
+    table = np.stack(signals)
+    values, ends = table[of[:, None], rows], np.stack([table[of, found], table[of, found + 1]], axis=1)
+    start, line = np.sign(ends[:, 0]), np.stack([low, high], axis=1)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         straight = ends[:, 0] + (ends[:, 1] - ends[:, 0]) * (middle - line[:, 0]) / (line[:, 1] - line[:, 0])
@@ -116,7 +116,7 @@ def find_kinks(
         # a crossing of two balls that carry less is a kink of nothing, and does no harm
         signals += [table[:, a] - table[:, b] for a, b in sorted({(min(pair), max(pair)) for pair in pairs})]
     kept: list[float] = []
-    for time in np.sort(np.concatenate([np.zeros(0), *(crossings(t, segment, signal) for signal in signals)])).tolist():
+    for time in np.sort(crossings(t, segment, *signals)).tolist():
         last = kept[-1] if kept else -np.inf
         if time - last > APART * length and np.min(np.abs(edges - time)) > APART * length:
             kept.append(time)
