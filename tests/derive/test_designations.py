@@ -244,11 +244,11 @@ def test_a_group_may_stand_where_a_number_is_written() -> None:
             "bearing.clearance",
             "only together with designation",
         ),
-        (named("6204", more='dynamic_rating = "-1 kN"\n'), "bearing.dynamic_rating", "a force above zero"),
+        (named("6204", more='dynamic_rating = "-1 kN"\n'), "bearing.dynamic_rating", "a value above zero"),
         (
             named("6204", more='fit = { inner_interference = "-1 um" }\n'),
             "bearing.fit.inner_interference",
-            "zero or above",
+            "zero or a value above it",
         ),
         (
             named("6204", more='fit = { inner_interference = "9 um", bore = "30 mm" }\n'),

@@ -176,7 +176,7 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
             without=_without_smoothing(scene, sharp, f"{bearing.path}.contact.smoothing"),
         )
     if bearing.damping.numbers:
-        undamped = replace(bearing, damping=Damping(law="none", numbers=()))
+        undamped = replace(bearing, damping=Damping(law="none", numbers=(), smoothing=None))
         yield Feature(
             name=f"contact damping{of}",
             path=f"{bearing.path}.damping",

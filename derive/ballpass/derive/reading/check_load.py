@@ -5,19 +5,13 @@ from __future__ import annotations
 import math
 
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import HarmonicLoad, Load, TableLoad, UnbalanceLoad
+from ballpass.derive.scene.records import Load, TableLoad
 
 
 def check_load(checker: Checker, load: Load) -> None:
     """Note faults of the numbers of a load."""
-    law = load.law
-    if isinstance(law, HarmonicLoad):
-        checker.positive(law.frequency)
-    elif isinstance(law, UnbalanceLoad):
-        checker.not_negative(law.mass)
-        checker.not_negative(law.eccentricity, "give the amount, and turn the angle by 180 deg")
-    elif isinstance(law, TableLoad):
-        _check_table(checker, load.path, law)
+    if isinstance(load.law, TableLoad):
+        _check_table(checker, load.path, load.law)
     _check_windows(checker, load)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from ballpass.derive.scene.designations import GROUPS, bearing_types
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.records import Scene
-from ballpass.derive.scene.schema import listing
+from ballpass.derive.scene.table import listing
 from ballpass.derive.scene.units import show
 
 

@@ -27,8 +27,9 @@ from ballpass.derive.reading.values import parse_override, quantities_of, replac
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.file_columns import with_columns
+from ballpass.derive.scene.keys import keys_of
 from ballpass.derive.scene.records import Load, Mechanism, Scene
-from ballpass.derive.scene.schema import Collector, Table, listing
+from ballpass.derive.scene.table import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
 from ballpass.derive.terms import Names
@@ -196,7 +197,7 @@ def _parse(text: str, source: str | None) -> dict[str, Any]:
 
 def _read(root: Table, name: str) -> Scene:
     with root:
-        title = _read_title(root, name)
+        title = keys_of(Scene)["title"].read(root, "title") or name
         root.know(*_TABLES)
         mechanism, driven = read_mechanism(root.table("mechanism")) if root.has("mechanism") else (None, None)
         has_bearing = root.has("bearing") or root.has("bearings")
@@ -286,21 +287,6 @@ def _check_couplings(several: Table, bearings: Sequence[Bearing]) -> None:
                 allowed="one bearing coupled two-way at a joint, count for equal ones side by side",
                 remedy="write count = 2 at the other one and delete this one",
             )
-
-
-def _read_title(root: Table, name: str) -> str:
-    if not root.has("title"):
-        return name
-    title = root.text("title", "Punching machine") or name
-    if not title.isprintable() or len(title) > 200:
-        root.fault(
-            "title",
-            "the title is no single line",
-            given=show(title),
-            allowed="at most 200 printable characters",
-            remedy="shorten the title; put the rest into a comment",
-        )
-    return title
 
 
 def _read_loads(root: Table, *, required: bool) -> tuple[Load, ...]:

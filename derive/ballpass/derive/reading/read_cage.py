@@ -3,13 +3,41 @@
 from __future__ import annotations
 
 import random
+from dataclasses import dataclass
 
 from ballpass.derive.scene.bearing_records import CageMotion
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.keys import ColumnKey, WholeKey, declared, keys_of, quantity, read_keys, read_record
+from ballpass.derive.scene.quantity import Bounds, UsualRange
+from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
 
 #: Most rows of a random slip: each is a number of the model.
 MOST_ROWS = 500
+#: Columns of a slip over time.
+SLIPS = {
+    "time": ColumnKey(
+        unit="s", words="Time from which the cage's slip of row ROW holds", symbol="t_{c,ROW}", note="the first is zero"
+    ),
+    "value": ColumnKey(
+        unit="1",
+        words="Part by which the cage turns slower than by rolling, row ROW",
+        symbol="s_{c,ROW}",
+        bounds=Bounds(above=-1.0, below=1.0),
+        usual=UsualRange(
+            least=-0.3, most=0.3, hint="A cage lags by some hundredths: check whether percents were given."
+        ),
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Jitter:
+    """Random slip, drawn anew after each interval."""
+
+    deviation: float = quantity("1", "Standard deviation of the slip", example=0.01, setting=True)
+    interval: float = quantity("s", "Interval of the jitter", example="5 ms", setting=True)
+    duration: float = quantity("s", "Duration of the jitter", example="1 s", setting=True, note="at most 500 intervals")
+    seed: int = declared(WholeKey(words="Seed", lowest=0, highest=2**63 - 1, example=1))
 
 
 def read_cage(table: Table, uneven: str) -> CageMotion | None:
@@ -22,8 +50,7 @@ def read_cage(table: Table, uneven: str) -> CageMotion | None:
     if not table.has("cage"):
         return None
     with table.table("cage", "ratio or slip") as cage:
-        ratio = cage.optional_quantity("ratio", "1", "Speed of the cage over that of the inner ring", r"\kappa_c")
-        words = "Part by which the cage turns slower than by rolling"
+        cage.know(*keys_of(CageMotion), "jitter")
         for key in ("slip", "jitter"):
             if cage.has(key) and uneven:
                 cage.fault(
@@ -36,13 +63,10 @@ def read_cage(table: Table, uneven: str) -> CageMotion | None:
         if cage.has("jitter"):
             cage.data = {**cage.data, "slip": _jitter(cage)}
         if not isinstance(cage.data.get("slip"), dict):
-            return CageMotion(ratio=ratio, slip=cage.optional_quantity("slip", "1", words, "s_c"))
+            return read_record(CageMotion, cage, time=(), slips=())
         with cage.table("slip") as rows:
-            return CageMotion(
-                ratio=ratio,
-                time=rows.column("time", "s", "Time from which the cage's slip of row ROW holds", "t_{c,ROW}"),
-                slips=rows.column("value", "1", f"{words}, row ROW", "s_{c,ROW}"),
-            )
+            time, slips = read_keys(rows, SLIPS).values()
+        return read_record(CageMotion, cage, slip=None, time=time, slips=slips)
 
 
 def _jitter(cage: Table) -> object:
@@ -61,10 +85,8 @@ def _jitter(cage: Table) -> object:
         )
     noted = len(cage.collector.faults)
     with cage.table("jitter") as jitter:
-        deviation = jitter.number("deviation", example="0.01")
-        interval = jitter.quantity("interval", "s", "Interval of the jitter", "", example="5 ms").value
-        duration = jitter.quantity("duration", "s", "Duration of the jitter", "", example="1 s").value
-        seed = jitter.integer("seed", 0, 2**63 - 1, example="1")
+        known = read_record(Jitter, jitter)
+        deviation, interval, duration = known.deviation, known.interval, known.duration
         if len(cage.collector.faults) > noted:
             return mean
         if not (deviation >= 0.0 and interval > 0.0 and 1.0 <= duration / interval <= MOST_ROWS):
@@ -76,6 +98,6 @@ def _jitter(cage: Table) -> object:
                 remedy="give a longer interval, or a shorter duration",
             )
             return mean
-    draw, count = random.Random(seed), round(duration / interval)
+    draw, count = random.Random(known.seed), round(duration / interval)
     times = [f"{k * interval!r} s" for k in range(count + 1)]
     return {"time": times, "value": [*(mean + deviation * draw.gauss() for _ in range(count)), mean]}

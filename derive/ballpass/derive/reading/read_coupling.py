@@ -9,15 +9,24 @@ from __future__ import annotations
 from typing import Literal
 
 from ballpass.derive.bearing.effects import EFFECTS
+from ballpass.derive.scene.bearing_records import Bearing
+from ballpass.derive.scene.keys import TextKey, keys_of
 from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.records import FRAME, Mechanism
-from ballpass.derive.scene.schema import Table, listing, suggest
+from ballpass.derive.scene.table import Table, listing, suggest
 from ballpass.derive.scene.units import show
+
+#: Key of the inner ring of a bearing coupled two-way.
+BODY = TextKey(
+    words="Body of the joint that carries the inner ring",
+    example="crank",
+    when="two-way: required where both bodies move; the only key allowed then",
+)
 
 
 def read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-way", "two-way"]:
     """How a bearing and its linkage move each other; faults where the scene has no room for it."""
-    coupling = table.choice("coupling", ("one-way", "two-way"), default="one-way")
+    coupling = keys_of(Bearing)["coupling"].read(table, "coupling")
     if coupling == "one-way" and mechanism is not None and mechanism.driver.torque is not None:
         _refuse_one_way(table)
         return "two-way"
@@ -55,7 +64,7 @@ def read_count(table: Table, coupling: str) -> Quantity | None:
             allowed='share, as in 0.5 for one of a pair; count only with coupling = "two-way"',
             remedy="write share = 0.5 for one of two bearings",
         )
-    return table.quantity("count", "1", "Bearings side by side at the joint", "n_b", example="2")
+    return keys_of(Bearing)["count"].read(table, "count")  # type: ignore[no-any-return]
 
 
 def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None) -> str:
@@ -74,7 +83,7 @@ def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None)
                     remedy="delete the key",
                 )
         if joint is None:
-            return ring.text("body", "crank") or "" if ring.has("body") else ""
+            return str(BODY.read(ring, "body")) if ring.has("body") else ""
         moving = [body for body in joint.bodies if body != FRAME]
         if not ring.has("body"):
             if len(moving) == 1:
@@ -87,7 +96,7 @@ def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None)
                 remedy=f'add the table inner_ring with body = "{moving[0]}"',
             )
             return moving[0]
-        body = ring.text("body", moving[0]) or ""
+        body = BODY.read(ring, "body")
         if body not in joint.bodies:
             ring.fault(
                 "body",
@@ -97,7 +106,7 @@ def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None)
                 remedy=suggest(body, joint.bodies, "name one of the two"),
             )
             return moving[0]
-        return body
+        return str(body)
 
 
 def refuse_effects(table: Table, what: str, remedy: str) -> None:

@@ -10,17 +10,20 @@ from decimal import Decimal
 
 from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import GROOVES, GROUPS, BearingType, bearing_types
-from ballpass.derive.scene.schema import Table, listing, suggest
+from ballpass.derive.scene.keys import TextKey, keys_of, read_record
+from ballpass.derive.scene.table import Table, listing, suggest
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 
 #: Bearing steel of rings and balls, where a designation gives the geometry.
 YOUNG_MODULUS, POISSON_RATIO = "207 GPa", 0.3
-_RATINGS = ("dynamic_rating", "static_rating", "fatigue_limit")
+RATINGS = keys_of(Catalogue)
+DESIGNATION = TextKey(
+    words="A bearing of the table", example="6204", optional=True, note="supplies the keys below that are not given"
+)
 
 
 def fill_by_designation(table: Table) -> Catalogue | None:
     """Fill in what the designation of a bearing gives; None where the scene takes nothing from a catalogue."""
-    table.know("designation", *_RATINGS)
     kind = _bearing_type(table) if table.has("designation") else None
     group = _clearance_group(table, kind)
     span = kind.clearance(group) if kind is not None and group else None
@@ -35,23 +38,21 @@ def fill_by_designation(table: Table) -> Catalogue | None:
         given = {key: value for key, value in table.data.items() if key != "clearance" or not group}
         table.data = filled | given
         _fill_contact(table)
-    dynamic, static, limit = (_rating(table, key) for key in _RATINGS)
-    if kind is None and not any(key in table.data for key in _RATINGS):
-        return None
-    return Catalogue(
+    catalogue = read_record(
+        Catalogue,
+        table,
         designation=kind.designation if kind is not None else "",
         clearance_group=group if span is not None else "",
         clearance_range=(span[0] / 1e6, span[1] / 1e6) if span is not None else None,
-        dynamic_rating=dynamic,
-        static_rating=static,
-        fatigue_limit=limit,
+        mounting_loss=0.0,
     )
+    return None if kind is None and not any(key in table.data for key in RATINGS) else catalogue
 
 
 def _bearing_type(table: Table) -> BearingType:
-    name = table.text("designation", "6204")
+    name = DESIGNATION.read(table, "designation")
     types = bearing_types()
-    if name is None or name in types:
+    if not name or name in types:
         return types[name or "6204"]
     table.fault(
         "designation",
@@ -118,17 +119,3 @@ def _fill_contact(table: Table) -> None:
         except QuantityError:  # told where the ball diameter is read
             filled[f"{ring}_groove_radius"] = "1 m"
     table.data = {**table.data, "contact": filled | contact}
-
-
-def _rating(table: Table, key: str) -> float | None:
-    words = f"the {key.replace('_', ' ')} of the catalogue"
-    given = table.optional_quantity(key, "N", words, "")
-    if given is not None and given.value <= 0.0:
-        table.fault(
-            key,
-            "the rating is not positive",
-            given=show(table.data[key]),
-            allowed="a force above zero",
-            remedy="delete the key for the value that follows from the geometry",
-        )
-    return None if given is None else given.value

@@ -13,14 +13,13 @@ from typing import Any
 from ballpass.derive.reading.values import parse_override, with_values
 from ballpass.derive.scene.bearing_records import Lubrication
 from ballpass.derive.scene.errors import Fault, SceneError
+from ballpass.derive.scene.keys import read_record
 from ballpass.derive.scene.records import DutyState, Scene
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
 
 #: Shares of all states add up to one within this [1].
 SHARES = 1e-6
-#: Least viscosity ratio for which ISO 281 has a life factor.
-LEAST_RATIO = 0.1
 
 
 def read_duty(table: Table, scene: Scene) -> tuple[DutyState, ...]:
@@ -54,15 +53,6 @@ def duty_faults(scene: Scene) -> list[Fault]:
 
 def _read_state(table: Table, name: str, scene: Scene) -> DutyState:
     with table as state:
-        share = state.number("share", example="0.5")
-        if share <= 0.0:
-            state.fault(
-                "share",
-                "the state takes no time",
-                given=show(state.data["share"]),
-                allowed="a number above 0",
-                remedy="delete the state, or give its share of the time",
-            )
         numbers: dict[str, float] = {}
         given = state.table("set", required=False).data
         for path, value in _leaves(given):
@@ -74,7 +64,7 @@ def _read_state(table: Table, name: str, scene: Scene) -> DutyState:
                 for fault in error.faults:
                     words = {"given": fault.given, "allowed": fault.allowed, "remedy": fault.remedy}
                     state.fault(f"set.{path}", fault.problem, **words)
-    return DutyState(name=name, share=share, parameters=tuple(numbers.items()))
+        return read_record(DutyState, state, name=name, parameters=tuple(numbers.items()))
 
 
 def _no_value(path: str, value: Any) -> Fault:
@@ -101,42 +91,4 @@ def read_lubrication(table: Table) -> Lubrication | None:
     if not table.has("lubrication"):
         return None
     with table.table("lubrication") as film:
-        both = [key for key in ("viscosity_ratio", "viscosity") if film.has(key)]
-        if len(both) != 1 and not film.missing:
-            film.fault(
-                "",
-                "the film is given twice" if both else "the film is missing",
-                given=" and ".join(both),
-                allowed='viscosity_ratio, as in 1.2, or viscosity in operation, as in "32 mm^2/s"',
-                remedy="delete one of the two" if both else "add viscosity_ratio = 1.2",
-            )
-        ratio = film.number("viscosity_ratio", example="1.2") if "viscosity_ratio" in both else None
-        if ratio is not None and ratio < LEAST_RATIO:
-            film.fault(
-                "viscosity_ratio",
-                "ISO 281 has no life factor for so thin a film",
-                given=show(film.data["viscosity_ratio"]),
-                allowed=f"{LEAST_RATIO} and above",
-                remedy="take a thicker lubricant, or delete the table and judge by the life without it",
-            )
-        viscosity = film.optional_quantity("viscosity", "m^2/s", "Kinematic viscosity in operation", "")
-        if viscosity is not None and viscosity.value <= 0.0:
-            film.fault(
-                "viscosity",
-                "the viscosity is not positive",
-                given=show(film.data["viscosity"]),
-                allowed="a viscosity above zero",
-                remedy="give that of the oil at the bearing's temperature",
-            )
-        contamination = film.number("contamination", example="0.5")
-        if not (0.0 <= contamination <= 1.0 or math.isnan(contamination)):
-            film.fault(
-                "contamination",
-                "the contamination factor lies outside its bounds",
-                given=show(film.data["contamination"]),
-                allowed="e_C of ISO 281, from 0 (very dirty) to 1 (clean)",
-                remedy="write contamination = 0.5 where cleanliness is normal",
-            )
-    return Lubrication(
-        viscosity_ratio=ratio, viscosity=None if viscosity is None else viscosity.value, contamination=contamination
-    )
+        return read_record(Lubrication, film)

@@ -6,13 +6,49 @@ In: the table of a bearing, its clearance before mounting.  Out: the clearance i
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import bearing_types
-from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.keys import keys_of, quantity, read_record
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
+from ballpass.derive.scene.table import Table
 from ballpass.runtime.ratings.mounted_clearance import inner_growth, outer_shrinkage, thermal_reduction
+
+
+def _interference(words: str) -> Any:
+    return quantity(
+        "m",
+        f"Effective interference of {words}",
+        example="10 um",
+        optional=True,
+        setting=True,
+        bounds=NOT_NEGATIVE,
+        remedy="delete the key: a fit with play changes no clearance",
+    )
+
+
+def _size(words: str, example: str) -> Any:
+    when = "required with the interference of that ring, unless the designation gives it"
+    return quantity("m", words, example=example, optional=True, setting=True, when=when)
+
+
+def _warming(ring: str) -> Any:
+    words = f"Temperature rise of the {ring} ring since the clearance was measured"
+    return quantity("K", words, example="10 K", default="0 K", setting=True, note="the balls have the mean")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fit:
+    """What stands in the table."""
+
+    inner_interference: float | None = _interference("shaft and bore")
+    outer_interference: float | None = _interference("outer ring and housing")
+    bore: float | None = _size("Bore of the bearing", "20 mm")
+    outside_diameter: float | None = _size("Outside diameter of the bearing", "47 mm")
+    inner_warming: float = _warming("inner")
+    outer_warming: float = _warming("outer")
 
 
 def mounted(
@@ -23,14 +59,15 @@ def mounted(
         return clearance, catalogue
     inner_race, outer_race = pitch_diameter - ball_diameter, pitch_diameter + ball_diameter
     kind = bearing_types().get(catalogue.designation) if catalogue is not None else None
-    bore, outside = ("", "") if kind is None else (f"{kind.bore} mm", f"{kind.outside} mm")
-    with table.table("fit", "inner_interference") as fit:
-        lost = _pressed(fit, "inner", ("bore", bore), inner_race, inner_growth)
-        lost += _pressed(fit, "outer", ("outside_diameter", outside), outer_race, outer_shrinkage)
-        inner, outer = (
-            fit.quantity(f"{ring}_warming", "K", "", "", example="10 K", default="0 K").value
-            for ring in ("inner", "outer")
+    bore, outside = (None, None) if kind is None else (float(kind.bore) / 1e3, float(kind.outside) / 1e3)
+    with table.table("fit", "inner_interference") as data:
+        fit = read_record(Fit, data)
+        lost = _pressed(data, "inner", fit.inner_interference, ("bore", fit.bore or bore), inner_race, inner_growth)
+        outside = fit.outside_diameter or outside
+        lost += _pressed(
+            data, "outer", fit.outer_interference, ("outside_diameter", outside), outer_race, outer_shrinkage
         )
+        inner, outer = fit.inner_warming, fit.outer_warming
         lost += thermal_reduction(inner, (inner + outer) / 2.0, outer, ball_diameter, pitch_diameter)
     if catalogue is not None:
         span = catalogue.clearance_range
@@ -40,24 +77,27 @@ def mounted(
 
 
 def _pressed(
-    fit: Table, ring: str, size: tuple[str, str], raceway: float, change: Callable[[float, float, float], float]
+    data: Table,
+    ring: str,
+    interference: float | None,
+    size: tuple[str, float | None],
+    raceway: float,
+    change: Callable[[float, float, float], float],
 ) -> float:
     """Clearance that the interference of a ring takes [m]; 0 where there is none, or with a fault."""
-    key, default = size
-    if not fit.has(f"{ring}_interference"):
-        if default:
-            fit.know(key)
+    key, diameter = size
+    if not interference or interference < 0.0:  # reported
         return 0.0
-    interference = fit.quantity(f"{ring}_interference", "m", "", "", example="10 um").value
-    diameter = fit.quantity(key, "m", "", "", example="20 mm", default=default or None).value
-    outside_its_ring = diameter <= 0.0 or (diameter >= raceway if ring == "inner" else diameter <= raceway)
-    if interference < 0.0 or outside_its_ring:
-        fit.fault(
-            f"{ring}_interference" if interference < 0.0 else key,
-            "a fit with play changes no clearance" if interference < 0.0 else "the raceway is not within its ring",
-            given=f"{interference:.6g} m" if interference < 0.0 else f"{diameter:.6g} m, raceway {raceway:.6g} m",
-            allowed="zero or above" if interference < 0.0 else "bore < inner raceway, outer raceway < outside_diameter",
-            remedy="delete the key" if interference < 0.0 else "correct the diameter of the ring",
+    if diameter is None:
+        data.take(key, keys_of(Fit)[key].sample)
+        return 0.0
+    if diameter <= 0.0 or (diameter >= raceway if ring == "inner" else diameter <= raceway):
+        data.fault(
+            key,
+            "the raceway is not within its ring",
+            given=f"{diameter:.6g} m, raceway {raceway:.6g} m",
+            allowed="bore < inner raceway, outer raceway < outside_diameter",
+            remedy="correct the diameter of the ring",
         )
         return 0.0
     return change(interference, diameter, raceway)

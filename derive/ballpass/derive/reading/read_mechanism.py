@@ -7,29 +7,44 @@ linkage can be assembled is no question of reading: `derive` answers it.
 from __future__ import annotations
 
 import math
-from typing import Literal
+from dataclasses import replace
 
 from ballpass.derive.drive import LAWS
 from ballpass.derive.drive.laws import TorqueLaw
 from ballpass.derive.mechanism.dyads import BRANCHES
 from ballpass.derive.mechanism.forces import FORCE_TABLES
-from ballpass.derive.scene.body_keys import Points, read_pair, refuse_unknown_body, refuse_unknown_point
-from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.records import FRAME, Body, Driver, Force, Joint, Mechanism, NamedPoint, SpeedOverTime
-from ballpass.derive.scene.schema import Table, VectorWords, listing, suggest, upright
+from ballpass.derive.scene.body_keys import Points, check_two_bodies, refuse_unknown_point
+from ballpass.derive.scene.keys import ChoiceKey, QuantityKey, VectorKey, keys_of, read_record
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
+from ballpass.derive.scene.records import FRAME, POINT, Body, Driver, Force, Joint, Mechanism, NamedPoint, SpeedOverTime
+from ballpass.derive.scene.table import Table, listing, suggest, upright
 from ballpass.derive.scene.units import show
 
-_JOINT_TYPES: tuple[Literal["revolute", "prismatic"], ...] = ("revolute", "prismatic")
-
-
-def words_of_gravity() -> VectorWords:
-    """Words of the acceleration of gravity; a single number points down."""
-    return VectorWords(
-        what="the acceleration of gravity",
-        axis="Acceleration of gravity, along -y",
-        latex=("g", "g_x", "g_y", "g", r"\alpha_g"),
-        polar=("magnitude", "direction"),
-    )
+GRAVITY = VectorKey(
+    unit="m/s^2",
+    words="the acceleration of gravity",
+    axis="Acceleration of gravity, along -y",
+    symbols=("g", "g_x", "g_y", "g", r"\alpha_g"),
+    polar=("magnitude", "direction"),
+    optional=True,
+)
+BRANCH = ChoiceKey(
+    words="On which of the two sides the dyad is assembled",
+    choices=BRANCHES,
+    optional=True,
+    when="required at the inner joint of each dyad, else refused",
+    note="left and right for RRR, ahead and behind for RRP and RPR; see {doc}`../theory/linkage`",
+)
+FLYWHEEL = QuantityKey(
+    unit="kg*m^2",
+    words="Moment of inertia that turns with the driven body",
+    symbol="J_f",
+    example="0.5 kg*m^2",
+    bounds=NOT_NEGATIVE,
+)
+#: What placeholders in the words of the driver's speed stand for, with a torque and without.
+START, CONSTANT = {"START": " at the start", "ZERO": "_0"}, {"START": "", "ZERO": ""}
+LAW = ChoiceKey(words="Law of the torque", choices=tuple(LAWS))
 
 
 def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
@@ -39,7 +54,7 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
     revolute joint from the frame to a body; names; and what `Table` notes.
     """
     with table:
-        gravity = table.vector("gravity", "m/s^2", words_of_gravity()) if table.has("gravity") else None
+        gravity = GRAVITY.read(table, "gravity")
         driver = _read_driver(table)
         with table.table("frame", "its points") as frame:
             frame_points = _read_points(frame, FRAME)
@@ -63,21 +78,12 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
 def _read_driver(table: Table) -> Driver:
     with table.table("driver", "joint and speed") as driver:
         by_torque = driver.has("torque")
-        words = "Speed of the driver at the start" if by_torque else "Speed of the driver"
-        joint = driver.text("joint", "A") or ""
+        joint, start = (keys_of(Driver)[name].read(driver, name) for name in ("joint", "start_angle"))
         speed, over_time = _read_table(driver) if driver.has("table") else (None, None)
         return Driver(
             joint=joint,
-            speed=speed
-            or driver.quantity("speed", "rad/s", words, r"\omega_0" if by_torque else r"\omega", example="500 rpm"),
-            start_angle=driver.quantity(
-                "start_angle",
-                "rad",
-                "Angle of the driver at the start",
-                r"\theta_{1,0}",
-                example="0 deg",
-                default="0 deg",
-            ),
+            speed=speed or keys_of(Driver, START if by_torque else CONSTANT)["speed"].read(driver, "speed"),
+            start_angle=start,
             table=over_time,
             torque=_read_torque(driver) if by_torque else None,
             flywheel=_read_flywheel(driver, by_torque or over_time is not None) if driver.has("flywheel") else None,
@@ -96,20 +102,19 @@ def _read_table(driver: Table) -> tuple[Quantity | None, SpeedOverTime | None]:
                 remedy=f"delete {key}, or the table",
             )
     with driver.table("table", "time and speed") as data:
-        time = data.column("time", "s", "Time in row ROW of the driver's table", "t_{1,ROW}")
-        speed = data.column("speed", "rad/s", "Speed in row ROW of the driver's table", r"\omega_{1,ROW}")
-    if not speed:  # reported
+        found = read_record(SpeedOverTime, data)
+    if not found.later_speed:  # reported
         return Quantity(path="", value=math.nan, unit="rad/s", description="", latex=""), None
-    return speed[0], SpeedOverTime(time=time, later_speed=speed[1:])
+    return found.later_speed[0], replace(found, later_speed=found.later_speed[1:])
 
 
 def _read_torque(driver: Table) -> TorqueLaw | None:
     with driver.table("torque", f"law: {listing(list(LAWS))}") as data:
-        name = data.choice("law", tuple(LAWS))
+        name = LAW.read(data, "law")
         if name is None:
             data.know(*data.data)
             return None
-        return LAWS[name].read(data)
+        return read_record(LAWS[name], data)
 
 
 def _read_flywheel(driver: Table, changing: bool) -> Quantity:
@@ -122,8 +127,7 @@ def _read_flywheel(driver: Table, changing: bool) -> Quantity:
             remedy="delete the flywheel, or add [mechanism.driver.torque]",
         )
     with driver.table("flywheel", "inertia") as wheel:
-        words = "Moment of inertia that turns with the driven body"
-        return wheel.quantity("inertia", "kg*m^2", words, "J_f", example="0.5 kg*m^2")
+        return FLYWHEEL.read(wheel, "inertia")  # type: ignore[no-any-return]
 
 
 def _read_points(table: Table, body: str) -> tuple[NamedPoint, ...]:
@@ -132,13 +136,8 @@ def _read_points(table: Table, body: str) -> tuple[NamedPoint, ...]:
     with table.table("points", 'A = "origin"') as listed:
         for name in listed.names("point"):
             index = f"{upright(body)},{name if len(name) == 1 else upright(name)}"
-            words = VectorWords(
-                what=f"point {name} of the {owner}",
-                axis=f"Distance of point {name} of the {owner} from the origin of its x axis",
-                latex=(f"l_{{{index}}}", f"x_{{{index}}}", f"y_{{{index}}}", f"l_{{{index}}}", rf"\phi_{{{index}}}"),
-                origin=True,
-            )
-            points.append(NamedPoint(name=name, position=listed.vector(name, "m", words)))
+            key = POINT.told({"POINT": name, "OWNER": owner, "INDEX": index})
+            points.append(NamedPoint(name=name, position=key.read(listed, name)))
         if not listed.missing and not points:
             listed.fault("", "there are no points here", allowed='A = "origin"', remedy="name the points of the joints")
     return tuple(points)
@@ -155,29 +154,10 @@ def _read_bodies(table: Table) -> tuple[Body, ...]:
 
 
 def _read_body(listed: Table, name: str) -> Body:
-    owner, index = name.replace("_", " "), upright(name)
-    words = VectorWords(
-        what=f"the centre of mass of the {owner}",
-        axis=f"Distance of the centre of mass of the {owner} from its origin, along its x axis",
-        latex=(
-            f"l_{{o,{index}}}",
-            f"x_{{o,{index}}}",
-            f"y_{{o,{index}}}",
-            f"l_{{o,{index}}}",
-            rf"\theta_{{p,{index}}}",
-        ),
-        origin=True,
-    )
     with listed.table(name, "mass, center_of_mass and points") as body:
-        return Body(
-            name=name,
-            mass=body.quantity("mass", "kg", f"Mass of the {owner}", f"m_{{{index}}}", example="0.36 kg"),
-            inertia=body.optional_quantity(
-                "inertia", "kg*m^2", f"Moment of inertia of the {owner} about its centre of mass", f"J_{{{index}}}"
-            ),
-            center_of_mass=body.vector("center_of_mass", "m", words),
-            points=_read_points(body, name),
-        )
+        body.know(*keys_of(Body), "points")
+        fill = {"NAME": name.replace("_", " "), "INDEX": upright(name)}
+        return read_record(Body, body, fill, name=name, points=_read_points(body, name))
 
 
 def _read_joints(table: Table, points: Points) -> tuple[tuple[Joint, ...], list[str]]:
@@ -196,50 +176,21 @@ def _read_joints(table: Table, points: Points) -> tuple[tuple[Joint, ...], list[
 
 
 def _read_joint(data: Table, name: str, points: Points) -> tuple[Joint, bool]:
-    kind = data.choice("type", _JOINT_TYPES)
-    bodies = read_pair(data, "bodies", '["frame", "crank"]')
-    good = kind is not None and bodies is not None
-    if bodies is not None:
-        for body in bodies:
-            good = refuse_unknown_body(data, "bodies", body, points) and good
-        if bodies[0] == bodies[1]:
-            good = False
-            data.fault(
-                "bodies",
-                "a joint of a body with itself",
-                given=listing(bodies),
-                allowed="two different bodies",
-                remedy="name the other body",
-            )
-    ends = read_pair(data, "points", f'["{name}", "{name}"]') if data.has("points") else (name, name)
-    if bodies is not None and ends is not None:
-        for body, point in zip(bodies, ends, strict=True):
-            refuse_unknown_point(data, "points", body, point, points)
-    direction = None
-    if kind == "prismatic":
-        direction = data.quantity(
-            "direction",
-            "rad",
-            f"Direction of the guide of joint {name}",
-            rf"\psi_{{{upright(name)}}}",
-            example="270 deg",
-        )
-    elif data.has("direction") and kind is not None:
+    data.know(*keys_of(Joint), "branch")
+    is_guide, fill = data.data.get("type") == "prismatic", {"NAME": name, "INDEX": upright(name)}
+    branch = BRANCH.read(data, "branch")
+    joint = read_record(Joint, data, fill, name=name, branch=branch, **({} if is_guide else {"direction": None}))
+    good = check_two_bodies(data, joint.bodies, points, "a joint of a body with itself") and joint.kind is not None
+    for body, point in zip(joint.bodies, joint.points, strict=False):
+        refuse_unknown_point(data, "points", body, point, points)
+    if joint.kind == "revolute" and data.has("direction"):
         data.fault(
             "direction",
             "a revolute joint has no direction",
             given=show(data.data["direction"]),
             remedy='delete the key, or write type = "prismatic"',
         )
-    branch = data.choice("branch", BRANCHES) if data.has("branch") else None
-    return Joint(
-        name=name,
-        kind=kind or "revolute",
-        bodies=bodies or ("", ""),
-        points=ends or ("", ""),
-        direction=direction,
-        branch=branch,
-    ), good
+    return joint, good
 
 
 def _check_driver(table: Table, driver: Driver, joints: tuple[Joint, ...], sound: list[str]) -> str | None:

@@ -3,17 +3,71 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.keys import ChoiceKey, Either, TextKey, WholeKey, declared, quantity
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Quantity, UsualRange
+
+FEWEST_BALLS, MOST_BALLS = 3, 200
+_BY_DESIGNATION = "required without a designation"
+#: Clearance or preload over ball diameter.
+_CLEARANCE = UsualRange(
+    least=-0.01, most=0.01, of="ball_diameter", hint="Clearances are some micrometres: check the unit."
+)
+#: Young's modulus from magnesium to silicon carbide.
+_MODULUS = UsualRange(least=50e9, most=400e9, hint="Steel has 207 GPa: check the unit.")
+#: Over ball diameter: ISO 16281 takes 0.52 and 0.53; the bounds are those of made bearings, wide.
+_GROOVE = UsualRange(
+    least=0.505, most=0.56, of="ball_diameter", hint="Check that the ball's diameter was given, not its radius."
+)
+_WIDTH = "give a small width, or delete the key for the law itself"
+#: Slip of a cage: beyond, balls skid, and the model of a cage that turns evenly is none.
+_PERCENTS = "A cage lags by some hundredths: check whether percents were given."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
     """Young's modulus [Pa] and Poisson's ratio [1]."""
 
-    young_modulus: Quantity
-    poisson_ratio: Quantity
+    young_modulus: Quantity = quantity(
+        "Pa", "Young's modulus of the PART", "E_OF", "207 GPa", bounds=POSITIVE, usual=_MODULUS
+    )
+    poisson_ratio: Quantity = quantity(
+        "1",
+        "Poisson's ratio of the PART",
+        r"\nu_OF",
+        0.3,
+        bounds=Bounds(above=-1.0, below=0.5),
+        remedy="give about 0.3 for steel",
+    )
+
+
+def _groove(ring: str, symbol: str, example: str) -> Any:
+    return quantity(
+        "m",
+        f"Groove curvature radius of the {ring} raceway",
+        symbol,
+        example,
+        bounds=POSITIVE,
+        usual=_GROOVE,
+        note="of the cross section, above half the ball diameter",
+    )
+
+
+def _smoothing() -> Any:
+    hint = "The contact then acts where ball and raceway are apart: give a smaller width."
+    return quantity(
+        "m",
+        "Half width of the smoothed contact onset",
+        r"w_\delta",
+        "0.05 um",
+        optional=True,
+        when="optional; default: Hertz's law itself",
+        bounds=POSITIVE,
+        remedy=_WIDTH,
+        usual=UsualRange(most=1.0, of="clearance", hint=hint),
+        note="see {doc}`../theory/damping`",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,19 +77,21 @@ class HertzContact:
     `smoothing` is the half width [m] of the smoothed contact onset; None for Hertz's law itself.
     """
 
-    inner_groove_radius: Quantity
-    outer_groove_radius: Quantity
+    inner_groove_radius: Quantity = _groove("inner", "r_i", "4.1275 mm")
+    outer_groove_radius: Quantity = _groove("outer", "r_e", "4.206875 mm")
     ring: Material
     ball: Material | None
-    smoothing: Quantity | None = None
+    smoothing: Quantity | None = _smoothing()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GivenContact:
     """Contact stiffness of one ball between both raceways, k_b [N/m^1.5], as a number; `smoothing` as above."""
 
-    stiffness: Quantity
-    smoothing: Quantity | None = None
+    stiffness: Quantity = quantity(
+        "N/m^1.5", "Contact stiffness of a ball between both raceways", "k_b", "8.6e9 N/m^1.5", bounds=POSITIVE
+    )
+    smoothing: Quantity | None = _smoothing()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +103,16 @@ class Damping:
 
     law: str
     numbers: tuple[Quantity, ...]
-    smoothing: Quantity | None = None
+    smoothing: Quantity | None = quantity(
+        "m/s",
+        "Half width of the smoothed kink of the damping at rest",
+        "w_v",
+        "1 mm/s",
+        optional=True,
+        when="optional, for the two one-sided laws",
+        bounds=POSITIVE,
+        remedy=_WIDTH,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +132,27 @@ class CageMotion:
     `time` [s] until the next; the first is zero.
     """
 
-    ratio: Quantity | None
-    slip: Quantity | None = None
+    ratio: Quantity | None = quantity(
+        "1",
+        "Speed of the cage over that of the inner ring",
+        r"\kappa_c",
+        0.4,
+        optional=True,
+        when="default: $(1 - D_w/D_{pw})/2$",
+        bounds=Bounds(above=0.0, below=1.0),
+    )
+    slip: Quantity | None = quantity(
+        "1",
+        "Part by which the cage turns slower than by rolling",
+        "s_c",
+        0.02,
+        optional=True,
+        when='default: none; not with `coupling = "two-way"` or `driver.table`',
+        bounds=Bounds(above=-1.0, below=1.0),
+        usual=UsualRange(least=0.0, most=0.3, hint=_PERCENTS),
+        note="or a table over time, from 0 s on, each value constant until the next row: "
+        '`{ time = ["0 s", "0.5 s"], value = [0.0, 0.04] }`',
+    )
     time: tuple[Quantity, ...] = ()
     slips: tuple[Quantity, ...] = ()
 
@@ -82,26 +166,66 @@ class CageMotion:
 class EquivalentMass:
     """Eq. (3): ring mass m_i, crankpin mass m_x [kg], crank counted whole or halved (a pair of bearings carries it)."""
 
-    ring: Quantity
-    crankpin: Quantity
-    crank: Literal["whole", "half"]
+    ring: Quantity = quantity("kg", "Mass of the inner ring", "m_i", "0.032 kg", bounds=POSITIVE)
+    crankpin: Quantity = quantity(
+        "kg",
+        "Mass of the crankpin",
+        "m_x",
+        "0.05 kg",
+        bounds=NOT_NEGATIVE,
+        note="zero where it is part of the crank's mass",
+    )
+    crank: Literal["whole", "half"] = declared(
+        ChoiceKey(words="How much of the crank counts", choices=("whole", "half"))
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InnerRing:
     """Mass moved by the inner ring: a number [kg] or Eq. (3).  `damping` to the frame [N*s/m] or None."""
 
-    mass: Quantity | EquivalentMass
-    damping: Quantity | None
+    mass: Quantity | EquivalentMass = quantity(
+        "kg", "Mass moved by the inner ring", "m_{ei}", "0.4 kg", when="this or `equivalent_mass`", bounds=POSITIVE
+    )
+    damping: Quantity | None = quantity(
+        "N*s/m",
+        "Viscous damping of the inner ring's motion to the frame",
+        "c_i",
+        "200 N*s/m",
+        optional=True,
+        bounds=NOT_NEGATIVE,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OuterRing:
     """Outer ring on an elastic housing: mass [kg], stiffness [N/m], damping [N*s/m]."""
 
-    mass: Quantity
-    stiffness: Quantity
-    damping: Quantity
+    mass: Quantity = quantity(
+        "kg",
+        "Mass of the outer ring and what moves with it",
+        "m_o",
+        "0.5 kg",
+        when="required if elastic",
+        bounds=POSITIVE,
+        remedy='give the moved mass, or write support = "fixed"',
+    )
+    stiffness: Quantity = quantity(
+        "N/m",
+        "Stiffness between outer ring and frame",
+        "k_p",
+        "50 N/um",
+        when="required if elastic",
+        bounds=NOT_NEGATIVE,
+    )
+    damping: Quantity = quantity(
+        "N*s/m",
+        "Damping between outer ring and frame",
+        "c_p",
+        "500 N*s/m",
+        when="required if elastic",
+        bounds=NOT_NEGATIVE,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,6 +234,19 @@ class InitialState:
 
     position: tuple[Quantity, ...]
     velocity: tuple[Quantity, ...]
+
+
+def _rating(symbol: str) -> Any:
+    return quantity(
+        "N",
+        f"The manufacturer's ${symbol}$",
+        example="13.5 kN",
+        optional=True,
+        setting=True,
+        bounds=POSITIVE,
+        remedy="delete the key for the value that follows from the geometry",
+        note="instead of the one computed from the geometry",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,9 +261,9 @@ class Catalogue:
     designation: str
     clearance_group: str
     clearance_range: tuple[float, float] | None
-    dynamic_rating: float | None
-    static_rating: float | None
-    fatigue_limit: float | None
+    dynamic_rating: float | None = _rating("C")
+    static_rating: float | None = _rating("C_0")
+    fatigue_limit: float | None = _rating("C_u")
     mounting_loss: float = 0.0
 
 
@@ -138,9 +275,34 @@ class Lubrication:
     `contamination` is e_C [1].
     """
 
-    viscosity_ratio: float | None
-    viscosity: float | None
-    contamination: float
+    either: ClassVar[Either] = Either(what="the film", groups=(("viscosity_ratio",), ("viscosity",)))
+
+    viscosity_ratio: float | None = quantity(
+        "1",
+        "Viscosity ratio κ",
+        example=1.2,
+        setting=True,
+        bounds=Bounds(least=0.1),  # ISO 281 has no life factor for a thinner film
+        remedy="take a thicker lubricant, or delete the table and judge by the life without it",
+    )
+    viscosity: float | None = quantity(
+        "m^2/s",
+        "Kinematic viscosity at the bearing's temperature",
+        example="32 mm^2/s",
+        setting=True,
+        bounds=POSITIVE,
+        remedy="give that of the oil at the bearing's temperature",
+        note="κ follows at each speed",
+    )
+    contamination: float = quantity(
+        "1",
+        "Contamination factor $e_C$ of ISO 281",
+        example=0.5,
+        setting=True,
+        bounds=Bounds(least=0.0, most=1.0),
+        remedy="write contamination = 0.5 where cleanliness is normal",
+        note="1 is clean; classes in {doc}`../theory/life`",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,16 +320,68 @@ class Bearing:
     """
 
     name: str
-    joint: str | None
-    share: Quantity | None
-    coupling: Literal["one-way", "two-way"] = "one-way"
+    joint: str | None = declared(
+        TextKey(
+            words="The joint that the bearing is at",
+            example="A",
+            when="required with a mechanism, else refused",
+            note="one-way: the driver's joint; two-way: any revolute joint",
+        )
+    )
+    share: Quantity | None = quantity(
+        "1",
+        "Share of the joint's reaction that the bearing carries",
+        "s",
+        0.5,
+        when="one-way: required with a mechanism, else refused",
+        bounds=Bounds(least=0.0, most=1.0),
+        remedy="give the part of the joint's reaction that this bearing carries: 0.5 for one of a pair",
+    )
+    coupling: Literal["one-way", "two-way"] = declared(
+        ChoiceKey(
+            words="How bearing and linkage move each other",
+            choices=("one-way", "two-way"),
+            default="one-way",
+            note="one-way: the reaction of an ideal linkage loads the bearing; two-way: its clearance and its forces "
+            "act on both bodies, see {doc}`../theory/coupling`. The same for all bearings of a scene",
+        )
+    )
     inner_body: str = ""
-    count: Quantity | None = None
-    balls: int
-    ball_diameter: Quantity
-    pitch_diameter: Quantity
-    clearance: Quantity
-    ball_angle: Quantity
+    count: Quantity | None = quantity(
+        "1",
+        "Bearings side by side at the joint",
+        "n_b",
+        2,
+        optional=True,
+        when="two-way: default 1, else refused",
+        bounds=POSITIVE,
+    )
+    balls: int = declared(
+        WholeKey(
+            words="Number of balls",
+            lowest=FEWEST_BALLS,
+            highest=MOST_BALLS,
+            example=8,
+            when=_BY_DESIGNATION,
+            note="they must fit on the pitch circle",
+        )
+    )
+    ball_diameter: Quantity = quantity("m", "Ball diameter", "D_w", "7.9375 mm", when=_BY_DESIGNATION, bounds=POSITIVE)
+    pitch_diameter: Quantity = quantity(
+        "m", "Diameter of the circle of ball centres", "D_{pw}", "33.5 mm", when=_BY_DESIGNATION, bounds=POSITIVE
+    )
+    clearance: Quantity = quantity(
+        "m",
+        "Diametral clearance of the bearing",
+        "P_d",
+        "10 um",
+        when='required; with a designation default `"CN"`',
+        usual=_CLEARANCE,
+        note='negative is preload. With a designation also a group: `"C2"`, `"CN"`, `"C3"`, `"C4"`, `"C5"`',
+    )
+    ball_angle: Quantity = quantity(
+        "rad", "Angle of the first ball at the start", r"\theta_0", "0 deg", default="0 deg"
+    )
     contact: HertzContact | GivenContact
     damping: Damping
     effects: tuple[BallEffect, ...]

@@ -4,25 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ballpass.derive.scene.records import FRAME
-from ballpass.derive.scene.schema import Table, listing, suggest
+from ballpass.derive.scene.keys import NamesKey, TextKey
+from ballpass.derive.scene.table import FRAME, Table, listing, suggest
 from ballpass.derive.scene.units import show
 
 #: Names of the points of every body and of the frame.
 Points = Mapping[str, Sequence[str]]
 
 
-def read_pair(data: Table, key: str, example: str) -> tuple[str, str] | None:
-    """A list of two names; None, with a fault, where there is none."""
-    given = data.take(key, example)
-    if given is None:
-        return None
-    if isinstance(given, list) and len(given) == 2 and all(isinstance(item, str) for item in given):
-        return given[0], given[1]
-    data.fault(
-        key, "this is not a list of two names", given=show(given), allowed=example, remedy=f"write {key} = {example}"
-    )
-    return None
+#: Keys of pathways, and of joints.
+BODY = TextKey(words="The body it acts on", example="slider", note="a moving body")
+BODIES = NamesKey(words="Its two bodies", example='["frame", "lever"]', note='different; `"frame"` may be one of them')
+POINTS = NamesKey(words="A point of each body", example='["anchor", "tip"]')
 
 
 def refuse_unknown_body(data: Table, key: str, body: str, points: Points) -> bool:
@@ -55,45 +48,30 @@ def refuse_unknown_point(data: Table, key: str, body: str, point: str, points: P
     )
 
 
-def read_two_points(data: Table, points: Points) -> tuple[tuple[str, str], tuple[str, str]]:
-    """Two different bodies and a point of each, of the keys bodies and points; empty names, with faults noted."""
-    bodies = read_two_bodies(data, points)
-    ends = read_pair(data, "points", '["anchor", "tip"]') or ("", "")
-    for body, point in zip(bodies, ends, strict=True):
-        if point:
-            refuse_unknown_point(data, "points", body, point, points)
-    return bodies, ends
+def check_points(data: Table, bodies: Sequence[str], ends: Sequence[str], points: Points) -> None:
+    """Note a fault for each body of two that has no such point."""
+    for body, point in zip(bodies, ends, strict=False):
+        refuse_unknown_point(data, "points", body, point, points)
 
 
-def read_moving_body(data: Table, points: Points) -> str:
-    """The moving body a load acts on; empty, with a fault, where there is none."""
-    body = data.text("body", "slider")
-    if not body:
-        return ""
-    if body == FRAME:
-        data.fault(
-            "body",
-            "a load on the frame moves nothing",
-            given=show(body),
-            allowed=listing([name for name in points if name != FRAME]),
-            remedy="name a moving body",
-        )
-        return ""
-    return body if refuse_unknown_body(data, "body", body, points) else ""
+def check_moving_body(data: Table, body: str, points: Points) -> bool:
+    """Note a fault where there is no such body, or it does not move; whether it does."""
+    if body != FRAME:
+        return bool(body) and refuse_unknown_body(data, "body", body, points)
+    data.fault(
+        "body",
+        "a load on the frame moves nothing",
+        given=show(body),
+        allowed=listing([name for name in points if name != FRAME]),
+        remedy="name a moving body",
+    )
+    return False
 
 
-def read_two_bodies(data: Table, points: Points) -> tuple[str, str]:
-    """The two different bodies of the key bodies; empty names, with a fault, where there are none."""
-    bodies = read_pair(data, "bodies", '["frame", "lever"]')
-    if bodies is None:
-        return "", ""
+def check_two_bodies(data: Table, bodies: Sequence[str], points: Points, problem: str) -> bool:
+    """Note a fault for each body that does not exist, and for one body twice; whether there is none."""
     known = [refuse_unknown_body(data, "bodies", body, points) for body in bodies]
-    if bodies[0] == bodies[1]:
-        data.fault(
-            "bodies",
-            "both ends are on one body",
-            given=listing(bodies),
-            allowed="two different bodies",
-            remedy="name the other body",
-        )
-    return bodies if all(known) else ("", "")
+    if not bodies or bodies[0] != bodies[1]:
+        return bool(bodies) and all(known)
+    data.fault("bodies", problem, given=listing(bodies), allowed="two different bodies", remedy="name the other body")
+    return False

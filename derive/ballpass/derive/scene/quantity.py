@@ -2,8 +2,75 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import operator
+from dataclasses import dataclass, field
 from typing import Literal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What a value must satisfy: > above, >= least, <= most, < below; None bounds nothing."""
+
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+    below: float | None = None
+
+    def __str__(self) -> str:
+        if self in (POSITIVE, NOT_NEGATIVE):
+            return "above zero" if self == POSITIVE else "zero or above"
+        ends = ((self.above, "above"), (self.least, "from"), (self.most, "up to"), (self.below, "below"))
+        return " ".join(f"{words} {bound:g}" for bound, words in ends if bound is not None)
+
+    @property
+    def allowed(self) -> str:
+        """What may stand there."""
+        return "zero or a value above it" if self == NOT_NEGATIVE else f"a value {self}"
+
+    def problem(self, value: float) -> str:
+        """What is wrong with a value; empty where nothing is, and for NaN."""
+        checks = (
+            (self.above, operator.le),
+            (self.least, operator.lt),
+            (self.most, operator.gt),
+            (self.below, operator.ge),
+        )
+        if not any(bound is not None and wrong(value, bound) for bound, wrong in checks):
+            return ""
+        if self not in (POSITIVE, NOT_NEGATIVE):
+            return "the value is out of its bounds"
+        return "the value is zero" if value == 0.0 else "the value is negative"
+
+
+POSITIVE, NOT_NEGATIVE = Bounds(above=0.0), Bounds(least=0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UsualRange:
+    """Where a number usually lies: itself, or over the amount of the nearest number `of`, in a table around it."""
+
+    least: float | None = None
+    most: float | None = None
+    of: str = ""
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What the declaration of a key says of its values: bounds, what to do beyond them, where values usually lie."""
+
+    bounds: Bounds | None = None
+    remedy: str = ""
+    usual: UsualRange | None = None
+
+    @property
+    def advice(self) -> str:
+        """What to do where a value is out of its bounds."""
+        words = {POSITIVE: "give a positive value", NOT_NEGATIVE: "give zero or a positive value"}
+        return self.remedy or words.get(self.bounds or POSITIVE, "correct the value")
+
+
+NO_LIMITS = Limits()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,6 +84,7 @@ class Quantity:
     unit : SI unit as text, "kg*m^2"; "1" when dimensionless
     description : one line for people, without the unit
     latex : symbol in the derived equations
+    limits : of its value, by the declaration of its key
     """
 
     path: str
@@ -24,16 +92,7 @@ class Quantity:
     unit: str
     description: str
     latex: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
-    """What a value must satisfy: > above, >= least, <= most, < below; None bounds nothing."""
-
-    above: float | None = None
-    least: float | None = None
-    most: float | None = None
-    below: float | None = None
+    limits: Limits = field(default=NO_LIMITS, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,15 +13,75 @@ Frame: x right, y up, angles counter-clockwise from +x.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
-from ballpass.derive.scene.quantity import Quantity, Vector
+from ballpass.derive.scene.keys import (
+    ChoiceKey,
+    ColumnKey,
+    Either,
+    NamesKey,
+    TextKey,
+    VectorKey,
+    WholeKey,
+    declared,
+    quantity,
+)
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limits, Quantity, Vector
+from ballpass.derive.scene.table import FRAME as FRAME
 from ballpass.derive.scene.toml_lines import LineIndex
 from ballpass.runtime.show import html
 
-#: Name of the body that does not move.
-FRAME = "frame"
+#: Of a length in polar form.
+AMOUNT = Limits(bounds=NOT_NEGATIVE, remedy="give the amount, and turn the angle by 180 deg")
+METHODS = (
+    "auto",
+    "stepper",
+    "stepper-rodas4",
+    "stepper-rodas5p",
+    "stepper-dp54",
+    "stepper-dop853",
+    "rosenbrock",
+    "erk",
+    "cvodes",
+)
+
+
+def force_key(words: str, symbol: str, name: str = "", when: str = "", note: str = "") -> VectorKey:
+    """A force: no single number, because nothing says along which axis it would act.
+
+    The symbol may hold the place of an index: "F_{INDEX}".
+    """
+    base, _, index = symbol.partition("_")
+    index = index.strip("{}")
+    comma = "," if index else ""
+    return VectorKey(
+        name=name,
+        unit="N",
+        words=words,
+        when=when,
+        note=note,
+        symbols=(
+            "",
+            f"{base}_{{{index}{comma}x}}",
+            f"{base}_{{{index}{comma}y}}",
+            symbol,
+            rf"\alpha_{{{index or base}}}",
+        ),
+        polar=("magnitude", "direction"),
+    )
+
+
+#: A point of a body, POINT of the OWNER with the index INDEX.
+POINT = VectorKey(
+    unit="m",
+    words="point POINT of the OWNER",
+    axis="Distance of point POINT of the OWNER from the origin of its x axis",
+    symbols=("l_{INDEX}", "x_{INDEX}", "y_{INDEX}", "l_{INDEX}", r"\phi_{INDEX}"),
+    origin=True,
+    axis_limits=Limits(bounds=POSITIVE, remedy="give a positive length, or write the point as [x, y]"),
+    length_limits=AMOUNT,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,9 +101,35 @@ class Body:
     """
 
     name: str
-    mass: Quantity
-    inertia: Quantity | None
-    center_of_mass: Vector
+    mass: Quantity = quantity(
+        "kg",
+        "Mass of the NAME",
+        "m_{INDEX}",
+        "0.36 kg",
+        bounds=POSITIVE,
+        remedy="every moving body has a mass: give it, small where it hardly matters",
+    )
+    inertia: Quantity | None = quantity(
+        "kg*m^2",
+        "Moment of inertia of the NAME about its centre of mass",
+        "J_{INDEX}",
+        "611.7 kg*mm^2",
+        optional=True,
+        when="required, except for a slider on a fixed guide, which does not turn",
+        bounds=POSITIVE,
+        remedy="give a positive value, or delete the key for a body that does not rotate",
+    )
+    center_of_mass: Vector = declared(
+        VectorKey(
+            unit="m",
+            words="the centre of mass of the NAME",
+            note="vector in body axes",
+            axis="Distance of the centre of mass of the NAME from its origin, along its x axis",
+            symbols=("l_{o,INDEX}", "x_{o,INDEX}", "y_{o,INDEX}", "l_{o,INDEX}", r"\theta_{p,INDEX}"),
+            origin=True,
+            length_limits=AMOUNT,
+        )
+    )
     points: tuple[NamedPoint, ...]
 
     def point(self, name: str) -> Vector:
@@ -66,10 +152,33 @@ class Joint:
     """
 
     name: str
-    kind: Literal["revolute", "prismatic"]
-    bodies: tuple[str, str]
-    points: tuple[str, str]
-    direction: Quantity | None
+    kind: Literal["revolute", "prismatic"] = declared(
+        ChoiceKey(name="type", words="Kind of joint", choices=("revolute", "prismatic"))
+    )
+    bodies: tuple[str, str] = declared(
+        NamesKey(
+            words="Its two bodies",
+            example='["frame", "crank"]',
+            note='`"frame"` is the body that does not move; the reaction is the force of the second on the first',
+        )
+    )
+    points: tuple[str, str] = declared(
+        NamesKey(
+            words="The point of each body",
+            example='["NAME", "NAME"]',
+            default=("NAME", "NAME"),
+            when="default: the joint's own name, twice",
+        )
+    )
+    direction: Quantity | None = quantity(
+        "rad",
+        "Direction of the guide of joint NAME",
+        r"\psi_{INDEX}",
+        "270 deg",
+        when="required for prismatic, else refused",
+        note="in the axes of the first body. The guide belongs to the first body and passes through its point; the "
+        "second body's point moves along it without rotation against the first body",
+    )
     branch: str | None
 
     def point(self, body: str) -> str:
@@ -85,8 +194,24 @@ class Joint:
 class SpeedOverTime:
     """Rows of a driver's speed: times [s], increasing, and the speeds behind the first, which is `Driver.speed`."""
 
-    time: tuple[Quantity, ...]
-    later_speed: tuple[Quantity, ...]
+    time: tuple[Quantity, ...] = declared(
+        ColumnKey(
+            unit="s",
+            words="Time in row ROW of the driver's table",
+            symbol="t_{1,ROW}",
+            bounds=NOT_NEGATIVE,
+            note="increasing, from zero or above",
+        )
+    )
+    later_speed: tuple[Quantity, ...] = declared(
+        ColumnKey(
+            name="speed",
+            unit="rad/s",
+            words="Speed in row ROW of the driver's table",
+            symbol=r"\omega_{1,ROW}",
+            note="linear between rows, constant outside",
+        )
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,9 +225,20 @@ class Driver:
     [kg*m^2] (None: none) turns with the driven body.
     """
 
-    joint: str
-    speed: Quantity
-    start_angle: Quantity
+    joint: str = declared(
+        TextKey(words="The joint that turns", example="A", note='revolute, with `bodies = ["frame", <driven body>]`')
+    )
+    speed: Quantity = quantity(
+        "rad/s",
+        "Speed of the driverSTART",
+        r"\omegaZERO",
+        "500 rpm",
+        when="required without `driver.table`, else refused",
+        note="counter-clockwise positive; constant, with `[mechanism.driver.torque]` that at t = 0, which may be zero",
+    )
+    start_angle: Quantity = quantity(
+        "rad", "Angle of the driver at the start", r"\theta_{1,0}", "0 deg", default="0 deg"
+    )
     table: SpeedOverTime | None = None
     torque: Any = None
     flywheel: Quantity | None = None
@@ -161,14 +297,16 @@ class Mechanism:
 class Shaft:
     """Rotation of the inner ring where no mechanism gives it: constant speed [rad/s]."""
 
-    speed: Quantity
+    speed: Quantity = quantity(
+        "rad/s", "Speed of the shaft", r"\omega", "1200 rpm", note="of the inner ring, whose angle is zero at t = 0"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConstantLoad:
     """Constant force on the inner ring [N]."""
 
-    force: Vector
+    force: Vector = declared(force_key("the load on the inner ring", "F"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,33 +316,89 @@ class HarmonicLoad:
     `phase` is one for both components, or that of x and that of y.
     """
 
-    mean: Vector
-    amplitude: Vector
-    frequency: Quantity
-    phase: Quantity | tuple[Quantity, Quantity]
+    mean: Vector = declared(force_key("the mean load on the inner ring", r"\bar F"))
+    amplitude: Vector = declared(
+        force_key(
+            "the amplitude of the load on the inner ring",
+            r"\hat F",
+            note="the load is mean + amplitude · cos(2π·frequency·t + phase)",
+        )
+    )
+    frequency: Quantity = quantity("Hz", "Frequency of the load", "f", "50 Hz", bounds=POSITIVE)
+    phase: Quantity | tuple[Quantity, Quantity] = quantity(
+        "rad",
+        "Phase of the load at the start",
+        r"\varphi",
+        "0 deg",
+        note="of both components, or a list: that of x and that of y, `load.phase.x`",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableLoad:
     """Force on the inner ring, linear between rows.
 
-    `over` says what the rows are over: the time [s], constant before the first and behind the last, or the angle of the
-    shaft [rad], periodic over a turn.  Rows strictly increasing, `x` and `y` [N]; all of one length of at least two.
+    Rows are over the `time` [s], constant before the first and behind the last, or the `angle` of the shaft [rad],
+    periodic over a turn; the other one is empty.  Rows strictly increasing, `x` and `y` [N]; all of one length of at
+    least two.
     """
 
-    over: Literal["time", "angle"]
-    rows: tuple[Quantity, ...]
-    x: tuple[Quantity, ...]
-    y: tuple[Quantity, ...]
+    either: ClassVar[Either] = Either(what="what the rows are over", groups=(("time",), ("angle",)), at="angle")
+
+    time: tuple[Quantity, ...] = declared(
+        ColumnKey(
+            unit="s",
+            words="Time of row ROW of the load's table",
+            symbol="t_{ROW}",
+            note="strictly increasing, two rows or more; constant outside",
+        )
+    )
+    angle: tuple[Quantity, ...] = declared(
+        ColumnKey(
+            unit="rad",
+            words="Angle of the shaft in row ROW of the load's table",
+            symbol=r"\theta_{ROW}",
+            note="within less than a turn; periodic",
+        )
+    )
+    x: tuple[Quantity, ...] = declared(
+        ColumnKey(
+            unit="N",
+            words="x component of the load in row ROW of its table",
+            symbol="F_{x,ROW}",
+            note="linear between rows",
+        )
+    )
+    y: tuple[Quantity, ...] = declared(
+        ColumnKey(unit="N", words="y component of the load in row ROW of its table", symbol="F_{y,ROW}")
+    )
+
+    @property
+    def over(self) -> Literal["time", "angle"]:
+        """What the rows are over."""
+        return "angle" if self.angle else "time"
+
+    @property
+    def rows(self) -> tuple[Quantity, ...]:
+        """Their times or angles."""
+        return self.angle or self.time or ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnbalanceLoad:
     """Unbalance of the shaft: a mass [kg] at an eccentricity [m], at an angle of the shaft [rad]."""
 
-    mass: Quantity
-    eccentricity: Quantity
-    angle: Quantity
+    mass: Quantity = quantity("kg", "Unbalanced mass", "m_u", "5 g", bounds=NOT_NEGATIVE)
+    eccentricity: Quantity = quantity(
+        "m",
+        "Distance of the unbalanced mass from the axis",
+        "e_u",
+        "20 mm",
+        bounds=NOT_NEGATIVE,
+        remedy=AMOUNT.remedy,
+        note="the force mass · eccentricity · speed² turns with the shaft",
+    )
+    angle: Quantity = quantity("rad", "Angle of the unbalance at t = 0", r"\alpha_u", "0 deg", default="0 deg")
 
 
 LoadLaw = ConstantLoad | HarmonicLoad | TableLoad | UnbalanceLoad
@@ -214,8 +408,8 @@ LoadLaw = ConstantLoad | HarmonicLoad | TableLoad | UnbalanceLoad
 class LoadWindow:
     """From `start` (inclusive) to `end` (exclusive; None: for ever): times [s], or angles of the shaft [rad]."""
 
-    start: Quantity
-    end: Quantity | None
+    start: Quantity = quantity("UNIT", "WHAT at which the load begins", "SYMBOL_{on}", "FIRST")
+    end: Quantity | None = quantity("UNIT", "WHAT at which the load ends", "SYMBOL_{off}", "LAST")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -251,12 +445,52 @@ class Load:
 class Run:
     """How long to run and what to keep.  Exactly one of `cycles` (turns of driver or shaft) and `duration` [s]."""
 
-    cycles: float | None
-    duration: float | None
-    transient_cycles: float
-    samples_per_cycle: int
-    method: str
-    rtol: float
+    either: ClassVar[Either] = Either(what="the length of the run", groups=(("cycles",), ("duration",)))
+
+    cycles: float | None = quantity("1", "Turns of driver or shaft", example=4, setting=True, bounds=POSITIVE)
+    duration: float | None = quantity("s", "Duration of the run", example="0.5 s", setting=True, bounds=POSITIVE)
+    transient_cycles: float = quantity(
+        "1",
+        "Turns at the start that figures and summary leave out",
+        example=2,
+        default=0.0,
+        setting=True,
+        bounds=NOT_NEGATIVE,
+        remedy="write 0 to keep the whole run",
+        note="fewer than `cycles`",
+    )
+    samples_per_cycle: int = declared(
+        WholeKey(
+            words="Samples in a turn",
+            lowest=16,
+            highest=1_000_000,
+            example=2000,
+            default=2000,
+            note="in the whole run where nothing turns",
+        )
+    )
+    method: str = declared(
+        ChoiceKey(words="Integrator", choices=METHODS, default="auto", note="see {doc}`../theory/integration`")
+    )
+    rtol: float = quantity(
+        "1",
+        "Relative tolerance",
+        example=1e-6,
+        default=1e-6,
+        setting=True,
+        bounds=Bounds(least=1e-13, most=0.1),
+        remedy="write rtol = 1e-6 where nothing speaks for another value",
+        note="see {doc}`../theory/integration`",
+    )
+
+
+#: Outputs of a run, which `Scene.outputs` holds.
+OUTPUTS = NamesKey(
+    words="Names or patterns of what is computed",
+    two=False,
+    example='["inner.*", "ball.force"]',
+    note='only these are computed. {doc}`outputs` lists all, also those on request, such as `"point.slider.C.ay"`',
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -264,7 +498,15 @@ class DutyState:
     """A state of a duty cycle: its share of the time [1], and the numbers that differ then, by path [SI]."""
 
     name: str
-    share: float
+    share: float = quantity(
+        "1",
+        "Share of the time",
+        example=0.5,
+        setting=True,
+        bounds=POSITIVE,
+        remedy="delete the state, or give its share of the time",
+        note="the shares add up to 1",
+    )
     parameters: tuple[tuple[str, float], ...]
 
 
@@ -284,7 +526,15 @@ class Scene:
     """
 
     name: str
-    title: str
+    title: str = declared(
+        TextKey(
+            words="What the scene is, in one line",
+            example="Punching machine",
+            default="",
+            when="default: the scene's name",
+            longest=200,
+        )
+    )
     mechanism: Mechanism | None
     shaft: Shaft | None
     loads: tuple[Load, ...]

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
+from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.keys import QuantityKey
+from ballpass.derive.scene.quantity import UsualRange
+from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Names, symbol_of
 
 if TYPE_CHECKING:
     import sympy as sp
 
-#: Deviation over ball diameter.
-DEVIATION = (-0.001, 0.001)
+DEVIATION = QuantityKey(
+    unit="m",
+    words="Deviation of the diameter of ball BALL",
+    symbol=r"\Delta D_{w,BALL}",
+    example="0.5 um",
+    usual=UsualRange(
+        least=-0.001,
+        most=0.001,
+        of="ball_diameter",
+        hint="Balls of one bearing differ by tenths of a micrometre: check the unit.",
+    ),
+)
 
 
 class BallDeviation(Effect):
@@ -28,21 +39,8 @@ class BallDeviation(Effect):
             names = [str(number) for number in range(1, balls + 1)]
             table.know(*names)
             which = [name for name in names if name in table.data]
-            numbers = [
-                table.quantity(
-                    name,
-                    "m",
-                    f"Deviation of the diameter of ball {name}",
-                    rf"\Delta D_{{w,{name}}}",
-                    example="0.5 um",
-                )
-                for name in which
-            ]
+            numbers = [DEVIATION.told({"BALL": name}).read(table, name) for name in which]
         return BallEffect(kind=self.name, structure=tuple(map(int, which)), numbers=tuple(numbers))
-
-    def usual(self, effect: BallEffect) -> Iterable[Usual]:
-        hint = "Balls of one bearing differ by tenths of a micrometre: check the unit."
-        return [(deviation, DEVIATION, hint) for deviation in effect.numbers]
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         import sympy as sp

@@ -7,15 +7,13 @@ the amplitude, and nothing of odd ones, which only move the ball.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
-from ballpass.derive.bearing.effects.read_waves import ORDERS, read_waves, usual_amplitudes, with_roughness
+from ballpass.derive.bearing.effects.effect import Effect, GenericBall
+from ballpass.derive.bearing.effects.read_waves import ORDERS, read_waves, with_roughness
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
-from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Names, symbol_of
 
 if TYPE_CHECKING:
@@ -45,15 +43,8 @@ class BallWaviness(Effect):
                 numbers += read
         return BallEffect(kind=self.name, structure=tuple(structure), numbers=tuple(numbers))
 
-    def check(self, effect: BallEffect, checker: Checker, bearing: Bearing) -> None:
-        for amplitude in effect.numbers[::2]:
-            checker.not_negative(amplitude, "give the amount, and turn the phase by 180 deg")
-
     def spins(self, effect: BallEffect) -> bool:
         return True
-
-    def usual(self, effect: BallEffect) -> Iterable[Usual]:
-        return usual_amplitudes(effect.numbers[::2])
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         import sympy as sp

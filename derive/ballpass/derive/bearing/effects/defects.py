@@ -15,16 +15,17 @@ with every ball, and steps end on it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.cage_slip import lag_names
-from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
-from ballpass.derive.scene.bearing_records import BallEffect, Bearing
+from ballpass.derive.bearing.effects.effect import Effect, GenericBall
+from ballpass.derive.scene.bearing_records import MOST_BALLS, BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.keys import ChoiceKey, WholeKey, declared, keys_of, quantity, read_record
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Quantity, UsualRange
+from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Input
 
@@ -33,8 +34,7 @@ if TYPE_CHECKING:
 
 PROFILES = ("rectangular", "half-sine", "path")
 PLACES = ("outer", "inner", "ball")
-#: Chord and depth over ball diameter.
-CHORD, DEPTH = (None, 0.5), (None, 0.1)
+BALL = WholeKey(words="Number of the ball", lowest=1, highest=MOST_BALLS, example=1, when="required on a ball")
 
 
 class Defects(Effect):
@@ -47,26 +47,16 @@ class Defects(Effect):
         structure, numbers = list[int | str](), list[Quantity]()
         with table:
             for name in table.names("defect"):
-                with table.table(name, "on, angle, chord, depth and profile") as spall:
-                    on, profile = spall.choice("on", PLACES) or "outer", spall.choice("profile", PROFILES) or "path"
-                    number = spall.integer("ball", 1, balls, example="1") if on == "ball" else 0
-                    numbers += [
-                        spall.quantity(
-                            "angle", "rad", f"Angle of the middle of {name}", r"\alpha_d", example="270 deg"
-                        ),
-                        spall.quantity("chord", "m", f"Chord of {name}", "L_d", example="1 mm"),
-                    ]
-                    deep = profile == "path" and not spall.has("depth")
-                    if not deep:
-                        numbers.append(spall.quantity("depth", "m", f"Depth of {name}", "h_d", example="20 um"))
-                    structure += [name, on, number, "deep path" if deep else profile]
+                with table.table(name, "on, angle, chord, depth and profile") as data:
+                    spall = _read_spall(data, name, balls)
+                deep = spall.profile == "path" and spall.depth is None
+                numbers += [q for q in (spall.angle, spall.chord, spall.depth) if q is not None]
+                structure += [name, spall.on, spall.ball, "deep path" if deep else spall.profile]
         return BallEffect(kind=self.name, structure=tuple(structure), numbers=tuple(numbers))
 
     def check(self, effect: BallEffect, checker: Checker, bearing: Bearing) -> None:
         ball = bearing.ball_diameter
         for spall in _spalls(effect):
-            checker.positive(spall.chord)
-            checker.not_negative(spall.depth)
             widest = ball.value / _room(spall, bearing)
             if spall.chord.value >= widest > 0.0:
                 checker.fault(
@@ -80,12 +70,6 @@ class Defects(Effect):
     def relations(self, effect: BallEffect, bearing: Bearing) -> list[tuple[str, float, str]]:
         ball = bearing.ball_diameter.path
         return [(ball, _room(spall, bearing), spall.chord.path) for spall in _spalls(effect)]
-
-    def usual(self, effect: BallEffect) -> Iterable[Usual]:
-        for spall in _spalls(effect):
-            yield spall.chord, CHORD, "Spalls are shorter than the balls are thick: check the unit."
-            if spall.depth is not None:
-                yield spall.depth, DEPTH, "Spalls are some hundredths of a millimetre deep: check the unit."
 
     def spins(self, effect: BallEffect) -> bool:
         return any(spall.on == "ball" for spall in _spalls(effect))
@@ -125,22 +109,57 @@ class Defects(Effect):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Spall:
+class Spall:
+    """A spall of a raceway or of a ball."""
+
     name: str
-    on: str
-    ball: int
-    profile: str
-    angle: Quantity
-    chord: Quantity
-    depth: Quantity | None
+    on: str = declared(ChoiceKey(words="What it is on", choices=PLACES, note="a raceway or a ball"))
+    ball: int = declared(BALL)
+    profile: str = declared(ChoiceKey(words="How deep a ball sinks over it", choices=PROFILES))
+    angle: Quantity = quantity(
+        "rad", "Angle of the middle of NAME", r"\alpha_d", "270 deg", note="in axes of that raceway or ball"
+    )
+    chord: Quantity = quantity(
+        "m",
+        "Chord of NAME",
+        "L_d",
+        "1 mm",
+        bounds=POSITIVE,
+        usual=UsualRange(
+            most=0.5, of="ball_diameter", hint="Spalls are shorter than the balls are thick: check the unit."
+        ),
+        note="from edge to edge, shorter than the room between balls",
+    )
+    depth: Quantity | None = quantity(
+        "m",
+        "Depth of NAME",
+        "h_d",
+        "20 um",
+        optional=True,
+        when='required, except for `"path"`',
+        bounds=NOT_NEGATIVE,
+        usual=UsualRange(
+            most=0.1, of="ball_diameter", hint="Spalls are some hundredths of a millimetre deep: check the unit."
+        ),
+    )
 
 
-def _spalls(effect: BallEffect) -> Iterator[_Spall]:
+def _read_spall(data: Table, name: str, balls: int) -> Spall:
+    number = 0
+    if data.data.get("on") == "ball":
+        number = replace(BALL, highest=balls).read(data, "ball")
+    found = read_record(Spall, data, {"NAME": name}, name=name, ball=number)
+    if found.depth is None and found.profile != "path":
+        data.take("depth", keys_of(Spall)["depth"].sample)
+    return found
+
+
+def _spalls(effect: BallEffect) -> Iterator[Spall]:
     numbers = iter(effect.numbers)
     for k in range(0, len(effect.structure), 4):
         name, on, ball, profile = effect.structure[k : k + 4]
         angle, chord = next(numbers), next(numbers)
-        yield _Spall(
+        yield Spall(
             name=str(name),
             on=str(on),
             ball=int(ball),
@@ -151,7 +170,7 @@ def _spalls(effect: BallEffect) -> Iterator[_Spall]:
         )
 
 
-def _room(spall: _Spall, bearing: Bearing) -> float:
+def _room(spall: Spall, bearing: Bearing) -> float:
     """Times the chord that a ball's diameter must exceed, so that two balls never are in one spall."""
     return 1.0 / (1.0 - math.sin(math.pi / bearing.balls)) if spall.on == "inner" else 1.0
 
@@ -166,7 +185,7 @@ class _Contact:
     middle : angle at which it is met [rad]
     """
 
-    spall: _Spall
+    spall: Spall
     bearing: Bearing
     names: Names
     ring: str
@@ -332,7 +351,7 @@ class _Contact:
         return ball - raceway + (aside - own * cosine if self.spall.on == "ball" else own * cosine - aside)
 
 
-def _contacts(spall: _Spall, bearing: Bearing, names: Names) -> Iterator[_Contact]:
+def _contacts(spall: Spall, bearing: Bearing, names: Names) -> Iterator[_Contact]:
     import sympy as sp
 
     angle = symbol_of(spall.angle)

@@ -6,14 +6,12 @@ An effect is one object in one file of this folder; `EFFECTS` in ``__init__.py``
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names
 from ballpass.derive.variables import Input
 
@@ -48,10 +46,6 @@ class GenericBall:
         return sp.Piecewise((value, near > sp.cos(sp.pi / self.balls)), (sp.S.Zero, True))
 
 
-#: A number, bounds over the ball diameter, and what to look at where it lies beyond.
-Usual = tuple[Quantity, tuple[float | None, float | None], str]
-
-
 class Effect(ABC):
     """An effect on the balls of a bearing; `name` is its table within the bearing's."""
 
@@ -64,15 +58,11 @@ class Effect(ABC):
         """The effect out of its table; faults are noted."""
 
     def check(self, effect: BallEffect, checker: Checker, bearing: Bearing) -> None:  # noqa: B027  an effect may take any number
-        """Note faults of its numbers."""
+        """Note faults of its numbers, beyond their bounds."""
 
     def relations(self, effect: BallEffect, bearing: Bearing) -> list[tuple[str, float, str]]:
         """What its numbers must be to others: the first above so many times the second."""
         return []
-
-    def usual(self, effect: BallEffect) -> Iterable[Usual]:
-        """Ranges in which its numbers usually lie, over the ball diameter, with a hint for one beyond."""
-        return ()
 
     def spins(self, effect: BallEffect) -> bool:
         """Whether it depends on how the balls are turned."""

@@ -7,26 +7,44 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterable
+from dataclasses import dataclass
 
-from ballpass.derive.bearing.effects.effect import Usual
-from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.keys import WholeKey, declared, quantity, read_record
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity, UsualRange
+from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
 
 #: Highest order.
 MOST_WAVES = 200
 #: Orders as their keys; an order has one key, 8 and not 08.
 ORDERS = [str(order) for order in range(1, MOST_WAVES + 1)]
-#: Amplitude over ball diameter.
-AMPLITUDE = (None, 0.001)
 
 
-def usual_amplitudes(amplitudes: Iterable[Quantity]) -> list[Usual]:
-    """Usual ranges of amplitudes."""
-    return [
-        (amplitude, AMPLITUDE, "Waves are some tenths of a micrometre: check the unit.") for amplitude in amplitudes
-    ]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wave:
+    """Waves of one order."""
+
+    amplitude: Quantity = quantity(
+        "m",
+        "Amplitude of ORDER waves WHERE",
+        "AMPLITUDE_{MARK}",
+        "1 um",
+        bounds=NOT_NEGATIVE,
+        remedy="give the amount, and turn the phase by 180 deg",
+        usual=UsualRange(most=0.001, of="ball_diameter", hint="Waves are some tenths of a micrometre: check the unit."),
+    )
+    phase: Quantity = quantity("rad", "Phase of ORDER waves WHERE", "PHASE_{MARK}", "0 deg", default="0 deg")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Roughness:
+    """Waves of a range of orders, with random phases."""
+
+    amplitude: float = quantity("m", "Amplitude of the lowest order", example="0.1 um", setting=True)
+    exponent: float = quantity("1", "$p$ of $B_n = B_{n_0} (n_0/n)^p$", example=1.0, setting=True)
+    lowest: int = declared(WholeKey(words="Lowest order", lowest=1, highest=MOST_WAVES, example=2))
+    highest: int = declared(WholeKey(words="Highest order", lowest=1, highest=MOST_WAVES, example=40))
+    seed: int = declared(WholeKey(words="Seed of the random phases", lowest=0, highest=2**63 - 1, example=1))
 
 
 def read_waves(table: Table, where: str, symbols: tuple[str, str], label: str = "") -> tuple[list[int], list[Quantity]]:
@@ -52,17 +70,11 @@ def read_waves(table: Table, where: str, symbols: tuple[str, str], label: str = 
                     remedy='write for example 8 = { amplitude = "1 um" }',
                 )
                 continue
-            with table.table(key) as wave:
-                orders.append(int(key))
-                words, (amplitude, phase) = f"of {key} waves {where}", symbols
-                numbers += [
-                    wave.quantity(
-                        "amplitude", "m", f"Amplitude {words}", f"{amplitude}_{{{label}{key}}}", example="1 um"
-                    ),
-                    wave.quantity(
-                        "phase", "rad", f"Phase {words}", f"{phase}_{{{label}{key}}}", example="0 deg", default="0 deg"
-                    ),
-                ]
+            orders.append(int(key))
+            fill = {"ORDER": key, "WHERE": where, "AMPLITUDE": symbols[0], "PHASE": symbols[1], "MARK": f"{label}{key}"}
+            with table.table(key) as data:
+                wave = read_record(Wave, data, fill)
+            numbers += [wave.amplitude, wave.phase]
     return orders, numbers
 
 
@@ -80,11 +92,8 @@ def with_roughness(table: Table, draws: str = "") -> dict[str, object]:
     rest = {key: value for key, value in table.data.items() if key != "roughness"}
     noted = len(table.collector.faults)
     with table.table("roughness") as rough:
-        amplitude = rough.quantity("amplitude", "m", "Amplitude of the lowest order", "", example="0.1 um").value
-        exponent = rough.number("exponent", example="1.0")
-        lowest = rough.integer("lowest", 1, MOST_WAVES, example="2")
-        highest = rough.integer("highest", 1, MOST_WAVES, example="40")
-        seed = rough.integer("seed", 0, 2**63 - 1, example="1")
+        waves = read_record(Roughness, rough)
+        lowest, highest = waves.lowest, waves.highest
         if highest < lowest:
             rough.fault(
                 "highest",
@@ -104,10 +113,10 @@ def with_roughness(table: Table, draws: str = "") -> dict[str, object]:
             )
     if len(table.collector.faults) > noted:
         return rest
-    draw = random.Random(f"{seed} {draws}" if draws else seed)
+    draw = random.Random(f"{waves.seed} {draws}" if draws else waves.seed)
     made = {
         str(n): {
-            "amplitude": f"{amplitude * (lowest / n) ** exponent!r} m",
+            "amplitude": f"{waves.amplitude * (lowest / n) ** waves.exponent!r} m",
             "phase": f"{draw.random() * 2.0 * math.pi!r} rad",
         }
         for n in range(lowest, highest + 1)

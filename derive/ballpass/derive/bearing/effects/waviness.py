@@ -6,14 +6,12 @@ added to its deflection.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from ballpass.derive.bearing.effects.effect import Effect, GenericBall, Usual
-from ballpass.derive.bearing.effects.read_waves import read_waves, usual_amplitudes
+from ballpass.derive.bearing.effects.effect import Effect, GenericBall
+from ballpass.derive.bearing.effects.read_waves import read_waves
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
-from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Names, symbol_of
 
 if TYPE_CHECKING:
@@ -27,13 +25,6 @@ class _RacewayWaviness(Effect):
     def read(self, table: Table, balls: int) -> BallEffect:
         orders, numbers = read_waves(table, f"around the {self.ring} raceway", ("B", r"\alpha"), self.label)
         return BallEffect(kind=self.name, structure=tuple(orders), numbers=tuple(numbers))
-
-    def check(self, effect: BallEffect, checker: Checker, bearing: Bearing) -> None:
-        for amplitude in effect.numbers[::2]:
-            checker.not_negative(amplitude, "give the amount, and turn the phase by 180 deg")
-
-    def usual(self, effect: BallEffect) -> Iterable[Usual]:
-        return usual_amplitudes(effect.numbers[::2])
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         import sympy as sp

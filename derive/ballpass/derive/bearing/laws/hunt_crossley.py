@@ -8,11 +8,12 @@ Des. 112 (1990) 369, doi:10.1115/1.2912617): the energy lost is then (1 - e^2) o
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.laws.law import DampingLaw
-from ballpass.derive.scene.quantity import Bounds, Quantity
-from ballpass.derive.scene.schema import Table, listing
+from ballpass.derive.scene.keys import Either, QuantityKey
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -29,40 +30,29 @@ class HuntCrossley(DampingLaw):
     latex = r"\alpha"
     words = "Hysteresis damping factor of the contact"
 
-    def read(self, table: Table) -> tuple[Quantity, ...]:
-        keys = ("hysteresis", "restitution", "impact_speed")
-        table.know(*keys)
-        present = tuple(key for key in keys if key in table.data)
-        if present not in (keys[:1], keys[1:]):
-            problem, remedy = "the damping factor is missing", 'add hysteresis = "0.2 s/m"'
-            if "hysteresis" in present:
-                problem, remedy = "the damping factor is given twice", "delete hysteresis, or the other two"
-            elif present:
-                problem = "half of what gives the damping factor is missing"
-                remedy = 'add impact_speed = "0.1 m/s"' if "restitution" in present else "add restitution = 0.8"
-            table.fault(
-                "",
-                problem,
-                given=listing(present) if present else "neither",
-                allowed='hysteresis (as in "0.2 s/m"), or restitution (as in 0.8) and impact_speed (as in "0.1 m/s")',
-                remedy=remedy,
-            )
-        numbers = []
-        if "hysteresis" in present:
-            numbers.append(table.quantity("hysteresis", "s/m", self.words, r"\alpha", example="0.2 s/m"))
-        if "restitution" in present:
-            words = "Coefficient of restitution of a ball's contact"
-            numbers.append(table.quantity("restitution", "1", words, "e", example="0.8"))
-        if "impact_speed" in present:
-            words = "Speed of impact that the coefficient of restitution holds for"
-            numbers.append(table.quantity("impact_speed", "m/s", words, "v_0", example="0.1 m/s"))
-        return tuple(numbers)
-
-    def bounds(self, key: str) -> Bounds:
-        return {
-            "restitution": Bounds(least=0.0, most=1.0),
-            "impact_speed": Bounds(above=0.0),
-        }.get(key, Bounds(least=0.0))
+    keys = MappingProxyType(
+        {
+            "hysteresis": QuantityKey(
+                unit="s/m", words=words, symbol=r"\alpha", example="0.2 s/m", bounds=NOT_NEGATIVE
+            ),
+            "restitution": QuantityKey(
+                unit="1",
+                words="Coefficient of restitution of a ball's contact",
+                symbol="e",
+                example=0.8,
+                bounds=Bounds(least=0.0, most=1.0),
+                note="accurate near one only, see {doc}`../theory/damping`",
+            ),
+            "impact_speed": QuantityKey(
+                unit="m/s",
+                words="Speed of impact that the coefficient of restitution holds for",
+                symbol="v_0",
+                example="0.1 m/s",
+                bounds=POSITIVE,
+            ),
+        }
+    )
+    either = Either(what="the damping factor", groups=(("hysteresis",), ("restitution", "impact_speed")))
 
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
         if "hysteresis" in numbers:

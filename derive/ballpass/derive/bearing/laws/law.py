@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
-from ballpass.derive.scene.quantity import Bounds, Quantity
-from ballpass.derive.scene.schema import Table
-from ballpass.derive.scene.units import show
+from ballpass.derive.scene.keys import Either, QuantityKey, read_keys
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
+from ballpass.derive.scene.table import Table
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -29,6 +30,7 @@ class DampingLaw(ABC):
     description : one clause for people
     unit, latex, words : of the law's coefficient, a constant of a run made of its numbers
     kinked_at_rest : whether its force has a kink where the rate passes zero, which a scene may smooth
+    keys, either : of its numbers in ``[bearing.damping]``; LAW stands for its name
     """
 
     name: ClassVar[str]
@@ -37,10 +39,13 @@ class DampingLaw(ABC):
     latex: ClassVar[str] = "c_b"
     words: ClassVar[str] = "Damping coefficient of a ball, Eq. (10)"
     kinked_at_rest: ClassVar[bool] = False
+    keys: ClassVar[Mapping[str, QuantityKey]] = MappingProxyType({})
+    either: ClassVar[Either | None] = None
 
-    @abstractmethod
     def read(self, table: Table) -> tuple[Quantity, ...]:
         """The law's numbers out of ``[bearing.damping]``; faults are noted."""
+        keys = {name: key.told({"LAW": self.name}) for name, key in self.keys.items()}
+        return tuple(number for number in read_keys(table, keys, self.either).values() if number is not None)
 
     @abstractmethod
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
@@ -50,48 +55,31 @@ class DampingLaw(ABC):
     def force(self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: Rest) -> sp.Expr:
         """Damping force [N]; positive pushes the rings apart.  Zero is a law without a force."""
 
-    def bounds(self, key: str) -> Bounds:
-        """What a number of the law must satisfy."""
-        del key
-        return Bounds(least=0.0)
-
-
-def coefficient_or_ratio(table: Table, law: str) -> tuple[Quantity, ...]:
-    """One of ``coefficient`` c_b [N*s/m] and ``ratio`` c_b/k_b [s*m^0.5]."""
-    table.know("coefficient", "ratio")
-    present = [key for key in ("coefficient", "ratio") if key in table.data]
-    if len(present) != 1:
-        table.fault(
-            "",
-            "the coefficient is given twice" if present else "the coefficient is missing",
-            given=" and ".join(f"{key} = {show(table.data[key])}" for key in present) or "neither",
-            allowed='either coefficient (as in "683 N*s/m") or ratio (as in "0.25e-5 s*mm^0.5")',
-            remedy="delete one of the two" if present else 'add coefficient = "683 N*s/m", or a ratio',
-        )
-    numbers = []
-    if "coefficient" in present:
-        words = "Damping coefficient of a ball's contacts"
-        numbers.append(table.quantity("coefficient", "N*s/m", words, "c_b", example="683 N*s/m"))
-    if "ratio" in present:
-        numbers.append(
-            table.quantity(
-                "ratio",
-                "s*m^0.5",
-                "Ratio of damping coefficient to contact stiffness of a ball",
-                r"\beta",
-                example="0.25e-5 s*mm^0.5",
-                wrong_dimension=f'the law "{law}" multiplies k_b [N/m^1.5]: write the paper\'s number as '
-                '"0.25e-5 s*mm^0.5"; for a time, as in "0.25e-5 s", name the law "tangent"',
-            )
-        )
-    return tuple(numbers)
-
 
 class ViscousLaw(DampingLaw):
     """A law whose coefficient c_b is given, or a ratio of the contact stiffness."""
 
-    def read(self, table: Table) -> tuple[Quantity, ...]:
-        return coefficient_or_ratio(table, self.name)
+    keys = MappingProxyType(
+        {
+            "coefficient": QuantityKey(
+                unit="N*s/m",
+                words="Damping coefficient of a ball's contacts",
+                symbol="c_b",
+                example="683 N*s/m",
+                bounds=NOT_NEGATIVE,
+            ),
+            "ratio": QuantityKey(
+                unit="s*m^0.5",
+                words="Ratio of damping coefficient to contact stiffness of a ball",
+                symbol=r"\beta",
+                example="0.25e-5 s*mm^0.5",
+                bounds=NOT_NEGATIVE,
+                wrong_dimension='the law "LAW" multiplies k_b [N/m^1.5]: write the paper\'s number as '
+                '"0.25e-5 s*mm^0.5"; for a time, as in "0.25e-5 s", name the law "tangent"',
+            ),
+        }
+    )
+    either = Either(what="the coefficient", groups=(("coefficient",), ("ratio",)))
 
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
         return numbers["coefficient"] if "coefficient" in numbers else numbers["ratio"] * stiffness

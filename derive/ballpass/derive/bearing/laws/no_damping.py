@@ -6,9 +6,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.laws.law import DampingLaw
-from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table
-from ballpass.derive.scene.units import show
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -21,17 +18,6 @@ class NoDamping(DampingLaw):
 
     name = "none"
     description = "no damping in the contacts"
-
-    def read(self, table: Table) -> tuple[Quantity, ...]:
-        for key in ("coefficient", "ratio"):
-            if table.has(key):
-                table.fault(
-                    key,
-                    'the law "none" has no coefficient',
-                    given=show(table.data[key]),
-                    remedy="delete the key, or name another law",
-                )
-        return ()
 
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
         return 0 * stiffness

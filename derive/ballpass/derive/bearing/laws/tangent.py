@@ -6,12 +6,12 @@ Consistent in dimension, gated by itself, continuous.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.laws.law import DampingLaw
-from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table
-from ballpass.derive.scene.units import show
+from ballpass.derive.scene.keys import QuantityKey
+from ballpass.derive.scene.quantity import NOT_NEGATIVE
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -28,29 +28,19 @@ class Tangent(DampingLaw):
     latex = r"\beta"
     words = "Damping time constant of the contact"
 
-    def read(self, table: Table) -> tuple[Quantity, ...]:
-        table.know("coefficient", "ratio")
-        if "coefficient" in table.data:
-            table.fault(
-                "coefficient",
-                'the law "tangent" takes its coefficient from the slope of the contact force',
-                given=show(table.data["coefficient"]),
-                allowed='ratio, a time, as in "0.25e-5 s"',
-                remedy='write ratio = "0.25e-5 s" instead, or name the law "one-sided"',
-            )
-            if "ratio" not in table.data:
-                return ()
-        return (
-            table.quantity(
-                "ratio",
-                "s",
-                "Damping time constant: damping over tangent stiffness of the contact",
-                r"\beta",
+    keys = MappingProxyType(
+        {
+            "ratio": QuantityKey(
+                unit="s",
+                words="Damping time constant: damping over tangent stiffness of the contact",
+                symbol=r"\beta",
                 example="0.25e-5 s",
+                bounds=NOT_NEGATIVE,
                 wrong_dimension='write a time, as in "0.25e-5 s": the law "tangent" multiplies the slope of the '
                 "contact force [N/m]",
-            ),
-        )
+            )
+        }
+    )
 
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
         return numbers["ratio"]

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw, not_zero, same_sign
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.keys import quantity
+from ballpass.derive.scene.quantity import POSITIVE, Quantity
 from ballpass.derive.terms import symbol_of
 
 
@@ -25,21 +25,9 @@ class Asynchronous(TorqueLaw):
 
     name: ClassVar[str] = "asynchronous"
 
-    breakdown_torque: Quantity
-    breakdown_slip: Quantity
-    synchronous_speed: Quantity
-
-    @classmethod
-    def read(cls, data: Table) -> Self:
-        return cls(
-            breakdown_torque=data.quantity(
-                "breakdown_torque", "N*m", "Breakdown torque of the motor", "M_b", example="20 N*m"
-            ),
-            breakdown_slip=data.quantity("breakdown_slip", "1", "Slip at the breakdown torque", "s_b", example="0.2"),
-            synchronous_speed=data.quantity(
-                "synchronous_speed", "rad/s", "Synchronous speed of the motor", r"\omega_s", example="1500 rpm"
-            ),
-        )
+    breakdown_torque: Quantity = quantity("N*m", "Breakdown torque of the motor", "M_b", "20 N*m")
+    breakdown_slip: Quantity = quantity("1", "Slip at the breakdown torque", "s_b", 0.2, bounds=POSITIVE)
+    synchronous_speed: Quantity = quantity("rad/s", "Synchronous speed of the motor", r"\omega_s", "1500 rpm")
 
     def torque(self, speed: sp.Expr) -> sp.Expr:
         slip, most = 1 - speed / symbol_of(self.synchronous_speed), symbol_of(self.breakdown_slip)
@@ -50,7 +38,6 @@ class Asynchronous(TorqueLaw):
         return "an asynchronous motor by Kloss's curve"
 
     def check(self, checker: Checker) -> None:
-        """A slip above zero, torque and speed in one direction."""
-        checker.positive(self.breakdown_slip)
+        """Torque and speed in one direction."""
         not_zero(checker, self.synchronous_speed, "synchronous speed")
         same_sign(checker, self.breakdown_torque, self.synchronous_speed, "breakdown torque and synchronous speed")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw
+from ballpass.derive.scene.keys import quantity
 from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table
 from ballpass.derive.terms import symbol_of
 
 
@@ -19,12 +19,7 @@ class ConstantTorque(TorqueLaw):
 
     name: ClassVar[str] = "constant"
 
-    amount: Quantity
-
-    @classmethod
-    def read(cls, data: Table) -> Self:
-        words = "Torque of the drive, counter-clockwise"
-        return cls(amount=data.quantity("torque", "N*m", words, "M_d", example="5 N*m"))
+    amount: Quantity = quantity("N*m", "Torque of the drive, counter-clockwise", "M_d", "5 N*m", name="torque")
 
     def torque(self, speed: sp.Expr) -> sp.Expr:
         del speed

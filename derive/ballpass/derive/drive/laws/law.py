@@ -1,20 +1,19 @@
-"""What a law of a drive's torque is: its name, its numbers in the scene file, its torque over the speed."""
+"""What a law of a drive's torque is: its name, its keys in the scene file, its torque over the speed."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import sympy as sp
 
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table
 from ballpass.derive.terms import Smoothness
 
 
 class TorqueLaw(ABC):
-    """Torque of a drive; a frozen record of the scene.
+    """Torque of a drive; a frozen record of ``[mechanism.driver.torque]``.
 
     Attributes
     ----------
@@ -25,11 +24,6 @@ class TorqueLaw(ABC):
     __slots__ = ()
     name: ClassVar[str]
     smoothness: ClassVar[Smoothness] = Smoothness.TWICE_SMOOTH
-
-    @classmethod
-    @abstractmethod
-    def read(cls, data: Table) -> Self:
-        """The law from the keys of ``[mechanism.driver.torque]``, faults noted there."""
 
     @abstractmethod
     def torque(self, speed: sp.Expr) -> sp.Expr:

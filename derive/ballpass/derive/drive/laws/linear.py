@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw, not_zero, same_sign
 from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.keys import Either, quantity
 from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table, listing
 from ballpass.derive.terms import symbol_of
 
 
@@ -20,36 +20,21 @@ class LinearCharacteristic(TorqueLaw):
 
     name: ClassVar[str] = "linear"
 
-    no_load_speed: Quantity
-    amount: Quantity
-    at: Quantity | None
+    either: ClassVar[Either] = Either(
+        what="the torque", groups=(("stall_torque",), ("nominal_torque", "nominal_speed"))
+    )
 
-    @classmethod
-    def read(cls, data: Table) -> Self:
-        data.know("stall_torque", "nominal_torque", "nominal_speed")
-        nominal = "nominal_torque" in data.data or "nominal_speed" in data.data
-        if nominal == ("stall_torque" in data.data):
-            data.fault(
-                "",
-                "the torque is given twice" if nominal else "the torque is missing",
-                given=listing([k for k in ("stall_torque", "nominal_torque", "nominal_speed") if k in data.data]),
-                allowed="no_load_speed with either stall_torque, or nominal_torque and nominal_speed",
-                remedy="delete stall_torque, or the nominal point" if nominal else 'add stall_torque = "20 N*m"',
-            )
-            data.missing = True  # which keys are missing depends on what stays
-        no_load = data.quantity("no_load_speed", "rad/s", "No-load speed of the motor", r"\omega_0", example="1500 rpm")
-        if not nominal:
-            words = "Torque of the motor at rest"
-            return cls(
-                no_load_speed=no_load,
-                amount=data.quantity("stall_torque", "N*m", words, "M_0", example="20 N*m"),
-                at=None,
-            )
-        return cls(
-            no_load_speed=no_load,
-            amount=data.quantity("nominal_torque", "N*m", "Nominal torque of the motor", "M_N", example="5 N*m"),
-            at=data.quantity("nominal_speed", "rad/s", "Nominal speed of the motor", r"\omega_N", example="1400 rpm"),
-        )
+    no_load_speed: Quantity = quantity("rad/s", "No-load speed of the motor", r"\omega_0", "1500 rpm")
+    stall_torque: Quantity | None = quantity("N*m", "Torque of the motor at rest", "M_0", "20 N*m")
+    nominal_torque: Quantity | None = quantity("N*m", "Nominal torque of the motor", "M_N", "5 N*m")
+    at: Quantity | None = quantity("rad/s", "Nominal speed of the motor", r"\omega_N", "1400 rpm", name="nominal_speed")
+
+    @property
+    def amount(self) -> Quantity:
+        """The torque at rest, or the nominal one."""
+        amount = self.stall_torque or self.nominal_torque
+        assert amount is not None  # `either`
+        return amount
 
     def torque(self, speed: sp.Expr) -> sp.Expr:
         no_load = symbol_of(self.no_load_speed)
@@ -61,6 +46,8 @@ class LinearCharacteristic(TorqueLaw):
 
     def check(self, checker: Checker) -> None:
         """The torque falls with the speed, and vanishes at the no-load speed."""
+        if self.stall_torque is None and self.nominal_torque is None:  # reported
+            return
         not_zero(checker, self.no_load_speed, "no-load speed")
         same_sign(checker, self.amount, self.no_load_speed, "torque and no-load speed")
         if self.at is not None and not 0.0 <= self.at.value / (self.no_load_speed.value or 1.0) < 1.0:

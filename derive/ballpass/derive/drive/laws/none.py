@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw
-from ballpass.derive.scene.schema import Table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,11 +15,6 @@ class NoTorque(TorqueLaw):
     """Zero."""
 
     name: ClassVar[str] = "none"
-
-    @classmethod
-    def read(cls, data: Table) -> Self:
-        del data
-        return cls()
 
     def torque(self, speed: sp.Expr) -> sp.Expr:
         del speed

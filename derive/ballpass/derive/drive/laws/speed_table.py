@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw
 from ballpass.derive.drive.piecewise_linear import piecewise_linear
 from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.keys import ColumnKey, declared
 from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.schema import Table
 from ballpass.derive.terms import Smoothness, symbol_of
 
 
@@ -22,16 +22,12 @@ class SpeedTable(TorqueLaw):
     name: ClassVar[str] = "table"
     smoothness: ClassVar[Smoothness] = Smoothness.KINKED
 
-    speed: tuple[Quantity, ...]
-    amount: tuple[Quantity, ...]
-
-    @classmethod
-    def read(cls, data: Table) -> Self:
-        speed = data.column("speed", "rad/s", "Speed in row ROW of the drive's table", r"\omega_{d,ROW}")
-        return cls(
-            speed=speed,
-            amount=data.column("torque", "N*m", "Torque in row ROW of the drive's table", "M_{d,ROW}"),
-        )
+    speed: tuple[Quantity, ...] = declared(
+        ColumnKey(unit="rad/s", words="Speed in row ROW of the drive's table", symbol=r"\omega_{d,ROW}")
+    )
+    amount: tuple[Quantity, ...] = declared(
+        ColumnKey(name="torque", unit="N*m", words="Torque in row ROW of the drive's table", symbol="M_{d,ROW}")
+    )
 
     def torque(self, speed: sp.Expr) -> sp.Expr:
         return piecewise_linear(speed, [symbol_of(q) for q in self.speed], [symbol_of(q) for q in self.amount])

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Load
-from ballpass.derive.mechanism.forces.force import Action, Law, Measure, Pathway, Points, Setting
+from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Points, Setting
 from ballpass.derive.mechanism.kinematics import body_point, cross, dot, scale, subscript, subtract
-from ballpass.derive.scene.body_keys import read_two_points
+from ballpass.derive.scene.body_keys import BODIES, POINTS, check_points, check_two_bodies
+from ballpass.derive.scene.keys import declared, quantity
 from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.records import FRAME, Force
-from ballpass.derive.scene.schema import Table, upright
+from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
 
@@ -30,17 +31,21 @@ class AlongDirection(Pathway):
         size="distance", size_unit="m", example="2 mm", amount="tension", amount_unit="N"
     )
 
-    bodies: tuple[str, str]
-    points: tuple[str, str]
-    direction: Quantity
+    bodies: tuple[str, str] = declared(BODIES)
+    points: tuple[str, str] = declared(POINTS)
+    direction: Quantity = quantity(
+        "rad",
+        "Direction of NAME in the axes of its first body",
+        r"\alpha_{INDEX}",
+        "90 deg",
+        note="makes the stop a wall through the first body's point, normal to it; the distance of the second body's "
+        "point is positive where it points",
+    )
 
-    @classmethod
-    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
-        """Keys bodies, points and direction."""
-        bodies, ends = read_two_points(data, points)
-        words = f"Direction of {name} in the axes of its first body"
-        direction = data.quantity("direction", "rad", words, rf"\alpha_{{{upright(name)}}}", example="90 deg")
-        return cls(bodies=bodies, points=ends, direction=direction)
+    def check_names(self, data: Table, points: Points) -> None:
+        """Two bodies, and a point of each."""
+        check_two_bodies(data, self.bodies, points, "both ends are on one body")
+        check_points(data, self.bodies, self.points, points)
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Distance and its rate; the force on the wall acts where the point is."""

@@ -8,11 +8,12 @@ from typing import ClassVar, Self
 
 import sympy as sp
 
-from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
+from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.keys import ColumnKey, Fill, declared, read_record
 from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.records import Force
-from ballpass.derive.scene.schema import Table, upright
+from ballpass.derive.scene.table import Table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,20 +22,29 @@ class AngleTable(Law):
 
     key: ClassVar[str] = "table"
 
-    angle: tuple[Quantity, ...]
-    values: tuple[Quantity, ...]
+    angle: tuple[Quantity, ...] = declared(
+        ColumnKey(
+            unit="rad",
+            words="Driver angle in row ROW of the table of NAME",
+            symbol=r"\theta_{INDEX,ROW}",
+            note="increasing, within less than a turn",
+        )
+    )
+    values: tuple[Quantity, ...] = declared(
+        ColumnKey(
+            name="COLUMN",
+            unit="COLUMN_UNIT",
+            words="THE_COLUMN in row ROW of the table of NAME",
+            symbol="T_{INDEX,ROW}",
+            note="linear between rows and periodic: the last row joins the first, one turn later",
+        )
+    )
 
     @classmethod
-    def read(cls, data: Table, name: str, pathway: type[Pathway]) -> Self:
+    def read(cls, data: Table, fill: Fill) -> Self:
         """Columns angle and force (or torque)."""
-        column, unit, index = pathway.column, pathway.unit, upright(name)
-        with data.table("table", f"angle and {column}") as table:
-            angle = table.column(
-                "angle", "rad", f"Driver angle in row ROW of the table of {name}", rf"\theta_{{{index},ROW}}"
-            )
-            words = f"{column.capitalize()} in row ROW of the table of {name}"
-            values = table.column(column, unit, words, f"T_{{{index},ROW}}")
-        return cls(angle=angle, values=values)
+        with data.table("table", f"angle and {fill['COLUMN']}") as table:
+            return read_record(cls, table, fill)
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The table's value."""

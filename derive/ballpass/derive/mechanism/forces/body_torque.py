@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar
 
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points, Setting
-from ballpass.derive.scene.body_keys import read_moving_body
+from ballpass.derive.scene.body_keys import BODY, check_moving_body
+from ballpass.derive.scene.keys import declared, quantity
 from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.records import Force
-from ballpass.derive.scene.schema import Table, upright
+from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of
 
 
@@ -21,23 +22,19 @@ class BodyTorque(Pathway):
     column: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N*m"
 
-    body: str
-    torque: Quantity | None
+    body: str = declared(BODY)
+    torque: Quantity | None = quantity(
+        "N*m", "Torque NAME on the BODY, counter-clockwise", "M_{INDEX}", "20 N*m", when="required without `table`"
+    )
 
     @classmethod
-    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
-        """Keys body and torque."""
-        body = read_moving_body(data, points)
-        if not law.factor:
-            return cls(body=body, torque=None)
-        torque = data.quantity(
-            "torque",
-            "N*m",
-            f"Torque {name} on the {body.replace('_', ' ')}, counter-clockwise",
-            f"M_{{{upright(name)}}}",
-            example="20 N*m",
-        )
-        return cls(body=body, torque=torque)
+    def left_out(cls, law: type[Law]) -> dict[str, Any]:
+        """The torque where the law gives it."""
+        return {} if law.factor else {"torque": None}
+
+    def check_names(self, data: Table, points: Points) -> None:
+        """A moving body."""
+        check_moving_body(data, self.body, points)
 
     def act(self, force: Force, setting: Setting) -> Action:
         """The torque times the law's factor, or the law's torque."""

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import sympy as sp
 
-from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
+from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.records import Force
-from ballpass.derive.scene.schema import Table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,11 +16,6 @@ class Constant(Law):
     """The factor 1."""
 
     factor: ClassVar[bool] = True
-
-    @classmethod
-    def read(cls, data: Table, name: str, pathway: type[Pathway]) -> Self:
-        """No key."""
-        return cls()
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """One."""

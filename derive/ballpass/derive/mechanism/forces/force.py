@@ -11,9 +11,9 @@ A law gives an amount.  The pathway multiplies it by its own direction, and give
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import sympy as sp
 
@@ -21,14 +21,16 @@ from ballpass.derive.drive import Drive, OverAngle
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.linkage import Linkage
+from ballpass.derive.scene.body_keys import Points
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.records import Force, Mechanism
-from ballpass.derive.scene.schema import Table, listing
+from ballpass.derive.scene.keys import Fill, read_record
+from ballpass.derive.scene.records import Driver, Force, Mechanism
+from ballpass.derive.scene.table import Table, listing, upright
 from ballpass.derive.terms import Definition, Smoothness
 from ballpass.derive.variables import Input, Output, StateSwitch
+from ballpass.runtime.contract.manifest import UsualInfo
 
-#: Names of the points of every body and of the frame.
-Points = Mapping[str, Sequence[str]]
+__all__ = ["Action", "ForceTable", "Law", "Measure", "Pathway", "Points", "Setting"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,9 +105,31 @@ class Pathway(ABC):
     measure: ClassVar[Measure | None] = None
 
     @classmethod
-    @abstractmethod
-    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
+    def read(cls, data: Table, fill: Fill, points: Points, law: type[Law]) -> Self:
         """The pathway from the keys of a force's table, faults noted there."""
+        found = read_record(cls, data, fill, **cls.left_out(law))
+        found.check_names(data, points)
+        return found
+
+    @classmethod
+    def left_out(cls, law: type[Law]) -> dict[str, Any]:
+        """Fields that have no key beside a law, and their values."""
+        return {}
+
+    def check_names(self, data: Table, points: Points) -> None:  # noqa: B027  joints are looked up while deriving
+        """Note faults of names of bodies and points."""
+
+    @classmethod
+    def fill(cls, name: str, body: str) -> dict[str, str]:
+        """What placeholders in the keys of a force with this pathway stand for."""
+        found = {"NAME": name, "INDEX": upright(name), "BODY": body.replace("_", " ")}
+        found |= {"THE_COLUMN": cls.column.capitalize(), "COLUMN": cls.column, "COLUMN_UNIT": cls.unit}
+        measure = cls.measure
+        if measure is not None:
+            found |= {"THE_SIZE": measure.size.capitalize(), "SIZE": measure.size, "SIZE_UNIT": measure.size_unit}
+            found |= {"THE_AMOUNT": measure.amount.capitalize(), "AMOUNT": measure.amount}
+            found |= {"AMOUNT_UNIT": measure.amount_unit, "EXAMPLE": measure.example}
+        return found
 
     @abstractmethod
     def act(self, force: Force, setting: Setting) -> Action:
@@ -114,9 +138,6 @@ class Pathway(ABC):
     @abstractmethod
     def words(self) -> str:
         """What it is, for people: "force on slider.C"."""
-
-    def check(self, checker: Checker) -> None:  # noqa: B027  most have no number that could be wrong
-        """Note faults of its numbers."""
 
 
 class Law(ABC):
@@ -133,9 +154,9 @@ class Law(ABC):
     factor: ClassVar[bool] = False
 
     @classmethod
-    @abstractmethod
-    def read(cls, data: Table, name: str, pathway: type[Pathway]) -> Self:
+    def read(cls, data: Table, fill: Fill) -> Self:
         """The law from the keys of a force's table, faults noted there."""
+        return read_record(cls, data, fill)
 
     @abstractmethod
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
@@ -146,7 +167,11 @@ class Law(ABC):
         return ""
 
     def check(self, checker: Checker) -> None:  # noqa: B027  most have no number that could be wrong
-        """Note faults of its numbers."""
+        """Note faults of its numbers, beyond their bounds."""
+
+    def usual(self, driver: Driver) -> Iterable[UsualInfo]:
+        """Ranges in which its numbers usually lie, beyond those of its keys."""
+        return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,9 +201,5 @@ class ForceTable:
             )
             data.missing = True  # which keys are missing depends on what stays
             law = next(law for law in asked if law.factor == (column in data.data))
-        return Force(
-            name=name,
-            table=self.key,
-            pathway=pathway.read(data, name, points, law),
-            law=law.read(data, name, pathway),
-        )
+        fill = pathway.fill(name, str(data.data.get("body", "")))
+        return Force(name=name, table=self.key, pathway=pathway.read(data, fill, points, law), law=law.read(data, fill))

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
 
 import sympy as sp
 
-from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
+from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
-from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.records import Force
-from ballpass.derive.scene.schema import Table, upright
+from ballpass.derive.scene.keys import Fill, quantity, read_record
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Quantity
+from ballpass.derive.scene.records import Driver, Force
+from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
+from ballpass.runtime.contract.manifest import UsualInfo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,33 +27,50 @@ class Friction(Law):
     At a revolute joint in [N*m*s/rad], [N*m] and [rad/s], at a guide in [N*s/m], [N] and [m/s].
     """
 
-    viscous: Quantity | None
-    coulomb: Quantity | None
-    smoothing: Quantity | None
+    viscous: Quantity | None = quantity(
+        "AMOUNT_UNIT*s/SIZE_UNIT",
+        "Viscous friction of NAME",
+        "c_{INDEX}",
+        "0.1 AMOUNT_UNIT*s/SIZE_UNIT",
+        optional=True,
+        when="this, `AMOUNT`, or both",
+        bounds=NOT_NEGATIVE,
+    )
+    coulomb: Quantity | None = quantity(
+        "AMOUNT_UNIT",
+        "Coulomb friction of NAME",
+        "F_{c,INDEX}",
+        "2 AMOUNT_UNIT",
+        name="AMOUNT",
+        optional=True,
+        when="this, `viscous`, or both",
+        bounds=NOT_NEGATIVE,
+    )
+    smoothing: Quantity | None = quantity(
+        "SIZE_UNIT/s",
+        "Rate over which the Coulomb friction of NAME turns round",
+        r"\epsilon_{INDEX}",
+        "EXAMPLE",
+        when="required with `AMOUNT`, else refused",
+        bounds=POSITIVE,
+        remedy="give a small rate: within it friction grows, beyond it the friction is whole",
+        note="at this rate it reaches 76 % of its amount (tanh 1)",
+    )
 
     @classmethod
-    def read(cls, data: Table, name: str, pathway: type[Pathway]) -> Self:
+    def read(cls, data: Table, fill: Fill) -> Self:
         """Viscous, or torque (force) with smoothing, or both."""
-        measure, index = pathway.measure, upright(name)
-        assert measure is not None  # the tables where this law may stand have pathways with a rate
-        amount, unit, size_unit = measure.amount, measure.amount_unit, measure.size_unit
+        amount = fill["AMOUNT"]
         _refuse_coefficient(data, amount)
-        viscous = data.optional_quantity(
-            "viscous", f"{unit}*s/{size_unit}", f"Viscous friction of {name}", f"c_{{{index}}}"
-        )
-        coulomb = data.optional_quantity(amount, unit, f"Coulomb friction of {name}", f"F_{{c,{index}}}")
-        smoothing = None
-        if coulomb is not None:
-            words, example = f"Rate over which the Coulomb friction of {name} turns round", measure.example
-            smoothing = data.quantity("smoothing", f"{size_unit}/s", words, rf"\epsilon_{{{index}}}", example=example)
-        if viscous is None and coulomb is None:
+        found = read_record(cls, data, fill, **({} if amount in data.data else {"smoothing": None}))
+        if found.viscous is None and found.coulomb is None:
             data.fault(
                 "",
                 f"neither viscous friction nor a {amount}",
                 allowed=f"viscous, {amount} with smoothing, or both",
                 remedy=f"add viscous, or {amount} and smoothing",
             )
-        return cls(viscous=viscous, coulomb=coulomb, smoothing=smoothing)
+        return found
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The friction under a name of its own."""
@@ -75,11 +94,11 @@ class Friction(Law):
         parts = [word for word, given in (("viscous", self.viscous), ("Coulomb", self.coulomb)) if given is not None]
         return f", {' and '.join(parts)}"
 
-    def check(self, checker: Checker) -> None:
-        """No friction drives; a width of zero is a jump."""
-        checker.not_negative(self.viscous)
-        checker.not_negative(self.coulomb)
-        checker.positive(self.smoothing, "give a small rate: within it friction grows, beyond it the friction is whole")
+    def usual(self, driver: Driver) -> Iterable[UsualInfo]:
+        """At a constant speed of the drive friction turns round well below it: above it is mostly viscous."""
+        if self.smoothing is not None and driver.torque is None and self.smoothing.unit == driver.speed.unit:
+            hint = "Coulomb friction is whole only at rates well above it: give a smaller one."
+            yield UsualInfo(names=(self.smoothing.path,), least=None, most=0.1, of=driver.speed.path, hint=hint)
 
 
 def _refuse_coefficient(data: Table, amount: str) -> None:

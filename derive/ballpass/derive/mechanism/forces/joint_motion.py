@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal
 
 from ballpass.derive.mechanism.balance import Load
-from ballpass.derive.mechanism.forces.force import Action, Law, Measure, Pathway, Points, Setting
+from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import dot, joint_point, scale, subtract
 from ballpass.derive.scene.errors import Fault, LinkageError
+from ballpass.derive.scene.keys import TextKey, declared
 from ballpass.derive.scene.records import FRAME, Force, Joint
-from ballpass.derive.scene.schema import Table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,12 +21,13 @@ class JointMotion(Pathway):
     kind: ClassVar[Literal["revolute", "prismatic"]]
     other: ClassVar[str]
 
-    joint: str
-
-    @classmethod
-    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
-        """Key joint."""
-        return cls(joint=data.text("joint", "B") or "")
+    joint: str = declared(
+        TextKey(
+            words="The joint",
+            example="B",
+            note="revolute (friction) or prismatic (guide friction), with or without a bearing",
+        )
+    )
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Rate of the joint, and what an amount does to its bodies."""

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Self
+from dataclasses import dataclass, replace
+from typing import Any
 
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points, Setting
 from ballpass.derive.mechanism.kinematics import body_point, scale
-from ballpass.derive.scene.body_keys import read_moving_body, refuse_unknown_point
-from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.body_keys import BODY, check_moving_body, refuse_unknown_point
+from ballpass.derive.scene.keys import TextKey, declared, quantity
 from ballpass.derive.scene.quantity import Quantity, Vector
-from ballpass.derive.scene.records import Force
-from ballpass.derive.scene.schema import Table, upright, words_of_force
+from ballpass.derive.scene.records import AMOUNT, Force, force_key
+from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import components, symbol_of
 
 
@@ -22,24 +22,33 @@ from ballpass.derive.terms import components, symbol_of
 class PointForce(Pathway):
     """`force` [N] on a named point; where the law gives the amount, its `direction` [rad] alone."""
 
-    body: str
-    point: str
-    force: Vector
-    direction: Quantity | None = None
+    body: str = declared(BODY)
+    point: str = declared(TextKey(words="The point of it where the force acts", example="C"))
+    force: Vector = declared(
+        replace(
+            force_key("the force NAME on the BODY", "F_{INDEX}", note="in the frame's axes"),
+            length_limits=AMOUNT,
+            when="required without `table`",
+        )
+    )
+    direction: Quantity | None = quantity(
+        "rad",
+        "Direction of the force NAME on the BODY",
+        r"\alpha_{INDEX}",
+        "180 deg",
+        when="required with `table`, else refused",
+        note="where the force points, from +x",
+    )
 
     @classmethod
-    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
-        """Keys body, point and force; instead of the force its direction where the law gives the amount."""
-        body = read_moving_body(data, points)
-        point = data.text("point", "C") or ""
-        if body and point:
-            refuse_unknown_point(data, "point", body, point, points)
-        what = f"the force {name} on the {body.replace('_', ' ')}"
-        if not law.factor:
-            words, latex = f"Direction of {what}", rf"\alpha_{{{upright(name)}}}"
-            direction = data.quantity("direction", "rad", words, latex, example="180 deg")
-            return cls(body=body, point=point, force=Vector(kind="zero"), direction=direction)
-        return cls(body=body, point=point, force=data.vector("force", "N", words_of_force(what, "F", upright(name))))
+    def left_out(cls, law: type[Law]) -> dict[str, Any]:
+        """The direction, or the force where the law gives the amount."""
+        return {"direction": None} if law.factor else {"force": Vector(kind="zero")}
+
+    def check_names(self, data: Table, points: Points) -> None:
+        """A moving body and a point of it."""
+        if check_moving_body(data, self.body, points) and self.point:
+            refuse_unknown_point(data, "point", self.body, self.point, points)
 
     def act(self, force: Force, setting: Setting) -> Action:
         """The force times the law's factor."""
@@ -53,7 +62,3 @@ class PointForce(Pathway):
     def words(self) -> str:
         """Force and point."""
         return f"force on {self.body}.{self.point}"
-
-    def check(self, checker: Checker) -> None:
-        """A magnitude is not negative."""
-        checker.polar(self.force)

@@ -7,12 +7,12 @@ from typing import Self
 
 import sympy as sp
 
-from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
+from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
-from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.keys import Fill, quantity, read_record
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
 from ballpass.derive.scene.records import Force
-from ballpass.derive.scene.schema import Table, upright
+from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
 
@@ -24,33 +24,49 @@ class SpringDamper(Law):
     Along a line in [N], [N/m], [N*s/m] and [m]; between two bodies in [N*m], [N*m/rad], [N*m*s/rad] and [rad].
     """
 
-    stiffness: Quantity | None
-    free: Quantity | None
-    damping: Quantity | None
-    preload: Quantity | None
+    stiffness: Quantity | None = quantity(
+        "AMOUNT_UNIT/SIZE_UNIT",
+        "Stiffness of NAME",
+        "k_{INDEX}",
+        "1e4 AMOUNT_UNIT/SIZE_UNIT",
+        optional=True,
+        when="this, `damping`, or both",
+        bounds=NOT_NEGATIVE,
+    )
+    free: Quantity | None = quantity(
+        "SIZE_UNIT",
+        "THE_SIZE of NAME without force",
+        "L_{0,INDEX}",
+        "EXAMPLE",
+        name="free_SIZE",
+        when="required with `stiffness`, else refused",
+        note="an angle is that of the second body in the axes of the first",
+    )
+    damping: Quantity | None = quantity(
+        "AMOUNT_UNIT*s/SIZE_UNIT",
+        "Damping of NAME",
+        "c_{INDEX}",
+        "10 AMOUNT_UNIT*s/SIZE_UNIT",
+        optional=True,
+        when="this, `stiffness`, or both",
+        bounds=NOT_NEGATIVE,
+    )
+    preload: Quantity | None = quantity(
+        "AMOUNT_UNIT", "THE_AMOUNT of NAME at its free SIZE", "F_{0,INDEX}", "5 AMOUNT_UNIT", optional=True
+    )
 
     @classmethod
-    def read(cls, data: Table, name: str, pathway: type[Pathway]) -> Self:
+    def read(cls, data: Table, fill: Fill) -> Self:
         """Stiffness with free length or angle, damping, or both; optionally a preload."""
-        measure, index = pathway.measure, upright(name)
-        assert measure is not None  # the tables where this law may stand have pathways with a size
-        unit, size_unit, free = measure.amount_unit, measure.size_unit, f"free_{measure.size}"
-        stiffness = data.optional_quantity("stiffness", f"{unit}/{size_unit}", f"Stiffness of {name}", f"k_{{{index}}}")
-        free_size = None
-        if stiffness is not None:
-            words, example = f"{measure.size.capitalize()} of {name} without force", measure.example
-            free_size = data.quantity(free, size_unit, words, f"L_{{0,{index}}}", example=example)
-        damping = data.optional_quantity("damping", f"{unit}*s/{size_unit}", f"Damping of {name}", f"c_{{{index}}}")
-        if stiffness is None and damping is None:
+        free = f"free_{fill['SIZE']}"
+        if "stiffness" not in data.data and "damping" not in data.data:
             data.fault(
                 "",
                 "neither stiffness nor damping",
                 allowed=f"stiffness with {free}, damping, or both",
                 remedy=f"add stiffness and {free}, or damping",
             )
-        words = f"{measure.amount.capitalize()} of {name} at its free {measure.size}"
-        preload = data.optional_quantity("preload", unit, words, f"F_{{0,{index}}}")
-        return cls(stiffness=stiffness, free=free_size, damping=damping, preload=preload)
+        return read_record(cls, data, fill, **({} if "stiffness" in data.data else {"free": None}))
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The tension or torque under a name of its own."""
@@ -89,8 +105,3 @@ class SpringDamper(Law):
         """Spring, damper or both."""
         parts = [word for word, given in (("spring", self.stiffness), ("damper", self.damping)) if given is not None]
         return f", {' and '.join(parts)}"
-
-    def check(self, checker: Checker) -> None:
-        """Stiffness and damping are not negative."""
-        checker.not_negative(self.stiffness)
-        checker.not_negative(self.damping)

@@ -7,16 +7,14 @@ a viscous damper would jump at contact, and pull at its end.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
 
 import sympy as sp
 
-from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
+from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
-from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.keys import quantity
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
 from ballpass.derive.scene.records import Force
-from ballpass.derive.scene.schema import Table, upright
 from ballpass.derive.terms import Smoothness, symbol_of
 from ballpass.derive.variables import Input, Output, StateSwitch
 
@@ -28,32 +26,30 @@ class Stop(Law):
     In [N/m], [m] and [s/m], between two bodies in [N*m/rad], [rad] and [s/rad].
     """
 
-    stiffness: Quantity
-    free: Quantity
-    hysteresis: Quantity | None
-
-    @classmethod
-    def read(cls, data: Table, name: str, pathway: type[Pathway]) -> Self:
-        """Stiffness, free size, and optionally hysteresis."""
-        measure, index = pathway.measure, upright(name)
-        assert measure is not None  # the tables where this law may stand have pathways with a size
-        unit, size, size_unit = measure.amount_unit, measure.size, measure.size_unit
-        example = f"1e6 {unit}/{size_unit}"
-        return cls(
-            stiffness=data.quantity(
-                "stiffness", f"{unit}/{size_unit}", f"Stiffness of the stop {name}", f"k_{{{index}}}", example=example
-            ),
-            free=data.quantity(
-                f"free_{size}",
-                size_unit,
-                f"{size.capitalize()} of the stop {name} below which it pushes",
-                f"L_{{0,{index}}}",
-                example=measure.example,
-            ),
-            hysteresis=data.optional_quantity(
-                "hysteresis", f"s/{size_unit}", f"Hysteresis damping factor of the stop {name}", rf"\alpha_{{{index}}}"
-            ),
-        )
+    stiffness: Quantity = quantity(
+        "AMOUNT_UNIT/SIZE_UNIT",
+        "Stiffness of the stop NAME",
+        "k_{INDEX}",
+        "1e6 AMOUNT_UNIT/SIZE_UNIT",
+        bounds=NOT_NEGATIVE,
+    )
+    free: Quantity = quantity(
+        "SIZE_UNIT",
+        "THE_SIZE of the stop NAME below which it pushes",
+        "L_{0,INDEX}",
+        "EXAMPLE",
+        name="free_SIZE",
+        note="an angle is that of the second body in the axes of the first",
+    )
+    hysteresis: Quantity | None = quantity(
+        "s/SIZE_UNIT",
+        "Hysteresis damping factor of the stop NAME",
+        r"\alpha_{INDEX}",
+        "0.1 s/SIZE_UNIT",
+        optional=True,
+        bounds=NOT_NEGATIVE,
+        note="loss of an impact",
+    )
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """What the stop pushes, as a tension: negative."""
@@ -109,8 +105,3 @@ class Stop(Law):
     def words(self) -> str:
         """A stop."""
         return ", stop" if self.hysteresis is None else ", stop with hysteresis"
-
-    def check(self, checker: Checker) -> None:
-        """It pushes, and takes energy out."""
-        checker.not_negative(self.stiffness)
-        checker.not_negative(self.hysteresis)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Load
-from ballpass.derive.mechanism.forces.force import Action, Law, Measure, Pathway, Points, Setting
+from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Points, Setting
 from ballpass.derive.mechanism.kinematics import cross, dot
-from ballpass.derive.scene.body_keys import read_two_bodies
+from ballpass.derive.scene.body_keys import BODIES, check_two_bodies
+from ballpass.derive.scene.keys import declared
 from ballpass.derive.scene.records import FRAME, Force
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.table import Table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,12 +27,11 @@ class TwoBodies(Pathway):
         size="angle", size_unit="rad", example="90 deg", amount="torque", amount_unit="N*m"
     )
 
-    bodies: tuple[str, str]
+    bodies: tuple[str, str] = declared(BODIES)
 
-    @classmethod
-    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
-        """Key bodies."""
-        return cls(bodies=read_two_bodies(data, points))
+    def check_names(self, data: Table, points: Points) -> None:
+        """Two bodies."""
+        check_two_bodies(data, self.bodies, points, "both ends are on one body")
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Relative angle and its rate."""

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Load
-from ballpass.derive.mechanism.forces.force import Action, Law, Measure, Pathway, Points, Setting
+from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Points, Setting
 from ballpass.derive.mechanism.kinematics import body_point, dot, scale, subscript, subtract
-from ballpass.derive.scene.body_keys import read_two_points
+from ballpass.derive.scene.body_keys import BODIES, POINTS, check_points, check_two_bodies
 from ballpass.derive.scene.errors import Fault, LinkageError
+from ballpass.derive.scene.keys import declared
 from ballpass.derive.scene.records import FRAME, Force, Mechanism
-from ballpass.derive.scene.schema import Table
+from ballpass.derive.scene.table import Table
 from ballpass.derive.variables import Output
 
 
@@ -25,14 +26,13 @@ class TwoPoints(Pathway):
         size="length", size_unit="m", example="40 mm", amount="tension", amount_unit="N"
     )
 
-    bodies: tuple[str, str]
-    points: tuple[str, str]
+    bodies: tuple[str, str] = declared(BODIES)
+    points: tuple[str, str] = declared(POINTS)
 
-    @classmethod
-    def read(cls, data: Table, name: str, points: Points, law: type[Law]) -> Self:
-        """Keys bodies and points."""
-        bodies, ends = read_two_points(data, points)
-        return cls(bodies=bodies, points=ends)
+    def check_names(self, data: Table, points: Points) -> None:
+        """Two bodies, and a point of each."""
+        check_two_bodies(data, self.bodies, points, "both ends are on one body")
+        check_points(data, self.bodies, self.points, points)
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Length, its rate and the direction of the line."""

@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import sympy as sp
 
-from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
+from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.records import Force
-from ballpass.derive.scene.schema import Table, upright
+from ballpass.derive.scene.keys import Fill, quantity, read_record
+from ballpass.derive.scene.quantity import Quantity, UsualRange
+from ballpass.derive.scene.records import Driver, Force
+from ballpass.derive.scene.table import Table
+from ballpass.runtime.contract.manifest import UsualInfo
+
+#: An angle of the driver.  Both edges of a window between zero and 2 pi degrees are probably meant in radians.
+_ANGLE = UsualRange(least=-4.0 * math.pi, most=4.0 * math.pi, hint="Check whether degrees were given as radians.")
+_RADIANS = math.radians(2.0 * math.pi)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
     """Driver angles [rad] between which a load acts: from `start` on, up to and without `end`, modulo a turn."""
 
-    start: Quantity
-    end: Quantity
+    start: Quantity = quantity(
+        "rad", "Driver angle at the start of PLACE", r"\theta_{\mathrm{start},INDEX}", "237 deg", usual=_ANGLE
+    )
+    end: Quantity = quantity(
+        "rad", "Driver angle at the end of PLACE", r"\theta_{\mathrm{end},INDEX}", "267 deg", usual=_ANGLE
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,11 +44,12 @@ class Windows(Law):
     windows: tuple[Window, ...]
 
     @classmethod
-    def read(cls, data: Table, name: str, pathway: type[Pathway]) -> Self:
+    def read(cls, data: Table, fill: Fill) -> Self:
         """A table with start and end, or a list of them."""
-        given: Any = data.data["window"]
+        given, name, index = data.data["window"], fill["NAME"], fill["INDEX"]
         if not isinstance(given, list):
-            return cls(windows=(_read_window(data.table("window", "start and end"), name, ""),))
+            with data.table("window", "start and end") as table:
+                return cls(windows=(read_record(Window, table, {"PLACE": f"the window of {name}", "INDEX": index}),))
         if not given:
             data.fault(
                 "window",
@@ -48,8 +61,12 @@ class Windows(Law):
         numbered = Table(
             data.collector, (*data.path, "window"), {str(number): item for number, item in enumerate(given, start=1)}
         )
-        tables = ((number, numbered.table(number, "start and end")) for number in numbered.data)
-        return cls(windows=tuple(_read_window(table, name, f",{number}") for number, table in tables))
+        windows = []
+        for number in numbered.data:
+            with numbered.table(number, "start and end") as table:
+                place = {"PLACE": f"the window {number} of {name}", "INDEX": f"{index},{number}"}
+                windows.append(read_record(Window, table, place))
+        return cls(windows=tuple(windows))
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The gate."""
@@ -65,19 +82,8 @@ class Windows(Law):
         for window in self.windows:
             checker.window(window.start, window.end)
 
-
-def _read_window(table: Table, name: str, number: str) -> Window:
-    place = f"the window {number[1:]} of {name}" if number else f"the window of {name}"
-    index = f"{upright(name)}{number}"
-    with table as window:
-        start, end = (
-            window.quantity(
-                edge,
-                "rad",
-                f"Driver angle at the {edge} of {place}",
-                rf"\theta_{{\mathrm{{{edge}}},{index}}}",
-                example=example,
-            )
-            for edge, example in (("start", "237 deg"), ("end", "267 deg"))
-        )
-        return Window(start=start, end=end)
+    def usual(self, driver: Driver) -> Iterable[UsualInfo]:
+        """Not both edges of a window between zero and 2 pi degrees."""
+        hint = "Check whether radians were given as degrees."
+        for window in self.windows:
+            yield UsualInfo(names=(window.start.path, window.end.path), least=_RADIANS, each=True, hint=hint)

@@ -20,7 +20,7 @@ from ballpass.runtime.many.signals import PRECISIONS, Signals
 if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.derive.scene.errors import Fault
-    from ballpass.derive.scene.schema import Table
+    from ballpass.derive.scene.table import Table
 
 #: Largest seed, as long as integers of most programs.
 MOST_SEED = 2**63 - 1
@@ -65,7 +65,8 @@ def read_spec(path: Path) -> DataSetSpec:
     """
     from ballpass.derive import SceneError
     from ballpass.derive.scene.errors import Fault
-    from ballpass.derive.scene.schema import Collector, Table
+    from ballpass.derive.scene.keys import TextKey, WholeKey
+    from ballpass.derive.scene.table import Collector, Table
     from ballpass.derive.scene.toml_lines import index_lines
 
     try:
@@ -79,12 +80,13 @@ def read_spec(path: Path) -> DataSetSpec:
     collector = Collector(lines=index_lines(text))
     collector.check_name((), path.stem, "data set")
     with Table(collector, (), data) as root:
-        title = (root.text("title", "") if root.has("title") else "") or path.stem
-        seed = root.integer("seed", 0, MOST_SEED, example="1")
-        chunk = root.integer("chunk", 1, MOST_MEMBERS, example="32") if root.has("chunk") else None
+        title = TextKey(default="").read(root, "title") or path.stem
+        seed = WholeKey(lowest=0, highest=MOST_SEED, example=1).read(root, "seed")
+        chunk = WholeKey(lowest=1, highest=MOST_MEMBERS, example=32, optional=True).read(root, "chunk")
         signals, outputs = _read_signals(root)
-        default = root.integer("members", 1, MOST_MEMBERS, example="1000") if root.has("members") else None
-        base = root.text("scene", "scene.toml") if root.has("scene") else None
+        members = WholeKey(lowest=1, highest=MOST_MEMBERS, example=1000, optional=True)
+        default = members.read(root, "members")
+        base = TextKey(example="scene.toml", optional=True).read(root, "scene") or None
         common = root.table("parameters", required=False)
         classes = root.table("classes", "a table for each class, as in [classes.healthy]")
         if not classes.missing and not classes.data:
@@ -109,6 +111,8 @@ def read_spec(path: Path) -> DataSetSpec:
 
 def _read_signals(root: Table) -> tuple[Signals | None, list[str]]:
     """What is recorded, and the names of the outputs; None where something is wrong."""
+    from ballpass.derive.scene.keys import ChoiceKey, QuantityKey
+
     before = len(root.collector.faults)
     outputs = root.take("outputs", '["inner.ax"]')
     if outputs is not None and not (
@@ -116,11 +120,11 @@ def _read_signals(root: Table) -> tuple[Signals | None, list[str]]:
     ):
         allowed = 'a list of names such as ["inner.ax"]'
         root.fault("outputs", "this is no list of names", given=repr(outputs), allowed=allowed, remedy="write names")
-    sample_rate = root.quantity("sample_rate", "Hz", "", "", example="25.6 kHz").value
-    duration = root.quantity("duration", "s", "", "", example="1 s").value
-    transient = root.quantity("transient", "s", "", "", example="0.2 s", default="0 s").value
-    rtol = root.number("rtol", example="1e-6") if root.has("rtol") else None
-    precision = root.choice("precision", PRECISIONS, default=PRECISIONS[0])
+    sample_rate = QuantityKey(unit="Hz", example="25.6 kHz", setting=True).read(root, "sample_rate")
+    duration = QuantityKey(unit="s", example="1 s", setting=True).read(root, "duration")
+    transient = QuantityKey(unit="s", example="0.2 s", default="0 s", setting=True).read(root, "transient")
+    rtol = QuantityKey(unit="1", example=1e-6, setting=True, optional=True).read(root, "rtol")
+    precision = ChoiceKey(choices=PRECISIONS, default=PRECISIONS[0]).read(root, "precision")
     snr = _read_value(root, "snr", root.data["snr"], "1") if root.has("snr") else None
     if len(root.collector.faults) > before or precision is None:
         return None, []
@@ -148,12 +152,13 @@ def _read_class(
 ) -> tuple[Scene | None, int, dict[str, Distribution | float], dict[str, str]]:
     """Scene (None where it is wrong), members, parameters, and the units of the scene's numbers."""
     from ballpass.derive import SceneError, read_scene
+    from ballpass.derive.scene.keys import TextKey, WholeKey
 
-    file = table.text("scene", "scene.toml") if table.has("scene") or base is None else base
-    members = table.integer("members", 1, MOST_MEMBERS, example="1000", default=default)
+    file = TextKey(example="scene.toml", default=base).read(table, "scene")
+    members = WholeKey(lowest=1, highest=MOST_MEMBERS, example=1000, default=default).read(table, "members")
     changes = table.table("changes", required=False).data
     own = table.table("parameters", required=False)
-    if file is None:
+    if not file:
         return None, members, {}, {}
     recorded = {"run": {**changes.get("run", {}), **({"outputs": outputs} if outputs else {})}}
     try:

@@ -1,0 +1,461 @@
+"""Keys of the scene file.  Each is declared once, at the field of the record that it fills.
+
+A declaration says what the key is, in words, and for a number its unit, symbol, bounds and the range it usually lies
+in.  The reader, the checks of values, the warnings of unusual numbers, the reference page and the JSON Schema take it
+from there.  Only rules across keys are code.
+
+Text of a declaration may hold placeholders in capitals ("Mass of the NAME"), which the owner of a table fills in.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
+from typing import Any, ClassVar, Self, TypeVar
+
+from ballpass.derive.scene.quantity import NO_LIMITS, Bounds, Limits, Quantity, UsualRange, Vector
+from ballpass.derive.scene.table import Table, listing, suggest
+from ballpass.derive.scene.units import show
+
+Record = TypeVar("Record")
+
+#: What placeholders stand for.
+Fill = Mapping[str, str]
+_NOTHING: Fill = MappingProxyType({})
+
+
+def filled(text: str, fill: Fill) -> str:
+    """A text with its placeholders replaced, in one pass: names of the scene may be like placeholders."""
+    longest_first = sorted(fill, key=len, reverse=True)
+    return re.sub("|".join(longest_first), lambda match: fill[match[0]], text) if fill else text
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Key(ABC):
+    """One key of a table.
+
+    Attributes
+    ----------
+    words : what it is, one line without its unit; the description of its parameter
+    name : in the file, where it is not that of its field
+    example : as the file has it; a text without its quotes
+    default : what stands for a key that is not given, likewise
+    optional : it may be left out, and is None then
+    when : for people, where other keys decide whether it is needed: "required if elastic"
+    note : more for the reference page, in Markdown
+    """
+
+    words: str = ""
+    name: str = ""
+    example: Any = ""
+    default: Any = None
+    optional: bool = False
+    when: str = ""
+    note: str = ""
+
+    quoted: ClassVar[bool] = True
+
+    def told(self, fill: Fill) -> Self:
+        """The key with its placeholders filled in."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)} if fill else {}
+        texts: dict[str, Any] = {name: filled(v, fill) for name, v in values.items() if isinstance(v, str)}
+        texts |= {name: tuple(filled(t, fill) for t in v) for name, v in values.items() if _texts(v)}
+        return replace(self, **texts) if texts else self
+
+    @property
+    def sample(self) -> str:
+        """What may stand in the file."""
+        return f'"{self.example}"' if self.quoted else str(self.example)
+
+    def read(self, table: Table, name: str) -> Any:
+        """What a table holds at this key; a placeholder, with a fault, where it holds nothing that fits."""
+        if not table.has(name) and (self.optional or self.default is not None):
+            return self.absent(table, name)
+        given = table.take(name, self.sample)
+        return self.placeholder(table, name) if given is None else self.value(table, name, given)
+
+    def absent(self, table: Table, name: str) -> Any:
+        """What stands for a key that is not given."""
+        return self.default
+
+    def placeholder(self, table: Table, name: str) -> Any:
+        """What stands for a value that is missing or wrong; such a record never leaves the reader."""
+        return None
+
+    @abstractmethod
+    def value(self, table: Table, name: str, given: Any) -> Any:
+        """The value; faults are noted."""
+
+    def refuse(self, table: Table, name: str, problem: str, given: Any, allowed: str = "", remedy: str = "") -> Any:
+        """Note a fault; the placeholder."""
+        remedy = remedy or f"write {name} = {self.sample}"
+        table.fault(name, problem, given=show(given), allowed=allowed or self.sample, remedy=remedy)
+        return self.placeholder(table, name)
+
+
+def _texts(value: object) -> bool:
+    return isinstance(value, tuple) and all(isinstance(item, str) for item in value)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QuantityKey(Key):
+    """A number with a unit; "1": a plain number.
+
+    Attributes
+    ----------
+    unit, symbol : SI unit, and symbol in the equations
+    bounds, remedy, usual : see `Limits`
+    setting : it is read once and is no parameter of the model: the value is a float
+    wrong_dimension : remedy where number and unit can be read, but measure something else
+    """
+
+    unit: str
+    symbol: str = ""
+    bounds: Bounds | None = None
+    remedy: str = ""
+    usual: UsualRange | None = None
+    setting: bool = False
+    wrong_dimension: str = ""
+
+    @property
+    def sample(self) -> str:
+        """Text with a unit, or a plain number."""
+        return str(self.example) if self.unit == "1" else f'"{self.example}"'
+
+    @property
+    def limits(self) -> Limits:
+        """Of its value."""
+        return Limits(bounds=self.bounds, remedy=self.remedy, usual=self.usual)
+
+    def absent(self, table: Table, name: str) -> Any:
+        """The default with its unit."""
+        return None if self.default is None else self.value(table, name, self.default)
+
+    def placeholder(self, table: Table, name: str) -> Any:
+        """Not a number."""
+        if self.setting:
+            return math.nan
+        path = ".".join((*table.path, name))
+        return Quantity(path=path, value=math.nan, unit=self.unit, description=self.words, latex=self.symbol)
+
+    def value(self, table: Table, name: str, given: Any) -> Any:
+        """The quantity, whose bounds are checked with those of all others; of a setting the number, checked here."""
+        quantity = self.at((*table.path, name), table, given)
+        problem = self.bounds.problem(quantity.value) if self.bounds is not None and self.setting else ""
+        if self.bounds is not None and problem:
+            self.refuse(table, name, problem, given, self.bounds.allowed, self.limits.advice)
+        return quantity.value if self.setting else quantity
+
+    def at(self, path: tuple[str, ...], table: Table, given: Any) -> Quantity:
+        """The quantity of a path."""
+        return table.collector.quantity(
+            path, given, self.unit, self.words, self.symbol, limits=self.limits, wrong_dimension=self.wrong_dimension
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairKey(QuantityKey):
+    """Two components, ``["0 um", "0 um"]``; AXIS in words and symbol stands for x and y."""
+
+    @property
+    def sample(self) -> str:
+        """Both components."""
+        return f'["{self.example}", "{self.example}"]'
+
+    def absent(self, table: Table, name: str) -> Any:
+        """Twice the default."""
+        return self.value(table, name, [self.default, self.default])
+
+    def placeholder(self, table: Table, name: str) -> Any:
+        """No component."""
+        return ()
+
+    def value(self, table: Table, name: str, given: Any) -> Any:
+        """The quantities with x and y behind their paths."""
+        if not isinstance(given, list) or len(given) != 2:
+            return self.refuse(table, name, "these are not two components", given)
+        pairs = zip("xy", given, strict=True)
+        return tuple(self.told({"AXIS": axis}).at((*table.path, name, axis), table, item) for axis, item in pairs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ColumnKey(QuantityKey):
+    """A column of a table: a list of quantities, or numbers with one unit.
+
+    The number of a row, counted from 1, takes the place of ROW in words and symbol.
+    """
+
+    @property
+    def sample(self) -> str:
+        """Two rows."""
+        return f'["0 {self.unit}", "1 {self.unit}"]'
+
+    def placeholder(self, table: Table, name: str) -> Any:
+        """No row."""
+        return ()
+
+    def value(self, table: Table, name: str, given: Any) -> Any:
+        """The quantity of each row."""
+        values, suffix = given, ""
+        if isinstance(given, dict):
+            with table.table(name) as column:
+                values = column.take("values", "[0, 1]")
+                suffix = TextKey(example=self.unit).read(column, "unit")
+            if values is None or not suffix:
+                return ()
+        if not isinstance(values, list) or not values:
+            allowed = f'{self.sample}, or {{ values = [0, 1], unit = "{self.unit}" }}'
+            remedy = "write a list with one value for each row"
+            return self.refuse(table, name, "this is no column of numbers", given, allowed, remedy)
+        return tuple(
+            self.told({"ROW": str(row)}).at(
+                (*table.path, name, str(row)),
+                table,
+                f"{value!r} {suffix}" if suffix and isinstance(value, int | float) and abs(value) < 1e300 else value,
+            )
+            for row, value in enumerate(values, start=1)
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WholeKey(Key):
+    """A whole number from `lowest` to `highest`."""
+
+    lowest: int
+    highest: int
+    quoted = False
+
+    def placeholder(self, table: Table, name: str) -> int:
+        """The lowest."""
+        return self.lowest
+
+    def value(self, table: Table, name: str, given: Any) -> int:
+        """The number."""
+        if isinstance(given, int) and not isinstance(given, bool) and self.lowest <= given <= self.highest:
+            return given
+        allowed, remedy = (
+            f"a whole number from {self.lowest} to {self.highest}",
+            f"write for example {name} = {self.sample}",
+        )
+        self.refuse(table, name, "this is not a whole number within the bounds", given, allowed, remedy)
+        return self.lowest
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChoiceKey(Key):
+    """One of some words; None, with a fault, where it is none of them."""
+
+    choices: Sequence[str]
+
+    @property
+    def sample(self) -> str:
+        """All of them."""
+        return " or ".join(f'"{choice}"' for choice in self.choices)
+
+    def value(self, table: Table, name: str, given: Any) -> str | None:
+        """The word."""
+        if isinstance(given, str) and given in self.choices:
+            return given
+        remedy = suggest(given, self.choices, f'write for example {name} = "{self.choices[0]}"')
+        self.refuse(table, name, "this is none of the choices", given, listing(self.choices), remedy)
+        return None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextKey(Key):
+    """A text; empty, with a fault, where there is none.  With `longest`, one line of at most as many characters."""
+
+    longest: int = 0
+
+    def placeholder(self, table: Table, name: str) -> str:
+        """Nothing."""
+        return ""
+
+    def value(self, table: Table, name: str, given: Any) -> Any:
+        """The text."""
+        if not isinstance(given, str):
+            return self.refuse(table, name, "this is not a text", given, "a text")
+        if self.longest and (not given.isprintable() or len(given) > self.longest):
+            allowed, remedy = f"at most {self.longest} printable characters", "shorten it; put the rest into a comment"
+            return self.refuse(table, name, "this is no single line", given, allowed, remedy)
+        return given
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NamesKey(Key):
+    """A list of names, of two where `two`; empty, with a fault, where there is none."""
+
+    two: bool = True
+    quoted = False
+
+    def placeholder(self, table: Table, name: str) -> Any:
+        """No name."""
+        return ()
+
+    def value(self, table: Table, name: str, given: Any) -> Any:
+        """The names."""
+        if self.two:
+            if isinstance(given, list) and len(given) == 2 and all(isinstance(item, str) for item in given):
+                return tuple(given)
+            return self.refuse(table, name, "this is not a list of two names", given)
+        allowed = f"a list of names and patterns, as in {self.sample}"
+        if not isinstance(given, list) or not given:
+            return self.refuse(table, name, "this is no list of names", given, allowed)
+        names = []
+        for number, item in enumerate(given, start=1):
+            if isinstance(item, str) and item.strip() and len(item) <= 200:
+                names.append(item.strip())
+            else:
+                remedy = "delete the entry, or write a name"
+                self.refuse(table, name, f"entry {number} is no name", item, allowed, remedy)
+        return tuple(names)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VectorKey(Key):
+    """A plane vector, in one of the forms of the reference page.
+
+    Attributes
+    ----------
+    words : what goes behind "x component of"
+    axis : description of the form with one number, empty where that form is not allowed
+    symbols : of axis, x, y, length and angle
+    polar : keys of the form with an angle
+    origin : whether the zero vector may be written as a word
+    axis_limits, length_limits : of the number alone, and of the length
+    """
+
+    unit: str
+    axis: str = ""
+    symbols: tuple[str, str, str, str, str]
+    polar: tuple[str, str] = ("distance", "angle")
+    origin: bool = False
+    axis_limits: Limits = NO_LIMITS
+    length_limits: Limits = NO_LIMITS
+
+    @property
+    def sample(self) -> str:
+        """The forms that may stand in the file."""
+        unit = self.unit
+        first, second = {"m": ("6 mm", "2 mm"), "N": ("0 N", "196 N")}.get(unit, (f"0 {unit}", f"9.81 {unit}"))
+        forms = ['"origin"'] if self.origin else []
+        if self.axis:
+            forms.append(f'"{first}"')
+        forms += [f'["{first}", "{second}"]', f'{{ {self.polar[0]} = "{second}", {self.polar[1]} = "30 deg" }}']
+        return ", ".join(forms[:-1]) + " or " + forms[-1]
+
+    def placeholder(self, table: Table, name: str) -> Vector:
+        """Zero."""
+        return Vector(kind="zero")
+
+    def value(self, table: Table, name: str, given: Any) -> Vector:
+        """The vector in the form the file gives it."""
+        path, read = (*table.path, name), table.collector.quantity
+        if isinstance(given, list) and len(given) == 2:
+            first, second = (
+                read((*path, axis), item, self.unit, f"{axis} component of {self.words}", symbol)
+                for axis, item, symbol in zip("xy", given, self.symbols[1:3], strict=True)
+            )
+            return Vector(kind="cartesian", first=first, second=second)
+        if isinstance(given, dict):
+            length, angle = self.polar
+            bounds, remedy = self.length_limits.bounds, self.length_limits.remedy
+            keys = (
+                QuantityKey(
+                    unit=self.unit,
+                    words=f"{length.capitalize()} of {self.words}",
+                    symbol=self.symbols[3],
+                    example=f"1 {self.unit}",
+                    bounds=bounds,
+                    remedy=remedy,
+                ),
+                QuantityKey(
+                    unit="rad", words=f"{angle.capitalize()} of {self.words}", symbol=self.symbols[4], example="30 deg"
+                ),
+            )
+            with table.table(name) as polar:
+                first, second = (key.read(polar, part) for key, part in zip(keys, self.polar, strict=True))
+            return Vector(kind="polar", first=first, second=second)
+        if isinstance(given, str) and given.strip() == "origin" and self.origin:
+            return Vector(kind="zero")
+        if self.axis and not isinstance(given, list):
+            only = read(path, given, self.unit, self.axis, self.symbols[0], limits=self.axis_limits)
+            return Vector(kind="axis", first=only)
+        problem = f"this is not a vector with {len(given)} numbers" if isinstance(given, list) else "this is no vector"
+        remedy = "write the components along x and y, each with its unit"
+        return self.refuse(table, name, problem, given, remedy=remedy)  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Either:
+    """Groups of keys of which a table gives exactly one.
+
+    Attributes
+    ----------
+    what : they give, "the coefficient"
+    groups : of keys, the usual one first; the keys of the other groups are None
+    at : key that a second group is reported at; the table itself by default
+    """
+
+    what: str
+    groups: tuple[tuple[str, ...], ...]
+    at: str = ""
+
+    def choose(self, table: Table, keys: Mapping[str, Key]) -> tuple[str, ...]:
+        """The group that is given; none, with a fault, where there is none, and the first of several."""
+        table.know(*(key for group in self.groups for key in group))
+        given = [group for group in self.groups if any(key in table.data for key in group)]
+        if table.missing or len(given) == 1:
+            return given[0] if given else ()
+        found = [[key for key in group if key in table.data] for group in given]
+        samples = [[f"{key} = {keys[key].sample}" if key in keys else key for key in group] for group in self.groups]
+        table.fault(
+            self.at if given else "",
+            f"{self.what} is given twice" if given else f"{self.what} is missing",
+            given=" and ".join(key for group in found for key in group) or "neither",
+            allowed="either " + ", or ".join(" and ".join(group) for group in samples),
+            remedy="delete one of the two: " + ", or ".join(f"delete {' and '.join(group)}" for group in found)
+            if given
+            else f"add {' and '.join(samples[0])}",
+        )
+        return given[0] if given else ()
+
+
+def declared(key: Key) -> Any:
+    """A field of a record that the key fills."""
+    return field(metadata={"key": key})
+
+
+def quantity(unit: str, words: str, symbol: str = "", example: Any = "", **more: Any) -> Any:
+    """A field that a number fills; `more` as in `QuantityKey`."""
+    return declared(QuantityKey(unit=unit, words=words, symbol=symbol, example=example, **more))
+
+
+def keys_of(kind: type[Any], fill: Fill = _NOTHING) -> dict[str, Key]:
+    """Keys by their names in the file, in the order of a record's fields."""
+    found = (key.told(fill) for key in _keys(kind).values())
+    return {key.name or name: key for name, key in zip(_keys(kind), found, strict=True)}
+
+
+def _keys(kind: type[Any]) -> dict[str, Key]:
+    return {f.name: f.metadata["key"] for f in fields(kind) if "key" in f.metadata}
+
+
+def read_keys(table: Table, keys: Mapping[str, Key], either: Either | None = None) -> dict[str, Any]:
+    """Values of all keys, by name."""
+    table.know(*keys)
+    chosen = either.choose(table, keys) if either is not None else ()
+    left_out = {key for group in either.groups for key in group} - set(chosen) if either is not None else set()
+    return {name: None if name in left_out else key.read(table, name) for name, key in keys.items()}
+
+
+def read_record(kind: type[Record], table: Table, fill: Fill = _NOTHING, **known: Any) -> Record:
+    """A record from its keys; fields that are `known` are not read."""
+    keys = {name: key.told(fill) for name, key in _keys(kind).items() if name not in known}
+    names = {name: key.name or name for name, key in keys.items()}
+    values = read_keys(table, {names[name]: key for name, key in keys.items()}, getattr(kind, "either", None))
+    return kind(**{name: values[names[name]] for name in keys}, **known)

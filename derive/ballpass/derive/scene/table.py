@@ -1,0 +1,204 @@
+"""Reading tables of a scene file: every fault is noted, reading goes on.
+
+A `Table` hands out what its keys hold and knows at its end which keys nobody asked for.  Where a value is missing or
+wrong, a `Fault` is noted and a placeholder is handed out (NaN for a quantity), so that one pass over the file finds all
+faults.  The records made of placeholders never leave `read.py`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from types import TracebackType
+from typing import Any
+
+from ballpass.derive.scene.errors import Fault
+from ballpass.derive.scene.quantity import NO_LIMITS, Limits, Quantity
+from ballpass.derive.scene.toml_lines import LineIndex
+from ballpass.derive.scene.units import QuantityError, parse_quantity, show
+
+#: Name of the body that does not move.
+FRAME = "frame"
+MAX_NAME = 64
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+NAME_RULE = f'a letter (a to z, A to Z), then letters, digits and "_"; at most {MAX_NAME} characters; not "{FRAME}"'
+
+Path = tuple[str, ...]
+
+
+@dataclass(slots=True, kw_only=True)
+class Collector:
+    """The faults found so far; `given` keeps the text of each quantity for the checks that follow."""
+
+    lines: LineIndex
+    faults: list[Fault] = field(default_factory=list)
+    given: dict[str, str] = field(default_factory=dict)
+
+    def fault(self, path: Path, problem: str, *, given: str = "", allowed: str = "", remedy: str) -> None:
+        """Note a fault, with its line where the file has one."""
+        self.faults.append(
+            Fault(
+                key=".".join(path),
+                problem=problem,
+                given=given,
+                allowed=allowed,
+                remedy=remedy,
+                line=self.lines.find(path),
+            )
+        )
+
+    def quantity(
+        self,
+        path: Path,
+        given: object,
+        unit: str,
+        description: str = "",
+        latex: str = "",
+        *,
+        limits: Limits = NO_LIMITS,
+        wrong_dimension: str = "",
+    ) -> Quantity:
+        """Quantity from what stands at `path`; its value is NaN where that is none.
+
+        `wrong_dimension` replaces the remedy where number and unit can be read, but measure something else.
+        """
+        name = ".".join(path)
+        self.given[name] = show(given)
+        try:
+            value = parse_quantity(given, unit)
+        except QuantityError as error:
+            value = math.nan
+            remedy = wrong_dimension if wrong_dimension and "wrong dimension" in error.problem else error.remedy
+            self.fault(path, error.problem, given=error.given, allowed=error.allowed, remedy=remedy)
+        return Quantity(path=name, value=value, unit=unit, description=description, latex=latex, limits=limits)
+
+    def check_name(self, path: Path, name: str, what: str) -> None:
+        """Note a fault where `name` cannot be the name of a body, joint, point or force."""
+        if name == FRAME:
+            self.fault(
+                path,
+                f'"{FRAME}" is the name of the body that does not move',
+                given=show(name),
+                allowed=NAME_RULE,
+                remedy=f"give the {what} another name",
+            )
+        elif len(name) > MAX_NAME or not _NAME.fullmatch(name):
+            self.fault(
+                path, f"this is no name for a {what}", given=show(name), allowed=NAME_RULE, remedy=f"rename the {what}"
+            )
+
+
+def suggest(given: object, known: Sequence[str], otherwise: str) -> str:
+    """Remedy that names the nearest of `known`."""
+    near = get_close_matches(str(given)[:MAX_NAME], known, n=3, cutoff=0.5)
+    if not near:
+        return otherwise
+    return "did you mean " + " or ".join(f'"{name}"' for name in near) + "?"
+
+
+def listing(names: Sequence[str]) -> str:
+    """Names as people read them: "a", "b"."""
+    return ", ".join(show(name) for name in names) if names else "none"
+
+
+def upright(name: str) -> str:
+    """A name of the scene as LaTeX text."""
+    escaped = name.replace("_", r"\_")
+    return rf"\mathrm{{{escaped}}}"
+
+
+class Table:
+    """A table of the file; as a context it reports the keys nobody asked for.
+
+    Parameters
+    ----------
+    collector : takes the faults
+    path : place of the table
+    data : its keys; None where the table is missing, which has been reported: then missing keys are not reported again
+    """
+
+    def __init__(self, collector: Collector, path: Path, data: dict[str, Any] | None) -> None:
+        self.collector = collector
+        self.path = path
+        self.missing = data is None
+        self.data: dict[str, Any] = data or {}
+        self._known: list[str] = []
+
+    def __enter__(self) -> Table:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self.report_unknown()
+
+    def report_unknown(self) -> None:
+        """Note a fault for every key that was not asked for."""
+        absent = [key for key in self._known if key not in self.data]
+        for key in self.data:
+            if key not in self._known:
+                self.fault(
+                    key,
+                    "unknown key",
+                    given=show(key),
+                    allowed=listing(self._known),
+                    remedy=suggest(key, absent, "delete it, or move it to the table it belongs to"),
+                )
+
+    def fault(self, key: str, problem: str, *, given: str = "", allowed: str = "", remedy: str) -> None:
+        """Note a fault at `key`; the empty key means the table itself."""
+        path = (*self.path, key) if key else self.path
+        self.collector.fault(path, problem, given=given, allowed=allowed, remedy=remedy)
+
+    def know(self, *keys: str) -> None:
+        """These keys belong here."""
+        self._known.extend(key for key in keys if key not in self._known)
+
+    def has(self, key: str) -> bool:
+        """Whether the key is there; it belongs here from now on."""
+        self.know(key)
+        return key in self.data
+
+    def names(self, what: str) -> list[str]:
+        """All keys, where they are names the user chooses."""
+        for key in self.data:
+            self.know(key)
+            self.collector.check_name((*self.path, key), key, what)
+        return list(self.data)
+
+    def take(self, key: str, example: str) -> Any:
+        """What stands at a required key; None, with a fault, where nothing does."""
+        if self.has(key):
+            return self.data[key]
+        if not self.missing:
+            self.fault(key, "this key is missing", allowed=f"{key} = {example}", remedy=f"add {key} = {example}")
+        return None
+
+    def table(self, key: str, example: str = "", *, required: bool = True) -> Table:
+        """The table at `key`."""
+        path = (*self.path, key)
+        if not self.has(key):
+            if required and not self.missing:
+                name = ".".join(path)
+                self.fault(
+                    key,
+                    "this table is missing",
+                    allowed=f"[{name}] with {example}" if example else f"[{name}]",
+                    remedy=f"add the table [{name}]",
+                )
+            return Table(self.collector, path, None)
+        data = self.data[key]
+        if not isinstance(data, dict):
+            self.fault(
+                key,
+                "this is not a table",
+                given=show(data),
+                allowed=f"[{'.'.join(path)}]" + (f" with {example}" if example else ""),
+                remedy=f"write a table instead of {show(data, 30)}",
+            )
+            return Table(self.collector, path, None)
+        return Table(self.collector, path, data)
