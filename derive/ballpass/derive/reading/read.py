@@ -27,7 +27,7 @@ from ballpass.derive.reading.values import parse_override, quantities_of, replac
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.file_columns import with_columns
-from ballpass.derive.scene.keys import keys_of
+from ballpass.derive.scene.read_keys import keys_of
 from ballpass.derive.scene.records import Load, Mechanism, Scene
 from ballpass.derive.scene.table import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines

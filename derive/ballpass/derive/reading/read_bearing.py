@@ -26,8 +26,9 @@ from ballpass.derive.scene.bearing_records import (
     Material,
     OuterRing,
 )
-from ballpass.derive.scene.keys import ChoiceKey, Either, PairKey, keys_of, read_keys, read_record
+from ballpass.derive.scene.keys import ChoiceKey, PairKey
 from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import Either, keys_of, read_keys, read_record
 from ballpass.derive.scene.records import FRAME, Mechanism, Shaft
 from ballpass.derive.scene.table import Table, listing, suggest
 from ballpass.derive.scene.units import show

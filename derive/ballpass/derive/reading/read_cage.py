@@ -6,8 +6,9 @@ import random
 from dataclasses import dataclass
 
 from ballpass.derive.scene.bearing_records import CageMotion
-from ballpass.derive.scene.keys import ColumnKey, WholeKey, declared, keys_of, quantity, read_keys, read_record
+from ballpass.derive.scene.keys import ColumnKey, WholeKey
 from ballpass.derive.scene.quantity import Bounds, UsualRange
+from ballpass.derive.scene.read_keys import declared, keys_of, quantity, read_keys, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
 

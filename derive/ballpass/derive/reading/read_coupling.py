@@ -10,8 +10,9 @@ from typing import Literal
 
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.scene.keys import TextKey, keys_of
+from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import keys_of
 from ballpass.derive.scene.records import FRAME, Mechanism
 from ballpass.derive.scene.table import Table, listing, suggest
 from ballpass.derive.scene.units import show

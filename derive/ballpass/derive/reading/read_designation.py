@@ -10,7 +10,8 @@ from decimal import Decimal
 
 from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import GROOVES, GROUPS, BearingType, bearing_types
-from ballpass.derive.scene.keys import TextKey, keys_of, read_record
+from ballpass.derive.scene.keys import TextKey
+from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.table import Table, listing, suggest
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 

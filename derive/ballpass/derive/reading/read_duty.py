@@ -13,7 +13,7 @@ from typing import Any
 from ballpass.derive.reading.values import parse_override, with_values
 from ballpass.derive.scene.bearing_records import Lubrication
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.keys import read_record
+from ballpass.derive.scene.read_keys import read_record
 from ballpass.derive.scene.records import DutyState, Scene
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show

@@ -11,8 +11,8 @@ from typing import Any
 
 from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import bearing_types
-from ballpass.derive.scene.keys import keys_of, quantity, read_record
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
+from ballpass.derive.scene.read_keys import keys_of, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.runtime.ratings.mounted_clearance import inner_growth, outer_shrinkage, thermal_reduction
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ballpass.derive.scene.keys import ChoiceKey, PairKey, QuantityKey, keys_of, read_record
+from ballpass.derive.scene.keys import ChoiceKey, PairKey, QuantityKey
+from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.records import (
     ConstantLoad,
     HarmonicLoad,

@@ -14,8 +14,9 @@ from ballpass.derive.drive.laws import TorqueLaw
 from ballpass.derive.mechanism.dyads import BRANCHES
 from ballpass.derive.mechanism.forces import FORCE_TABLES
 from ballpass.derive.scene.body_keys import Points, check_two_bodies, refuse_unknown_point
-from ballpass.derive.scene.keys import ChoiceKey, QuantityKey, VectorKey, keys_of, read_record
+from ballpass.derive.scene.keys import ChoiceKey, QuantityKey, VectorKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
+from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.records import FRAME, POINT, Body, Driver, Force, Joint, Mechanism, NamedPoint, SpeedOverTime
 from ballpass.derive.scene.table import Table, listing, suggest, upright
 from ballpass.derive.scene.units import show

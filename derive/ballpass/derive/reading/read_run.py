@@ -5,7 +5,7 @@ In: the table.  Out: records, possibly with placeholders where faults were noted
 
 from __future__ import annotations
 
-from ballpass.derive.scene.keys import read_keys, read_record
+from ballpass.derive.scene.read_keys import read_keys, read_record
 from ballpass.derive.scene.records import OUTPUTS, Run
 from ballpass.derive.scene.table import Table
 

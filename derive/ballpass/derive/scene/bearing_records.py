@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
-from ballpass.derive.scene.keys import ChoiceKey, Either, TextKey, WholeKey, declared, quantity
+from ballpass.derive.scene.designations import GROUPS
+from ballpass.derive.scene.keys import ChoiceKey, TextKey, WholeKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Quantity, UsualRange
+from ballpass.derive.scene.read_keys import Either, declared, quantity
 
 FEWEST_BALLS, MOST_BALLS = 3, 200
 _BY_DESIGNATION = "required without a designation"
@@ -377,6 +379,7 @@ class Bearing:
         "10 um",
         when='required; with a designation default `"CN"`',
         usual=_CLEARANCE,
+        groups=GROUPS,
         note='negative is preload. With a designation also a group: `"C2"`, `"CN"`, `"C3"`, `"C4"`, `"C5"`',
     )
     ball_angle: Quantity = quantity(

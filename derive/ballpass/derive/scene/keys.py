@@ -13,19 +13,19 @@ import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from types import MappingProxyType
-from typing import Any, ClassVar, Self, TypeVar
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Self
 
 from ballpass.derive.scene.quantity import NO_LIMITS, Bounds, Limits, Quantity, UsualRange, Vector
 from ballpass.derive.scene.table import Table, listing, suggest
 from ballpass.derive.scene.units import show
 
-Record = TypeVar("Record")
-
 #: What placeholders stand for.
 Fill = Mapping[str, str]
-_NOTHING: Fill = MappingProxyType({})
+
+
+#: How a quantity begins, in JSON Schema.
+NUMBER = r"^\s*[-+]?(\d|\.\d)"
 
 
 def filled(text: str, fill: Fill) -> str:
@@ -90,11 +90,20 @@ class Key(ABC):
     def value(self, table: Table, name: str, given: Any) -> Any:
         """The value; faults are noted."""
 
+    @abstractmethod
+    def schema(self) -> dict[str, Any]:
+        """What may stand there, as JSON Schema."""
+
     def refuse(self, table: Table, name: str, problem: str, given: Any, allowed: str = "", remedy: str = "") -> Any:
         """Note a fault; the placeholder."""
         remedy = remedy or f"write {name} = {self.sample}"
         table.fault(name, problem, given=show(given), allowed=allowed or self.sample, remedy=remedy)
         return self.placeholder(table, name)
+
+
+def _single(key: QuantityKey) -> dict[str, Any]:
+    """Schema of one number of a list."""
+    return QuantityKey(unit=key.unit, bounds=key.bounds).schema()
 
 
 def _texts(value: object) -> bool:
@@ -111,6 +120,7 @@ class QuantityKey(Key):
     bounds, remedy, usual : see `Limits`
     setting : it is read once and is no parameter of the model: the value is a float
     wrong_dimension : remedy where number and unit can be read, but measure something else
+    groups : words that may stand there instead
     """
 
     unit: str
@@ -120,6 +130,7 @@ class QuantityKey(Key):
     usual: UsualRange | None = None
     setting: bool = False
     wrong_dimension: str = ""
+    groups: tuple[str, ...] = ()
 
     @property
     def sample(self) -> str:
@@ -130,6 +141,17 @@ class QuantityKey(Key):
     def limits(self) -> Limits:
         """Of its value."""
         return Limits(bounds=self.bounds, remedy=self.remedy, usual=self.usual)
+
+    def schema(self) -> dict[str, Any]:
+        """A text with a unit, or a plain number within its bounds."""
+        text: dict[str, Any] = {"type": "string", "pattern": NUMBER}
+        if self.unit != "1":
+            return {"anyOf": [text, {"enum": [*self.groups]}]} if self.groups else text
+        bounds = self.bounds or Bounds()
+        ends = {"exclusiveMinimum": bounds.above, "minimum": bounds.least, "maximum": bounds.most}
+        ends["exclusiveMaximum"] = bounds.below
+        number = {"type": "number", **{word: bound for word, bound in ends.items() if bound is not None}}
+        return {"anyOf": [number, text]}
 
     def absent(self, table: Table, name: str) -> Any:
         """The default with its unit."""
@@ -166,6 +188,10 @@ class PairKey(QuantityKey):
         """Both components."""
         return f'["{self.example}", "{self.example}"]'
 
+    def schema(self) -> dict[str, Any]:
+        """A list of two."""
+        return {"type": "array", "items": _single(self), "minItems": 2, "maxItems": 2}
+
     def absent(self, table: Table, name: str) -> Any:
         """Twice the default."""
         return self.value(table, name, [self.default, self.default])
@@ -193,6 +219,14 @@ class ColumnKey(QuantityKey):
     def sample(self) -> str:
         """Two rows."""
         return f'["0 {self.unit}", "1 {self.unit}"]'
+
+    def schema(self) -> dict[str, Any]:
+        """A list, a list of numbers with one unit, or a column of a file."""
+        unit, numbers = {"type": "string"}, {"type": "array", "items": {"type": "number"}, "minItems": 1}
+        written = {"properties": {"values": numbers, "unit": unit}, "required": ["values", "unit"]}
+        named = {"properties": {"file": unit, "column": unit, "unit": unit}, "required": ["file", "column"]}
+        tables = [{"type": "object", **table, "additionalProperties": False} for table in (written, named)]
+        return {"anyOf": [{"type": "array", "items": _single(self), "minItems": 1}, *tables]}
 
     def placeholder(self, table: Table, name: str) -> Any:
         """No row."""
@@ -229,6 +263,10 @@ class WholeKey(Key):
     highest: int
     quoted = False
 
+    def schema(self) -> dict[str, Any]:
+        """A number between both."""
+        return {"type": "integer", "minimum": self.lowest, "maximum": self.highest}
+
     def placeholder(self, table: Table, name: str) -> int:
         """The lowest."""
         return self.lowest
@@ -256,6 +294,10 @@ class ChoiceKey(Key):
         """All of them."""
         return " or ".join(f'"{choice}"' for choice in self.choices)
 
+    def schema(self) -> dict[str, Any]:
+        """The words."""
+        return {"enum": [*self.choices]}
+
     def value(self, table: Table, name: str, given: Any) -> str | None:
         """The word."""
         if isinstance(given, str) and given in self.choices:
@@ -270,6 +312,10 @@ class TextKey(Key):
     """A text; empty, with a fault, where there is none.  With `longest`, one line of at most as many characters."""
 
     longest: int = 0
+
+    def schema(self) -> dict[str, Any]:
+        """A text."""
+        return {"type": "string", **({"maxLength": self.longest} if self.longest else {})}
 
     def placeholder(self, table: Table, name: str) -> str:
         """Nothing."""
@@ -291,6 +337,11 @@ class NamesKey(Key):
 
     two: bool = True
     quoted = False
+
+    def schema(self) -> dict[str, Any]:
+        """A list of texts."""
+        counts = {"minItems": 2, "maxItems": 2} if self.two else {"minItems": 1}
+        return {"type": "array", "items": {"type": "string"}, **counts}
 
     def placeholder(self, table: Table, name: str) -> Any:
         """No name."""
@@ -348,6 +399,16 @@ class VectorKey(Key):
         forms += [f'["{first}", "{second}"]', f'{{ {self.polar[0]} = "{second}", {self.polar[1]} = "30 deg" }}']
         return ", ".join(forms[:-1]) + " or " + forms[-1]
 
+    def schema(self) -> dict[str, Any]:
+        """Its forms."""
+        number = {"type": "string", "pattern": NUMBER}
+        polar = {"properties": dict.fromkeys(self.polar, number), "required": [*self.polar]}
+        forms = [
+            {"type": "array", "items": number, "minItems": 2, "maxItems": 2},
+            {"type": "object", **polar, "additionalProperties": False},
+        ]
+        return {"anyOf": [*([{"const": "origin"}] * self.origin), *([number] * bool(self.axis)), *forms]}
+
     def placeholder(self, table: Table, name: str) -> Vector:
         """Zero."""
         return Vector(kind="zero")
@@ -388,74 +449,3 @@ class VectorKey(Key):
         problem = f"this is not a vector with {len(given)} numbers" if isinstance(given, list) else "this is no vector"
         remedy = "write the components along x and y, each with its unit"
         return self.refuse(table, name, problem, given, remedy=remedy)  # type: ignore[no-any-return]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Either:
-    """Groups of keys of which a table gives exactly one.
-
-    Attributes
-    ----------
-    what : they give, "the coefficient"
-    groups : of keys, the usual one first; the keys of the other groups are None
-    at : key that a second group is reported at; the table itself by default
-    """
-
-    what: str
-    groups: tuple[tuple[str, ...], ...]
-    at: str = ""
-
-    def choose(self, table: Table, keys: Mapping[str, Key]) -> tuple[str, ...]:
-        """The group that is given; none, with a fault, where there is none, and the first of several."""
-        table.know(*(key for group in self.groups for key in group))
-        given = [group for group in self.groups if any(key in table.data for key in group)]
-        if table.missing or len(given) == 1:
-            return given[0] if given else ()
-        found = [[key for key in group if key in table.data] for group in given]
-        samples = [[f"{key} = {keys[key].sample}" if key in keys else key for key in group] for group in self.groups]
-        table.fault(
-            self.at if given else "",
-            f"{self.what} is given twice" if given else f"{self.what} is missing",
-            given=" and ".join(key for group in found for key in group) or "neither",
-            allowed="either " + ", or ".join(" and ".join(group) for group in samples),
-            remedy="delete one of the two: " + ", or ".join(f"delete {' and '.join(group)}" for group in found)
-            if given
-            else f"add {' and '.join(samples[0])}",
-        )
-        return given[0] if given else ()
-
-
-def declared(key: Key) -> Any:
-    """A field of a record that the key fills."""
-    return field(metadata={"key": key})
-
-
-def quantity(unit: str, words: str, symbol: str = "", example: Any = "", **more: Any) -> Any:
-    """A field that a number fills; `more` as in `QuantityKey`."""
-    return declared(QuantityKey(unit=unit, words=words, symbol=symbol, example=example, **more))
-
-
-def keys_of(kind: type[Any], fill: Fill = _NOTHING) -> dict[str, Key]:
-    """Keys by their names in the file, in the order of a record's fields."""
-    found = (key.told(fill) for key in _keys(kind).values())
-    return {key.name or name: key for name, key in zip(_keys(kind), found, strict=True)}
-
-
-def _keys(kind: type[Any]) -> dict[str, Key]:
-    return {f.name: f.metadata["key"] for f in fields(kind) if "key" in f.metadata}
-
-
-def read_keys(table: Table, keys: Mapping[str, Key], either: Either | None = None) -> dict[str, Any]:
-    """Values of all keys, by name."""
-    table.know(*keys)
-    chosen = either.choose(table, keys) if either is not None else ()
-    left_out = {key for group in either.groups for key in group} - set(chosen) if either is not None else set()
-    return {name: None if name in left_out else key.read(table, name) for name, key in keys.items()}
-
-
-def read_record(kind: type[Record], table: Table, fill: Fill = _NOTHING, **known: Any) -> Record:
-    """A record from its keys; fields that are `known` are not read."""
-    keys = {name: key.told(fill) for name, key in _keys(kind).items() if name not in known}
-    names = {name: key.name or name for name, key in keys.items()}
-    values = read_keys(table, {names[name]: key for name, key in keys.items()}, getattr(kind, "either", None))
-    return kind(**{name: values[names[name]] for name in keys}, **known)

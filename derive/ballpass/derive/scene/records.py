@@ -16,18 +16,9 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
-from ballpass.derive.scene.keys import (
-    ChoiceKey,
-    ColumnKey,
-    Either,
-    NamesKey,
-    TextKey,
-    VectorKey,
-    WholeKey,
-    declared,
-    quantity,
-)
+from ballpass.derive.scene.keys import ChoiceKey, ColumnKey, NamesKey, TextKey, VectorKey, WholeKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limits, Quantity, Vector
+from ballpass.derive.scene.read_keys import Either, declared, quantity
 from ballpass.derive.scene.table import FRAME as FRAME
 from ballpass.derive.scene.toml_lines import LineIndex
 from ballpass.runtime.show import html
@@ -409,7 +400,9 @@ class LoadWindow:
     """From `start` (inclusive) to `end` (exclusive; None: for ever): times [s], or angles of the shaft [rad]."""
 
     start: Quantity = quantity("UNIT", "WHAT at which the load begins", "SYMBOL_{on}", "FIRST")
-    end: Quantity | None = quantity("UNIT", "WHAT at which the load ends", "SYMBOL_{off}", "LAST")
+    end: Quantity | None = quantity(
+        "UNIT", "WHAT at which the load ends", "SYMBOL_{off}", "LAST", when="required for angles; without one a step"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

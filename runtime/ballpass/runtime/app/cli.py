@@ -30,6 +30,7 @@ from ballpass.runtime.app.commands.explain import explain
 from ballpass.runtime.app.commands.jacobian import jacobian, linearize
 from ballpass.runtime.app.commands.life import life
 from ballpass.runtime.app.commands.new import new
+from ballpass.runtime.app.commands.schema import schema
 from ballpass.runtime.app.commands.sensitivity import sensitivity
 from ballpass.runtime.app.commands.shared import (
     Stages,
@@ -370,7 +371,7 @@ def export(
 
 
 for _panel, _commands in {
-    DESCRIBE: (bearings, explain),
+    DESCRIBE: (bearings, explain, schema),
     SIMULATE: (animate, dataset, stream, sweep),
     ASK: (jacobian, life, linearize, sensitivity, spectrum, trade),
 }.items():

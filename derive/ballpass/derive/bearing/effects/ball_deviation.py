@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
@@ -33,6 +34,7 @@ class BallDeviation(Effect):
 
     name = "ball_deviation"
     words = "balls of different diameters"
+    tables = MappingProxyType({(): {"#": DEVIATION.told({"BALL": "<ball>"})}})
 
     def read(self, table: Table, balls: int) -> BallEffect:
         with table:

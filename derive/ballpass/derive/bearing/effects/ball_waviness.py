@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
-from ballpass.derive.bearing.effects.read_waves import ORDERS, read_waves, with_roughness
+from ballpass.derive.bearing.effects.read_waves import ORDERS, read_waves, wave_tables, with_roughness
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
 from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.table import Table
@@ -28,6 +28,7 @@ class BallWaviness(Effect):
 
     name = "ball_waviness"
     words = "waviness of the balls"
+    tables = wave_tables("around each ball", EACH) | wave_tables("around the ball", "#")
 
     def read(self, table: Table, balls: int) -> BallEffect:
         structure, numbers = list[str](), list[Quantity]()

@@ -17,14 +17,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.cage_slip import lag_names
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.scene.bearing_records import MOST_BALLS, BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.keys import ChoiceKey, WholeKey, declared, keys_of, quantity, read_record
+from ballpass.derive.scene.keys import ChoiceKey, WholeKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Quantity, UsualRange
+from ballpass.derive.scene.read_keys import declared, keys_of, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Input
@@ -37,11 +39,48 @@ PLACES = ("outer", "inner", "ball")
 BALL = WholeKey(words="Number of the ball", lowest=1, highest=MOST_BALLS, example=1, when="required on a ball")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spall:
+    """A spall of a raceway or of a ball."""
+
+    name: str
+    on: str = declared(ChoiceKey(words="What it is on", choices=PLACES, note="a raceway or a ball"))
+    ball: int = declared(BALL)
+    profile: str = declared(ChoiceKey(words="How deep a ball sinks over it", choices=PROFILES))
+    angle: Quantity = quantity(
+        "rad", "Angle of the middle of NAME", r"\alpha_d", "270 deg", note="in axes of that raceway or ball"
+    )
+    chord: Quantity = quantity(
+        "m",
+        "Chord of NAME",
+        "L_d",
+        "1 mm",
+        bounds=POSITIVE,
+        usual=UsualRange(
+            most=0.5, of="ball_diameter", hint="Spalls are shorter than the balls are thick: check the unit."
+        ),
+        note="from edge to edge, shorter than the room between balls",
+    )
+    depth: Quantity | None = quantity(
+        "m",
+        "Depth of NAME",
+        "h_d",
+        "20 um",
+        optional=True,
+        when='required, except for `"path"`',
+        bounds=NOT_NEGATIVE,
+        usual=UsualRange(
+            most=0.1, of="ball_diameter", hint="Spalls are some hundredths of a millimetre deep: check the unit."
+        ),
+    )
+
+
 class Defects(Effect):
     """Local defects."""
 
     name = "defects"
     words = "local defects of raceways and balls"
+    tables = MappingProxyType({("*",): keys_of(Spall, {"NAME": "<name>"})})
 
     def read(self, table: Table, balls: int) -> BallEffect:
         structure, numbers = list[int | str](), list[Quantity]()
@@ -106,42 +145,6 @@ class Defects(Effect):
             where = f"ball {spall.ball}" if spall.on == "ball" else f"the {spall.on} raceway"
             told.append(f"{spall.name} on {where}, {spall.profile}")
         return "local defects: " + "; ".join(told)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spall:
-    """A spall of a raceway or of a ball."""
-
-    name: str
-    on: str = declared(ChoiceKey(words="What it is on", choices=PLACES, note="a raceway or a ball"))
-    ball: int = declared(BALL)
-    profile: str = declared(ChoiceKey(words="How deep a ball sinks over it", choices=PROFILES))
-    angle: Quantity = quantity(
-        "rad", "Angle of the middle of NAME", r"\alpha_d", "270 deg", note="in axes of that raceway or ball"
-    )
-    chord: Quantity = quantity(
-        "m",
-        "Chord of NAME",
-        "L_d",
-        "1 mm",
-        bounds=POSITIVE,
-        usual=UsualRange(
-            most=0.5, of="ball_diameter", hint="Spalls are shorter than the balls are thick: check the unit."
-        ),
-        note="from edge to edge, shorter than the room between balls",
-    )
-    depth: Quantity | None = quantity(
-        "m",
-        "Depth of NAME",
-        "h_d",
-        "20 um",
-        optional=True,
-        when='required, except for `"path"`',
-        bounds=NOT_NEGATIVE,
-        usual=UsualRange(
-            most=0.1, of="ball_diameter", hint="Spalls are some hundredths of a millimetre deep: check the unit."
-        ),
-    )
 
 
 def _read_spall(data: Table, name: str, balls: int) -> Spall:

@@ -6,11 +6,13 @@ An effect is one object in one file of this folder; `EFFECTS` in ``__init__.py``
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
+from ballpass.derive.scene.keys import Key
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names
 from ballpass.derive.variables import Input
@@ -47,9 +49,13 @@ class GenericBall:
 
 
 class Effect(ABC):
-    """An effect on the balls of a bearing; `name` is its table within the bearing's."""
+    """An effect on the balls of a bearing; `name` is its table within the bearing's.
+
+    `tables` are the keys in it and in those inside, by path: "*" stands for a name, "#" for a number.
+    """
 
     name: ClassVar[str]
+    tables: ClassVar[Mapping[tuple[str, ...], Mapping[str, Key]]]
     #: For people: what a scene without it leaves out.
     words: ClassVar[str]
 

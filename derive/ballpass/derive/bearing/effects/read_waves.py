@@ -9,8 +9,9 @@ import math
 import random
 from dataclasses import dataclass
 
-from ballpass.derive.scene.keys import WholeKey, declared, quantity, read_record
+from ballpass.derive.scene.keys import Key, WholeKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity, UsualRange
+from ballpass.derive.scene.read_keys import declared, keys_of, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
 
@@ -45,6 +46,12 @@ class Roughness:
     lowest: int = declared(WholeKey(words="Lowest order", lowest=1, highest=MOST_WAVES, example=2))
     highest: int = declared(WholeKey(words="Highest order", lowest=1, highest=MOST_WAVES, example=40))
     seed: int = declared(WholeKey(words="Seed of the random phases", lowest=0, highest=2**63 - 1, example=1))
+
+
+def wave_tables(where: str, *around: str) -> dict[tuple[str, ...], dict[str, Key]]:
+    """Keys of waves `around` which they are, in the tables of a scene file."""
+    fill = {"ORDER": "<order>", "WHERE": where, "AMPLITUDE": "", "PHASE": "", "MARK": ""}
+    return {(*around, "#"): keys_of(Wave, fill), (*around, "roughness"): keys_of(Roughness)}
 
 
 def read_waves(table: Table, where: str, symbols: tuple[str, str], label: str = "") -> tuple[list[int], list[Quantity]]:

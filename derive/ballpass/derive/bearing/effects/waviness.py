@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
-from ballpass.derive.bearing.effects.read_waves import read_waves
+from ballpass.derive.bearing.effects.read_waves import read_waves, wave_tables
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Names, symbol_of
@@ -46,6 +46,7 @@ class OuterWaviness(_RacewayWaviness):
     name = "outer_waviness"
     words = "waviness of the outer raceway"
     ring = "outer"
+    tables = wave_tables("around the outer raceway")
 
 
 class InnerWaviness(_RacewayWaviness):
@@ -54,4 +55,5 @@ class InnerWaviness(_RacewayWaviness):
     name = "inner_waviness"
     words = "waviness of the inner raceway"
     ring = "inner"
+    tables = wave_tables("around the inner raceway")
     label = "i,"

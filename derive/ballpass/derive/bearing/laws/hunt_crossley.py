@@ -12,8 +12,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.laws.law import DampingLaw
-from ballpass.derive.scene.keys import Either, QuantityKey
+from ballpass.derive.scene.keys import QuantityKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds
+from ballpass.derive.scene.read_keys import Either
 
 if TYPE_CHECKING:
     import sympy as sp

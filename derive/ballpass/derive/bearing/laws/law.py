@@ -11,8 +11,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
-from ballpass.derive.scene.keys import Either, QuantityKey, read_keys
+from ballpass.derive.scene.keys import QuantityKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
+from ballpass.derive.scene.read_keys import Either, read_keys
 from ballpass.derive.scene.table import Table
 
 if TYPE_CHECKING:

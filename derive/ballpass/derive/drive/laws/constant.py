@@ -8,8 +8,8 @@ from typing import ClassVar
 import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw
-from ballpass.derive.scene.keys import quantity
 from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import quantity
 from ballpass.derive.terms import symbol_of
 
 

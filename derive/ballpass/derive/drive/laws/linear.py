@@ -9,8 +9,8 @@ import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw, not_zero, same_sign
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.keys import Either, quantity
 from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import Either, quantity
 from ballpass.derive.terms import symbol_of
 
 

@@ -10,8 +10,9 @@ import sympy as sp
 from ballpass.derive.drive.laws.law import TorqueLaw
 from ballpass.derive.drive.piecewise_linear import piecewise_linear
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.keys import ColumnKey, declared
+from ballpass.derive.scene.keys import ColumnKey
 from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.terms import Smoothness, symbol_of
 
 

@@ -11,8 +11,8 @@ from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Points, Setting
 from ballpass.derive.mechanism.kinematics import body_point, cross, dot, scale, subscript, subtract
 from ballpass.derive.scene.body_keys import BODIES, POINTS, check_points, check_two_bodies
-from ballpass.derive.scene.keys import declared, quantity
 from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import declared, quantity
 from ballpass.derive.scene.records import FRAME, Force
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.keys import ColumnKey, Fill, declared, read_record
+from ballpass.derive.scene.keys import ColumnKey, Fill
 from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import declared, read_record
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import Table
 
@@ -39,6 +40,11 @@ class AngleTable(Law):
             note="linear between rows and periodic: the last row joins the first, one turn later",
         )
     )
+
+    @classmethod
+    def inner(cls) -> type[Any]:
+        """Its columns."""
+        return cls
 
     @classmethod
     def read(cls, data: Table, fill: Fill) -> Self:

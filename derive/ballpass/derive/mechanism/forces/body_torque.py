@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points, Setting
 from ballpass.derive.scene.body_keys import BODY, check_moving_body
-from ballpass.derive.scene.keys import declared, quantity
 from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import declared, quantity
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of

@@ -23,7 +23,8 @@ from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.body_keys import Points
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.keys import Fill, read_record
+from ballpass.derive.scene.keys import Fill
+from ballpass.derive.scene.read_keys import read_record
 from ballpass.derive.scene.records import Driver, Force, Mechanism
 from ballpass.derive.scene.table import Table, listing, upright
 from ballpass.derive.terms import Definition, Smoothness
@@ -157,6 +158,11 @@ class Law(ABC):
     def read(cls, data: Table, fill: Fill) -> Self:
         """The law from the keys of a force's table, faults noted there."""
         return read_record(cls, data, fill)
+
+    @classmethod
+    def inner(cls) -> type[Any] | None:
+        """The record of a table, or of each of a list, at `key`; None where that is no table."""
+        return None
 
     @abstractmethod
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:

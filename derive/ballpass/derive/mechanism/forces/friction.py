@@ -10,8 +10,9 @@ import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
-from ballpass.derive.scene.keys import Fill, quantity, read_record
+from ballpass.derive.scene.keys import Fill
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Quantity
+from ballpass.derive.scene.read_keys import quantity, read_record
 from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show

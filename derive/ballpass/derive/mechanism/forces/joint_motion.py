@@ -10,7 +10,8 @@ from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import dot, joint_point, scale, subtract
 from ballpass.derive.scene.errors import Fault, LinkageError
-from ballpass.derive.scene.keys import TextKey, declared
+from ballpass.derive.scene.keys import TextKey
+from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.scene.records import FRAME, Force, Joint
 
 

@@ -11,8 +11,9 @@ from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points, Setting
 from ballpass.derive.mechanism.kinematics import body_point, scale
 from ballpass.derive.scene.body_keys import BODY, check_moving_body, refuse_unknown_point
-from ballpass.derive.scene.keys import TextKey, declared, quantity
+from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.quantity import Quantity, Vector
+from ballpass.derive.scene.read_keys import declared, quantity
 from ballpass.derive.scene.records import AMOUNT, Force, force_key
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import components, symbol_of

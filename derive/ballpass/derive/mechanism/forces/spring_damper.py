@@ -9,8 +9,9 @@ import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
-from ballpass.derive.scene.keys import Fill, quantity, read_record
+from ballpass.derive.scene.keys import Fill
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
+from ballpass.derive.scene.read_keys import quantity, read_record
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of

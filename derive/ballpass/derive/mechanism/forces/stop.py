@@ -12,8 +12,8 @@ import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
-from ballpass.derive.scene.keys import quantity
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
+from ballpass.derive.scene.read_keys import quantity
 from ballpass.derive.scene.records import Force
 from ballpass.derive.terms import Smoothness, symbol_of
 from ballpass.derive.variables import Input, Output, StateSwitch

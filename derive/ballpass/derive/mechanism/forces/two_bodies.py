@@ -11,7 +11,7 @@ from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Points, Setting
 from ballpass.derive.mechanism.kinematics import cross, dot
 from ballpass.derive.scene.body_keys import BODIES, check_two_bodies
-from ballpass.derive.scene.keys import declared
+from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.scene.records import FRAME, Force
 from ballpass.derive.scene.table import Table
 

@@ -12,7 +12,7 @@ from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Poi
 from ballpass.derive.mechanism.kinematics import body_point, dot, scale, subscript, subtract
 from ballpass.derive.scene.body_keys import BODIES, POINTS, check_points, check_two_bodies
 from ballpass.derive.scene.errors import Fault, LinkageError
-from ballpass.derive.scene.keys import declared
+from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.scene.records import FRAME, Force, Mechanism
 from ballpass.derive.scene.table import Table
 from ballpass.derive.variables import Output

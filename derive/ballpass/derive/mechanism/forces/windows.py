@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.keys import Fill, quantity, read_record
+from ballpass.derive.scene.keys import Fill
 from ballpass.derive.scene.quantity import Quantity, UsualRange
+from ballpass.derive.scene.read_keys import quantity, read_record
 from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table
 from ballpass.runtime.contract.manifest import UsualInfo
@@ -42,6 +43,11 @@ class Windows(Law):
     factor: ClassVar[bool] = True
 
     windows: tuple[Window, ...]
+
+    @classmethod
+    def inner(cls) -> type[Any]:
+        """A window."""
+        return Window
 
     @classmethod
     def read(cls, data: Table, fill: Fill) -> Self:
