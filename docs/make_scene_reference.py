@@ -15,7 +15,7 @@ from ballpass.derive.reading.sections import Section, sections
 from ballpass.derive.scene.keys import ChoiceKey, Key, QuantityKey, VectorKey, WholeKey
 
 PAGE = Path(__file__).parent / "reference" / "scene.md"
-TABLE = re.compile(r"(<!-- (keys|usual): ?(.*?) -->\n).*?(\n<!-- end -->)", re.DOTALL)
+TABLE = re.compile(r"(<!-- (keys|usual)(.*?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def page(text: str) -> str:
@@ -24,7 +24,7 @@ def page(text: str) -> str:
 
     def made(match: re.Match[str]) -> str:
         rows = usual_rows(known) if match[2] == "usual" else key_rows(known, match[3].split())
-        return f"{match[1]}{rows}{match[4]}"
+        return f"{match[1]}{rows}\n{match[4]}"
 
     return TABLE.sub(made, text)
 
@@ -38,7 +38,7 @@ def key_rows(known: Sequence[Section], paths: Sequence[str]) -> str:
         base = next(base for base in bases if path == base or path.startswith(f"{base}."))
         inside = path.removeprefix(base).removeprefix(".")
         for section in known:
-            if ".".join(section.path) == path.replace("top", ""):
+            if ".".join(section.path) == ("" if path == "top" else path):
                 tables.setdefault(inside, []).append(section)
                 for name, key in section.keys.items():
                     name = {"*": "<name>", "#": "<number>"}.get(name, name)
@@ -101,24 +101,26 @@ def need(section: Section, key: Key) -> str:
         text = f"default {key.default}"
     for group in groups:
         if name in group:
+            beside = "".join(f" with `{other}`" for other in group if other != name)
             others = (" and ".join(f"`{key}`" for key in other) for other in groups if other != group)
-            text = f"this{' and others' * (len(group) > 1)} or {' or '.join(others)}"
+            text = f"this{beside} or {' or '.join(others)}"
     return text + ("; setting" if isinstance(key, QuantityKey) and key.setting else "")
 
 
 def usual_rows(known: Sequence[Section]) -> str:
     """A table of the ranges in which numbers usually lie."""
-    lines = ["| number | usual |", "| --- | --- |"]
+    found: dict[str, list[str]] = {}
     for section in known:
         for name, key in section.keys.items():
             usual = key.usual if isinstance(key, QuantityKey) else None
-            if usual is None:
+            if not isinstance(key, QuantityKey) or usual is None:
                 continue
-            unit = f" of `{usual.of}`" if usual.of else f" {key.unit}" if key.unit != "1" else ""  # type: ignore[attr-defined]
+            unit = f" of `{usual.of}`" if usual.of else f" {key.unit}" * (key.unit != "1")
             span = f"{usual.least:.4g} to {usual.most:.4g}" if usual.least is not None else f"up to {usual.most:.4g}"
             path = ".".join((*section.path, name)).replace("*", "<name>").replace("#", "<number>")
-            lines.append(f"| `{path}` | {span}{unit} |")
-    return "\n".join(dict.fromkeys(lines))
+            found.setdefault(span + unit, []).append(f"`{path}`")
+    rows = (f"| {', '.join(distinct(names))} | {usual} |" for usual, names in found.items())
+    return "\n".join(("| number | usual |", "| --- | --- |", *rows))
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ TABLES = {
     "docs/howto/sensitivity.md": "test_sensitivity_table.py",
     "docs/howto/two_way.md": "test_coupling_table.py",
     "docs/theory/damping.md": "a definition",
-    "docs/reference/scene.md": "definitions and limits",
+    "docs/reference/scene.md": "test_keys.py, which makes the page anew",
 }
 
 #: Numbers without a block: inputs, definitions, limits of the code.  By page, with the words around them.  Where the
@@ -213,7 +213,7 @@ NAMED: dict[str, dict[str, str]] = {
         "by more than 0.5 % of its range and no rms by more than 1 %": "settle.py",
     },
     "docs/reference/scene.md": {
-        "at most 64 characters": "schema.py",
+        "at most 64 characters": "table.py",
         "turned by 180°": "geometry",
         "at most 1000 rows": "file_columns.py",
     },

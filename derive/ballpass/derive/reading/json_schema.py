@@ -41,7 +41,8 @@ def json_schema() -> dict[str, Any]:
 
 def meaning(key: Key) -> str:
     """What a key is, and what bounds it."""
-    words = f"{key.words[:1].upper()}{key.words[1:]}"
+    told = key.told({"row ROW": "each row", ", AXIS": "", "AXIS": "each"}).words
+    words = f"{told[:1].upper()}{told[1:]}"
     return words if not isinstance(key, QuantityKey) or key.bounds is None else f"{words}, {key.bounds}"
 
 

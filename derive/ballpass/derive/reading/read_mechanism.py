@@ -41,6 +41,7 @@ FLYWHEEL = QuantityKey(
     words="Moment of inertia that turns with the driven body",
     symbol="J_f",
     example="0.5 kg*m^2",
+    when="optional; only with `[mechanism.driver.torque]` or `driver.table`",
     bounds=NOT_NEGATIVE,
 )
 #: What placeholders in the words of the driver's speed stand for, with a torque and without.

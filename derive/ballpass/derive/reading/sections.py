@@ -124,7 +124,8 @@ def _bearing() -> Iterator[Section]:
     yield from _variants("bearing.damping", read_bearing.LAW, "law", laws)
     yield _of("bearing.inner_ring", bearing_records.InnerRing, body=read_coupling.BODY)
     yield _of("bearing.inner_ring.equivalent_mass", bearing_records.EquivalentMass)
-    yield _of("bearing.outer_ring", bearing_records.OuterRing, support=read_bearing.SUPPORT)
+    outer = {"support": read_bearing.SUPPORT} | keys_of(bearing_records.OuterRing)
+    yield Section(path=("bearing", "outer_ring"), keys=outer)
     for effect in EFFECTS.values():
         for path, keys in effect.tables.items():
             yield Section(path=("bearing", effect.name, *path), keys=keys)

@@ -191,7 +191,7 @@ class SpeedOverTime:
             words="Time in row ROW of the driver's table",
             symbol="t_{1,ROW}",
             bounds=NOT_NEGATIVE,
-            note="increasing, from zero or above",
+            note="increasing",
         )
     )
     later_speed: tuple[Quantity, ...] = declared(

@@ -123,7 +123,7 @@ class Pathway(ABC):
     @classmethod
     def fill(cls, name: str, body: str) -> dict[str, str]:
         """What placeholders in the keys of a force with this pathway stand for."""
-        found = {"NAME": name, "INDEX": upright(name), "BODY": body.replace("_", " ")}
+        found = {"NAME": name, "INDEX": upright(name), "BODY": body.replace("_", " "), "PLACE": f"the window of {name}"}
         found |= {"THE_COLUMN": cls.column.capitalize(), "COLUMN": cls.column, "COLUMN_UNIT": cls.unit}
         measure = cls.measure
         if measure is not None:

@@ -52,10 +52,10 @@ class Windows(Law):
     @classmethod
     def read(cls, data: Table, fill: Fill) -> Self:
         """A table with start and end, or a list of them."""
-        given, name, index = data.data["window"], fill["NAME"], fill["INDEX"]
+        given = data.data["window"]
         if not isinstance(given, list):
             with data.table("window", "start and end") as table:
-                return cls(windows=(read_record(Window, table, {"PLACE": f"the window of {name}", "INDEX": index}),))
+                return cls(windows=(read_record(Window, table, fill),))
         if not given:
             data.fault(
                 "window",
@@ -70,7 +70,7 @@ class Windows(Law):
         windows = []
         for number in numbered.data:
             with numbered.table(number, "start and end") as table:
-                place = {"PLACE": f"the window {number} of {name}", "INDEX": f"{index},{number}"}
+                place = {"PLACE": f"the window {number} of {fill['NAME']}", "INDEX": f"{fill['INDEX']},{number}"}
                 windows.append(read_record(Window, table, place))
         return cls(windows=tuple(windows))
 
