@@ -154,7 +154,10 @@ def build(
                 name=name,
                 table="forces",
                 pathway=PointForce(
-                    body=body, point=point, force=numbers.vector(f"{root}.forces.{name}.force", force, "N")
+                    body=body,
+                    point=point,
+                    force=numbers.vector(f"{root}.forces.{name}.force", force, "N"),
+                    direction=None,
                 ),
                 law=Constant(),
             )

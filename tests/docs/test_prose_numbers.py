@@ -215,6 +215,7 @@ NAMED: dict[str, dict[str, str]] = {
     "docs/reference/scene.md": {
         "at most 64 characters": "table.py",
         "turned by 180°": "geometry",
+        "has 76 % of its amount": "tanh 1",
         "at most 1000 rows": "file_columns.py",
     },
 }

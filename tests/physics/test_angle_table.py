@@ -136,7 +136,7 @@ def test_knots_that_do_not_increase_within_a_turn_are_refused_at_run_time(shaper
     ("change", "key", "words"),
     [
         (("[-20, 30,", "[-20, 140,"), "angle.3", "does not increase"),
-        (("190, 250]", "190, 345]"), "angle.5", "a turn or more"),
+        (("190, 250]", "190, 345]"), "angle.5", "cover a whole turn"),
         (("900, -60]", "900]"), "", "differ in length"),
         ((', force = { values = [0, 1200, 1700, 900, -60], unit = "N" }', ""), "force", "missing"),
         (('direction = "10 deg"\n', ""), "direction", "missing"),

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from ballpass.derive import SceneError, generate, read_scene
-from ballpass.derive.reading.values import quantities_of
 from ballpass.derive.scene.bearing_records import EquivalentMass
-from ballpass.derive.scene.records import Scene
+from ballpass.derive.scene.records import Scene, quantities_of
 from ballpass.runtime import Model, RequestError, load
 from ballpass.runtime.certify.simplification import measure_simplification, rows, to_plain
 

@@ -173,10 +173,10 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
             name=f"contact smoothing{of}",
             path=f"{bearing.path}.contact.smoothing",
             modelled="contact onset smoothed over a given width: second derivatives exist",
-            without=_without_smoothing(scene, sharp, f"{bearing.path}.contact.smoothing"),
+            without=_with(scene, sharp),
         )
     if bearing.damping.numbers:
-        undamped = replace(bearing, damping=Damping(law="none", numbers=(), smoothing=None))
+        undamped = replace(bearing, damping=Damping(law="none", numbers=()))
         yield Feature(
             name=f"contact damping{of}",
             path=f"{bearing.path}.damping",
@@ -189,7 +189,7 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
             name=f"damping smoothing{of}",
             path=f"{bearing.path}.damping.smoothing",
             modelled="kink of the one-sided law at rest smoothed over a given speed",
-            without=_without_smoothing(scene, kinked, f"{bearing.path}.damping.smoothing"),
+            without=_with(scene, kinked),
         )
     if bearing.inner is not None and bearing.inner.damping is not None:
         free = replace(bearing, inner=InnerRing(mass=bearing.inner.mass, damping=None))
@@ -212,32 +212,20 @@ def _of_bearing(scene: Scene, bearing: Bearing) -> Iterator[Feature]:
         )
     if bearing.cage is not None:
         cage = bearing.cage
-        told = [q.path for q in (cage.ratio, cage.slip, *cage.time, *cage.slips) if q is not None]
         yield Feature(
             name=f"cage{of}",
             path=f"{bearing.path}.cage",
             modelled="the cage's own speed: " + ("slip" if cage.slipping else "a given ratio"),
-            without=replace(
-                _with(scene, replace(bearing, cage=None)),
-                quantities=tuple(q for q in scene.quantities if q.path not in told),
-            ),
+            without=_with(scene, replace(bearing, cage=None)),
         )
     for effect in bearing.effects:
         rest = tuple(e for e in bearing.effects if e is not effect)
-        gone = {q.path for q in effect.numbers}
         yield Feature(
             name=f"{effect.kind}{of}",
             path=f"{bearing.path}.{effect.kind}",
             modelled=EFFECTS[effect.kind].describe(effect),
-            without=replace(
-                _with(scene, replace(bearing, effects=rest)),
-                quantities=tuple(q for q in scene.quantities if q.path not in gone),
-            ),
+            without=_with(scene, replace(bearing, effects=rest)),
         )
-
-
-def _without_smoothing(scene: Scene, bearing: Bearing, path: str) -> Scene:
-    return replace(_with(scene, bearing), quantities=tuple(q for q in scene.quantities if q.path != path))
 
 
 def _is_free(load: Load) -> bool:
@@ -249,7 +237,6 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
     mechanism, or its speed changes."""
     if not scene.bearings or scene.coupled or mechanism.driver.table is not None:
         return None
-    quantities = list(scene.quantities)
     bearings = []
     for bearing in scene.bearings:
         inner = bearing.inner
@@ -257,7 +244,6 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
         if isinstance(inner.mass, EquivalentMass):
             path = f"{bearing.path}.inner_ring.mass"
             number = Quantity(path=path, value=1.0, unit="kg", description="Mass of the inner ring", latex="m_i")
-            quantities.append(number)
             inner = InnerRing(mass=number, damping=inner.damping)
         bearings.append(replace(bearing, inner=inner, joint=None, share=None))
     return replace(
@@ -265,7 +251,6 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
         mechanism=None,
         shaft=Shaft(speed=mechanism.driver.speed),
         bearings=tuple(bearings),
-        quantities=tuple(quantities),
     )
 
 
@@ -288,8 +273,7 @@ def _one_way(scene: Scene, bearing: Bearing) -> Scene | None:
         share=share,
         inner=InnerRing(mass=mass, damping=None),
     )
-    kept = (q for q in scene.quantities if bearing.count is None or q.path != bearing.count.path)
-    return replace(_with(scene, loaded), quantities=(*kept, share, mass))
+    return _with(scene, loaded)
 
 
 def _with(scene: Scene, bearing: Bearing) -> Scene:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.records import Load, TableLoad
 
@@ -11,7 +9,11 @@ from ballpass.derive.scene.records import Load, TableLoad
 def check_load(checker: Checker, load: Load) -> None:
     """Note faults of the numbers of a load."""
     if isinstance(load.law, TableLoad):
-        _check_table(checker, load.path, load.law)
+        table = load.law
+        remedy = f'give every row {table.over}, x and y; add rows, or write type = "constant"'
+        checker.rows(load.path, {table.over: table.rows, "x": table.x, "y": table.y}, remedy)
+        if table.over == "angle":
+            checker.within_a_turn(table.rows)
     _check_windows(checker, load)
 
 
@@ -27,44 +29,4 @@ def _check_windows(checker: Checker, load: Load) -> None:
             f"start {checker.show(window.start)}, end {checker.show(window.end)}",
             "an end behind the start",
             "give a later end, or none for a load that does not end",
-        )
-
-
-def _check_table(checker: Checker, path: str, table: TableLoad) -> None:
-    rows = {table.over: len(table.rows), "x": len(table.x), "y": len(table.y)}
-    if min(rows.values()) == 0:  # reported when it was read
-        return
-    if min(rows.values()) != max(rows.values()):
-        checker.fault(
-            path,
-            "the columns of the table differ in length",
-            ", ".join(f"{name}: {count}" for name, count in rows.items()),
-            "three columns of one length",
-            f"give every row a {table.over}, x and y",
-        )
-    elif len(table.rows) < 2:
-        checker.fault(
-            f"{path}.{table.over}",
-            "the table has too few rows",
-            str(len(table.rows)),
-            "two rows or more",
-            'add rows, or write type = "constant"',
-        )
-    for before, behind in zip(table.rows, table.rows[1:], strict=False):
-        if behind.value <= before.value:
-            checker.fault(
-                behind.path,
-                f"the {table.over} does not increase",
-                f"{checker.show(behind)} after {checker.show(before)}",
-                f"strictly increasing {table.over}s",
-                f"sort the rows by {table.over}; write a jump as two rows with a short {table.over} between them, or "
-                "as a load with a window",
-            )
-    if table.over == "angle" and table.rows[-1].value - table.rows[0].value >= math.tau * (1.0 - 1e-12):
-        checker.fault(
-            table.rows[-1].path,
-            "the angles of the table cover a whole turn",
-            f"{checker.show(table.rows[0])} to {checker.show(table.rows[-1])}",
-            "angles within less than a turn: the last row joins the first, one turn later",
-            "leave the last row out",
         )

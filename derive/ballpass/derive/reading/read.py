@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from ballpass.derive.reading.read_bearing import read_bearing, read_shaft
 from ballpass.derive.reading.read_duty import duty_faults, read_duty
@@ -23,16 +23,18 @@ from ballpass.derive.reading.read_load import read_load
 from ballpass.derive.reading.read_mechanism import read_mechanism
 from ballpass.derive.reading.read_run import read_run
 from ballpass.derive.reading.recouple import Coupling, recoupled
-from ballpass.derive.reading.values import parse_override, quantities_of, replaced, value_faults, with_values
+from ballpass.derive.reading.values import parse_override, replaced, value_faults, with_values
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.file_columns import with_columns
 from ballpass.derive.scene.read_keys import keys_of
-from ballpass.derive.scene.records import Load, Mechanism, Scene
+from ballpass.derive.scene.records import Load, Mechanism, Scene, quantities_of
 from ballpass.derive.scene.table import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
 from ballpass.derive.terms import Names
+
+T = TypeVar("T", Bearing, Load)
 
 __all__ = ["parse_override", "read_scene", "scene_from_text", "with_values"]
 
@@ -218,7 +220,6 @@ def _read(root: Table, name: str) -> Scene:
         if mechanism is not None:
             _check_loads_beside(root, loads, bearings)
         run, outputs = read_run(root.table("run", "cycles or duration, and outputs"))
-        quantities = tuple(quantities_of((mechanism, shaft, loads, bearings)))
         scene = Scene(
             name=name,
             title=title,
@@ -228,51 +229,61 @@ def _read(root: Table, name: str) -> Scene:
             bearings=bearings,
             outputs=outputs,
             run=run,
-            quantities=quantities,
         )
         return replace(scene, duty=read_duty(root.table("duty"), scene)) if root.has("duty") else scene
 
 
 def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None) -> tuple[Bearing, ...]:
     """``[bearing]``, or ``[bearings.<name>]`` for several."""
-    if root.has("bearing") and root.has("bearings"):
-        root.fault(
-            "bearings",
-            "bearings are given in two places",
-            given="[bearing] and [bearings]",
-            allowed="[bearing] for one, or [bearings.<name>] for several",
-            remedy="move [bearing] to [bearings.<name>], with a name of its own",
-        )
-        return ()  # what a half-moved bearing lacks would only hide this
-    if root.has("bearing"):
-        return (read_bearing(root.table("bearing"), mechanism, driven),)
     bearings = []
-    with root.table("bearings") as several:
-        for name in several.names("bearing"):
-            if name in RESERVED:
-                several.fault(
-                    name,
-                    "other outputs and variables have names that begin so",
-                    given=show(name),
-                    allowed=f"a name that is none of {listing(RESERVED)}",
-                    remedy="give the bearing another name",
-                )
-            bearing = read_bearing(several.table(name), mechanism, driven, name)
-            names = Names(prefix=bearing.prefix, path=bearing.path)
-            # several bearings have the same symbols: their name tells them apart
-            marked = {q.path: replace(q, latex=names.latex(q.latex)) for q in quantities_of(bearing)}
-            bearings.append(replaced(bearing, marked))
-        _check_couplings(several, bearings)
+    for table, name in _one_or_several(root, "bearing", ""):
+        if name in RESERVED:
+            table.fault(
+                "",
+                "other outputs and variables have names that begin so",
+                given=show(name),
+                allowed=f"a name that is none of {listing(RESERVED)}",
+                remedy="give the bearing another name",
+            )
+        bearing = read_bearing(table, mechanism, driven, name)
+        bearings.append(_marked(bearing, Names(prefix=bearing.prefix, path=bearing.path)))
+    _check_couplings(root, bearings)
     return tuple(bearings)
 
 
-def _check_couplings(several: Table, bearings: Sequence[Bearing]) -> None:
+def _one_or_several(root: Table, one: str, example: str) -> Iterator[tuple[Table, str]]:
+    """The table ``[one]``, or those of ``[ones.<name>]`` with their names."""
+    several = f"{one}s"
+    if root.has(one) and root.has(several):
+        root.fault(
+            several,
+            f"{several} are given in two places",
+            given=f"[{one}] and [{several}]",
+            allowed=f"[{one}] for one, or [{several}.<name>] for several",
+            remedy=f"move [{one}] to [{several}.<name>], with a name of its own",
+        )
+        return  # what a half-moved table lacks would only hide this
+    if not root.has(several):
+        yield root.table(one, example), ""
+        return
+    with root.table(several) as tables:
+        for name in tables.names(one):
+            yield tables.table(name, example), name
+
+
+def _marked(record: T, names: Names) -> T:
+    """A part with its name in its symbols, where several have the same ones."""
+    marked = {q.path: replace(q, latex=names.latex(q.latex)) for q in quantities_of(record)}
+    return cast(T, replaced(record, marked))
+
+
+def _check_couplings(root: Table, bearings: Sequence[Bearing]) -> None:
     """All bearings one-way or all two-way, and of these one at each joint."""
     one_way = [b.name for b in bearings if b.coupling == "one-way"]
     two_way = [b for b in bearings if b.coupling == "two-way"]
     if one_way and two_way:
-        several.fault(
-            one_way[0],
+        root.fault(
+            f"bearings.{one_way[0]}",
             "a bearing loaded one-way takes the reaction of an ideal linkage, and others give this linkage play",
             given=f"one-way: {listing(one_way)}; two-way: {listing([b.name for b in two_way])}",
             allowed="one coupling for all bearings of a scene",
@@ -280,8 +291,8 @@ def _check_couplings(several: Table, bearings: Sequence[Bearing]) -> None:
         )
     for k, bearing in enumerate(two_way):
         if any(bearing.joint == other.joint for other in two_way[:k]):
-            several.fault(
-                bearing.name,
+            root.fault(
+                f"bearings.{bearing.name}",
                 "another bearing gives this joint its play",
                 given=f"joint {show(bearing.joint)}",
                 allowed="one bearing coupled two-way at a joint, count for equal ones side by side",
@@ -291,50 +302,30 @@ def _check_couplings(several: Table, bearings: Sequence[Bearing]) -> None:
 
 def _read_loads(root: Table, *, required: bool) -> tuple[Load, ...]:
     """``[load]``, or ``[loads.<name>]`` for several."""
-    if root.has("load") and root.has("loads"):
-        root.fault(
-            "loads",
-            "loads are given in two places",
-            given="[load] and [loads]",
-            allowed="[load] for one, or [loads.<name>] for several",
-            remedy="move [load] to [loads.<name>], with a name of its own",
-        )
+    if not required and not root.has("load") and not root.has("loads"):
         return ()
-    if not root.has("loads"):
-        load = read_load(root.table("load", "type")) if required or root.has("load") else None
-        return () if load is None else (load,)
-    loads = []
-    with root.table("loads") as several:
-        for name in several.names("load"):
-            load = read_load(several.table(name, "type"), name)
-            if load is not None:
-                names = Names(prefix=f"{name}.", path=load.path)
-                # several loads have the same symbols: their name tells them apart
-                marked = {q.path: replace(q, latex=names.latex(q.latex)) for q in quantities_of(load)}
-                loads.append(replaced(load, marked))
-    return tuple(loads)
+    loads = (read_load(table, name) for table, name in _one_or_several(root, "load", "type"))
+    return tuple(
+        _marked(load, Names(prefix=f"{load.name}." * bool(load.name), path=load.path))
+        for load in loads
+        if load is not None
+    )
 
 
 def _check_loads_beside(root: Table, loads: Sequence[Load], bearings: Sequence[Bearing]) -> None:
     """Beside a mechanism loads follow the time, and bearings are loaded one-way."""
-    for load in loads:
-        allowed = "loads over time on bearings that are coupled one-way"
-        if any(bearing.coupling == "two-way" for bearing in bearings):
-            root.collector.fault(
-                tuple(load.path.split(".")),
-                "a bearing coupled two-way has no ring of its own that a load could act on",
-                given=f"[{load.path}]",
-                allowed=allowed,
-                remedy="write it as a force on a body, [mechanism.forces.<name>]",
-            )
-        elif load.turns:
-            root.collector.fault(
-                tuple(load.path.split(".")),
-                "this load follows the angle of a shaft, and a mechanism has none",
-                given=f"[{load.path}]",
-                allowed=allowed,
-                remedy="write it as a force on a body, [mechanism.forces.<name>], an unbalance as its center_of_mass",
-            )
+    coupled = any(bearing.coupling == "two-way" for bearing in bearings)
+    for load in (load for load in loads if coupled or load.turns):
+        of_mass = ", an unbalance as its center_of_mass" * (not coupled)
+        root.collector.fault(
+            tuple(load.path.split(".")),
+            "a bearing coupled two-way has no ring of its own that a load could act on"
+            if coupled
+            else "this load follows the angle of a shaft, and a mechanism has none",
+            given=f"[{load.path}]",
+            allowed="loads over time on bearings that are coupled one-way",
+            remedy=f"write it as a force on a body, [mechanism.forces.<name>]{of_mass}",
+        )
 
 
 def _refuse_loads(root: Table, because: str) -> None:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from ballpass.derive.bearing.effects import EFFECTS
 from ballpass.derive.bearing.laws import LAWS
 from ballpass.derive.reading.read_cage import read_cage
-from ballpass.derive.reading.read_coupling import read_count, read_coupling, read_inner_body, refuse_effects
+from ballpass.derive.reading.read_coupling import read_count, read_coupling, read_inner_body, refuse_uneven
 from ballpass.derive.reading.read_designation import fill_by_designation
 from ballpass.derive.reading.read_duty import read_lubrication
 from ballpass.derive.reading.read_fit import mounted
@@ -35,6 +35,7 @@ from ballpass.derive.scene.units import show
 
 #: Keys that every bearing has.
 _NUMBERS = ("balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle")
+_EFFECTS_ARE = "effects on the balls are"
 #: What placeholders in the keys of materials stand for.
 RINGS, BALLS = {"PART": "rings", "_OF": ""}, {"PART": "balls", "_OF": "_w"}
 #: What gives the stiffness of a contact.
@@ -78,10 +79,12 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         support = _read_outer_ring(table)
         inner_body = ""
         if coupling == "two-way":
-            refuse_effects(table, "coupling two-way", "load the bearing one-way")
+            refuse_uneven(table, EFFECTS, _EFFECTS_ARE, "coupling two-way", ", or load the bearing one-way")
             inner_body = read_inner_body(table, mechanism, joint)
         elif mechanism is not None and mechanism.driver.table is not None:
-            refuse_effects(table, "mechanism.driver.table", "write speed instead of the table")
+            refuse_uneven(
+                table, EFFECTS, _EFFECTS_ARE, "mechanism.driver.table", ", or write speed instead of the table"
+            )
         numbers = read_keys(table, {name: keys[name] for name in _NUMBERS})
         ball, pitch = numbers["ball_diameter"].value, numbers["pitch_diameter"].value
         numbers["clearance"], catalogue = mounted(table, catalogue, numbers["clearance"], ball, pitch)
@@ -109,24 +112,20 @@ def _read_place(
     table: Table, mechanism: Mechanism | None, driven: str | None, coupling: str
 ) -> tuple[str | None, Quantity | None]:
     if mechanism is None:
-        for key in ("joint", "share"):
-            if table.has(key):
-                table.fault(
-                    key,
-                    "there is no mechanism to load the bearing",
-                    given=show(table.data[key]),
-                    allowed="joint and share only in a scene with [mechanism]",
-                    remedy="delete the key, or describe the mechanism",
-                )
+        table.refuse(
+            ("joint", "share"),
+            "there is no mechanism to load the bearing",
+            allowed="joint and share only in a scene with [mechanism]",
+            remedy="delete the key, or describe the mechanism",
+        )
         return None, None
     share = None
     if coupling == "one-way":
         share = keys_of(Bearing)["share"].read(table, "share")
-    elif table.has("share"):
-        table.fault(
-            "share",
+    else:
+        table.refuse(
+            ("share",),
             "a bearing coupled two-way takes the load that the motion gives it",
-            given=show(table.data["share"]),
             allowed="count, the number of bearings side by side",
             remedy="write count = 2 instead of share = 0.5",
         )
@@ -134,32 +133,28 @@ def _read_place(
     if not name or not mechanism.joints:
         return name, share
     joint = next((joint for joint in mechanism.joints if joint.name == name), None)
-    names = [joint.name for joint in mechanism.joints]
+    names, given = [joint.name for joint in mechanism.joints], show(name)
     if joint is None:
-        table.fault(
-            "joint",
-            f"there is no joint {show(name)}",
-            given=show(name),
-            allowed=listing(names),
-            remedy=suggest(name, names, "name the driver's joint"),
+        problem, allowed = f"there is no joint {show(name)}", listing(names)
+        remedy = suggest(name, names, "name the driver's joint")
+    elif coupling == "two-way" and joint.kind != "revolute":
+        problem, remedy = "the bearing must sit at a revolute joint", "name one of these joints"
+        given, allowed = (
+            f"{given}, a {joint.kind} joint",
+            listing([j.name for j in mechanism.joints if j.kind == "revolute"]),
         )
-    elif coupling == "two-way":
-        if joint.kind != "revolute":
-            table.fault(
-                "joint",
-                "the bearing must sit at a revolute joint",
-                given=f"{show(name)}, a {joint.kind} joint",
-                allowed=listing([j.name for j in mechanism.joints if j.kind == "revolute"]),
-                remedy="name one of these joints",
-            )
-    elif driven is not None and (joint.kind != "revolute" or joint.bodies != (FRAME, driven)):
-        table.fault(
-            "joint",
-            "a bearing that is loaded one-way must sit at the driver's joint: its inner ring turns with the driver",
-            given=f"{show(name)}, a {joint.kind} joint with bodies {listing(joint.bodies)}",
-            allowed=f'"{mechanism.driver.joint}"',
-            remedy=f'write joint = "{mechanism.driver.joint}", or coupling = "two-way"',
+    elif coupling == "one-way" and driven is not None and (joint.kind != "revolute" or joint.bodies != (FRAME, driven)):
+        problem = (
+            "a bearing that is loaded one-way must sit at the driver's joint: its inner ring turns with the driver"
         )
+        given = f"{given}, a {joint.kind} joint with bodies {listing(joint.bodies)}"
+        allowed, remedy = (
+            show(mechanism.driver.joint),
+            f'write joint = "{mechanism.driver.joint}", or coupling = "two-way"',
+        )
+    else:
+        return name, share
+    table.fault("joint", problem, given=given, allowed=allowed, remedy=remedy)
     return name, share
 
 
@@ -185,27 +180,23 @@ def _read_damping(table: Table) -> Damping:
             return Damping(law="none", numbers=(), smoothing=None)
         law, known = LAWS[name], {"law": name, "numbers": ()}
         others = {key for other in LAWS.values() for key in other.keys}
+        samples = " and ".join(f"{own} = {declared.sample}" for own, declared in law.keys.items())
         for key in (key for key in damping.data if key in others and key not in law.keys):
-            damping.know(key)
-            samples = " and ".join(f"{own} = {declared.sample}" for own, declared in law.keys.items())
-            damping.fault(
-                key,
+            damping.refuse(
+                (key,),
                 f'the law "{name}" has no {key}',
-                given=show(damping.data[key]),
                 allowed=samples or "no further key",
                 remedy="delete the key" + f" and write {samples}" * bool(samples) + ", or name another law",
             )
         if not law.kinked_at_rest:
             known["smoothing"] = None
-            if damping.has("smoothing"):
-                kinked = [other.name for other in LAWS.values() if other.kinked_at_rest]
-                damping.fault(
-                    "smoothing",
-                    f'the law "{name}" has no kink at rest',
-                    given=show(damping.data["smoothing"]),
-                    allowed=f"smoothing with the laws {listing(kinked)}",
-                    remedy="delete the key; smoothing in [bearing.contact] smooths what happens at contact",
-                )
+            kinked = [other.name for other in LAWS.values() if other.kinked_at_rest]
+            damping.refuse(
+                ("smoothing",),
+                f'the law "{name}" has no kink at rest',
+                allowed=f"smoothing with the laws {listing(kinked)}",
+                remedy="delete the key; smoothing in [bearing.contact] smooths what happens at contact",
+            )
         return read_record(Damping, damping, **known | {"numbers": law.read(damping)})
 
 
@@ -225,10 +216,9 @@ def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:
         if chosen != ("equivalent_mass",):
             return read_record(InnerRing, ring)
         if not with_mechanism:
-            ring.fault(
-                "equivalent_mass",
+            ring.refuse(
+                ("equivalent_mass",),
                 "Eq. (3) takes the mass of the driven body, and there is no mechanism",
-                given=show(ring.data["equivalent_mass"]),
                 allowed='mass, as in "0.4 kg"',
                 remedy='write mass = "0.4 kg" instead',
             )
@@ -243,15 +233,12 @@ def _read_outer_ring(table: Table) -> OuterRing | None:
         if support == "elastic":
             return read_record(OuterRing, ring)
         if support == "fixed":
-            for key in keys:
-                if key in ring.data:
-                    ring.fault(
-                        key,
-                        "a fixed outer ring does not move",
-                        given=show(ring.data[key]),
-                        allowed='nothing besides support = "fixed"',
-                        remedy='delete the key, or write support = "elastic"',
-                    )
+            ring.refuse(
+                keys,
+                "a fixed outer ring does not move",
+                allowed='nothing besides support = "fixed"',
+                remedy='delete the key, or write support = "elastic"',
+            )
     return None
 
 
@@ -271,11 +258,8 @@ def _refuse_outer(initial: Table, table: Table) -> None:
     ring = table.data.get("outer_ring")
     if not isinstance(ring, dict) or ring.get("support") != "fixed":  # the support itself has a fault
         return
-    for key in ("outer", "outer_velocity"):
-        if key in initial.data:
-            initial.fault(
-                key,
-                "a fixed outer ring has no initial state",
-                given=show(initial.data[key]),
-                remedy='delete the key, or write support = "elastic" in the table outer_ring',
-            )
+    initial.refuse(
+        ("outer", "outer_velocity"),
+        "a fixed outer ring has no initial state",
+        remedy='delete the key, or write support = "elastic" in the table outer_ring',
+    )

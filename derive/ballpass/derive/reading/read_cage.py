@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
+from ballpass.derive.reading.read_coupling import refuse_uneven
 from ballpass.derive.scene.bearing_records import CageMotion
 from ballpass.derive.scene.keys import ColumnKey, WholeKey
 from ballpass.derive.scene.quantity import Bounds, UsualRange
@@ -52,15 +53,8 @@ def read_cage(table: Table, uneven: str) -> CageMotion | None:
         return None
     with table.table("cage", "ratio or slip") as cage:
         cage.know(*keys_of(CageMotion), "jitter")
-        for key in ("slip", "jitter"):
-            if cage.has(key) and uneven:
-                cage.fault(
-                    key,
-                    "slip of the cage is modelled for rings that turn at constant speed",
-                    given=f"{key}, and {uneven}",
-                    allowed=f'{key} with coupling = "one-way" and a driver of constant speed',
-                    remedy=f"delete {key}; ratio may stay",
-                )
+        if uneven:
+            refuse_uneven(cage, ("slip", "jitter"), "slip of the cage is", uneven, "; ratio may stay")
         if cage.has("jitter"):
             cage.data = {**cage.data, "slip": _jitter(cage)}
         if not isinstance(cage.data.get("slip"), dict):

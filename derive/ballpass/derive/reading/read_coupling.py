@@ -6,10 +6,10 @@ coupling stand beside the other.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Literal
 
-from ballpass.derive.bearing.effects import EFFECTS
-from ballpass.derive.scene.bearing_records import Bearing
+from ballpass.derive.scene.bearing_records import Bearing, InnerRing
 from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.read_keys import keys_of
@@ -29,7 +29,13 @@ def read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-way
     """How a bearing and its linkage move each other; faults where the scene has no room for it."""
     coupling = keys_of(Bearing)["coupling"].read(table, "coupling")
     if coupling == "one-way" and mechanism is not None and mechanism.driver.torque is not None:
-        _refuse_one_way(table)
+        table.fault(
+            "coupling",
+            "a bearing loaded one-way takes the reaction of a linkage at constant speed",
+            given=show(table.data.get("coupling", "nothing, which is one-way")),
+            allowed='coupling = "two-way" where [mechanism.driver.torque] drives',
+            remedy='write coupling = "two-way", and what such a bearing needs; or delete [mechanism.driver.torque]',
+        )
         return "two-way"
     if coupling == "two-way" and mechanism is None:
         table.fault(
@@ -43,25 +49,12 @@ def read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-way
     return "two-way" if coupling == "two-way" else "one-way"
 
 
-def _refuse_one_way(table: Table) -> None:
-    table.fault(
-        "coupling",
-        "a bearing loaded one-way takes the reaction of a linkage at constant speed",
-        given=show(table.data.get("coupling", "nothing, which is one-way")),
-        allowed='coupling = "two-way" where [mechanism.driver.torque] drives',
-        remedy='write coupling = "two-way", and what such a bearing needs; or delete [mechanism.driver.torque]',
-    )
-
-
 def read_count(table: Table, coupling: str) -> Quantity | None:
     """How many bearings stand side by side in a joint with play."""
-    if not table.has("count"):
-        return None
     if coupling == "one-way":
-        table.fault(
-            "count",
+        table.refuse(
+            ("count",),
             "a bearing that is loaded one-way carries a share of the reaction",
-            given=show(table.data["count"]),
             allowed='share, as in 0.5 for one of a pair; count only with coupling = "two-way"',
             remedy="write share = 0.5 for one of two bearings",
         )
@@ -73,16 +66,12 @@ def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None)
     joint = next((j for j in mechanism.joints if j.name == name), None) if mechanism is not None else None
     with table.table("inner_ring", "body", required=False) as ring:
         ring.know("body")
-        for key in ("mass", "equivalent_mass", "damping"):
-            if key in ring.data:
-                ring.know(key)
-                ring.fault(
-                    key,
-                    "the inner ring moves with the body that carries it, whose mass contains the ring",
-                    given=show(ring.data[key]),
-                    allowed='nothing but body with coupling = "two-way"',
-                    remedy="delete the key",
-                )
+        ring.refuse(
+            [key for key in keys_of(InnerRing) | {"equivalent_mass": None} if key in ring.data],
+            "the inner ring moves with the body that carries it, whose mass contains the ring",
+            allowed='nothing but body with coupling = "two-way"',
+            remedy="delete the key",
+        )
         if joint is None:
             return str(BODY.read(ring, "body")) if ring.has("body") else ""
         moving = [body for body in joint.bodies if body != FRAME]
@@ -110,14 +99,14 @@ def read_inner_body(table: Table, mechanism: Mechanism | None, name: str | None)
         return str(body)
 
 
-def refuse_effects(table: Table, what: str, remedy: str) -> None:
-    """Note a fault for each effect on the balls of a bearing whose rings turn unevenly: `what` makes them do so."""
-    for kind in EFFECTS:
-        if table.has(kind):
+def refuse_uneven(table: Table, keys: Iterable[str], what: str, because: str, remedy: str) -> None:
+    """Note a fault for each key of `what` is modelled for even rotation alone, `because` the rings turn unevenly."""
+    for key in keys:
+        if table.has(key):
             table.fault(
-                kind,
-                "effects on the balls are modelled for rings that turn at constant speed",
-                given=f"{kind}, and {what}",
-                allowed=f'{kind} with coupling = "one-way" and a driver of constant speed',
-                remedy=f"delete {kind}, or {remedy}",
+                key,
+                f"{what} modelled for rings that turn at constant speed",
+                given=f"{key}, and {because}",
+                allowed=f'{key} with coupling = "one-way" and a driver of constant speed',
+                remedy=f"delete {key}{remedy}",
             )

@@ -68,38 +68,27 @@ def _bearing_type(table: Table) -> BearingType:
 def _clearance_group(table: Table, kind: BearingType | None) -> str:
     """Name of the clearance group; empty where the clearance is a number."""
     given = table.data.get("clearance", "CN" if kind is not None else None)
-    if given not in GROUPS:
-        if kind is not None and isinstance(given, str) and given[:1].isalpha():
-            table.fault(
-                "clearance",
-                "this is no group of clearance",
-                given=show(given),
-                allowed=f'{listing(GROUPS)}, or a length, as in "10 um"',
-                remedy=suggest(given, GROUPS, 'write clearance = "CN" for the normal group'),
-            )
-            table.data = {**table.data, "clearance": "0 um"}
-        return ""
-    if kind is None:
-        table.fault(
-            "clearance",
-            "a group of clearance holds for a bore, and none is known",
-            given=show(given),
-            allowed='a length, as in "10 um"; a group only together with designation',
-            remedy='add designation = "6204", or write the clearance as a number',
+    if given in GROUPS and kind is not None and kind.clearance(given) is not None:
+        return str(given)
+    allowed, remedy = f'{listing(GROUPS)}, or a length, as in "10 um"', "write the clearance as a number"
+    if given in GROUPS and kind is None:
+        problem = "a group of clearance holds for a bore, and none is known"
+        allowed, remedy = (
+            'a length, as in "10 um"; a group only together with designation',
+            f'add designation = "6204", or {remedy}',
         )
-        table.data = {**table.data, "clearance": "0 um"}  # the fault is told; no second one
+    elif given in GROUPS and kind is not None:
+        problem = f"ISO 5753-1 has no such group for a bore of {kind.bore} mm"
+        allowed = listing([group for group in GROUPS if kind.clearance(group) is not None])
+        remedy = f"name one of them, or {remedy}"
+    elif kind is not None and isinstance(given, str) and given[:1].isalpha():
+        problem = "this is no group of clearance"
+        remedy = suggest(given, GROUPS, 'write clearance = "CN" for the normal group')
+    else:
         return ""
-    if kind.clearance(given) is None:
-        table.fault(
-            "clearance",
-            f"ISO 5753-1 has no such group for a bore of {kind.bore} mm",
-            given=show(given),
-            allowed=listing([group for group in GROUPS if kind.clearance(group) is not None]),
-            remedy="name one of them, or write the clearance as a number",
-        )
-        table.data = {**table.data, "clearance": "0 um"}
-        return ""
-    return str(given)
+    table.fault("clearance", problem, given=show(given), allowed=allowed, remedy=remedy)
+    table.data = {**table.data, "clearance": "0 um"}  # the fault is told; no second one
+    return ""
 
 
 def _fill_contact(table: Table) -> None:

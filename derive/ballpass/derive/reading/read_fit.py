@@ -11,20 +11,22 @@ from typing import Any
 
 from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import bearing_types
-from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
-from ballpass.derive.scene.read_keys import keys_of, quantity, read_record
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import keys_of, not_negative, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.runtime.ratings.mounted_clearance import inner_growth, outer_shrinkage, thermal_reduction
 
+#: What an interference takes, over itself, the diameter of the seat and that of the raceway.
+Change = Callable[[float, float, float], float]
+
 
 def _interference(words: str) -> Any:
-    return quantity(
+    return not_negative(
         "m",
         f"Effective interference of {words}",
         example="10 um",
         optional=True,
         setting=True,
-        bounds=NOT_NEGATIVE,
         remedy="delete the key: a fit with play changes no clearance",
     )
 
@@ -62,11 +64,9 @@ def mounted(
     bore, outside = (None, None) if kind is None else (float(kind.bore) / 1e3, float(kind.outside) / 1e3)
     with table.table("fit", "inner_interference") as data:
         fit = read_record(Fit, data)
-        lost = _pressed(data, "inner", fit.inner_interference, ("bore", fit.bore or bore), inner_race, inner_growth)
-        outside = fit.outside_diameter or outside
-        lost += _pressed(
-            data, "outer", fit.outer_interference, ("outside_diameter", outside), outer_race, outer_shrinkage
-        )
+        bore, outside = fit.bore or bore, fit.outside_diameter or outside
+        lost = _pressed(data, "bore", fit.inner_interference, bore, inner_race, inner_growth)
+        lost += _pressed(data, "outside_diameter", fit.outer_interference, outside, outer_race, outer_shrinkage)
         inner, outer = fit.inner_warming, fit.outer_warming
         lost += thermal_reduction(inner, (inner + outer) / 2.0, outer, ball_diameter, pitch_diameter)
     if catalogue is not None:
@@ -77,27 +77,22 @@ def mounted(
 
 
 def _pressed(
-    data: Table,
-    ring: str,
-    interference: float | None,
-    size: tuple[str, float | None],
-    raceway: float,
-    change: Callable[[float, float, float], float],
+    data: Table, key: str, interference: float | None, diameter: float | None, raceway: float, change: Change
 ) -> float:
     """Clearance that the interference of a ring takes [m]; 0 where there is none, or with a fault."""
-    key, diameter = size
     if not interference or interference < 0.0:  # reported
         return 0.0
     if diameter is None:
         data.take(key, keys_of(Fit)[key].sample)
         return 0.0
-    if diameter <= 0.0 or (diameter >= raceway if ring == "inner" else diameter <= raceway):
-        data.fault(
-            key,
-            "the raceway is not within its ring",
-            given=f"{diameter:.6g} m, raceway {raceway:.6g} m",
-            allowed="bore < inner raceway, outer raceway < outside_diameter",
-            remedy="correct the diameter of the ring",
-        )
-        return 0.0
-    return change(interference, diameter, raceway)
+    within = 0.0 < diameter < raceway if key == "bore" else diameter > raceway
+    if within:
+        return change(interference, diameter, raceway)
+    data.fault(
+        key,
+        "the raceway is not within its ring",
+        given=f"{diameter:.6g} m, raceway {raceway:.6g} m",
+        allowed="bore < inner raceway, outer raceway < outside_diameter",
+        remedy="correct the diameter of the ring",
+    )
+    return 0.0

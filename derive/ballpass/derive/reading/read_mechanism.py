@@ -14,9 +14,9 @@ from ballpass.derive.drive.laws import TorqueLaw
 from ballpass.derive.mechanism.dyads import BRANCHES
 from ballpass.derive.mechanism.forces import FORCE_TABLES
 from ballpass.derive.scene.body_keys import Points, check_two_bodies, refuse_unknown_point
-from ballpass.derive.scene.keys import ChoiceKey, QuantityKey, VectorKey
+from ballpass.derive.scene.keys import ChoiceKey, VectorKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
-from ballpass.derive.scene.read_keys import keys_of, read_record
+from ballpass.derive.scene.read_keys import keys_of, number, read_record
 from ballpass.derive.scene.records import FRAME, POINT, Body, Driver, Force, Joint, Mechanism, NamedPoint, SpeedOverTime
 from ballpass.derive.scene.table import Table, listing, suggest, upright
 from ballpass.derive.scene.units import show
@@ -36,11 +36,11 @@ BRANCH = ChoiceKey(
     when="required at the inner joint of each dyad, else refused",
     note="left and right for RRR, ahead and behind for RRP and RPR; see {doc}`../theory/linkage`",
 )
-FLYWHEEL = QuantityKey(
-    unit="kg*m^2",
-    words="Moment of inertia that turns with the driven body",
-    symbol="J_f",
-    example="0.5 kg*m^2",
+FLYWHEEL = number(
+    "kg*m^2",
+    "Moment of inertia that turns with the driven body",
+    "J_f",
+    "0.5 kg*m^2",
     when="optional; only with `[mechanism.driver.torque]` or `driver.table`",
     bounds=NOT_NEGATIVE,
 )
@@ -136,22 +136,16 @@ def _read_points(table: Table, body: str) -> tuple[NamedPoint, ...]:
     owner = "frame" if body == FRAME else body.replace("_", " ")
     points = []
     with table.table("points", 'A = "origin"') as listed:
-        for name in listed.names("point"):
+        for name in listed.names("point", 'A = "origin"'):
             index = f"{upright(body)},{name if len(name) == 1 else upright(name)}"
             key = POINT.told({"POINT": name, "OWNER": owner, "INDEX": index})
             points.append(NamedPoint(name=name, position=key.read(listed, name)))
-        if not listed.missing and not points:
-            listed.fault("", "there are no points here", allowed='A = "origin"', remedy="name the points of the joints")
     return tuple(points)
 
 
 def _read_bodies(table: Table) -> tuple[Body, ...]:
     with table.table("bodies", "one table for each moving body") as listed:
-        bodies = [_read_body(listed, name) for name in listed.names("body")]
-        if not listed.missing and not bodies:
-            listed.fault(
-                "", "there are no bodies here", allowed="[mechanism.bodies.crank]", remedy="add the moving bodies"
-            )
+        bodies = [_read_body(listed, name) for name in listed.names("body", "[mechanism.bodies.crank]")]
     return tuple(bodies)
 
 
@@ -166,14 +160,12 @@ def _read_joints(table: Table, points: Points) -> tuple[tuple[Joint, ...], list[
     """All joints, and the names of those whose type and bodies are without fault."""
     joints, sound = [], []
     with table.table("joints", "one table for each joint") as listed:
-        for name in listed.names("joint"):
+        for name in listed.names("joint", "[mechanism.joints.A]"):
             with listed.table(name, "type and bodies") as data:
                 joint, good = _read_joint(data, name, points)
             joints.append(joint)
             if good:
                 sound.append(name)
-        if not listed.missing and not joints:
-            listed.fault("", "there are no joints here", allowed="[mechanism.joints.A]", remedy="add the joints")
     return tuple(joints), sound
 
 
@@ -185,13 +177,9 @@ def _read_joint(data: Table, name: str, points: Points) -> tuple[Joint, bool]:
     good = check_two_bodies(data, joint.bodies, points, "a joint of a body with itself") and joint.kind is not None
     for body, point in zip(joint.bodies, joint.points, strict=False):
         refuse_unknown_point(data, "points", body, point, points)
-    if joint.kind == "revolute" and data.has("direction"):
-        data.fault(
-            "direction",
-            "a revolute joint has no direction",
-            given=show(data.data["direction"]),
-            remedy='delete the key, or write type = "prismatic"',
-        )
+    if joint.kind == "revolute":
+        remedy = 'delete the key, or write type = "prismatic"'
+        data.refuse(("direction",), "a revolute joint has no direction", remedy=remedy)
     return joint, good
 
 
@@ -201,40 +189,28 @@ def _check_driver(table: Table, driver: Driver, joints: tuple[Joint, ...], sound
         return None
     names = [joint.name for joint in joints]
     joint = next((joint for joint in joints if joint.name == driver.joint), None)
-    with Table(table.collector, (*table.path, "driver"), {}) as place:
-        if joint is None:
-            place.fault(
-                "joint",
-                f"there is no joint {show(driver.joint)}",
-                given=show(driver.joint),
-                allowed=listing(names),
-                remedy=suggest(driver.joint, names, "name one of the joints"),
-            )
-            return None
-        if joint.name not in sound:
-            return None
-        if joint.kind != "revolute":
-            place.fault(
-                "joint",
-                f"the driver turns a revolute joint; {show(joint.name)} is {joint.kind}",
-                given=show(driver.joint),
-                allowed="a revolute joint between the frame and a body",
-                remedy="name the joint that the motor turns",
-            )
-            return None
-        if joint.bodies[0] != FRAME:
-            swapped = joint.bodies[1] == FRAME
-            place.fault(
-                "joint",
-                f"the driver's joint goes from the frame to a body; {show(joint.name)} joins {listing(joint.bodies)}",
-                given=show(driver.joint),
-                allowed=f'a revolute joint with bodies = ["{FRAME}", <driven body>]',
-                remedy=f'write bodies = ["{FRAME}", "{joint.bodies[0]}"] at the joint {show(joint.name)}'
-                if swapped
-                else "name a joint of the frame",
-            )
-            return None
-    return joint.bodies[1]
+    problem, allowed, remedy = (
+        "",
+        'a revolute joint with bodies = ["frame", <driven body>]',
+        "name a joint of the frame",
+    )
+    if joint is None:
+        problem, allowed = f"there is no joint {show(driver.joint)}", listing(names)
+        remedy = suggest(driver.joint, names, "name one of the joints")
+    elif joint.name not in sound:
+        return None
+    elif joint.kind != "revolute":
+        problem = f"the driver turns a revolute joint; {show(joint.name)} is {joint.kind}"
+        remedy = "name the joint that the motor turns"
+    elif joint.bodies[0] != FRAME:
+        problem = f"the driver's joint goes from the frame to a body; {show(joint.name)} joins {listing(joint.bodies)}"
+        if joint.bodies[1] == FRAME:
+            remedy = f'write bodies = ["{FRAME}", "{joint.bodies[0]}"] at the joint {show(joint.name)}'
+    if not problem and joint is not None:
+        return joint.bodies[1]
+    place = (*table.path, "driver", "joint")
+    table.collector.fault(place, problem, given=show(driver.joint), allowed=allowed, remedy=remedy)
+    return None
 
 
 def _read_forces(table: Table, points: Points) -> tuple[Force, ...]:

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 
-from ballpass.derive.reading.values import quantities_of
 from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.records import Scene
+from ballpass.derive.scene.records import Scene, quantities_of
 from ballpass.runtime.contract.manifest import UsualInfo
 
 #: Sum of the shares of several bearings at one joint.

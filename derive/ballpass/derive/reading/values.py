@@ -7,7 +7,7 @@ that need nothing but numbers, so that a value from ``--set`` meets the same one
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from difflib import get_close_matches
 from typing import Any, cast
@@ -30,18 +30,6 @@ _STRUCTURE = (
     "law",
     "support",
 )
-
-
-def quantities_of(record: object) -> Iterator[Quantity]:
-    """Every quantity of a record, in the order of its fields."""
-    if isinstance(record, Quantity):
-        yield record
-    elif isinstance(record, tuple):
-        for item in record:
-            yield from quantities_of(item)
-    elif is_dataclass(record) and not isinstance(record, type):
-        for field in fields(record):
-            yield from quantities_of(getattr(record, field.name))
 
 
 def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
@@ -220,7 +208,7 @@ def _check_speeds(checker: Checker, driver: Driver) -> None:
     assert table is not None
     remedy = "give every row a time and a speed, or write speed instead of the table for one that does not change"
     path = driver.speed.path.rpartition(".")[0].rpartition(".")[0]
-    checker.rows(path, table.time, (driver.speed, *table.later_speed), "time", remedy)
+    checker.rows(path, {"time": table.time, "speed": (driver.speed, *table.later_speed)}, remedy)
 
 
 def _check_bearing(checker: Checker, bearing: Bearing) -> None:
@@ -237,7 +225,7 @@ def _check_bearing(checker: Checker, bearing: Bearing) -> None:
 def _check_slip(checker: Checker, cage: CageMotion, path: str) -> None:
     """Rows of a slip over time."""
     remedy = "give each row a time and a slip"
-    if not checker.rows(f"{path}.cage.slip", cage.time, cage.slips, "time", remedy):
+    if not checker.rows(f"{path}.cage.slip", {"time": cage.time, "value": cage.slips}, remedy):
         return
     if cage.time[0].value != 0.0:
         checker.fault(

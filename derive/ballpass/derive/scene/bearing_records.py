@@ -7,8 +7,8 @@ from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.designations import GROUPS
 from ballpass.derive.scene.keys import ChoiceKey, TextKey, WholeKey
-from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Quantity, UsualRange
-from ballpass.derive.scene.read_keys import Either, declared, quantity
+from ballpass.derive.scene.quantity import Bounds, Quantity, UsualRange
+from ballpass.derive.scene.read_keys import Either, declared, not_negative, positive, quantity
 
 FEWEST_BALLS, MOST_BALLS = 3, 200
 _BY_DESIGNATION = "required without a designation"
@@ -31,9 +31,7 @@ _PERCENTS = "A cage lags by some hundredths: check whether percents were given."
 class Material:
     """Young's modulus [Pa] and Poisson's ratio [1]."""
 
-    young_modulus: Quantity = quantity(
-        "Pa", "Young's modulus of the PART", "E_OF", "207 GPa", bounds=POSITIVE, usual=_MODULUS
-    )
+    young_modulus: Quantity = positive("Pa", "Young's modulus of the PART", "E_OF", "207 GPa", usual=_MODULUS)
     poisson_ratio: Quantity = quantity(
         "1",
         "Poisson's ratio of the PART",
@@ -45,12 +43,11 @@ class Material:
 
 
 def _groove(ring: str, symbol: str, example: str) -> Any:
-    return quantity(
+    return positive(
         "m",
         f"Groove curvature radius of the {ring} raceway",
         symbol,
         example,
-        bounds=POSITIVE,
         usual=_GROOVE,
         note="of the cross section, above half the ball diameter",
     )
@@ -58,14 +55,13 @@ def _groove(ring: str, symbol: str, example: str) -> Any:
 
 def _smoothing() -> Any:
     hint = "The contact then acts where ball and raceway are apart: give a smaller width."
-    return quantity(
+    return positive(
         "m",
         "Half width of the smoothed contact onset",
         r"w_\delta",
         "0.05 um",
         optional=True,
         when="optional; default: Hertz's law itself",
-        bounds=POSITIVE,
         remedy=_WIDTH,
         usual=UsualRange(most=1.0, of="clearance", hint=hint),
         note="see {doc}`../theory/damping`",
@@ -90,8 +86,8 @@ class HertzContact:
 class GivenContact:
     """Contact stiffness of one ball between both raceways, k_b [N/m^1.5], as a number; `smoothing` as above."""
 
-    stiffness: Quantity = quantity(
-        "N/m^1.5", "Contact stiffness of a ball between both raceways", "k_b", "8.6e9 N/m^1.5", bounds=POSITIVE
+    stiffness: Quantity = positive(
+        "N/m^1.5", "Contact stiffness of a ball between both raceways", "k_b", "8.6e9 N/m^1.5"
     )
     smoothing: Quantity | None = _smoothing()
 
@@ -105,14 +101,13 @@ class Damping:
 
     law: str
     numbers: tuple[Quantity, ...]
-    smoothing: Quantity | None = quantity(
+    smoothing: Quantity | None = positive(
         "m/s",
         "Half width of the smoothed kink of the damping at rest",
         "w_v",
         "1 mm/s",
         optional=True,
         when="optional, for the two one-sided laws",
-        bounds=POSITIVE,
         remedy=_WIDTH,
     )
 
@@ -168,15 +163,8 @@ class CageMotion:
 class EquivalentMass:
     """Eq. (3): ring mass m_i, crankpin mass m_x [kg], crank counted whole or halved (a pair of bearings carries it)."""
 
-    ring: Quantity = quantity("kg", "Mass of the inner ring", "m_i", "0.032 kg", bounds=POSITIVE)
-    crankpin: Quantity = quantity(
-        "kg",
-        "Mass of the crankpin",
-        "m_x",
-        "0.05 kg",
-        bounds=NOT_NEGATIVE,
-        note="zero where it is part of the crank's mass",
-    )
+    ring: Quantity = positive("kg", "Mass of the inner ring", "m_i", "0.032 kg")
+    crankpin: Quantity = not_negative("kg", "Mass of the crankpin", "m_x", "0.05 kg")
     crank: Literal["whole", "half"] = declared(
         ChoiceKey(words="How much of the crank counts", choices=("whole", "half"))
     )
@@ -186,16 +174,11 @@ class EquivalentMass:
 class InnerRing:
     """Mass moved by the inner ring: a number [kg] or Eq. (3).  `damping` to the frame [N*s/m] or None."""
 
-    mass: Quantity | EquivalentMass = quantity(
-        "kg", "Mass moved by the inner ring", "m_{ei}", "0.4 kg", when="this or `equivalent_mass`", bounds=POSITIVE
+    mass: Quantity | EquivalentMass = positive(
+        "kg", "Mass moved by the inner ring", "m_{ei}", "0.4 kg", when="this or `equivalent_mass`"
     )
-    damping: Quantity | None = quantity(
-        "N*s/m",
-        "Viscous damping of the inner ring's motion to the frame",
-        "c_i",
-        "200 N*s/m",
-        optional=True,
-        bounds=NOT_NEGATIVE,
+    damping: Quantity | None = not_negative(
+        "N*s/m", "Viscous damping of the inner ring's motion to the frame", "c_i", "200 N*s/m", optional=True
     )
 
 
@@ -203,30 +186,19 @@ class InnerRing:
 class OuterRing:
     """Outer ring on an elastic housing: mass [kg], stiffness [N/m], damping [N*s/m]."""
 
-    mass: Quantity = quantity(
+    mass: Quantity = positive(
         "kg",
         "Mass of the outer ring and what moves with it",
         "m_o",
         "0.5 kg",
         when="required if elastic",
-        bounds=POSITIVE,
         remedy='give the moved mass, or write support = "fixed"',
     )
-    stiffness: Quantity = quantity(
-        "N/m",
-        "Stiffness between outer ring and frame",
-        "k_p",
-        "50 N/um",
-        when="required if elastic",
-        bounds=NOT_NEGATIVE,
+    stiffness: Quantity = not_negative(
+        "N/m", "Stiffness between outer ring and frame", "k_p", "50 N/um", when="required if elastic"
     )
-    damping: Quantity = quantity(
-        "N*s/m",
-        "Damping between outer ring and frame",
-        "c_p",
-        "500 N*s/m",
-        when="required if elastic",
-        bounds=NOT_NEGATIVE,
+    damping: Quantity = not_negative(
+        "N*s/m", "Damping between outer ring and frame", "c_p", "500 N*s/m", when="required if elastic"
     )
 
 
@@ -239,13 +211,12 @@ class InitialState:
 
 
 def _rating(symbol: str) -> Any:
-    return quantity(
+    return positive(
         "N",
         f"The manufacturer's ${symbol}$",
         example="13.5 kN",
         optional=True,
         setting=True,
-        bounds=POSITIVE,
         remedy="delete the key for the value that follows from the geometry",
         note="instead of the one computed from the geometry",
     )
@@ -287,12 +258,11 @@ class Lubrication:
         bounds=Bounds(least=0.1),  # ISO 281 has no life factor for a thinner film
         remedy="take a thicker lubricant, or delete the table and judge by the life without it",
     )
-    viscosity: float | None = quantity(
+    viscosity: float | None = positive(
         "m^2/s",
         "Kinematic viscosity at the bearing's temperature",
         example="32 mm^2/s",
         setting=True,
-        bounds=POSITIVE,
         remedy="give that of the oil at the bearing's temperature",
         note="κ follows at each speed",
     )
@@ -349,14 +319,8 @@ class Bearing:
         )
     )
     inner_body: str = ""
-    count: Quantity | None = quantity(
-        "1",
-        "Bearings side by side at the joint",
-        "n_b",
-        2,
-        optional=True,
-        when="two-way: default 1, else refused",
-        bounds=POSITIVE,
+    count: Quantity | None = positive(
+        "1", "Bearings side by side at the joint", "n_b", 2, optional=True, when="two-way: default 1, else refused"
     )
     balls: int = declared(
         WholeKey(
@@ -368,9 +332,9 @@ class Bearing:
             note="they must fit on the pitch circle",
         )
     )
-    ball_diameter: Quantity = quantity("m", "Ball diameter", "D_w", "7.9375 mm", when=_BY_DESIGNATION, bounds=POSITIVE)
-    pitch_diameter: Quantity = quantity(
-        "m", "Diameter of the circle of ball centres", "D_{pw}", "33.5 mm", when=_BY_DESIGNATION, bounds=POSITIVE
+    ball_diameter: Quantity = positive("m", "Ball diameter", "D_w", "7.9375 mm", when=_BY_DESIGNATION)
+    pitch_diameter: Quantity = positive(
+        "m", "Diameter of the circle of ball centres", "D_{pw}", "33.5 mm", when=_BY_DESIGNATION
     )
     clearance: Quantity = quantity(
         "m",

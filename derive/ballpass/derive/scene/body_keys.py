@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from ballpass.derive.scene.keys import NamesKey, TextKey
 from ballpass.derive.scene.table import FRAME, Table, listing, suggest
@@ -48,10 +49,16 @@ def refuse_unknown_point(data: Table, key: str, body: str, point: str, points: P
     )
 
 
-def check_points(data: Table, bodies: Sequence[str], ends: Sequence[str], points: Points) -> None:
-    """Note a fault for each body of two that has no such point."""
-    for body, point in zip(bodies, ends, strict=False):
-        refuse_unknown_point(data, "points", body, point, points)
+def check_names(data: Table, record: Any, points: Points) -> None:
+    """Note faults of the names that a force's `body` and `point`, or `bodies` and `points`, hold."""
+    if hasattr(record, "body"):
+        known = check_moving_body(data, record.body, points)
+        if known and hasattr(record, "point") and record.point:
+            refuse_unknown_point(data, "point", record.body, record.point, points)
+    if hasattr(record, "bodies"):
+        check_two_bodies(data, record.bodies, points, "both ends are on one body")
+        for body, point in zip(record.bodies, getattr(record, "points", ()), strict=False):
+            refuse_unknown_point(data, "points", body, point, points)
 
 
 def check_moving_body(data: Table, body: str, points: Points) -> bool:

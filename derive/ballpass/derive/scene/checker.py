@@ -45,27 +45,28 @@ class Checker:
                 "give another end, or delete the window for a load that always acts",
             )
 
-    def rows(self, path: str, argument: Sequence[Quantity], values: Sequence[Quantity], word: str, remedy: str) -> bool:
-        """Two columns of a table: one length, two rows or more, the first one increasing; whether there are rows.
+    def rows(self, path: str, columns: Mapping[str, Sequence[Quantity]], remedy: str) -> bool:
+        """Columns of a table: one length, two rows or more, the first one increasing; whether there are rows.
 
         Parameters
         ----------
         path : of the table
-        word : what the first column holds, "angle"
+        columns : by name
         remedy : for columns that differ in length, or are too short
         """
-        counts = len(argument), len(values)
-        if min(counts) == 0:  # reported when it was read
+        counts, word = {name: len(column) for name, column in columns.items()}, next(iter(columns))
+        if min(counts.values()) == 0:  # reported when it was read
             return False
-        if counts[0] != counts[1] or counts[0] < 2:
+        differ = len(set(counts.values())) > 1
+        if differ or counts[word] < 2:
             self.fault(
-                path,
-                "the columns of the table differ in length" if counts[0] != counts[1] else "the table has too few rows",
-                " and ".join(str(count) for count in counts),
-                "two columns of one length, two rows or more",
+                path if differ else f"{path}.{word}",
+                "the columns of the table differ in length" if differ else "the table has too few rows",
+                ", ".join(f"{name}: {count}" for name, count in counts.items()),
+                "columns of one length, two rows or more",
                 remedy,
             )
-        for before, behind in pairwise(argument):
+        for before, behind in pairwise(columns[word]):
             if behind.value <= before.value:
                 self.fault(
                     behind.path,
@@ -75,3 +76,14 @@ class Checker:
                     f"sort the rows by {word}; write a jump as two rows with a small step of {word} between them",
                 )
         return True
+
+    def within_a_turn(self, angles: Sequence[Quantity]) -> None:
+        """Angles of a table that is periodic over a turn."""
+        if angles[-1].value - angles[0].value >= math.tau * (1.0 - 1e-12):
+            self.fault(
+                angles[-1].path,
+                "the angles of the table cover a whole turn",
+                f"{self.show(angles[0])} to {self.show(angles[-1])}",
+                "angles within less than a turn: the last row joins the first, one turn later",
+                "leave the last row out",
+            )

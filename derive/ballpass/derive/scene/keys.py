@@ -423,20 +423,13 @@ class VectorKey(Key):
             )
             return Vector(kind="cartesian", first=first, second=second)
         if isinstance(given, dict):
-            length, angle = self.polar
-            bounds, remedy = self.length_limits.bounds, self.length_limits.remedy
+            limits = self.length_limits
+            length, angle = (f"{part.capitalize()} of {self.words}" for part in self.polar)
             keys = (
                 QuantityKey(
-                    unit=self.unit,
-                    words=f"{length.capitalize()} of {self.words}",
-                    symbol=self.symbols[3],
-                    example=f"1 {self.unit}",
-                    bounds=bounds,
-                    remedy=remedy,
+                    unit=self.unit, words=length, symbol=self.symbols[3], bounds=limits.bounds, remedy=limits.remedy
                 ),
-                QuantityKey(
-                    unit="rad", words=f"{angle.capitalize()} of {self.words}", symbol=self.symbols[4], example="30 deg"
-                ),
+                QuantityKey(unit="rad", words=angle, symbol=self.symbols[4], example="30 deg"),
             )
             with table.table(name) as polar:
                 first, second = (key.read(polar, part) for key, part in zip(keys, self.polar, strict=True))

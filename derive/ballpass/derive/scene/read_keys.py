@@ -10,7 +10,8 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from ballpass.derive.scene.keys import Fill, Key, QuantityKey
+from ballpass.derive.scene.keys import ColumnKey, Fill, Key, QuantityKey
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE
 from ballpass.derive.scene.table import Table
 
 Record = TypeVar("Record")
@@ -53,13 +54,34 @@ class Either:
 
 
 def declared(key: Key) -> Any:
-    """A field of a record that the key fills."""
-    return field(metadata={"key": key})
+    """A field of a record that the key fills; None where it may be left out."""
+    metadata = {"key": key}
+    return field(default=None, metadata=metadata) if key.optional else field(metadata=metadata)
+
+
+def number(unit: str, words: str, symbol: str = "", example: Any = "", **more: Any) -> QuantityKey:
+    """The key of a number; `more` as in `QuantityKey`."""
+    return QuantityKey(unit=unit, words=words, symbol=symbol, example=example, **more)
 
 
 def quantity(unit: str, words: str, symbol: str = "", example: Any = "", **more: Any) -> Any:
-    """A field that a number fills; `more` as in `QuantityKey`."""
-    return declared(QuantityKey(unit=unit, words=words, symbol=symbol, example=example, **more))
+    """A field that a number fills."""
+    return declared(number(unit, words, symbol, example, **more))
+
+
+def positive(unit: str, words: str, symbol: str = "", example: Any = "", **more: Any) -> Any:
+    """A field that a number above zero fills."""
+    return quantity(unit, words, symbol, example, bounds=POSITIVE, **more)
+
+
+def not_negative(unit: str, words: str, symbol: str = "", example: Any = "", **more: Any) -> Any:
+    """A field that a number from zero on fills."""
+    return quantity(unit, words, symbol, example, bounds=NOT_NEGATIVE, **more)
+
+
+def column(unit: str, words: str, symbol: str, **more: Any) -> Any:
+    """A field that the column of a table fills."""
+    return declared(ColumnKey(unit=unit, words=words, symbol=symbol, **more))
 
 
 def keys_of(kind: type[Any], fill: Fill = _NOTHING) -> dict[str, Key]:

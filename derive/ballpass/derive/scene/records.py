@@ -12,13 +12,14 @@ Frame: x right, y up, angles counter-clockwise from +x.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
-from ballpass.derive.scene.keys import ChoiceKey, ColumnKey, NamesKey, TextKey, VectorKey, WholeKey
+from ballpass.derive.scene.keys import ChoiceKey, NamesKey, TextKey, VectorKey, WholeKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limits, Quantity, Vector
-from ballpass.derive.scene.read_keys import Either, declared, quantity
+from ballpass.derive.scene.read_keys import Either, column, declared, not_negative, positive, quantity
 from ballpass.derive.scene.table import FRAME as FRAME
 from ballpass.derive.scene.toml_lines import LineIndex
 from ballpass.runtime.show import html
@@ -38,29 +39,11 @@ METHODS = (
 )
 
 
-def force_key(words: str, symbol: str, name: str = "", when: str = "", note: str = "") -> VectorKey:
-    """A force: no single number, because nothing says along which axis it would act.
-
-    The symbol may hold the place of an index: "F_{INDEX}".
-    """
-    base, _, index = symbol.partition("_")
-    index = index.strip("{}")
-    comma = "," if index else ""
-    return VectorKey(
-        name=name,
-        unit="N",
-        words=words,
-        when=when,
-        note=note,
-        symbols=(
-            "",
-            f"{base}_{{{index}{comma}x}}",
-            f"{base}_{{{index}{comma}y}}",
-            symbol,
-            rf"\alpha_{{{index or base}}}",
-        ),
-        polar=("magnitude", "direction"),
-    )
+def force_key(words: str, symbol: str, index: str = "", **more: Any) -> VectorKey:
+    """A force: no single number, because nothing says along which axis it would act."""
+    x, y = (f"{symbol}_{{{index}{',' * bool(index)}{axis}}}" for axis in "xy")
+    length, angle = f"{symbol}_{{{index}}}" if index else symbol, rf"\alpha_{{{index or symbol}}}"
+    return VectorKey(unit="N", words=words, symbols=("", x, y, length, angle), polar=("magnitude", "direction"), **more)
 
 
 #: A point of a body, POINT of the OWNER with the index INDEX.
@@ -92,22 +75,20 @@ class Body:
     """
 
     name: str
-    mass: Quantity = quantity(
+    mass: Quantity = positive(
         "kg",
         "Mass of the NAME",
         "m_{INDEX}",
         "0.36 kg",
-        bounds=POSITIVE,
         remedy="every moving body has a mass: give it, small where it hardly matters",
     )
-    inertia: Quantity | None = quantity(
+    inertia: Quantity | None = positive(
         "kg*m^2",
         "Moment of inertia of the NAME about its centre of mass",
         "J_{INDEX}",
         "611.7 kg*mm^2",
         optional=True,
         when="required, except for a slider on a fixed guide, which does not turn",
-        bounds=POSITIVE,
         remedy="give a positive value, or delete the key for a body that does not rotate",
     )
     center_of_mass: Vector = declared(
@@ -185,23 +166,11 @@ class Joint:
 class SpeedOverTime:
     """Rows of a driver's speed: times [s], increasing, and the speeds behind the first, which is `Driver.speed`."""
 
-    time: tuple[Quantity, ...] = declared(
-        ColumnKey(
-            unit="s",
-            words="Time in row ROW of the driver's table",
-            symbol="t_{1,ROW}",
-            bounds=NOT_NEGATIVE,
-            note="increasing",
-        )
+    time: tuple[Quantity, ...] = column(
+        "s", "Time in row ROW of the driver's table", "t_{1,ROW}", bounds=NOT_NEGATIVE, note="increasing"
     )
-    later_speed: tuple[Quantity, ...] = declared(
-        ColumnKey(
-            name="speed",
-            unit="rad/s",
-            words="Speed in row ROW of the driver's table",
-            symbol=r"\omega_{1,ROW}",
-            note="linear between rows, constant outside",
-        )
+    later_speed: tuple[Quantity, ...] = column(
+        "rad/s", "Speed in row ROW of the driver's table", r"\omega_{1,ROW}", name="speed"
     )
 
 
@@ -308,14 +277,8 @@ class HarmonicLoad:
     """
 
     mean: Vector = declared(force_key("the mean load on the inner ring", r"\bar F"))
-    amplitude: Vector = declared(
-        force_key(
-            "the amplitude of the load on the inner ring",
-            r"\hat F",
-            note="the load is mean + amplitude · cos(2π·frequency·t + phase)",
-        )
-    )
-    frequency: Quantity = quantity("Hz", "Frequency of the load", "f", "50 Hz", bounds=POSITIVE)
+    amplitude: Vector = declared(force_key("the amplitude of the load on the inner ring", r"\hat F"))
+    frequency: Quantity = positive("Hz", "Frequency of the load", "f", "50 Hz")
     phase: Quantity | tuple[Quantity, Quantity] = quantity(
         "rad",
         "Phase of the load at the start",
@@ -336,33 +299,20 @@ class TableLoad:
 
     either: ClassVar[Either] = Either(what="what the rows are over", groups=(("time",), ("angle",)), at="angle")
 
-    time: tuple[Quantity, ...] = declared(
-        ColumnKey(
-            unit="s",
-            words="Time of row ROW of the load's table",
-            symbol="t_{ROW}",
-            note="strictly increasing, two rows or more; constant outside",
-        )
+    time: tuple[Quantity, ...] = column(
+        "s",
+        "Time of row ROW of the load's table",
+        "t_{ROW}",
+        note="strictly increasing, two rows or more; constant outside",
     )
-    angle: tuple[Quantity, ...] = declared(
-        ColumnKey(
-            unit="rad",
-            words="Angle of the shaft in row ROW of the load's table",
-            symbol=r"\theta_{ROW}",
-            note="within less than a turn; periodic",
-        )
+    angle: tuple[Quantity, ...] = column(
+        "rad",
+        "Angle of the shaft in row ROW of the load's table",
+        r"\theta_{ROW}",
+        note="within less than a turn; periodic",
     )
-    x: tuple[Quantity, ...] = declared(
-        ColumnKey(
-            unit="N",
-            words="x component of the load in row ROW of its table",
-            symbol="F_{x,ROW}",
-            note="linear between rows",
-        )
-    )
-    y: tuple[Quantity, ...] = declared(
-        ColumnKey(unit="N", words="y component of the load in row ROW of its table", symbol="F_{y,ROW}")
-    )
+    x: tuple[Quantity, ...] = column("N", "x component of the load in row ROW of its table", "F_{x,ROW}")
+    y: tuple[Quantity, ...] = column("N", "y component of the load in row ROW of its table", "F_{y,ROW}")
 
     @property
     def over(self) -> Literal["time", "angle"]:
@@ -379,15 +329,9 @@ class TableLoad:
 class UnbalanceLoad:
     """Unbalance of the shaft: a mass [kg] at an eccentricity [m], at an angle of the shaft [rad]."""
 
-    mass: Quantity = quantity("kg", "Unbalanced mass", "m_u", "5 g", bounds=NOT_NEGATIVE)
-    eccentricity: Quantity = quantity(
-        "m",
-        "Distance of the unbalanced mass from the axis",
-        "e_u",
-        "20 mm",
-        bounds=NOT_NEGATIVE,
-        remedy=AMOUNT.remedy,
-        note="the force mass · eccentricity · speed² turns with the shaft",
+    mass: Quantity = not_negative("kg", "Unbalanced mass", "m_u", "5 g")
+    eccentricity: Quantity = not_negative(
+        "m", "Distance of the unbalanced mass from the axis", "e_u", "20 mm", remedy=AMOUNT.remedy
     )
     angle: Quantity = quantity("rad", "Angle of the unbalance at t = 0", r"\alpha_u", "0 deg", default="0 deg")
 
@@ -440,15 +384,14 @@ class Run:
 
     either: ClassVar[Either] = Either(what="the length of the run", groups=(("cycles",), ("duration",)))
 
-    cycles: float | None = quantity("1", "Turns of driver or shaft", example=4, setting=True, bounds=POSITIVE)
-    duration: float | None = quantity("s", "Duration of the run", example="0.5 s", setting=True, bounds=POSITIVE)
-    transient_cycles: float = quantity(
+    cycles: float | None = positive("1", "Turns of driver or shaft", example=4, setting=True)
+    duration: float | None = positive("s", "Duration of the run", example="0.5 s", setting=True)
+    transient_cycles: float = not_negative(
         "1",
         "Turns at the start that figures and summary leave out",
         example=2,
         default=0.0,
         setting=True,
-        bounds=NOT_NEGATIVE,
         remedy="write 0 to keep the whole run",
         note="fewer than `cycles`",
     )
@@ -491,25 +434,35 @@ class DutyState:
     """A state of a duty cycle: its share of the time [1], and the numbers that differ then, by path [SI]."""
 
     name: str
-    share: float = quantity(
+    share: float = positive(
         "1",
         "Share of the time",
         example=0.5,
         setting=True,
-        bounds=POSITIVE,
         remedy="delete the state, or give its share of the time",
         note="the shares add up to 1",
     )
     parameters: tuple[tuple[str, float], ...]
 
 
+def quantities_of(record: object) -> Iterator[Quantity]:
+    """Every quantity of a record, in the order of its fields."""
+    if isinstance(record, Quantity):
+        yield record
+    elif isinstance(record, tuple):
+        for item in record:
+            yield from quantities_of(item)
+    elif is_dataclass(record) and not isinstance(record, type):
+        for field in fields(record):
+            yield from quantities_of(getattr(record, field.name))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Scene:
     """A checked scene.
 
-    `outputs` are the patterns of the file (``"inner.*"``); `derive` resolves them.  `quantities` lists every number
-    in the order of the file's schema: the model's parameters.  `duty` is for lives alone.  `lines` says where its keys
-    stand, for messages.
+    `outputs` are the patterns of the file (``"inner.*"``); `derive` resolves them.  `duty` is for lives alone.  `lines`
+    says where its keys stand, for messages.
 
     Examples
     --------
@@ -534,7 +487,6 @@ class Scene:
     bearings: tuple[Bearing, ...]
     outputs: tuple[str, ...]
     run: Run
-    quantities: tuple[Quantity, ...]
     duty: tuple[DutyState, ...] = ()
     lines: LineIndex = field(default=LineIndex(lines={}), repr=False, compare=False)
 
@@ -558,6 +510,11 @@ class Scene:
                 html.table(("name", "value", "unit", "description"), numbers, right=("value",)),
             ),
         )
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Every number in the order of the file's schema: the model's parameters."""
+        return tuple(quantities_of((self.mechanism, self.shaft, self.loads, self.bearings)))
 
     @property
     def coupled(self) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from types import TracebackType
@@ -154,6 +154,12 @@ class Table:
         path = (*self.path, key) if key else self.path
         self.collector.fault(path, problem, given=given, allowed=allowed, remedy=remedy)
 
+    def refuse(self, keys: Iterable[str], problem: str, *, allowed: str = "", remedy: str) -> None:
+        """Note a fault at each of some keys that is there, where they have no place beside others."""
+        for key in keys:
+            if self.has(key):
+                self.fault(key, problem, given=show(self.data[key]), allowed=allowed, remedy=remedy)
+
     def know(self, *keys: str) -> None:
         """These keys belong here."""
         self._known.extend(key for key in keys if key not in self._known)
@@ -163,11 +169,13 @@ class Table:
         self.know(key)
         return key in self.data
 
-    def names(self, what: str) -> list[str]:
-        """All keys, where they are names the user chooses."""
+    def names(self, what: str, example: str = "") -> list[str]:
+        """All keys, where they are names the user chooses; with an example there must be one."""
         for key in self.data:
             self.know(key)
             self.collector.check_name((*self.path, key), key, what)
+        if example and not self.missing and not self.data:
+            self.fault("", f"there is no {what} here", allowed=example, remedy=f"add {example}")
         return list(self.data)
 
     def take(self, key: str, example: str) -> Any:

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
-from ballpass.derive.scene.keys import QuantityKey
 from ballpass.derive.scene.quantity import UsualRange
+from ballpass.derive.scene.read_keys import number
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Names, symbol_of
 
 if TYPE_CHECKING:
     import sympy as sp
 
-DEVIATION = QuantityKey(
-    unit="m",
-    words="Deviation of the diameter of ball BALL",
-    symbol=r"\Delta D_{w,BALL}",
-    example="0.5 um",
+DEVIATION = number(
+    "m",
+    "Deviation of the diameter of ball BALL",
+    r"\Delta D_{w,BALL}",
+    "0.5 um",
     usual=UsualRange(
         least=-0.001,
         most=0.001,

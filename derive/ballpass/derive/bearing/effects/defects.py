@@ -25,8 +25,8 @@ from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.scene.bearing_records import MOST_BALLS, BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import ChoiceKey, WholeKey
-from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Quantity, UsualRange
-from ballpass.derive.scene.read_keys import declared, keys_of, quantity, read_record
+from ballpass.derive.scene.quantity import Quantity, UsualRange
+from ballpass.derive.scene.read_keys import declared, keys_of, not_negative, positive, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
 from ballpass.derive.variables import Input
@@ -50,25 +50,23 @@ class Spall:
     angle: Quantity = quantity(
         "rad", "Angle of the middle of NAME", r"\alpha_d", "270 deg", note="in axes of that raceway or ball"
     )
-    chord: Quantity = quantity(
+    chord: Quantity = positive(
         "m",
         "Chord of NAME",
         "L_d",
         "1 mm",
-        bounds=POSITIVE,
         usual=UsualRange(
             most=0.5, of="ball_diameter", hint="Spalls are shorter than the balls are thick: check the unit."
         ),
         note="from edge to edge, shorter than the room between balls",
     )
-    depth: Quantity | None = quantity(
+    depth: Quantity | None = not_negative(
         "m",
         "Depth of NAME",
         "h_d",
         "20 um",
         optional=True,
         when='required, except for `"path"`',
-        bounds=NOT_NEGATIVE,
         usual=UsualRange(
             most=0.1, of="ball_diameter", hint="Spalls are some hundredths of a millimetre deep: check the unit."
         ),

@@ -10,8 +10,8 @@ import random
 from dataclasses import dataclass
 
 from ballpass.derive.scene.keys import Key, WholeKey
-from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity, UsualRange
-from ballpass.derive.scene.read_keys import declared, keys_of, quantity, read_record
+from ballpass.derive.scene.quantity import Quantity, UsualRange
+from ballpass.derive.scene.read_keys import declared, keys_of, not_negative, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
 
@@ -25,12 +25,11 @@ ORDERS = [str(order) for order in range(1, MOST_WAVES + 1)]
 class Wave:
     """Waves of one order."""
 
-    amplitude: Quantity = quantity(
+    amplitude: Quantity = not_negative(
         "m",
         "Amplitude of ORDER waves WHERE",
         "AMPLITUDE_{MARK}",
         "1 um",
-        bounds=NOT_NEGATIVE,
         remedy="give the amount, and turn the phase by 180 deg",
         usual=UsualRange(most=0.001, of="ball_diameter", hint="Waves are some tenths of a micrometre: check the unit."),
     )

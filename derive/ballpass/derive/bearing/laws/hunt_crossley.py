@@ -12,9 +12,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.laws.law import DampingLaw
-from ballpass.derive.scene.keys import QuantityKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds
-from ballpass.derive.scene.read_keys import Either
+from ballpass.derive.scene.read_keys import Either, number
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -33,22 +32,20 @@ class HuntCrossley(DampingLaw):
 
     keys = MappingProxyType(
         {
-            "hysteresis": QuantityKey(
-                unit="s/m", words=words, symbol=r"\alpha", example="0.2 s/m", bounds=NOT_NEGATIVE
-            ),
-            "restitution": QuantityKey(
-                unit="1",
-                words="Coefficient of restitution of a ball's contact",
-                symbol="e",
-                example=0.8,
+            "hysteresis": number("s/m", words, r"\alpha", "0.2 s/m", bounds=NOT_NEGATIVE),
+            "restitution": number(
+                "1",
+                "Coefficient of restitution of a ball's contact",
+                "e",
+                0.8,
                 bounds=Bounds(least=0.0, most=1.0),
                 note="accurate near one only, see {doc}`../theory/damping`",
             ),
-            "impact_speed": QuantityKey(
-                unit="m/s",
-                words="Speed of impact that the coefficient of restitution holds for",
-                symbol="v_0",
-                example="0.1 m/s",
+            "impact_speed": number(
+                "m/s",
+                "Speed of impact that the coefficient of restitution holds for",
+                "v_0",
+                "0.1 m/s",
                 bounds=POSITIVE,
             ),
         }

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from ballpass.derive.scene.keys import QuantityKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
-from ballpass.derive.scene.read_keys import Either, read_keys
+from ballpass.derive.scene.read_keys import Either, number, read_keys
 from ballpass.derive.scene.table import Table
 
 if TYPE_CHECKING:
@@ -62,18 +62,14 @@ class ViscousLaw(DampingLaw):
 
     keys = MappingProxyType(
         {
-            "coefficient": QuantityKey(
-                unit="N*s/m",
-                words="Damping coefficient of a ball's contacts",
-                symbol="c_b",
-                example="683 N*s/m",
-                bounds=NOT_NEGATIVE,
+            "coefficient": number(
+                "N*s/m", "Damping coefficient of a ball's contacts", "c_b", "683 N*s/m", bounds=NOT_NEGATIVE
             ),
-            "ratio": QuantityKey(
-                unit="s*m^0.5",
-                words="Ratio of damping coefficient to contact stiffness of a ball",
-                symbol=r"\beta",
-                example="0.25e-5 s*mm^0.5",
+            "ratio": number(
+                "s*m^0.5",
+                "Ratio of damping coefficient to contact stiffness of a ball",
+                r"\beta",
+                "0.25e-5 s*mm^0.5",
                 bounds=NOT_NEGATIVE,
                 wrong_dimension='the law "LAW" multiplies k_b [N/m^1.5]: write the paper\'s number as '
                 '"0.25e-5 s*mm^0.5"; for a time, as in "0.25e-5 s", name the law "tangent"',

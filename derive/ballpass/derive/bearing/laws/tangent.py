@@ -10,8 +10,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.laws.law import DampingLaw
-from ballpass.derive.scene.keys import QuantityKey
 from ballpass.derive.scene.quantity import NOT_NEGATIVE
+from ballpass.derive.scene.read_keys import number
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -30,11 +30,11 @@ class Tangent(DampingLaw):
 
     keys = MappingProxyType(
         {
-            "ratio": QuantityKey(
-                unit="s",
-                words="Damping time constant: damping over tangent stiffness of the contact",
-                symbol=r"\beta",
-                example="0.25e-5 s",
+            "ratio": number(
+                "s",
+                "Damping time constant: damping over tangent stiffness of the contact",
+                r"\beta",
+                "0.25e-5 s",
                 bounds=NOT_NEGATIVE,
                 wrong_dimension='write a time, as in "0.25e-5 s": the law "tangent" multiplies the slope of the '
                 "contact force [N/m]",

@@ -9,8 +9,8 @@ import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw, not_zero, same_sign
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import POSITIVE, Quantity
-from ballpass.derive.scene.read_keys import quantity
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import positive, quantity
 from ballpass.derive.terms import symbol_of
 
 
@@ -26,7 +26,7 @@ class Asynchronous(TorqueLaw):
     name: ClassVar[str] = "asynchronous"
 
     breakdown_torque: Quantity = quantity("N*m", "Breakdown torque of the motor", "M_b", "20 N*m")
-    breakdown_slip: Quantity = quantity("1", "Slip at the breakdown torque", "s_b", 0.2, bounds=POSITIVE)
+    breakdown_slip: Quantity = positive("1", "Slip at the breakdown torque", "s_b", 0.2)
     synchronous_speed: Quantity = quantity("rad/s", "Synchronous speed of the motor", r"\omega_s", "1500 rpm")
 
     def torque(self, speed: sp.Expr) -> sp.Expr:

@@ -10,9 +10,8 @@ import sympy as sp
 from ballpass.derive.drive.laws.law import TorqueLaw
 from ballpass.derive.drive.piecewise_linear import piecewise_linear
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.keys import ColumnKey
 from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.read_keys import declared
+from ballpass.derive.scene.read_keys import column
 from ballpass.derive.terms import Smoothness, symbol_of
 
 
@@ -23,12 +22,8 @@ class SpeedTable(TorqueLaw):
     name: ClassVar[str] = "table"
     smoothness: ClassVar[Smoothness] = Smoothness.KINKED
 
-    speed: tuple[Quantity, ...] = declared(
-        ColumnKey(unit="rad/s", words="Speed in row ROW of the drive's table", symbol=r"\omega_{d,ROW}")
-    )
-    amount: tuple[Quantity, ...] = declared(
-        ColumnKey(name="torque", unit="N*m", words="Torque in row ROW of the drive's table", symbol="M_{d,ROW}")
-    )
+    speed: tuple[Quantity, ...] = column("rad/s", "Speed in row ROW of the drive's table", r"\omega_{d,ROW}")
+    amount: tuple[Quantity, ...] = column("N*m", "Torque in row ROW of the drive's table", "M_{d,ROW}", name="torque")
 
     def torque(self, speed: sp.Expr) -> sp.Expr:
         return piecewise_linear(speed, [symbol_of(q) for q in self.speed], [symbol_of(q) for q in self.amount])
@@ -41,4 +36,4 @@ class SpeedTable(TorqueLaw):
         if self.speed:
             path = self.speed[0].path.rpartition(".")[0].rpartition(".")[0]
             remedy = 'give every row a speed and a torque, or write law = "constant"'
-            checker.rows(path, self.speed, self.amount, "speed", remedy)
+            checker.rows(path, {"speed": self.speed, "torque": self.amount}, remedy)

@@ -8,13 +8,12 @@ from typing import ClassVar
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Load
-from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Points, Setting
+from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import body_point, cross, dot, scale, subscript, subtract
-from ballpass.derive.scene.body_keys import BODIES, POINTS, check_points, check_two_bodies
+from ballpass.derive.scene.body_keys import BODIES, POINTS
 from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.read_keys import declared, quantity
 from ballpass.derive.scene.records import FRAME, Force
-from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
 
@@ -34,18 +33,8 @@ class AlongDirection(Pathway):
     bodies: tuple[str, str] = declared(BODIES)
     points: tuple[str, str] = declared(POINTS)
     direction: Quantity = quantity(
-        "rad",
-        "Direction of NAME in the axes of its first body",
-        r"\alpha_{INDEX}",
-        "90 deg",
-        note="makes the stop a wall through the first body's point, normal to it; the distance of the second body's "
-        "point is positive where it points",
+        "rad", "Direction of NAME in the axes of its first body", r"\alpha_{INDEX}", "90 deg"
     )
-
-    def check_names(self, data: Table, points: Points) -> None:
-        """Two bodies, and a point of each."""
-        check_two_bodies(data, self.bodies, points, "both ends are on one body")
-        check_points(data, self.bodies, self.points, points)
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Distance and its rate; the force on the wall acts where the point is."""

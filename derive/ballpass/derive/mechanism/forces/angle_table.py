@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -10,9 +9,9 @@ import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.keys import ColumnKey, Fill
+from ballpass.derive.scene.keys import Fill
 from ballpass.derive.scene.quantity import Quantity
-from ballpass.derive.scene.read_keys import declared, read_record
+from ballpass.derive.scene.read_keys import column, read_record
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import Table
 
@@ -23,22 +22,9 @@ class AngleTable(Law):
 
     key: ClassVar[str] = "table"
 
-    angle: tuple[Quantity, ...] = declared(
-        ColumnKey(
-            unit="rad",
-            words="Driver angle in row ROW of the table of NAME",
-            symbol=r"\theta_{INDEX,ROW}",
-            note="increasing, within less than a turn",
-        )
-    )
-    values: tuple[Quantity, ...] = declared(
-        ColumnKey(
-            name="COLUMN",
-            unit="COLUMN_UNIT",
-            words="THE_COLUMN in row ROW of the table of NAME",
-            symbol="T_{INDEX,ROW}",
-            note="linear between rows and periodic: the last row joins the first, one turn later",
-        )
+    angle: tuple[Quantity, ...] = column("rad", "Driver angle in row ROW of the table of NAME", r"\theta_{INDEX,ROW}")
+    values: tuple[Quantity, ...] = column(
+        "COLUMN_UNIT", "THE_COLUMN in row ROW of the table of NAME", "T_{INDEX,ROW}", name="COLUMN"
     )
 
     @classmethod
@@ -63,16 +49,7 @@ class AngleTable(Law):
 
     def check(self, checker: Checker) -> None:
         """Columns of one length, of two rows or more; angles increase within a turn."""
-        if not self.angle:
-            return
-        remedy = "give every row an angle and a value, or delete the table for a load that does not change"
-        if not checker.rows(self.angle[0].path.rpartition(".")[0], self.angle, self.values, "angle", remedy):
-            return
-        if self.angle[-1].value - self.angle[0].value >= math.tau * (1.0 - 1e-12):
-            checker.fault(
-                self.angle[-1].path,
-                "the angles span a turn or more",
-                f"{checker.show(self.angle[0])} to {checker.show(self.angle[-1])}",
-                "angles within less than a turn",
-                "delete the last row: the table is periodic, its last row joins the first",
-            )
+        if self.angle:
+            remedy = "give every row an angle and a value, or delete the table for a load that does not change"
+            checker.rows(self.angle[0].path.rpartition(".")[0], {"angle": self.angle, "value": self.values}, remedy)
+            checker.within_a_turn(self.angle)

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ballpass.derive.mechanism.balance import Load
-from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points, Setting
-from ballpass.derive.scene.body_keys import BODY, check_moving_body
+from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
+from ballpass.derive.scene.body_keys import BODY
 from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.read_keys import declared, quantity
 from ballpass.derive.scene.records import Force
-from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of
 
 
@@ -31,10 +30,6 @@ class BodyTorque(Pathway):
     def left_out(cls, law: type[Law]) -> dict[str, Any]:
         """The torque where the law gives it."""
         return {} if law.factor else {"torque": None}
-
-    def check_names(self, data: Table, points: Points) -> None:
-        """A moving body."""
-        check_moving_body(data, self.body, points)
 
     def act(self, force: Force, setting: Setting) -> Action:
         """The torque times the law's factor, or the law's torque."""

@@ -21,7 +21,7 @@ from ballpass.derive.drive import Drive, OverAngle
 from ballpass.derive.mechanism.balance import Load
 from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.linkage import Linkage
-from ballpass.derive.scene.body_keys import Points
+from ballpass.derive.scene.body_keys import Points, check_names
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill
 from ballpass.derive.scene.read_keys import read_record
@@ -109,16 +109,13 @@ class Pathway(ABC):
     def read(cls, data: Table, fill: Fill, points: Points, law: type[Law]) -> Self:
         """The pathway from the keys of a force's table, faults noted there."""
         found = read_record(cls, data, fill, **cls.left_out(law))
-        found.check_names(data, points)
+        check_names(data, found, points)
         return found
 
     @classmethod
     def left_out(cls, law: type[Law]) -> dict[str, Any]:
         """Fields that have no key beside a law, and their values."""
         return {}
-
-    def check_names(self, data: Table, points: Points) -> None:  # noqa: B027  joints are looked up while deriving
-        """Note faults of names of bodies and points."""
 
     @classmethod
     def fill(cls, name: str, body: str) -> dict[str, str]:

@@ -11,11 +11,10 @@ import sympy as sp
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.keys import Fill
-from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Quantity
-from ballpass.derive.scene.read_keys import quantity, read_record
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import not_negative, positive, read_record
 from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table
-from ballpass.derive.scene.units import show
 from ballpass.derive.terms import symbol_of
 from ballpass.derive.variables import Output
 from ballpass.runtime.contract.manifest import UsualInfo
@@ -28,16 +27,15 @@ class Friction(Law):
     At a revolute joint in [N*m*s/rad], [N*m] and [rad/s], at a guide in [N*s/m], [N] and [m/s].
     """
 
-    viscous: Quantity | None = quantity(
+    viscous: Quantity | None = not_negative(
         "AMOUNT_UNIT*s/SIZE_UNIT",
         "Viscous friction of NAME",
         "c_{INDEX}",
         "0.1 AMOUNT_UNIT*s/SIZE_UNIT",
         optional=True,
         when="this, `AMOUNT`, or both",
-        bounds=NOT_NEGATIVE,
     )
-    coulomb: Quantity | None = quantity(
+    coulomb: Quantity | None = not_negative(
         "AMOUNT_UNIT",
         "Coulomb friction of NAME",
         "F_{c,INDEX}",
@@ -45,17 +43,14 @@ class Friction(Law):
         name="AMOUNT",
         optional=True,
         when="this, `viscous`, or both",
-        bounds=NOT_NEGATIVE,
     )
-    smoothing: Quantity | None = quantity(
+    smoothing: Quantity | None = positive(
         "SIZE_UNIT/s",
         "Rate over which the Coulomb friction of NAME turns round",
         r"\epsilon_{INDEX}",
         "EXAMPLE",
         when="required with `AMOUNT`, else refused",
-        bounds=POSITIVE,
         remedy="give a small rate: within it friction grows, beyond it the friction is whole",
-        note="at this rate it reaches 76 % of its amount (tanh 1)",
     )
 
     @classmethod
@@ -104,14 +99,10 @@ class Friction(Law):
 
 def _refuse_coefficient(data: Table, amount: str) -> None:
     """Friction in proportion to a reaction: the reaction depends on that friction."""
-    for key in ("coefficient", "pin_radius"):
-        if key in data.data:
-            data.fault(
-                key,
-                "friction does not follow the reaction of its joint: that reaction depends on the friction itself",
-                given=show(data.data[key]),
-                allowed=f"viscous, {amount} with smoothing, or both",
-                remedy=f"give the {amount} that the mean reaction makes, coefficient x reaction"
-                + (" x pin radius" if amount == "torque" else ""),
-            )
-            data.know(key)
+    data.refuse(
+        [key for key in ("coefficient", "pin_radius") if key in data.data],
+        "friction does not follow the reaction of its joint: that reaction depends on the friction itself",
+        allowed=f"viscous, {amount} with smoothing, or both",
+        remedy=f"give the {amount} that the mean reaction makes, coefficient x reaction"
+        + (" x pin radius" if amount == "torque" else ""),
+    )

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Load
-from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Points, Setting
+from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import body_point, scale
-from ballpass.derive.scene.body_keys import BODY, check_moving_body, refuse_unknown_point
+from ballpass.derive.scene.body_keys import BODY
 from ballpass.derive.scene.keys import TextKey
 from ballpass.derive.scene.quantity import Quantity, Vector
 from ballpass.derive.scene.read_keys import declared, quantity
 from ballpass.derive.scene.records import AMOUNT, Force, force_key
-from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import components, symbol_of
 
 
@@ -26,11 +25,7 @@ class PointForce(Pathway):
     body: str = declared(BODY)
     point: str = declared(TextKey(words="The point of it where the force acts", example="C"))
     force: Vector = declared(
-        replace(
-            force_key("the force NAME on the BODY", "F_{INDEX}", note="in the frame's axes"),
-            length_limits=AMOUNT,
-            when="required without `table`",
-        )
+        force_key("the force NAME on the BODY", "F", "INDEX", when="required without `table`", length_limits=AMOUNT)
     )
     direction: Quantity | None = quantity(
         "rad",
@@ -38,18 +33,12 @@ class PointForce(Pathway):
         r"\alpha_{INDEX}",
         "180 deg",
         when="required with `table`, else refused",
-        note="where the force points, from +x",
     )
 
     @classmethod
     def left_out(cls, law: type[Law]) -> dict[str, Any]:
         """The direction, or the force where the law gives the amount."""
         return {"direction": None} if law.factor else {"force": Vector(kind="zero")}
-
-    def check_names(self, data: Table, points: Points) -> None:
-        """A moving body and a point of it."""
-        if check_moving_body(data, self.body, points) and self.point:
-            refuse_unknown_point(data, "point", self.body, self.point, points)
 
     def act(self, force: Force, setting: Setting) -> Action:
         """The force times the law's factor."""

@@ -10,8 +10,8 @@ import sympy as sp
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.keys import Fill
-from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
-from ballpass.derive.scene.read_keys import quantity, read_record
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import not_negative, quantity, read_record
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import symbol_of
@@ -25,14 +25,13 @@ class SpringDamper(Law):
     Along a line in [N], [N/m], [N*s/m] and [m]; between two bodies in [N*m], [N*m/rad], [N*m*s/rad] and [rad].
     """
 
-    stiffness: Quantity | None = quantity(
+    stiffness: Quantity | None = not_negative(
         "AMOUNT_UNIT/SIZE_UNIT",
         "Stiffness of NAME",
         "k_{INDEX}",
         "1e4 AMOUNT_UNIT/SIZE_UNIT",
         optional=True,
         when="this, `damping`, or both",
-        bounds=NOT_NEGATIVE,
     )
     free: Quantity | None = quantity(
         "SIZE_UNIT",
@@ -41,16 +40,14 @@ class SpringDamper(Law):
         "EXAMPLE",
         name="free_SIZE",
         when="required with `stiffness`, else refused",
-        note="an angle is that of the second body in the axes of the first",
     )
-    damping: Quantity | None = quantity(
+    damping: Quantity | None = not_negative(
         "AMOUNT_UNIT*s/SIZE_UNIT",
         "Damping of NAME",
         "c_{INDEX}",
         "10 AMOUNT_UNIT*s/SIZE_UNIT",
         optional=True,
         when="this, `stiffness`, or both",
-        bounds=NOT_NEGATIVE,
     )
     preload: Quantity | None = quantity(
         "AMOUNT_UNIT", "THE_AMOUNT of NAME at its free SIZE", "F_{0,INDEX}", "5 AMOUNT_UNIT", optional=True

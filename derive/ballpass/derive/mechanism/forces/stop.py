@@ -12,8 +12,8 @@ import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
-from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
-from ballpass.derive.scene.read_keys import quantity
+from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.read_keys import not_negative, quantity
 from ballpass.derive.scene.records import Force
 from ballpass.derive.terms import Smoothness, symbol_of
 from ballpass.derive.variables import Input, Output, StateSwitch
@@ -26,28 +26,18 @@ class Stop(Law):
     In [N/m], [m] and [s/m], between two bodies in [N*m/rad], [rad] and [s/rad].
     """
 
-    stiffness: Quantity = quantity(
-        "AMOUNT_UNIT/SIZE_UNIT",
-        "Stiffness of the stop NAME",
-        "k_{INDEX}",
-        "1e6 AMOUNT_UNIT/SIZE_UNIT",
-        bounds=NOT_NEGATIVE,
+    stiffness: Quantity = not_negative(
+        "AMOUNT_UNIT/SIZE_UNIT", "Stiffness of the stop NAME", "k_{INDEX}", "1e6 AMOUNT_UNIT/SIZE_UNIT"
     )
     free: Quantity = quantity(
-        "SIZE_UNIT",
-        "THE_SIZE of the stop NAME below which it pushes",
-        "L_{0,INDEX}",
-        "EXAMPLE",
-        name="free_SIZE",
-        note="an angle is that of the second body in the axes of the first",
+        "SIZE_UNIT", "THE_SIZE of the stop NAME below which it pushes", "L_{0,INDEX}", "EXAMPLE", name="free_SIZE"
     )
-    hysteresis: Quantity | None = quantity(
+    hysteresis: Quantity | None = not_negative(
         "s/SIZE_UNIT",
         "Hysteresis damping factor of the stop NAME",
         r"\alpha_{INDEX}",
         "0.1 s/SIZE_UNIT",
         optional=True,
-        bounds=NOT_NEGATIVE,
         note="loss of an impact",
     )
 

@@ -8,12 +8,11 @@ from typing import ClassVar
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Load
-from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Points, Setting
+from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import cross, dot
-from ballpass.derive.scene.body_keys import BODIES, check_two_bodies
+from ballpass.derive.scene.body_keys import BODIES
 from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.scene.records import FRAME, Force
-from ballpass.derive.scene.table import Table
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,10 +27,6 @@ class TwoBodies(Pathway):
     )
 
     bodies: tuple[str, str] = declared(BODIES)
-
-    def check_names(self, data: Table, points: Points) -> None:
-        """Two bodies."""
-        check_two_bodies(data, self.bodies, points, "both ends are on one body")
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Relative angle and its rate."""

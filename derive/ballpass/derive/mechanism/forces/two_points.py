@@ -8,13 +8,12 @@ from typing import ClassVar
 import sympy as sp
 
 from ballpass.derive.mechanism.balance import Load
-from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Points, Setting
+from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import body_point, dot, scale, subscript, subtract
-from ballpass.derive.scene.body_keys import BODIES, POINTS, check_points, check_two_bodies
+from ballpass.derive.scene.body_keys import BODIES, POINTS
 from ballpass.derive.scene.errors import Fault, LinkageError
 from ballpass.derive.scene.read_keys import declared
 from ballpass.derive.scene.records import FRAME, Force, Mechanism
-from ballpass.derive.scene.table import Table
 from ballpass.derive.variables import Output
 
 
@@ -28,11 +27,6 @@ class TwoPoints(Pathway):
 
     bodies: tuple[str, str] = declared(BODIES)
     points: tuple[str, str] = declared(POINTS)
-
-    def check_names(self, data: Table, points: Points) -> None:
-        """Two bodies, and a point of each."""
-        check_two_bodies(data, self.bodies, points, "both ends are on one body")
-        check_points(data, self.bodies, self.points, points)
 
     def act(self, force: Force, setting: Setting) -> Action:
         """Length, its rate and the direction of the line."""
