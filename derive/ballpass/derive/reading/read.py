@@ -21,14 +21,13 @@ from ballpass.derive.reading.read_bearing import read_bearing, read_shaft
 from ballpass.derive.reading.read_duty import duty_faults, read_duty
 from ballpass.derive.reading.read_load import read_load
 from ballpass.derive.reading.read_mechanism import read_mechanism
-from ballpass.derive.reading.read_run import read_run
 from ballpass.derive.reading.recouple import Coupling, recoupled
 from ballpass.derive.reading.values import parse_override, replaced, value_faults, with_values
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.file_columns import with_columns
-from ballpass.derive.scene.read_keys import keys_of
-from ballpass.derive.scene.records import Load, Mechanism, Scene, quantities_of
+from ballpass.derive.scene.read_keys import keys_of, read_keys, read_record
+from ballpass.derive.scene.records import OUTPUTS, Load, Mechanism, Run, Scene, quantities_of
 from ballpass.derive.scene.table import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
@@ -219,7 +218,7 @@ def _read(root: Table, name: str) -> Scene:
         bearings = _read_bearings(root, mechanism, driven) if has_bearing else ()
         if mechanism is not None:
             _check_loads_beside(root, loads, bearings)
-        run, outputs = read_run(root.table("run", "cycles or duration, and outputs"))
+        run, outputs = _read_run(root.table("run", "cycles or duration, and outputs"))
         scene = Scene(
             name=name,
             title=title,
@@ -231,6 +230,21 @@ def _read(root: Table, name: str) -> Scene:
             run=run,
         )
         return replace(scene, duty=read_duty(root.table("duty"), scene)) if root.has("duty") else scene
+
+
+def _read_run(table: Table) -> tuple[Run, tuple[str, ...]]:
+    """Length, samples and method of a run, and the names of its outputs."""
+    with table:
+        run = read_record(Run, table)
+        if run.cycles is not None and 0.0 < run.cycles <= run.transient_cycles:
+            table.fault(
+                "transient_cycles",
+                "the transient cycles fill the whole run",
+                given=f"{run.transient_cycles:g} of {run.cycles:g} cycles",
+                allowed="fewer than cycles",
+                remedy="run more cycles, or drop fewer",
+            )
+        return run, read_keys(table, {"outputs": OUTPUTS})["outputs"]
 
 
 def _read_bearings(root: Table, mechanism: Mechanism | None, driven: str | None) -> tuple[Bearing, ...]:

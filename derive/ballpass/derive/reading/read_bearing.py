@@ -35,7 +35,6 @@ from ballpass.derive.scene.units import show
 
 #: Keys that every bearing has.
 _NUMBERS = ("balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle")
-_EFFECTS_ARE = "effects on the balls are"
 #: What placeholders in the keys of materials stand for.
 RINGS, BALLS = {"PART": "rings", "_OF": ""}, {"PART": "balls", "_OF": "_w"}
 #: What gives the stiffness of a contact.
@@ -77,14 +76,12 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
         catalogue = fill_by_designation(table)
         joint, share = _read_place(table, mechanism, driven, coupling)
         support = _read_outer_ring(table)
-        inner_body = ""
-        if coupling == "two-way":
-            refuse_uneven(table, EFFECTS, _EFFECTS_ARE, "coupling two-way", ", or load the bearing one-way")
-            inner_body = read_inner_body(table, mechanism, joint)
-        elif mechanism is not None and mechanism.driver.table is not None:
-            refuse_uneven(
-                table, EFFECTS, _EFFECTS_ARE, "mechanism.driver.table", ", or write speed instead of the table"
-            )
+        inner_body = read_inner_body(table, mechanism, joint) if coupling == "two-way" else ""
+        over_time = mechanism is not None and mechanism.driver.table is not None
+        uneven = "coupling two-way" if coupling == "two-way" else "mechanism.driver.table" * over_time
+        if uneven:
+            remedy = "load the bearing one-way" if coupling == "two-way" else "write speed instead of the table"
+            refuse_uneven(table, EFFECTS, "effects on the balls are", uneven, f", or {remedy}")
         numbers = read_keys(table, {name: keys[name] for name in _NUMBERS})
         ball, pitch = numbers["ball_diameter"].value, numbers["pitch_diameter"].value
         numbers["clearance"], catalogue = mounted(table, catalogue, numbers["clearance"], ball, pitch)
@@ -103,7 +100,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
             outer=support,
             initial=_read_initial(table, moving_outer=support is not None),
             catalogue=catalogue,
-            cage=read_cage(table, "two-way" if coupling == "two-way" else _uneven(mechanism)),
+            cage=read_cage(table, uneven),
             lubrication=read_lubrication(table),
         )
 
@@ -204,11 +201,6 @@ def _read_effects(table: Table, balls: int) -> tuple[BallEffect, ...]:
     return tuple(effect.read(table.table(kind), balls) for kind, effect in EFFECTS.items() if table.has(kind))
 
 
-def _uneven(mechanism: Mechanism | None) -> str:
-    """What makes a one-way bearing's rings turn unevenly; empty where nothing does."""
-    return "mechanism.driver.table" if mechanism is not None and mechanism.driver.table is not None else ""
-
-
 def _read_inner_ring(table: Table, with_mechanism: bool) -> InnerRing:
     with table.table("inner_ring", "mass or equivalent_mass") as ring:
         chosen = MASS.choose(ring, keys_of(InnerRing))
@@ -245,21 +237,12 @@ def _read_outer_ring(table: Table) -> OuterRing | None:
 def _read_initial(table: Table, *, moving_outer: bool) -> InitialState:
     with table.table("initial", required=False) as initial:
         initial.know(*INITIAL)
-        if not moving_outer:
-            _refuse_outer(initial, table)
+        ring = table.data.get("outer_ring")
+        if isinstance(ring, dict) and ring.get("support") == "fixed":  # another support has a fault itself
+            remedy = 'delete the key, or write support = "elastic" in the table outer_ring'
+            initial.refuse(("outer", "outer_velocity"), "a fixed outer ring has no initial state", remedy=remedy)
         kept = [key for key in INITIAL if moving_outer or not key.startswith("outer")]
         read = {key: INITIAL[key].read(initial, key) for key in kept}
         position = tuple(q for key in kept if "velocity" not in key for q in read[key])
         velocity = tuple(q for key in kept if "velocity" in key for q in read[key])
     return InitialState(position=position, velocity=velocity)
-
-
-def _refuse_outer(initial: Table, table: Table) -> None:
-    ring = table.data.get("outer_ring")
-    if not isinstance(ring, dict) or ring.get("support") != "fixed":  # the support itself has a fault
-        return
-    initial.refuse(
-        ("outer", "outer_velocity"),
-        "a fixed outer ring has no initial state",
-        remedy='delete the key, or write support = "elastic" in the table outer_ring',
-    )

@@ -67,12 +67,7 @@ def read_mechanism(table: Table) -> tuple[Mechanism, str | None]:
         driven = _check_driver(table, driver, joints, sound)
         forces = _read_forces(table, points)
     mechanism = Mechanism(
-        gravity=gravity,
-        driver=driver,
-        frame_points=frame_points,
-        bodies=bodies,
-        joints=joints,
-        forces=forces,
+        gravity=gravity, driver=driver, frame_points=frame_points, bodies=bodies, joints=joints, forces=forces
     )
     return mechanism, driven
 
@@ -94,15 +89,12 @@ def _read_driver(table: Table) -> Driver:
 
 def _read_table(driver: Table) -> tuple[Quantity | None, SpeedOverTime | None]:
     """The speed at t = 0, and the table it begins; faults where another key gives the speed."""
-    for key in ("speed", "torque"):
-        if driver.has(key):
-            driver.fault(
-                key,
-                "the table gives the driver's speed",
-                given=f"{key} and table",
-                allowed="one of speed, table, and speed with torque",
-                remedy=f"delete {key}, or the table",
-            )
+    driver.refuse(
+        ("speed", "torque"),
+        "the table gives the driver's speed",
+        allowed="one of speed, table, and speed with torque",
+        remedy="delete the key, or the table",
+    )
     with driver.table("table", "time and speed") as data:
         found = read_record(SpeedOverTime, data)
     if not found.later_speed:  # reported

@@ -13,23 +13,16 @@ from difflib import get_close_matches
 from typing import Any, cast
 
 from ballpass.derive.bearing.effects import EFFECTS
-from ballpass.derive.reading.check_load import check_load
 from ballpass.derive.reading.clearance_groups import clearance_of_group
 from ballpass.derive.scene.bearing_records import Bearing, CageMotion, HertzContact
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.quantity import Bounds, Quantity
-from ballpass.derive.scene.records import Driver, Mechanism, Scene
+from ballpass.derive.scene.records import Driver, Load, Mechanism, Scene, TableLoad
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 
 #: Ends of keys that stand in the file beside quantities, for the message where somebody asks to override one.
-_STRUCTURE = (
-    "balls",
-    "designation",
-    "joint",
-    "law",
-    "support",
-)
+_STRUCTURE = ("balls", "designation", "joint", "law", "support")
 
 
 def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
@@ -46,7 +39,7 @@ def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
     if scene.mechanism is not None:
         _check_mechanism(checker, scene.mechanism)
     for load in scene.loads:
-        check_load(checker, load)
+        _check_load(checker, load)
     for bearing in scene.bearings:
         _check_bearing(checker, bearing)
     _check_run(checker, scene)
@@ -209,6 +202,32 @@ def _check_speeds(checker: Checker, driver: Driver) -> None:
     remedy = "give every row a time and a speed, or write speed instead of the table for one that does not change"
     path = driver.speed.path.rpartition(".")[0].rpartition(".")[0]
     checker.rows(path, {"time": table.time, "speed": (driver.speed, *table.later_speed)}, remedy)
+
+
+def _check_load(checker: Checker, load: Load) -> None:
+    """Note faults of the numbers of a load."""
+    if isinstance(load.law, TableLoad):
+        table = load.law
+        remedy = f'give every row {table.over}, x and y; add rows, or write type = "constant"'
+        checker.rows(load.path, {table.over: table.rows, "x": table.x, "y": table.y}, remedy)
+        if table.over == "angle":
+            checker.within_a_turn(table.rows)
+    _check_windows(checker, load)
+
+
+def _check_windows(checker: Checker, load: Load) -> None:
+    window = load.angle_window
+    if window is not None and window.end is not None:
+        checker.window(window.start, window.end)
+    window = load.time_window
+    if window is not None and window.end is not None and window.end.value <= window.start.value:
+        checker.fault(
+            window.end.path,
+            "the load ends before it begins",
+            f"start {checker.show(window.start)}, end {checker.show(window.end)}",
+            "an end behind the start",
+            "give a later end, or none for a load that does not end",
+        )
 
 
 def _check_bearing(checker: Checker, bearing: Bearing) -> None:

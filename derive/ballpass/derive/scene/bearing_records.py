@@ -114,11 +114,10 @@ class Damping:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BallEffect:
-    """An effect on the balls: its kind, what of it is structure, and its numbers; `kind` says what they are."""
+    """An effect on the balls: its kind, and records of its own, which this layer only carries."""
 
     kind: str
-    structure: tuple[int | str, ...]
-    numbers: tuple[Quantity, ...]
+    parts: tuple[Any, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

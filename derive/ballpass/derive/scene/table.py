@@ -133,11 +133,8 @@ class Table:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if kind is None:
-            self.report_unknown()
-
-    def report_unknown(self) -> None:
-        """Note a fault for every key that was not asked for."""
+        if kind is not None:
+            return
         absent = [key for key in self._known if key not in self.data]
         for key in self.data:
             if key not in self._known:

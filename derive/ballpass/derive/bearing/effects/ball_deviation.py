@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
-from ballpass.derive.scene.quantity import UsualRange
+from ballpass.derive.scene.quantity import Quantity, UsualRange
 from ballpass.derive.scene.read_keys import number
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Names, symbol_of
@@ -29,6 +30,14 @@ DEVIATION = number(
 )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Deviation:
+    """How much thicker a ball is [m], of its number."""
+
+    ball: int
+    size: Quantity
+
+
 class BallDeviation(Effect):
     """Deviation of the diameter of single balls."""
 
@@ -40,20 +49,17 @@ class BallDeviation(Effect):
         with table:
             names = [str(number) for number in range(1, balls + 1)]
             table.know(*names)
-            which = [name for name in names if name in table.data]
-            numbers = [DEVIATION.told({"BALL": name}).read(table, name) for name in which]
-        return BallEffect(kind=self.name, structure=tuple(map(int, which)), numbers=tuple(numbers))
+            deviations = [
+                Deviation(ball=int(name), size=DEVIATION.told({"BALL": name}).read(table, name))
+                for name in names
+                if name in table.data
+            ]
+        return BallEffect(kind=self.name, parts=tuple(deviations))
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         import sympy as sp
 
-        return -sum(
-            (
-                ball.only(int(number), symbol_of(deviation))
-                for number, deviation in zip(effect.structure, effect.numbers, strict=True)
-            ),
-            start=sp.S.Zero,
-        )
+        return -sum((ball.only(one.ball, symbol_of(one.size)) for one in effect.parts), start=sp.S.Zero)
 
     def describe(self, effect: BallEffect) -> str:
-        return f"diameters of their own of the balls {', '.join(map(str, effect.structure))}"
+        return f"diameters of their own of the balls {', '.join(str(one.ball) for one in effect.parts)}"

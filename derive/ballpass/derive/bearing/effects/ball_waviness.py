@@ -10,9 +10,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
-from ballpass.derive.bearing.effects.read_waves import ORDERS, read_waves, wave_tables, with_roughness
+from ballpass.derive.bearing.effects.read_waves import ORDERS, Wave, read_waves, wave_tables, with_roughness
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
-from ballpass.derive.scene.quantity import Quantity
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Names, symbol_of
 
@@ -31,7 +30,7 @@ class BallWaviness(Effect):
     tables = wave_tables("around each ball", EACH) | wave_tables("around the ball", "#")
 
     def read(self, table: Table, balls: int) -> BallEffect:
-        structure, numbers = list[str](), list[Quantity]()
+        waves: list[Wave] = []
         with table:
             table.data = _for_every_ball(table, balls)
             names = (EACH, *ORDERS[:balls])
@@ -39,10 +38,8 @@ class BallWaviness(Effect):
             for whose in (name for name in names if name in table.data):
                 where = "around each ball" if whose == EACH else f"around ball {whose}"
                 label = "" if whose == EACH else f"{whose},"
-                orders, read = read_waves(table.table(whose), where, ("C", r"\gamma"), label)
-                structure += [f"{whose}.{n}" for n in orders]
-                numbers += read
-        return BallEffect(kind=self.name, structure=tuple(structure), numbers=tuple(numbers))
+                waves += read_waves(table.table(whose), where, ("C", r"\gamma"), label, whose)
+        return BallEffect(kind=self.name, parts=tuple(waves))
 
     def spins(self, effect: BallEffect) -> bool:
         return True
@@ -52,26 +49,24 @@ class BallWaviness(Effect):
 
         assert ball.spin is not None  # `spins`
         thicker: dict[str, sp.Expr] = {}
-        for entry, amplitude, phase in zip(effect.structure, effect.numbers[::2], effect.numbers[1::2], strict=True):
-            whose, _, order = str(entry).partition(".")
-            n = int(order)
+        for wave in effect.parts:
+            n, phase = wave.order, symbol_of(wave.phase)
             both = sum(
-                symbol_of(amplitude) * sp.cos(n * ball.spin + n * side + symbol_of(phase))
-                for side in (sp.S.Zero, sp.pi)
+                symbol_of(wave.amplitude) * sp.cos(n * ball.spin + n * side + phase) for side in (sp.S.Zero, sp.pi)
             )
-            thicker[whose] = thicker.get(whose, sp.S.Zero) + both
+            thicker[wave.whose] = thicker.get(wave.whose, sp.S.Zero) + both
         return -sum(
             (value if whose == EACH else ball.only(int(whose), value) for whose, value in thicker.items()),
             start=sp.S.Zero,
         )
 
     def describe(self, effect: BallEffect) -> str:
-        entries = [str(entry).partition(".") for entry in effect.structure]
-        names = dict.fromkeys(whose for whose, _, _ in entries)
+        orders: dict[str, list[str]] = {}
+        for wave in effect.parts:
+            orders.setdefault(wave.whose, []).append(str(wave.order))
         told = (
-            f"{'each ball' if whose == EACH else f'ball {whose}'}: orders "
-            + ", ".join(n for other, _, n in entries if other == whose)
-            for whose in names
+            f"{'each ball' if whose == EACH else f'ball {whose}'}: orders {', '.join(of)}"
+            for whose, of in orders.items()
         )
         return "waves around the balls, of which only even orders act; " + "; ".join(told)
 

@@ -72,6 +72,11 @@ class Spall:
         ),
     )
 
+    @property
+    def shape(self) -> str:
+        """Its profile; "deep path" where a ball meets no bottom."""
+        return "deep path" if self.profile == "path" and self.depth is None else self.profile
+
 
 class Defects(Effect):
     """Local defects."""
@@ -81,19 +86,16 @@ class Defects(Effect):
     tables = MappingProxyType({("*",): keys_of(Spall, {"NAME": "<name>"})})
 
     def read(self, table: Table, balls: int) -> BallEffect:
-        structure, numbers = list[int | str](), list[Quantity]()
         with table:
+            spalls = []
             for name in table.names("defect"):
                 with table.table(name, "on, angle, chord, depth and profile") as data:
-                    spall = _read_spall(data, name, balls)
-                deep = spall.profile == "path" and spall.depth is None
-                numbers += [q for q in (spall.angle, spall.chord, spall.depth) if q is not None]
-                structure += [name, spall.on, spall.ball, "deep path" if deep else spall.profile]
-        return BallEffect(kind=self.name, structure=tuple(structure), numbers=tuple(numbers))
+                    spalls.append(_read_spall(data, name, balls))
+        return BallEffect(kind=self.name, parts=tuple(spalls))
 
     def check(self, effect: BallEffect, checker: Checker, bearing: Bearing) -> None:
         ball = bearing.ball_diameter
-        for spall in _spalls(effect):
+        for spall in effect.parts:
             widest = ball.value / _room(spall, bearing)
             if spall.chord.value >= widest > 0.0:
                 checker.fault(
@@ -106,26 +108,22 @@ class Defects(Effect):
 
     def relations(self, effect: BallEffect, bearing: Bearing) -> list[tuple[str, float, str]]:
         ball = bearing.ball_diameter.path
-        return [(ball, _room(spall, bearing), spall.chord.path) for spall in _spalls(effect)]
+        return [(ball, _room(spall, bearing), spall.chord.path) for spall in effect.parts]
 
     def spins(self, effect: BallEffect) -> bool:
-        return any(spall.on == "ball" for spall in _spalls(effect))
+        return any(spall.on == "ball" for spall in effect.parts)
 
     def inputs(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Input, ...]:
-        return tuple(
-            gate for spall in _spalls(effect) for one in _contacts(spall, bearing, names) for gate in one.gates
-        )
+        return tuple(gate for spall in effect.parts for one in _contacts(spall, bearing, names) for gate in one.gates)
 
     def constants(self, effect: BallEffect, bearing: Bearing, names: Names) -> tuple[Definition, ...]:
-        return tuple(
-            d for spall in _spalls(effect) for one in _contacts(spall, bearing, names) for d in one.constants()
-        )
+        return tuple(d for spall in effect.parts for one in _contacts(spall, bearing, names) for d in one.constants())
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         import sympy as sp
 
         taken = sp.S.Zero
-        for spall in _spalls(effect):
+        for spall in effect.parts:
             for one in _contacts(spall, bearing, names):
                 if spall.on == "ball":
                     assert ball.spin is not None  # `spins`
@@ -139,9 +137,9 @@ class Defects(Effect):
 
     def describe(self, effect: BallEffect) -> str:
         told = []
-        for spall in _spalls(effect):
+        for spall in effect.parts:
             where = f"ball {spall.ball}" if spall.on == "ball" else f"the {spall.on} raceway"
-            told.append(f"{spall.name} on {where}, {spall.profile}")
+            told.append(f"{spall.name} on {where}, {spall.shape}")
         return "local defects: " + "; ".join(told)
 
 
@@ -153,22 +151,6 @@ def _read_spall(data: Table, name: str, balls: int) -> Spall:
     if found.depth is None and found.profile != "path":
         data.take("depth", keys_of(Spall)["depth"].sample)
     return found
-
-
-def _spalls(effect: BallEffect) -> Iterator[Spall]:
-    numbers = iter(effect.numbers)
-    for k in range(0, len(effect.structure), 4):
-        name, on, ball, profile = effect.structure[k : k + 4]
-        angle, chord = next(numbers), next(numbers)
-        yield Spall(
-            name=str(name),
-            on=str(on),
-            ball=int(ball),
-            profile=str(profile),
-            angle=angle,
-            chord=chord,
-            depth=None if profile == "deep path" else next(numbers),
-        )
 
 
 def _room(spall: Spall, bearing: Bearing) -> float:
@@ -202,13 +184,13 @@ class _Contact:
     @property
     def _edges(self) -> tuple[tuple[str, str, str], ...]:
         """Name of each gate, and of the edges of its window."""
-        if self.spall.profile == "path":
+        if self.spall.shape == "path":
             return (
                 ("", "begin", "bottom_begin"),
                 ("_bottom", "bottom_begin", "bottom_end"),
                 ("_out", "bottom_end", "end"),
             )
-        if self.spall.profile == "deep path":
+        if self.spall.shape == "deep path":
             return (("", "begin", "middle"), ("_out", "middle", "end"))
         return (("", "begin", "end"),)
 
@@ -289,9 +271,9 @@ class _Contact:
                 r"\omega_d",
             )
         edges = {"begin": -half, "end": half}
-        if spall.profile == "deep path":
+        if spall.shape == "deep path":
             edges["middle"] = sp.S.Zero
-        if spall.depth is not None and spall.profile == "path":
+        if spall.depth is not None and spall.shape == "path":
             # where the circle about the edge is down at the depth; chords are shorter than a ball's diameter
             deep = sp.Min(symbol_of(spall.depth), ball)
             centre = (raceway - ball + deep) if self.ring == "outer" else (raceway + ball - deep)
@@ -325,9 +307,9 @@ class _Contact:
         half, one_half = self._symbol("half_angle"), sp.Rational(1, 2)
         across, along = sp.sin(half), sp.cos(half)
         depth = sp.S.Zero if self.spall.depth is None else symbol_of(self.spall.depth)
-        if self.spall.profile == "rectangular":
+        if self.spall.shape == "rectangular":
             sunk: tuple[sp.Expr, ...] = (depth,)
-        elif self.spall.profile == "half-sine":
+        elif self.spall.shape == "half-sine":
             sunk = (depth * sp.cos(sp.pi * one_half * s / across),)
         else:
             into = self._about_edge(along * c - across * s, across * c + along * s)

@@ -1,6 +1,6 @@
 """Waves in a table of the scene: each order with amplitude and phase, or a spectrum that falls with the order.
 
-In: a table whose keys are orders, or ``roughness``.  Out: orders, and amplitude and phase of each.
+In: a table whose keys are orders, or ``roughness``.  Out: a `Wave` for each order.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ ORDERS = [str(order) for order in range(1, MOST_WAVES + 1)]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wave:
-    """Waves of one order."""
+    """Waves of one order; `whose` ball they are around where not all have them."""
+
+    order: int
+    whose: str
 
     amplitude: Quantity = not_negative(
         "m",
@@ -53,16 +56,17 @@ def wave_tables(where: str, *around: str) -> dict[tuple[str, ...], dict[str, Key
     return {(*around, "#"): keys_of(Wave, fill), (*around, "roughness"): keys_of(Roughness)}
 
 
-def read_waves(table: Table, where: str, symbols: tuple[str, str], label: str = "") -> tuple[list[int], list[Quantity]]:
-    """Orders, and amplitude and phase of each in turn.
+def read_waves(table: Table, where: str, symbols: tuple[str, str], label: str = "", whose: str = "") -> list[Wave]:
+    """Waves of all orders.
 
     Parameters
     ----------
     where : for people, "around the outer raceway"
     symbols : LaTeX of amplitude and phase
     label : index of these before the order, with its comma
+    whose : see `Wave`
     """
-    orders, numbers = [], []
+    waves = []
     with table:
         table.data = with_roughness(table)
         for key in list(table.data):
@@ -76,12 +80,10 @@ def read_waves(table: Table, where: str, symbols: tuple[str, str], label: str = 
                     remedy='write for example 8 = { amplitude = "1 um" }',
                 )
                 continue
-            orders.append(int(key))
             fill = {"ORDER": key, "WHERE": where, "AMPLITUDE": symbols[0], "PHASE": symbols[1], "MARK": f"{label}{key}"}
             with table.table(key) as data:
-                wave = read_record(Wave, data, fill)
-            numbers += [wave.amplitude, wave.phase]
-    return orders, numbers
+                waves.append(read_record(Wave, data, fill, order=int(key), whose=whose))
+    return waves
 
 
 def with_roughness(table: Table, draws: str = "") -> dict[str, object]:

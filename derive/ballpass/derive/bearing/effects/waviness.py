@@ -23,21 +23,20 @@ class _RacewayWaviness(Effect):
     label = ""
 
     def read(self, table: Table, balls: int) -> BallEffect:
-        orders, numbers = read_waves(table, f"around the {self.ring} raceway", ("B", r"\alpha"), self.label)
-        return BallEffect(kind=self.name, structure=tuple(orders), numbers=tuple(numbers))
+        waves = read_waves(table, f"around the {self.ring} raceway", ("B", r"\alpha"), self.label)
+        return BallEffect(kind=self.name, parts=tuple(waves))
 
     def term(self, effect: BallEffect, bearing: Bearing, names: Names, ball: GenericBall) -> sp.Expr:
         import sympy as sp
 
         angle = ball.on_outer if self.ring == "outer" else ball.on_inner
-        waves = zip(effect.structure, effect.numbers[::2], effect.numbers[1::2], strict=True)
         return -sum(
-            (symbol_of(amplitude) * sp.cos(n * angle + symbol_of(phase)) for n, amplitude, phase in waves),
+            (symbol_of(w.amplitude) * sp.cos(w.order * angle + symbol_of(w.phase)) for w in effect.parts),
             start=sp.S.Zero,
         )
 
     def describe(self, effect: BallEffect) -> str:
-        return f"waves around the {self.ring} raceway, orders {', '.join(str(n) for n in effect.structure)}"
+        return f"waves around the {self.ring} raceway, orders {', '.join(str(wave.order) for wave in effect.parts)}"
 
 
 class OuterWaviness(_RacewayWaviness):

@@ -49,12 +49,7 @@ class AlongDirection(Pathway):
             f"{label}.normal", "", along, "1", f"component of the normal of {force.name}", f"n_{{{mark},AXIS}}"
         )
         line = ledger.name_pair(
-            f"{label}.line",
-            "",
-            subtract(two.position, one.position),
-            "m",
-            f"distance of {words}",
-            f"d_{{{mark},AXIS}}",
+            f"{label}.line", "", subtract(two.position, one.position), "m", f"distance of {words}", f"d_{{{mark},AXIS}}"
         )
         distance = ledger.define(f"{label}.distance", dot(along, line), "m", f"distance of {words}", f"L_{{{mark}}}")
         setting.outputs.append(
