@@ -3,8 +3,8 @@
 In: the path of a TOML file, or its text.  Out: the frozen record in SI, every value checked.  A scene is data: nothing
 in it is evaluated.  All faults of a file are raised together, as one `SceneError`.
 
-The schema is in `read_*.py` and here; the checks of values, which `--set` repeats, in
-`values.py`.
+Keys are declared at the records that they fill (`ballpass.derive.scene.keys`).  Rules across them are here and in
+`read_*.py`; those that need nothing but numbers, which `--set` repeats, in `values.py`.
 """
 
 from __future__ import annotations
