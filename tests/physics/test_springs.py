@@ -95,6 +95,31 @@ def test_tension_is_preload_stiffness_and_damping_of_the_line_between_the_points
     assert along_turn(shaper, "torsion_spring.twist.torque") == pytest.approx(torque, rel=1e-11)
 
 
+def test_a_cubic_stiffness_hardens_a_spring_and_what_it_stores_comes_back(
+    make_model: Callable[..., Model], bare: Model
+) -> None:
+    """Tension by the closed form at every angle; over a turn no work, for the force has a potential."""
+    cubic = SPRING.replace("damping = ", 'cubic_stiffness = "3e5 N/m^3"\ndamping = ').replace('"40 N*s/m"', '"0 N*s/m"')
+    twist = TWIST.replace("damping = ", 'cubic_stiffness = "-9 N*m/rad^3"\ndamping = ').replace('"0.5 N', '"0 N')
+    model = make_model("crank_shaper", *changes(cubic, twist), OUTPUTS)
+    closed = lever(TURN, model.parameters["mechanism.driver.speed"])
+    excess, turned = closed.length - FREE, closed.angle - math.radians(80)
+    tension = PRELOAD + K * excess + 3e5 * excess**3
+    assert along_turn(model, "spring.return.tension") == pytest.approx(tension, rel=1e-11)
+    assert float(np.max(np.abs(3e5 * excess**3))) > 0.1 * float(np.max(np.abs(tension)))
+    torque = 3.0 + 30.0 * turned - 9.0 * turned**3
+    assert along_turn(model, "torsion_spring.twist.torque") == pytest.approx(torque, rel=1e-11)
+    added = along_turn(model, "drive_torque") - along_turn(bare, "drive_torque")
+    assert abs(np.mean(added)) < 1e-9 * float(np.max(np.abs(added)))
+
+
+def test_a_cubic_stiffness_goes_with_a_stiffness(scene_text: Callable[..., str]) -> None:
+    alone = SPRING.replace('stiffness = "2 N/mm"\nfree_length = "150 mm"', 'cubic_stiffness = "3e5 N/m^3"')
+    with pytest.raises(SceneError) as caught:
+        scene_from_text(scene_text("crank_shaper", *changes(alone)), "shaper")
+    assert [fault.key for fault in caught.value.faults] == ["mechanism.springs.return.cubic_stiffness"]
+
+
 def test_drive_power_of_springs_is_the_rate_of_their_energy_and_the_loss_of_their_dampers(
     shaper: Model, bare: Model
 ) -> None:

@@ -20,9 +20,10 @@ from ballpass.derive.variables import Output
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpringDamper(Law):
-    """``preload + stiffness * (size - free size) + damping * rate``; what the scene does not name has no term.
+    """``preload + stiffness * x + cubic_stiffness * x**3 + damping * rate``, with x = size - free size.
 
-    Along a line in [N], [N/m], [N*s/m] and [m]; between two bodies in [N*m], [N*m/rad], [N*m*s/rad] and [rad].
+    What the scene does not name has no term.  Along a line in [N], [N/m], [N/m^3], [N*s/m] and [m]; between two bodies
+    in [N*m], [N*m/rad], [N*m/rad^3], [N*m*s/rad] and [rad].
     """
 
     stiffness: Quantity | None = not_negative(
@@ -40,6 +41,15 @@ class SpringDamper(Law):
         "EXAMPLE",
         name="free_SIZE",
         when="required with `stiffness`, else refused",
+    )
+    cubic_stiffness: Quantity | None = quantity(
+        "AMOUNT_UNIT/SIZE_UNIT^3",
+        "Cubic stiffness of NAME",
+        "k_{3,INDEX}",
+        "1e6 AMOUNT_UNIT/SIZE_UNIT^3",
+        optional=True,
+        when="optional with `stiffness`, else refused",
+        note="times the third power of what is beyond the free size; a negative one softens",
     )
     damping: Quantity | None = not_negative(
         "AMOUNT_UNIT*s/SIZE_UNIT",
@@ -64,7 +74,8 @@ class SpringDamper(Law):
                 allowed=f"stiffness with {free}, damping, or both",
                 remedy=f"add stiffness and {free}, or damping",
             )
-        return read_record(cls, data, fill, **({} if "stiffness" in data.data else {"free": None}))
+        left_out = {} if "stiffness" in data.data else {"free": None, "cubic_stiffness": None}
+        return read_record(cls, data, fill, **left_out)
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
         """The tension or torque under a name of its own."""
@@ -82,6 +93,8 @@ class SpringDamper(Law):
                 rf"\Delta_{{{mark}}}",
             )
             terms.append(symbol_of(self.stiffness) * excess)
+            if self.cubic_stiffness is not None:
+                terms.append(symbol_of(self.cubic_stiffness) * excess**3)
         if self.damping is not None:
             rate = ledger.define(
                 f"{label}.rate",
