@@ -1,6 +1,6 @@
 """The numbers people read first as a table for the terminal.
 
-In: what `summarize` gave.  Out: tables of `rich`.
+In: what `summarize` gave.  Out: tables of a report.
 """
 
 from __future__ import annotations
@@ -8,12 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
-
 from ballpass.runtime.app.summary import TABLE_UNITS
 from ballpass.runtime.certify.whole_run import check_observables
 from ballpass.runtime.many.ensemble import observable_unit
-from ballpass.runtime.run.tables import simple_table
+from ballpass.runtime.report.report import ReportTable
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
@@ -36,28 +34,33 @@ _RUN = {
 }
 
 
-def render_summary(summary: Mapping[str, Any]) -> Table:
-    """The summary as a table for a terminal of 80 columns; mean and standard deviation are in the file only.
+def render_summary(summary: Mapping[str, Any]) -> ReportTable:
+    """The summary as a table; mean and standard deviation are in the file only.
 
     Parameters
     ----------
     summary : what `summarize` gave
     """
     columns = ("value", "min", "max", "rms")
-    heads = ("quantity", *columns, "unit")
-    table = simple_table(f"{summary['title']}: {summary['method']}", heads, right=columns, caption=_caption(summary))
+    rows: list[tuple[str, ...]] = []
     for name, item in summary.items():
         if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
             continue
         factor, unit = TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
         cells = [_cell(item, key, factor) for key in columns]
         if any(cells):
-            table.add_row(name, *cells, unit)
+            rows.append((name, *cells, unit))
         for key, value in item.items():
             if key not in _COLUMNS and key != "unit" and not isinstance(value, Mapping):
                 # a named part of a quantity, as the peak's elastic one; what is said of it is in the file
-                table.add_row(f"{name}.{key}", _cell(item, key, factor), "", "", "", unit)
-    return table
+                rows.append((f"{name}.{key}", _cell(item, key, factor), "", "", "", unit))
+    return ReportTable(
+        title=f"{summary['title']}: {summary['method']}",
+        heads=("quantity", *columns, "unit"),
+        rows=rows,
+        right=columns,
+        caption=_caption(summary),
+    )
 
 
 def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
@@ -68,15 +71,17 @@ def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
     return f"{factor * item[key]:z.4g}" if key in item else ""
 
 
-def render_accuracy(model: Model, accuracy: Accuracy) -> Table:
-    """Quantities of ``--error`` with their values and estimated errors, as a table for a terminal."""
-    right = ("value", "estimated error")
-    table = simple_table("Extremes between samples included", ("quantity", *right, "unit"), right=right)
+def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
+    """Quantities of ``--error`` with their values and estimated errors."""
+    rows = []
     for name, found in zip(accuracy.of, check_observables(model, accuracy.of), strict=True):
         unit = observable_unit(model.manifest, *found)
         factor, unit = TABLE_UNITS.get(unit, (1.0, unit))
-        table.add_row(name, f"{factor * accuracy.values[name]:z.7g}", f"{100 * accuracy.estimates[name]:.2g} %", unit)
-    return table
+        rows.append((name, f"{factor * accuracy.values[name]:z.7g}", f"{100 * accuracy.estimates[name]:.2g} %", unit))
+    right = ("value", "estimated error")
+    return ReportTable(
+        title="Extremes between samples included", heads=("quantity", *right, "unit"), rows=rows, right=right
+    )
 
 
 def _caption(summary: Mapping[str, Any]) -> str:

@@ -119,10 +119,14 @@ def read_value(option: str, text: str, unit: str) -> float:
         if can_derive():
             from ballpass.derive.scene.units import parse_quantity as parse_any
 
-            return parse_any(text, unit)
-        return parse_quantity(text, unit)
+            value = parse_any(text, unit)
+        else:
+            value = parse_quantity(text, unit)
     except QuantityError as error:
         raise RequestError(f"{option}: {error}") from None
+    if not math.isfinite(value):
+        raise RequestError(f"{option}: {text!r} is no finite quantity.")
+    return value
 
 
 def _asked_run(run: _Run, duration: float | None, transient: float | None) -> _Run:
@@ -190,16 +194,6 @@ def read_with_settings(
         raise SceneError(error.faults, source="--set") from None
 
 
-def read_quantity(option: str, text: str | None, unit: str) -> float | None:
-    """A finite quantity of an option [unit], None where it was not given."""
-    if text is None:
-        return None
-    value = read_value(option, text, unit)
-    if not math.isfinite(value):
-        raise RequestError(f"{option}: {text!r} is no finite quantity.")
-    return value
-
-
 def read_turns(text: str | None, length: float | str | None) -> bool:
     """Whether ``--turns settle`` was asked for.
 
@@ -234,46 +228,6 @@ def read_formats(given: list[str] | None) -> tuple[str, ...]:
         if kind not in FORMATS:
             raise RequestError(f"--format: {kind!r} is no kind of figure. Allowed: {', '.join(FORMATS)}.")
     return tuple(dict.fromkeys(given)) if given else FORMATS[:1]
-
-
-def read_duration(text: str | None, cycles: float | None) -> float | None:
-    """The time of ``--duration "0.5 s"`` [s].
-
-    Raises
-    ------
-    RequestError
-        No time above 0, or turns were given as well.
-    """
-    if text is None:
-        return None
-    if cycles is not None:
-        raise RequestError(
-            f"--cycles {cycles:g} and --duration {text!r} were both given. Allowed: one of them. Leave one away."
-        )
-    seconds = read_quantity("--duration", text, "s") or 0.0
-    if not seconds > 0.0:
-        raise RequestError(
-            f'--duration: {text!r} cannot be simulated. Allowed: a time above 0, as in --duration "0.5 s".'
-        )
-    return seconds
-
-
-def faults_of_numbers(cycles: float | None, transient: float | None, rtol: float | None) -> list[str]:
-    """What is wrong with ``--cycles``, ``--transient`` and ``--rtol``."""
-    from ballpass.runtime.run.request import TOLERANCES
-
-    least, most = TOLERANCES
-    faults = []
-    if rtol is not None and not least <= rtol <= most:
-        faults.append(
-            f"--rtol: {rtol:g} lies outside its bounds. Allowed: {least:g} to {most:g}. Take 1e-6 where nothing speaks "
-            "for another value."
-        )
-    if cycles is not None and not 0.0 < cycles < math.inf:
-        faults.append(f"--cycles: {cycles:g} turns cannot be simulated. Allowed: a number above 0, as in --cycles 4.")
-    if transient is not None and not 0.0 <= transient < math.inf:
-        faults.append(f"--transient: {transient:g} turns cannot be left out. Allowed: a number from 0 on.")
-    return faults
 
 
 def refuse_run_setting(text: str) -> None:

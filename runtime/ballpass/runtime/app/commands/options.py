@@ -1,4 +1,4 @@
-"""Options that several commands of ``ballpass`` have, each with one name, one meaning and one help text."""
+"""Options of the command line alone that several commands have; those of questions are in `contract.options`."""
 
 from __future__ import annotations
 
@@ -17,6 +17,16 @@ SceneOrFolder = Annotated[
     typer.Argument(metavar="SCENE", help="Scene file (TOML), or a generated folder in its place.", show_default=False),
 ]
 
+#: Of questions that take a run that is done as well.
+SceneFolderOrRun = Annotated[
+    Path,
+    typer.Argument(
+        metavar="SCENE",
+        help="Scene file (TOML), or the solution.nc of a run, or what ballpass stream wrote.",
+        show_default=False,
+    ),
+]
+
 Settings = Annotated[
     list[str] | None,
     typer.Option(
@@ -26,27 +36,12 @@ Settings = Annotated[
     ),
 ]
 
-Cycles = Annotated[float | None, typer.Option(metavar="N", help="Turns of driver or shaft to simulate.")]
-
-Duration = Annotated[
-    str | None,
-    typer.Option(metavar="TIME", help='Time to simulate instead of turns: --duration "0.5 s", also at speed 0.'),
-]
-
-SampleRate = Annotated[
-    str | None,
-    typer.Option(
-        metavar="RATE", help='Samples a second instead of the scene\'s samples in a turn: --sample-rate "25.6 kHz".'
-    ),
-]
-
-#: Of commands that give numbers of the steady motion; ``ballpass run`` keeps the transient in its solution.
-Transient = Annotated[float | None, typer.Option(metavar="N", help="Turns at the start that do not count.")]
-
-Tolerance = Annotated[float | None, typer.Option(metavar="R", help="Relative tolerance of the integrator.")]
-
 ResultsFolder = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder of the results; results/<scene> if not given.")
+]
+
+ReportFolder = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder for report and figures; none are written if not given.")
 ]
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object on stdout, nothing else.")]

@@ -12,9 +12,19 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked, read_formats
-from ballpass.runtime.app.commands.shared import Stages, can_draw, command, load_model, results_folder, show, show_json
+from ballpass.runtime.app.commands.shared import (
+    Stages,
+    can_draw,
+    command,
+    load_model,
+    results_folder,
+    show,
+    show_json,
+    show_parts,
+)
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.run.tables import show_tables, simple_table
+from ballpass.runtime.report.report import ReportTable
+from ballpass.runtime.report.text import show as show_report
 
 if TYPE_CHECKING:
     from ballpass.derive.reading.recouple import Coupling
@@ -54,7 +64,6 @@ def trade(
     """Measure error against time on a scene: of methods and tolerances, or of a simpler model (--against)."""
     from ballpass.runtime.certify.simplification import measure_simplification
     from ballpass.runtime.certify.trade import MEMBERS, measure_trade
-    from ballpass.runtime.certify.trade_report import table, to_plain, words
 
     with command(scene) as stages:
         stages("read")
@@ -75,16 +84,9 @@ def trade(
         measured = measure_trade(model, of, parameters=overrides, members=count, progress=stages.fraction)
         files = _draw(measured, folder, formats, stages) if figures else []
     if json_:
-        show_json(to_plain(measured))
+        show_json(measured.to_json())
         return
-    heads, rows = table(measured, measured.quantities[0])
-    title = f"{measured.title}: {measured.quantities[0]}, what no other way beats"
-    shown = simple_table(title, heads, right=heads[:-1], wrapped=heads[-1:])
-    for row in rows:
-        shown.add_row(*row)
-    show_tables(shown)
-    for line in words(measured):
-        show(line)
+    show_report(measured.report())
     if files:
         show(f"in {folder}: {', '.join(files)}")
 
@@ -106,11 +108,8 @@ def _show_simplification(found: Simplification, *, json_: bool) -> None:
         show_json(to_plain(found))
         return
     heads, lines = rows(found)
-    shown = simple_table(f"{found.title}; other: {found.simpler_title}", heads, right=heads[2:])
-    for line in lines:
-        shown.add_row(*line)
-    show_tables(shown)
-    show(found.words)
+    title = f"{found.title}; other: {found.simpler_title}"
+    show_parts(ReportTable(title=title, heads=heads, rows=lines, right=heads[2:]), found.words)
 
 
 def read_error(text: str | None, of: list[str] | None, method: str | None, rtol: float | None) -> float | None:

@@ -1,0 +1,168 @@
+"""Options of questions and commands, each declared once: words, unit, bounds, the text that people write.
+
+A parameter with one of these types is an option of the command line; its default is in the signature.  Help texts,
+checks, docstrings and the reference page come from here.  Flags are the parameters' names with hyphens.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, get_args, get_origin
+
+#: What a number with a unit is.
+_KINDS = {"s": "time", "Hz": "frequency", "rad": "angle"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Option:
+    """What an option means and what it allows.
+
+    Attributes
+    ----------
+    words : for its help
+    example : a value, for help on the command line
+    shown : stands for the value in the help
+    flags : on the command line, the first for messages; that of the parameter's name if there is none
+    unit : of a quantity, which the command line takes as text with a unit; empty for what has none
+    least, above, most : bounds of a number
+    choices : allowed words; empty for any
+    """
+
+    words: str
+    example: str = ""
+    shown: str | None = None
+    flags: tuple[str, ...] = ()
+    unit: str = ""
+    least: float = -math.inf
+    above: float = -math.inf
+    most: float = math.inf
+    choices: tuple[str, ...] = ()
+
+    def flag(self, name: str) -> str:
+        """How the command line calls the option of a parameter."""
+        return self.flags[0] if self.flags else f"--{name.strip('_').replace('_', '-')}"
+
+    def help(self, name: str) -> str:
+        """Words for the command line."""
+        return f"{self.words.removesuffix('.')}: {self.flag(name)} {self.example}." if self.example else self.words
+
+    def fault(self, name: str, value: Any) -> str | None:
+        """What is wrong with a value: what was given, what is allowed; None where nothing is."""
+        if self.choices:
+            allowed, right = ", ".join(self.choices), value in self.choices
+            given = f"{value!r:.60} is none of the choices"
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            kind = "whole number" if isinstance(value, int) else _KINDS.get(self.unit, "number")
+            allowed = self._allowed(kind)
+            right = self.least <= value <= self.most and value > self.above and math.isfinite(value)
+            given = f"{value:g} {self.unit}".rstrip() + " lies outside its bounds"
+        else:
+            return None
+        return None if right else f"{self.flag(name)}: {given}. Allowed: {allowed}."
+
+    def _allowed(self, kind: str) -> str:
+        if self.most < math.inf:
+            return f"{self.least:g} to {self.most:g}"
+        if self.above > -math.inf:
+            return f"a {kind} above {self.above:g}"
+        return f"a {kind} from {self.least:g} on" if self.least > -math.inf else f"a finite {kind}"
+
+
+def option_of(annotation: Any) -> Option | None:
+    """The option that a type declares; None for another type."""
+    return next((item for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Option)), None)
+
+
+def options_of(function: Callable[..., Any]) -> dict[str, Any]:
+    """The parameters of a function that are options, with their types."""
+    found = {}
+    for name, annotation in function.__annotations__.items():
+        try:
+            kind = eval(annotation, function.__globals__) if isinstance(annotation, str) else annotation
+        except NameError:  # imported for the type checker alone: no option
+            continue
+        if option_of(kind) is not None:
+            found[name] = kind
+    return found
+
+
+def faults_of(function: Callable[..., Any], values: Mapping[str, Any]) -> list[str]:
+    """What is wrong with values of a function's options; None and lists are right."""
+    kinds = {name: option_of(kind) for name, kind in options_of(function).items()}
+    found = [option.fault(name, values[name]) for name, option in kinds.items() if option and name in values]
+    return [fault for fault in found if fault is not None]
+
+
+def is_of(annotation: Any, kind: type) -> bool:
+    """Whether an option takes, among others, values of a kind: `Sequence`, `tuple`."""
+    plain = get_args(annotation)[0]
+    return any(get_origin(item) is kind for item in (plain, *get_args(plain)))
+
+
+# ------------------------------------------------------------------------------------------------ how long a run takes
+
+Cycles = Annotated[float | None, Option(words="Turns of driver or shaft to simulate.", shown="N", above=0.0)]
+
+Duration = Annotated[
+    float | None,
+    Option(
+        words="Time to simulate instead of turns, also at speed 0.",
+        example='"0.5 s"',
+        shown="TIME",
+        unit="s",
+        above=0.0,
+    ),
+]
+
+#: Of questions about the steady motion; ``ballpass run`` keeps the transient in its solution.
+Transient = Annotated[float | None, Option(words="Turns at the start that do not count.", shown="N", least=0.0)]
+
+# --------------------------------------------------------------------------------------------------------- how exactly
+
+
+def _tolerance(words: str) -> Option:
+    return Option(words=words, shown="R", least=1e-13, most=1e-1)
+
+
+Rtol = Annotated[float | None, _tolerance("Relative tolerance of the integrator.")]
+
+TightRtol = Annotated[float | None, _tolerance("Tolerance of the states; tight if not given.")]
+
+SensitivityRtol = Annotated[float | None, _tolerance("Tolerance of the derivatives; tight if not given.")]
+
+StepperMethod = Annotated[str | None, Option(words="auto, or one of the stepper's.", shown="NAME")]
+
+Check = Annotated[
+    bool, Option(words="Compare each derivative with extrapolated differences.", flags=("--check/--no-check",))
+]
+
+# -------------------------------------------------------------------------------------------------------- what to keep
+
+SampleRate = Annotated[
+    float | None,
+    Option(
+        words="Samples a second instead of the scene's samples in a turn.",
+        example='"25.6 kHz"',
+        shown="RATE",
+        unit="Hz",
+    ),
+]
+
+# ------------------------------------------------------------------------------------------------------- which instant
+
+Instant = Annotated[
+    float | None, Option(words="The instant as a time.", example='"0.08 s"', shown="TIME", unit="s", flags=("--time",))
+]
+
+CrankAngle = Annotated[
+    float | None,
+    Option(
+        words="The instant as an angle of crank or shaft in the first turn.",
+        example='"240 deg"',
+        shown="ANGLE",
+        unit="rad",
+        flags=("--at-angle", "--angle"),
+    ),
+]
