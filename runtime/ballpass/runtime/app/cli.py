@@ -52,11 +52,10 @@ from ballpass.runtime.contract import read_artefact, read_manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, SampleRate
 from ballpass.runtime.contract.version import __version__
-from ballpass.runtime.questions import Questions
-from ballpass.runtime.questions.question import questions_of
+from ballpass.runtime.questions import QUESTIONS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.locating import Kinks
@@ -341,14 +340,11 @@ def export(
     typer.echo(str(target))
 
 
-_listed: dict[str, list[Callable[..., None]]] = {
-    DESCRIBE: [bearings, explain],
-    SIMULATE: [animate, dataset, stream, sweep],
-    ASK: [*map(question_command, questions_of(Questions)), trade],
-}
-for _panel, _commands in _listed.items():
+for _panel, _commands in {DESCRIBE: (bearings, explain), SIMULATE: (animate, dataset, stream, sweep)}.items():
     for _command in _commands:
         app.command(rich_help_panel=_panel)(as_command(_command))
+for _question in (*QUESTIONS, trade):
+    app.command(rich_help_panel=ASK)(question_command(_question))
 
 
 def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:

@@ -173,17 +173,21 @@ class SensitivityReport(Reported):
 
     def _report(self) -> Report:
         numbers = ("quantity", "parameter", "value", "parameter_value", "derivative", "unit", "dimensionless")
-        records = [
-            {
-                **{name: getattr(pair, name) for name in (*numbers, "uncertainty")},
-                "verdict": pair.check.verdict.value,
-            }
-            for pair in self.pairs
-        ]
+        common = [{name: getattr(pair, name) for name in (*numbers, "uncertainty")} for pair in self.pairs]
+        pairs = list(zip(self.pairs, common, strict=True))
         return Report(
             parts=[*(_table(self, quantity) for quantity in self.quantities), *_remarks(self)],
-            facts=self._facts(),
-            records=records,
+            facts={
+                "scene": self.scene,
+                "settings": dict(self.settings),
+                "verdicts": {verdict.value: count for verdict, count in self.verdicts.items()},
+                "quantities": [asdict(item) for item in self.quantities],
+                "sensitivities": [known | _facts(pair) for pair, known in pairs],
+                "grazing": [
+                    {name: value for name, value in asdict(item).items() if name != "bearing"} for item in self.grazing
+                ],
+            },
+            records=[known | {"verdict": pair.check.verdict.value} for pair, known in pairs],
             index=("quantity", "parameter"),
             fault=self._fault(),
         )
@@ -199,52 +203,28 @@ class SensitivityReport(Reported):
             "Do not rely on them; take a tighter --rtol and --sensitivity-rtol, or fewer turns."
         )
 
-    def _facts(self) -> dict[str, Any]:
-        return {
-            "scene": self.scene,
-            "settings": dict(self.settings),
-            "verdicts": {verdict.value: count for verdict, count in self.verdicts.items()},
-            "quantities": [asdict(item) for item in self.quantities],
-            "sensitivities": [
-                {
-                    "quantity": pair.quantity,
-                    "parameter": pair.parameter,
-                    "value": pair.value,
-                    "parameter_value": pair.parameter_value,
-                    "derivative": pair.derivative,
-                    "unit": pair.unit,
-                    "dimensionless": pair.dimensionless,
-                    "parameter_scale": pair.scale,
-                    "change_per_scale": pair.change,
-                    "uncertainty": pair.uncertainty,
-                    "route": pair.route,
-                    "by_steps": pair.by_steps,
-                    "certificate": {
-                        "route": pair.check.route,
-                        "value": pair.check.value,
-                        "uncertainty": pair.check.uncertainty,
-                        "disagreement": pair.check.disagreement,
-                        "verdict": pair.check.verdict.value,
-                        "nothing": pair.is_nothing,
-                        "within_bound_only": pair.check.bounded,
-                        "bound": pair.check.quantum,
-                        "reason": pair.check.reason,
-                        "slopes_at_kink": pair.check.sides,
-                    },
-                }
-                for pair in self.pairs
-            ],
-            "grazing": [
-                {
-                    "ball": item.ball,
-                    "time": item.time,
-                    "crank_angle": item.crank_angle,
-                    "depth": item.depth,
-                    "kink": item.kink,
-                }
-                for item in self.grazing
-            ],
-        }
+
+def _facts(pair: Sensitivity) -> dict[str, Any]:
+    """What the JSON has of a pair beside its numbers."""
+    check = pair.check
+    return {
+        "parameter_scale": pair.scale,
+        "change_per_scale": pair.change,
+        "route": pair.route,
+        "by_steps": pair.by_steps,
+        "certificate": {
+            "route": check.route,
+            "value": check.value,
+            "uncertainty": check.uncertainty,
+            "disagreement": check.disagreement,
+            "verdict": check.verdict.value,
+            "nothing": pair.is_nothing,
+            "within_bound_only": check.bounded,
+            "bound": check.quantum,
+            "reason": check.reason,
+            "slopes_at_kink": check.sides,
+        },
+    }
 
 
 def ratio_unit(above: str, below: str) -> str:

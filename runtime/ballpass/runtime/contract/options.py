@@ -7,7 +7,7 @@ checks, docstrings and the reference page come from here.  Flags are the paramet
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, get_args, get_origin
 
@@ -50,7 +50,7 @@ class Option:
 
     def fault(self, name: str, value: Any) -> str | None:
         """What is wrong with a value: what was given, what is allowed; None where nothing is."""
-        if self.choices:
+        if self.choices and value is not None:
             allowed, right = ", ".join(self.choices), value in self.choices
             given = f"{value!r:.60} is none of the choices"
         elif isinstance(value, int | float) and not isinstance(value, bool):
@@ -70,35 +70,23 @@ class Option:
         return f"a {kind} from {self.least:g} on" if self.least > -math.inf else f"a finite {kind}"
 
 
-def option_of(annotation: Any) -> Option | None:
-    """The option that a type declares; None for another type."""
-    return next((item for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Option)), None)
-
-
-def options_of(function: Callable[..., Any]) -> dict[str, Any]:
-    """The parameters of a function that are options, with their types."""
+def options_of(function: Callable[..., Any]) -> dict[str, tuple[Any, Option]]:
+    """The parameters of a function that are options: the type of each, and what it means."""
     found = {}
     for name, annotation in function.__annotations__.items():
         try:
             kind = eval(annotation, function.__globals__) if isinstance(annotation, str) else annotation
         except NameError:  # imported for the type checker alone: no option
             continue
-        if option_of(kind) is not None:
-            found[name] = kind
+        option = next((item for item in getattr(kind, "__metadata__", ()) if isinstance(item, Option)), None)
+        if option is not None:
+            found[name] = get_args(kind)[0], option
     return found
 
 
-def faults_of(function: Callable[..., Any], values: Mapping[str, Any]) -> list[str]:
-    """What is wrong with values of a function's options; None and lists are right."""
-    kinds = {name: option_of(kind) for name, kind in options_of(function).items()}
-    found = [option.fault(name, values[name]) for name, option in kinds.items() if option and name in values]
-    return [fault for fault in found if fault is not None]
-
-
-def is_of(annotation: Any, kind: type) -> bool:
-    """Whether an option takes, among others, values of a kind: `Sequence`, `tuple`."""
-    plain = get_args(annotation)[0]
-    return any(get_origin(item) is kind for item in (plain, *get_args(plain)))
+def is_of(kind: Any, container: type) -> bool:
+    """Whether a type is, or may be, one of `Sequence`, `tuple`."""
+    return any(get_origin(item) is container for item in (kind, *get_args(kind)))
 
 
 # ------------------------------------------------------------------------------------------------ how long a run takes

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
+from typing import Any
+
 from ballpass.runtime.questions.jacobian import checked_jacobian
 from ballpass.runtime.questions.life import life
 from ballpass.runtime.questions.linearize import linearize
@@ -17,3 +21,7 @@ class Questions:
     linearize = linearize
     sensitivity = sensitivity
     spectrum = spectrum
+
+
+#: The same, as a list.
+QUESTIONS: list[Callable[..., Any]] = [item for item in vars(Questions).values() if inspect.isfunction(item)]

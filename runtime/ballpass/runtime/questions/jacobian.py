@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Check, CrankAngle, Instant, Option
 from ballpass.runtime.point.run_start import run_numbers
-from ballpass.runtime.questions.question import question
+from ballpass.runtime.questions.question import Question
 from ballpass.runtime.report.report import Report, ReportTable
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def _report(result: CheckedJacobian) -> Report:
     )
 
 
-@question(name="jacobian", report=_report, stage="differentiate", runs=False)
+@Question(name="jacobian", report=_report, stage="differentiate", runs=False)
 def checked_jacobian(
     model: PointModel,
     of: Of,

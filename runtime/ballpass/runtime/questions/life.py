@@ -10,7 +10,7 @@ import numpy as np
 
 from ballpass.runtime.contract.options import Cycles, Rtol, StepperMethod, Transient
 from ballpass.runtime.point.run_start import Initial, run_numbers, start_of
-from ballpass.runtime.questions.question import AnyModel, question
+from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.show.progress import Progress, shown
 
@@ -45,7 +45,7 @@ def life_figures(model: AnyModel, report: LifeReport, parameters: Mapping[str, f
             yield f"pressure{ending}", _pressure(model, info, bearing, numbers, title)
 
 
-@question(figures=life_figures)
+@Question(figures=life_figures)
 def life(
     model: PointModel,
     cycles: Cycles = None,

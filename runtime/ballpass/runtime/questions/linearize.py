@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ballpass.runtime.contract.options import CrankAngle, Instant
-from ballpass.runtime.questions.question import question
+from ballpass.runtime.questions.question import Question
 
 if TYPE_CHECKING:
     from ballpass.runtime.point.linearize import Linearization
     from ballpass.runtime.point.point_model import PointModel
 
 
-@question(stage="linearize", runs=False)
+@Question(stage="linearize", runs=False)
 def linearize(
     model: PointModel,
     t: Instant = None,

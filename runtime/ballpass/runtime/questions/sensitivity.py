@@ -16,7 +16,7 @@ from ballpass.runtime.contract.options import (
     Transient,
 )
 from ballpass.runtime.point.run_start import run_numbers
-from ballpass.runtime.questions.question import question
+from ballpass.runtime.questions.question import Question
 from ballpass.runtime.show.progress import shown_steps
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def _figures(_model: Any, report: SensitivityReport, _parameters: Any) -> Iterat
     return tornados(report)
 
 
-@question(stage="differentiate", figures=_figures)
+@Question(stage="differentiate", figures=_figures)
 def sensitivity(
     model: PointModel,
     of: Of = None,

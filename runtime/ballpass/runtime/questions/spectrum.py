@@ -11,9 +11,10 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, SampleRate, Transient
-from ballpass.runtime.questions.question import AnyModel, question
+from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.show.progress import Progress
 from ballpass.runtime.show.short import ShortRepr
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.ask.characteristic import CharacteristicLine
     from ballpass.runtime.ask.vibration import DiagnosisStatistics
-    from ballpass.runtime.run.solution import Solution
 
 #: Samples a segment of the spectrogram of a run-up has of the whole, at most.
 SEGMENTS = 40
@@ -186,67 +186,7 @@ def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Itera
     yield "spectrum", figure
 
 
-def spectrum_of_run(
-    solution: Solution,
-    of: Of,
-    *,
-    envelope: Band = None,
-    orders: Orders = False,
-    spectrogram: AsMap = False,
-    window: Window = "hann",
-    scaling: Scaling = "amplitude",
-    top: Top = 10,
-    transient: Transient = None,
-) -> SignalSpectrum:
-    """The same of a run that is done; see `spectrum`."""
-    from ballpass.runtime.ask.characteristic import characteristic_lines
-    from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
-    from ballpass.runtime.ask.vibration import diagnosis, order_spectrum
-    from ballpass.runtime.ask.vibration import envelope as envelope_of
-
-    if transient is not None:
-        solution = replace(solution, transient_cycles=transient)
-    changing = solution.period is None and solution.cycle_length is not None
-    solution = solution.steady()
-    signal = solution[of]
-    if signal.ndim != 1:
-        raise RequestError(f"--of: {of} has one value for each ball. Allowed: an output with one value, as inner.ax.")
-    values = signal if envelope is None else envelope_of(solution.t, signal, envelope)
-    unit = next((i.unit for i in (*solution.manifest.outputs, *solution.manifest.states) if i.name == of), "")
-    height_unit = unit
-    if orders or scaling == "amplitude":
-        if orders:
-            lines = order_spectrum(_angle(solution), values, window=window)
-        else:
-            lines = amplitude_spectrum(solution.t, values, window=window)
-        position, height, resolution = lines.frequency, lines.amplitude, lines.resolution
-    else:
-        kind: Literal["spectrum", "density"] = "spectrum" if scaling == "power" else "density"
-        power = power_spectrum(solution.t, values, window=window, scaling=kind)
-        position, height, resolution = power.frequency, power.power, power.resolution
-        height_unit = f"({unit})^2" + ("/Hz" if scaling == "density" else "")
-    numbers = {**solution.parameters, **solution.constants}
-    marks = () if changing and not orders else characteristic_lines(solution.manifest, numbers, orders=orders)
-    return SignalSpectrum(
-        of=of,
-        unit=unit,
-        envelope=envelope,
-        orders=orders,
-        spectrogram=spectrogram,
-        window=window,
-        scaling=scaling,
-        position=position,
-        height=height,
-        height_unit=height_unit,
-        resolution=resolution,
-        highest=_peaks(height, top),
-        marks=marks,
-        statistics=diagnosis(signal),
-        solution=solution,
-    )
-
-
-@question(stage="spectrum", check=_check, figures=_figures, files="always", of_run=spectrum_of_run)
+@Question(stage="spectrum", check=_check, figures=_figures, always=True, takes_runs=True)
 def spectrum(
     model: AnyModel,
     of: Of,
@@ -284,26 +224,66 @@ def spectrum(
     >>> model.spectrum("drive_torque", cycles=12, transient=2, orders=True, top=1).names
     ('shaft',)
     """
-    states = [info.name for info in model.manifest.states]
-    solution = model.simulate(
-        cycles=cycles,
-        duration=duration,
-        transient=transient,
-        parameters=parameters,
-        rtol=rtol,
-        sample_rate=sample_rate,
-        outputs=[] if of in states and of not in model.outputs else [of],
-        progress=progress,
-    )
-    return spectrum_of_run(
-        solution,
-        of,
+    from ballpass.runtime.ask.characteristic import characteristic_lines
+    from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
+    from ballpass.runtime.ask.vibration import diagnosis, order_spectrum
+    from ballpass.runtime.ask.vibration import envelope as envelope_of
+
+    if isinstance(model, Solution):
+        if any(item is not None for item in (sample_rate, cycles, duration, rtol, parameters or None)):
+            raise RequestError(
+                "This is a run that is done: options of a simulation have no place. Allowed: --of, --envelope, --orders, "
+                "--spectrogram, --window, --scaling, --top, --transient."
+            )
+        run = model if transient is None else replace(model, transient_cycles=transient)
+    else:
+        states = [info.name for info in model.manifest.states]
+        run = model.simulate(
+            cycles=cycles,
+            duration=duration,
+            transient=transient,
+            parameters=parameters,
+            rtol=rtol,
+            sample_rate=sample_rate,
+            outputs=[] if of in states and of not in model.outputs else [of],
+            progress=progress,
+        )
+    solution = run.steady()
+    signal = solution[of]
+    if signal.ndim != 1:
+        raise RequestError(f"--of: {of} has one value for each ball. Allowed: an output with one value, as inner.ax.")
+    values = signal if envelope is None else envelope_of(solution.t, signal, envelope)
+    unit = next((i.unit for i in (*solution.manifest.outputs, *solution.manifest.states) if i.name == of), "")
+    if orders or scaling == "amplitude":
+        if orders:
+            lines = order_spectrum(_angle(solution), values, window=window)
+        else:
+            lines = amplitude_spectrum(solution.t, values, window=window)
+        position, height, resolution = lines.frequency, lines.amplitude, lines.resolution
+        height_unit = unit
+    else:
+        kind: Literal["spectrum", "density"] = "spectrum" if scaling == "power" else "density"
+        power = power_spectrum(solution.t, values, window=window, scaling=kind)
+        position, height, resolution = power.frequency, power.power, power.resolution
+        height_unit = f"({unit})^2" + ("/Hz" if scaling == "density" else "")
+    numbers = {**solution.parameters, **solution.constants}
+    changing = run.period is None and run.cycle_length is not None
+    return SignalSpectrum(
+        of=of,
+        unit=unit,
         envelope=envelope,
         orders=orders,
         spectrogram=spectrogram,
         window=window,
         scaling=scaling,
-        top=top,
+        position=position,
+        height=height,
+        height_unit=height_unit,
+        resolution=resolution,
+        highest=_peaks(height, top),
+        marks=() if changing and not orders else characteristic_lines(solution.manifest, numbers, orders=orders),
+        statistics=diagnosis(signal),
+        solution=solution,
     )
 
 

@@ -10,7 +10,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any
 
 import typer
 
@@ -29,8 +29,8 @@ from ballpass.runtime.app.commands.shared import (
     warn,
 )
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.options import Option, faults_of, is_of, option_of, options_of
-from ballpass.runtime.questions.question import Question, summary_of
+from ballpass.runtime.contract.options import Option, is_of, options_of
+from ballpass.runtime.questions.question import Question, declared, summary_of
 from ballpass.runtime.report.plain import json_text, to_plain
 from ballpass.runtime.report.text import show as show_report
 
@@ -38,82 +38,73 @@ from ballpass.runtime.report.text import show as show_report
 def as_command(function: Callable[..., None]) -> Callable[..., None]:
     """The command of a function; typer's own options among its parameters stay as they are."""
     kinds = options_of(function)
-    parameters = [
-        item.replace(annotation=_typer_type(item.name, kinds[item.name], item.default)) if item.name in kinds else item
-        for item in inspect.signature(function, eval_str=True).parameters.values()
-    ]
 
     def call(**given: Any) -> None:
         with command(given.get("scene")):
-            values = read_options(function, given)
+            values = _read(kinds, given)
         function(**{**given, **values})
 
-    return _typed(call, function.__name__, function.__doc__ or "", parameters)
+    return _with_signature(
+        call,
+        function.__name__,
+        function.__doc__ or "",
+        [
+            _typer_option(item, *kinds[item.name]) if item.name in kinds else item
+            for item in inspect.signature(function, eval_str=True).parameters.values()
+        ],
+    )
 
 
-def question_command(question: Question) -> Callable[..., None]:
+def question_command(ask: Callable[..., Any]) -> Callable[..., None]:
     """The command of a question: a scene, the question's options, and what becomes of the report."""
-    defaults = inspect.signature(question.ask).parameters
-    own = [
-        _parameter(name, _typer_type(name, kind, defaults[name].default), defaults[name].default)
-        for name, kind in options_of(question.ask).items()
-    ]
-    files: list[inspect.Parameter] = []
-    if question.figures is not None:
-        files = [_parameter("format_", options.FigureFormats, None)]
-        if question.files == "always":
-            files += [_parameter("out", options.ResultsFolder, None), _parameter("figures", options.Figures, True)]
-        else:
-            files += [_parameter("out", options.ReportFolder, None)]
-    source = options.SceneFolderOrRun if question.of_run is not None else options.SceneOrFolder
+    question, kinds = declared(ask), options_of(ask)
+    own = inspect.signature(ask, eval_str=False).parameters
     parameters = [
-        _parameter("scene", source, inspect.Parameter.empty),
-        *own,
+        _parameter("scene", options.SceneFolderOrRun if question.takes_runs else options.SceneOrFolder),
+        *(own[name].replace(annotation=Annotated[kind]) for name, kind in kinds.items()),
         _parameter("set_", options.Settings, None),
-        *files,
         _parameter("json_", options.Json, False),
     ]
+    if question.figures is not None:
+        parameters.append(_parameter("out", options.ResultsFolder if question.always else options.ReportFolder, None))
+        parameters.append(_parameter("format_", options.FigureFormats, None))
+    if question.always:
+        parameters.append(_parameter("figures", options.Figures, True))
 
     def call(**given: Any) -> None:
-        _ask(question, **given)
+        values = {name: given.pop(name) for name in kinds}
+        _ask(ask, question, values, **given)
 
-    return _typed(call, question.name, summary_of(question.ask), parameters)
+    return as_command(_with_signature(call, question.name, summary_of(ask), parameters))
 
 
-def read_options(function: Callable[..., Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of a function's options from the texts of the command line.
+def _read(kinds: Mapping[str, tuple[Any, Option]], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of options from the texts of the command line.
 
     Raises
     ------
     RequestError
-        Texts that are no quantities, values out of their bounds, or both ways to say how long a run is.
+        Texts that are no quantities, values out of their bounds, or two ways to say one thing.
     """
     values: dict[str, Any] = {}
-    for name, kind in options_of(function).items():
-        option, text = option_of(kind), given[name]
-        assert option is not None
+    for name, (kind, option) in kinds.items():
+        text, flag = given[name], option.flag(name)
         if text is None or not option.unit:
             values[name] = (text or None) if is_of(kind, Sequence) else text
         elif is_of(kind, tuple):
-            values[name] = _band(option.flag(name), text, option)
+            values[name] = _band(flag, text, option)
         else:
-            value = read_value(option.flag(name), text, option.unit)
+            value = read_value(flag, text, option.unit)
             # the unit was written out, so that many turns are meant as such
             values[name] = math.fmod(value, math.tau) if option.unit == "rad" else value
-    for one, other in (("cycles", "duration"), ("crank_angle", "t")):
-        if values.get(one) is not None and values.get(other) is not None:
-            flags = " and ".join(_flag(function, name) for name in (one, other))
+    for pair in (("cycles", "duration"), ("crank_angle", "t")):
+        if all(values.get(name) is not None for name in pair):
+            flags = " and ".join(kinds[name][1].flag(name) for name in pair)
             raise RequestError(f"{flags} were both given. Allowed: one of them. Leave one away.")
-    faults = faults_of(function, values)
-    if faults:
-        raise RequestError("\n".join(faults))
+    faults = [option.fault(name, values[name]) for name, (_, option) in kinds.items()]
+    if any(faults):
+        raise RequestError("\n".join(filter(None, faults)))
     return values
-
-
-def _flag(function: Callable[..., Any], name: str) -> str:
-    option = option_of(options_of(function)[name])
-    assert option is not None
-    return option.flag(name)
 
 
 def _band(flag: str, text: str, option: Option) -> tuple[float, float]:
@@ -129,35 +120,36 @@ def _band(flag: str, text: str, option: Option) -> tuple[float, float]:
     return low, high
 
 
-def _typer_type(name: str, kind: Any, default: Any) -> Any:
-    option = option_of(kind)
-    assert option is not None
-    plain = get_args(kind)[0]
+def _typer_option(parameter: inspect.Parameter, kind: Any, option: Option) -> inspect.Parameter:
+    """The parameter as typer takes it: quantities are texts, and what may be repeated is a list."""
+    required = parameter.default is inspect.Parameter.empty
     if is_of(kind, Sequence):
-        plain = list[str] if default is inspect.Parameter.empty else list[str] | None
+        kind = list[str] if required else list[str] | None
     elif option.unit:
-        plain = str if default is inspect.Parameter.empty else str | None
-    info = typer.Option(*(option.flags or (option.flag(name),)), metavar=option.shown, help=option.help(name))
-    return Annotated[plain, info]
+        kind = str if required else str | None
+    flags = option.flags or (option.flag(parameter.name),)
+    info = typer.Option(*flags, metavar=option.shown, help=option.help(parameter.name))
+    return parameter.replace(annotation=Annotated[kind, info])
 
 
-def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
+def _parameter(name: str, annotation: Any, default: Any = inspect.Parameter.empty) -> inspect.Parameter:
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default)
 
 
-def _typed(
+def _with_signature(
     call: Callable[..., None], name: str, words: str, parameters: Sequence[inspect.Parameter]
 ) -> Callable[..., None]:
-    """A function with a signature that is found when the program runs."""
     call.__name__, call.__doc__ = name, words
-    signature = inspect.Signature([item.replace(kind=inspect.Parameter.KEYWORD_ONLY) for item in parameters])
-    call.__signature__ = signature  # type: ignore[attr-defined]
+    keywords = [item.replace(kind=inspect.Parameter.KEYWORD_ONLY) for item in parameters]
+    call.__signature__ = inspect.Signature(keywords)  # type: ignore[attr-defined]
     call.__annotations__ = {item.name: item.annotation for item in parameters}
     return call
 
 
 def _ask(
+    ask: Callable[..., Any],
     question: Question,
+    values: dict[str, Any],
     *,
     scene: Path,
     set_: list[str] | None,
@@ -165,32 +157,25 @@ def _ask(
     out: Path | None = None,
     figures: bool = True,
     format_: list[str] | None = None,
-    **given: Any,
 ) -> None:
     """Ask, write and print."""
     with command(scene) as stages:
-        values = read_options(question.ask, given)
         if question.check is not None:
             question.check(values)
         folder, formats = _place(question, scene, out, format_, figures=figures)
-        model, overrides = None, {}
-        if question.of_run is not None and scene.suffix == ".nc":
-            answer = _answer_of_run(question.of_run, scene, set_, values, stages, question.stage)
-        else:
-            stages("read")
-            asked = read_asked(scene, set_, values.get("duration"), values.get("transient"))
-            overrides = asked.overrides
-            method = (values.get("method") or asked.run.method) if question.runs else "none"
-            model = load_model(scene, stages, method, None, values.get("rtol"), overrides=overrides)
-            stages(question.stage)
-            if "progress" in inspect.signature(question.ask).parameters:
-                values["progress"] = _progress(stages)
-            answer = question.ask(model, **values, parameters=overrides)
+        stages("read")
+        model, overrides = _source(question, scene, set_, values, stages)
+        stages(question.stage)
+        if "progress" in ask.__annotations__:
+            values["progress"] = _progress(stages)
+        if "scene" in ask.__annotations__:
+            values["scene"] = scene
+        answer = ask(model, **values, parameters=overrides)
         report = question.report(answer)
         written: list[Path] = []
         if folder is not None:
-            folder.mkdir(parents=True, exist_ok=True)
-            if question.files == "where asked":
+            if not question.always:
+                folder.mkdir(parents=True, exist_ok=True)
                 written = [folder / f"{question.name}.json"]
                 written[0].write_text(json_text(to_plain(report)), encoding="utf-8")
             if formats and question.figures is not None:
@@ -218,37 +203,29 @@ def _place(
 ) -> tuple[Path | None, tuple[str, ...]]:
     """Folder of the files, None where none are written, and formats of the figures."""
     formats = read_formats(format_)
-    always = question.files == "always"
-    folder = Path("results") / name_of(scene) if out is None and always else out
+    folder = Path("results") / name_of(scene) if out is None and question.always else out
     if folder is None or not figures or not can_draw():
         formats = ()
-    if folder is None or (always and not formats):
+    if folder is None or (question.always and not formats):
         return None, ()
     check_folder(folder)
     return folder, formats
 
 
-def _answer_of_run(
-    ask: Callable[..., Any],
-    file: Path,
-    set_: list[str] | None,
-    values: Mapping[str, Any],
-    stages: Stages,
-    stage: str,
-) -> Any:
-    """The answer of a run in a file; options of a simulation are refused."""
-    from ballpass.runtime.run.solution_file import load_solution
+def _source(
+    question: Question, scene: Path, set_: list[str] | None, values: Mapping[str, Any], stages: Stages
+) -> tuple[Any, dict[str, float]]:
+    """What is asked, the scene's model or the run in a file, and numbers of ``--set``."""
+    if question.takes_runs and scene.suffix == ".nc":
+        from ballpass.runtime.run.solution_file import load_solution
 
-    kinds = options_of(ask)
-    if set_ or any(value is not None for name, value in values.items() if name not in kinds):
-        raise RequestError(
-            f"{file} holds a run that is done: options of a simulation have no place. Allowed: "
-            f"{', '.join(_flag(ask, name) for name in kinds)}."
-        )
-    stages("read")
-    solution = load_solution(file)
-    stages(stage)
-    return ask(solution, **{name: values[name] for name in kinds})
+        if set_:
+            raise RequestError(f"--set: {scene} holds a run that is done. Allowed: a scene. Leave --set away.")
+        return load_solution(scene), {}
+    asked = read_asked(scene, set_, values.get("duration"), values.get("transient"))
+    method = (values.get("method") or asked.run.method) if question.runs else "none"
+    model = load_model(scene, stages, method, None, values.get("rtol"), overrides=asked.overrides)
+    return model, asked.overrides
 
 
 def _progress(stages: Stages) -> Callable[..., None]:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_with_settings
 from ballpass.runtime.app.commands.shared import command, load_model, show_json
-from ballpass.runtime.contract.json_text import finite
-from ballpass.runtime.contract.smoothness import WORDS
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.text import show as show_report
 
@@ -53,7 +49,7 @@ def explain(scene: options.SceneFile, set_: options.Settings = None, json_: opti
     if json_:
         show_json(report)
     else:
-        show_report(_render(report))
+        show_report(_render(report, said))
 
 
 def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest: Manifest) -> dict[str, Any]:
@@ -89,21 +85,9 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
         "file": str(path),
         "modelled": parts,
         "not_modelled": [*_absent(scene), *_NEVER, *_of_drive(scene)],
-        "states": list(said.states),
-        "outputs": list(said.outputs),
         "functions": {f.name: {"operations": f.operations, "what": f.description} for f in manifest.functions},
         "step": _step(kernels, scene.bearings),
-        "breakpoints": [
-            {"time": b.time, "angle_deg": math.degrees(b.angle), "cause": b.cause} for b in said.breakpoints
-        ],
-        "turn": finite(said.turn),
-        "smoothness": [{"law": law, "is": kind, "words": WORDS[kind]} for law, kind in said.smoothness],
-        "time_scales": [
-            asdict(s) | {"angle_deg": math.degrees(s.angle), "stiffness": finite(s.stiffness)} for s in said.scales
-        ],
-        "without_equilibrium": list(said.unsupported),
-        "method": {"auto": said.method, "reason": said.reason},
-        "warnings": list(said.unusual),
+        **said.to_json(),
     }
 
 
@@ -167,7 +151,7 @@ def _absent(scene: Scene) -> list[str]:
     return out
 
 
-def _render(report: dict[str, Any]) -> Report:
+def _render(report: dict[str, Any], said: Explanation) -> Report:
     parts: list[Words | ReportTable] = ["", _modelled(report), "", Marked("Not modelled", "head")]
     parts += [f"  - {text}" for text in report["not_modelled"]]
     parts += ["", Marked("States", "head", f" {', '.join(report['states']) or 'none'}"), "", _functions(report)]
@@ -175,15 +159,7 @@ def _render(report: dict[str, Any]) -> Report:
         shares = ", ".join(f"{name} {count}" for name, count in report["step"].items() if name != "all")
         words = f" {report['step']['all']} operations: {shares}"
         parts += ["", Marked("One evaluation in the stepper", "head", words)]
-    where = "; ".join(f"{b['angle_deg']:.4g}° {b['cause']}" for b in report["breakpoints"]) or "none"
-    parts += ["", Marked("Breakpoints of the first turn", "head", f" {where}")]
-    laws = "; ".join(f"{entry['law']}: {entry['words']}" for entry in report["smoothness"]) or "no contact laws"
-    parts.append(Marked("Smoothness", "head", f" {laws}"))
-    if report["time_scales"]:
-        parts += ["", _scales(report)]
-    parts += [f"no equilibrium at {text}" for text in report["without_equilibrium"]]
-    parts += ["", Marked("Method", "head", f" auto takes {report['method']['auto']}: {report['method']['reason']}")]
-    parts += [Marked("unusual", "doubt", f" {text}") for text in report["warnings"]]
+    parts += ["", *said.report().parts]
     return Report(title=report["title"], parts=parts)
 
 
@@ -222,27 +198,4 @@ def _functions(report: dict[str, Any]) -> ReportTable:
         rows=rows,
         right=("operations",),
         wrapped=("what",),
-    )
-
-
-def _scales(report: dict[str, Any]) -> ReportTable:
-    angle = "crank angle" if report["mechanism"] else "shaft angle"
-    right = (angle, "fastest decay", "fastest frequency f", "slowest rate", "decay / (2π f)")
-    rows = [
-        (
-            entry["name"],
-            f"{entry['angle_deg']:.0f}°",
-            f"{entry['decay']:.3g} 1/s",
-            f"{entry['frequency'] / math.tau:.3g} Hz",
-            f"{entry['slowest']:.3g} 1/s",
-            "" if entry["stiffness"] is None else f"{entry['stiffness']:.2g}",
-        )
-        for entry in report["time_scales"]
-    ]
-    return ReportTable(
-        title="Time scales of small motions",
-        heads=("at", *right),
-        rows=rows,
-        right=right,
-        caption="decay / (2π f): of a single mode, up to 1, its damping ratio; above 3 decay bounds explicit steps",
     )
