@@ -69,7 +69,7 @@ class LifeReport(Reported):
                 "bearing": bearing.name,
                 "reading": reading,
                 "life": turns,
-                "hours": bearing.hours(turns),
+                "hours": bearing.hours(turns) if reading else math.nan,  # the rings may stand still
                 "governs": reading != "" and reading == bearing.governing,
                 "peak_force": bearing.peak_force,
                 "static_safety": bearing.static_safety,

@@ -232,8 +232,8 @@ def spectrum(
     if isinstance(model, Solution):
         if any(item is not None for item in (sample_rate, cycles, duration, rtol, parameters or None)):
             raise RequestError(
-                "This is a run that is done: options of a simulation have no place. Allowed: --of, --envelope, --orders, "
-                "--spectrogram, --window, --scaling, --top, --transient."
+                "This is a run that is done: options of a simulation have no place. Allowed: --of, --envelope, "
+                "--orders, --spectrogram, --window, --scaling, --top, --transient."
             )
         run = model if transient is None else replace(model, transient_cycles=transient)
     else:
