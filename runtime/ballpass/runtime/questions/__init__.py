@@ -11,6 +11,7 @@ from ballpass.runtime.questions.life import life
 from ballpass.runtime.questions.linearize import linearize
 from ballpass.runtime.questions.sensitivity import sensitivity
 from ballpass.runtime.questions.spectrum import spectrum
+from ballpass.runtime.questions.steady import steady
 
 
 class Questions:
@@ -21,6 +22,7 @@ class Questions:
     linearize = linearize
     sensitivity = sensitivity
     spectrum = spectrum
+    steady = steady
 
 
 #: The same, as a list.
