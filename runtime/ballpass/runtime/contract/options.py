@@ -46,7 +46,7 @@ class Option:
 
     def help(self, name: str) -> str:
         """Words for the command line."""
-        return f"{self.words.removesuffix('.')}: {self.flag(name)} {self.example}." if self.example else self.words
+        return f"{self.words.removesuffix('.')}: `{self.flag(name)} {self.example}`." if self.example else self.words
 
     def fault(self, name: str, value: Any) -> str | None:
         """What is wrong with a value: what was given, what is allowed; None where nothing is."""
@@ -120,7 +120,7 @@ TightRtol = Annotated[float | None, _tolerance("Tolerance of the states; tight i
 
 SensitivityRtol = Annotated[float | None, _tolerance("Tolerance of the derivatives; tight if not given.")]
 
-StepperMethod = Annotated[str | None, Option(words="auto, or one of the stepper's.", shown="NAME")]
+StepperMethod = Annotated[str | None, Option(words="`auto`, or one of the stepper's.", shown="NAME")]
 
 Check = Annotated[
     bool, Option(words="Compare each derivative with extrapolated differences.", flags=("--check/--no-check",))
@@ -141,7 +141,14 @@ SampleRate = Annotated[
 # ------------------------------------------------------------------------------------------------------- which instant
 
 Instant = Annotated[
-    float | None, Option(words="The instant as a time.", example='"0.08 s"', shown="TIME", unit="s", flags=("--time",))
+    float | None,
+    Option(
+        words="The instant as a time; the start if none is given.",
+        example='"0.08 s"',
+        shown="TIME",
+        unit="s",
+        flags=("--time",),
+    ),
 ]
 
 CrankAngle = Annotated[

@@ -17,16 +17,18 @@ if TYPE_CHECKING:
 
 Of = Annotated[
     str | Sequence[str],
-    Option(words='What to differentiate: rhs, a quantity, a pattern as "reaction.A.*". May be repeated.'),
+    Option(
+        words='What to differentiate: `rhs`, a quantity (also one that `run.outputs` does not name), a pattern as `"reaction.A.*"`. May be repeated.'
+    ),
 ]
 Wrt = Annotated[
     str | Sequence[str],
-    Option(words="By what: states, a state, time, crank_angle, a number of the scene. May be repeated."),
+    Option(words="By what: `states`, a state, `time`, `crank_angle`, a number of the scene. May be repeated."),
 ]
 State = Annotated[
     str,
     Option(
-        words="Where the rings are: equilibrium (static, under the load of that instant) or initial.",
+        words="Where the rings are: `equilibrium` (static, under the load of that instant) or `initial`.",
         choices=("equilibrium", "initial"),
     ),
 ]

@@ -28,21 +28,21 @@ if TYPE_CHECKING:
 Of = Annotated[
     str | Sequence[str] | None,
     Option(
-        words="Quantity: max:ball.force (or peak_ball_force), rms:inner.y, value:inner.y@240deg, "
-        "amplitude:inner.y@bpfo, drive_work, static_deflection@240deg ... May be repeated. Peak ball force and motion "
-        "of the rings if none is given.",
+        words="Quantity: `max:ball.force` (or `peak_ball_force`); `min:`, `mean:`, `integral:`, `rms:`, `range:` and an "
+        "output; `value:inner.y@240deg`, `amplitude:inner.y@bpfo`, `drive_work`, `static_deflection`, "
+        "`static_peak_ball_force`. May be repeated. Peak ball force and motion of the rings if none is given.",
         shown="Q",
     ),
 ]
 Wrt = Annotated[
     str | Sequence[str] | None,
     Option(
-        words='Parameter by its path in the scene, or a pattern, as "bearing.*". May be repeated. All if none is '
+        words='Parameter by its path in the scene, or a pattern, as `"bearing.*"`. May be repeated. All if none is '
         "given.",
         shown="P",
     ),
 ]
-Method = Annotated[str, Option(words="Of the derivatives: auto, or a stepper's name.", shown="NAME")]
+Method = Annotated[str, Option(words="Of the derivatives: `auto`, or a stepper's name.", shown="NAME")]
 
 
 def _figures(_model: Any, report: SensitivityReport, _parameters: Any) -> Iterator[tuple[str, Figure]]:

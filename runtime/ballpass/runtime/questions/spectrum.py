@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 #: Samples a segment of the spectrogram of a run-up has of the whole, at most.
 SEGMENTS = 40
 
-Of = Annotated[str, Option(words="Output or state of the scene: inner.ax.", shown="OUTPUT")]
+Of = Annotated[str, Option(words="Output or state of the scene with one value: `inner.ax`.", shown="OUTPUT")]
 Band = Annotated[
     tuple[float, float] | None,
     Option(words="The envelope of this band instead of the signal.", example="2kHz:8kHz", shown="LOW:HIGH", unit="Hz"),
@@ -36,13 +36,15 @@ Orders = Annotated[
     bool, Option(words="Over multiples of the shaft's speed, also where that changes.", flags=("--orders",))
 ]
 AsMap = Annotated[
-    bool, Option(words="Draw amplitudes over time and frequency, as of a run-up.", flags=("--spectrogram",))
+    bool, Option(words="Draw amplitudes over time and frequency instead, as of a run-up.", flags=("--spectrogram",))
 ]
-Window = Annotated[str, Option(words="Window of scipy.signal: hann, boxcar, flattop, blackmanharris.", shown="NAME")]
+Window = Annotated[
+    str, Option(words="Window of `scipy.signal`: `hann`, `boxcar`, `flattop`, `blackmanharris`.", shown="NAME")
+]
 Scaling = Annotated[
     str,
     Option(
-        words="amplitude, power of the lines, or density of the power.",
+        words="`amplitude`, `power` of the lines, or `density` of the power.",
         shown="HOW",
         choices=("amplitude", "power", "density"),
     ),

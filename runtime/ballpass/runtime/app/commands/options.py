@@ -32,12 +32,12 @@ Settings = Annotated[
     typer.Option(
         "--set",
         metavar="PATH=VALUE",
-        help='Another value for a number of the scene: --set bearing.clearance="20 um". May be repeated.',
+        help='Another value for a number of the scene: `--set bearing.clearance="20 um"`. May be repeated.',
     ),
 ]
 
 ResultsFolder = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Folder of the results; results/<scene> if not given.")
+    Path | None, typer.Option(metavar="DIR", help="Folder of the results; `results/<scene>` if not given.")
 ]
 
 ReportFolder = Annotated[
@@ -50,7 +50,9 @@ Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the 
 
 FigureFormats = Annotated[
     list[str] | None,
-    typer.Option("--format", metavar="KIND", help="Kind of the figures: png (default), svg or pdf. May be repeated."),
+    typer.Option(
+        "--format", metavar="KIND", help="Kind of the figures: `png` (default), `svg` or `pdf`. May be repeated."
+    ),
 ]
 
 Scheduler = Annotated[

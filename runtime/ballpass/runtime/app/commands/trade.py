@@ -25,14 +25,15 @@ if TYPE_CHECKING:
 Of = Annotated[
     Sequence[str] | None,
     Option(
-        words="Quantity whose error counts: peak_ball_force, rms:inner.y, range:inner.x, mean:, min:. May be repeated.",
+        words="Quantity whose error counts, as for a sweep: `peak_ball_force`, `rms:inner.y`, `range:inner.x`. May be "
+        "repeated. Peak ball force, rms and range of the inner ring's motion if none is given.",
         shown="Q",
     ),
 ]
 Against = Annotated[
     str | None,
     Option(
-        words="Measure another model of the machine instead of methods: one-way or two-way, the same scene with its "
+        words="Measure another model of the machine instead of methods: `one-way` or `two-way`, the same scene with its "
         "bearings coupled so, or another scene file.",
         shown="WHAT",
     ),
