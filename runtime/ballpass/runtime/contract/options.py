@@ -7,8 +7,9 @@ checks, docstrings and the reference page come from here.  Flags are the paramet
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, Any, get_args, get_origin
 
 #: What a number with a unit is.
@@ -70,18 +71,21 @@ class Option:
         return f"a {kind} from {self.least:g} on" if self.least > -math.inf else f"a finite {kind}"
 
 
+def options_in(annotations: Mapping[str, Any]) -> dict[str, tuple[Any, Option]]:
+    """The options among annotations: the type of each, and what it means."""
+    return {
+        name: (get_args(kind)[0], option)
+        for name, kind in annotations.items()
+        for option in getattr(kind, "__metadata__", ())
+        if isinstance(option, Option)
+    }
+
+
+@cache
 def options_of(function: Callable[..., Any]) -> dict[str, tuple[Any, Option]]:
-    """The parameters of a function that are options: the type of each, and what it means."""
-    found = {}
-    for name, annotation in function.__annotations__.items():
-        try:
-            kind = eval(annotation, function.__globals__) if isinstance(annotation, str) else annotation
-        except NameError:  # imported for the type checker alone: no option
-            continue
-        option = next((item for item in getattr(kind, "__metadata__", ()) if isinstance(item, Option)), None)
-        if option is not None:
-            found[name] = get_args(kind)[0], option
-    return found
+    """The options among a function's parameters, where they are written as names of types in its module."""
+    known = function.__globals__
+    return options_in({name: known.get(written) for name, written in function.__annotations__.items()})
 
 
 def is_of(kind: Any, container: type) -> bool:

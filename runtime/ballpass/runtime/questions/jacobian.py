@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Check, CrankAngle, Instant, Option
-from ballpass.runtime.point.run_start import run_numbers
 from ballpass.runtime.questions.question import Question
 from ballpass.runtime.report.report import Report, ReportTable
 
@@ -18,7 +17,8 @@ if TYPE_CHECKING:
 Of = Annotated[
     str | Sequence[str],
     Option(
-        words='What to differentiate: `rhs`, a quantity (also one that `run.outputs` does not name), a pattern as `"reaction.A.*"`. May be repeated.'
+        words="What to differentiate: `rhs`, a quantity (also one that `run.outputs` does not name), a pattern as "
+        '`"reaction.A.*"`. May be repeated.'
     ),
 ]
 Wrt = Annotated[
@@ -105,6 +105,7 @@ def checked_jacobian(
     from ballpass.runtime.certify.jacobian_check import checked_jacobian
     from ballpass.runtime.point.equilibrium import instant, static_equilibrium
     from ballpass.runtime.point.jacobian import directions_of, rows_of
+    from ballpass.runtime.point.run_start import run_numbers
 
     numbers = run_numbers(model, parameters)
     time = instant(model, numbers, t, crank_angle)

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ballpass.runtime.contract.options import Cycles, Rtol, StepperMethod, Transient
-from ballpass.runtime.point.run_start import Initial, run_numbers, start_of
 from ballpass.runtime.questions.question import AnyModel, Question
-from ballpass.runtime.run.request import Request
 from ballpass.runtime.show.progress import Progress, shown
 
 if TYPE_CHECKING:
@@ -21,6 +19,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.ask.life_text import LifeReport
     from ballpass.runtime.contract import BearingInfo
     from ballpass.runtime.point.point_model import PointModel
+    from ballpass.runtime.point.run_start import Initial
 
 #: Clearances of the figure of life, and steady turns of each.
 POINTS, TURNS = 17, 64
@@ -81,6 +80,8 @@ def life(
     '0.9, 225 million turns'
     """
     from ballpass.runtime.ask.life_report import life_report
+    from ballpass.runtime.point.run_start import run_numbers, start_of
+    from ballpass.runtime.run.request import Request
 
     numbers = run_numbers(model, parameters)
     request = Request(

@@ -1,13 +1,13 @@
 """What makes a function a question: its options, its report, how the command line shows it.
 
 A question is a function of a model.  Parameters with a type of `contract.options` are its options; ``parameters`` are
-overrides of the model's numbers; ``progress`` is told how far it is.
+overrides of the model's numbers; ``progress`` is told how far it is.  Its module imports inside functions what computes:
+the command line reads all modules before it knows which question is asked.
 """
 
 from __future__ import annotations
 
 import inspect
-import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -79,5 +79,5 @@ def _with_options(ask: Callable[..., Any]) -> str:
         default = defaults[name].default
         told = "" if default in (None, inspect.Parameter.empty) else f"  Default: {default!r}"
         unit = f" [{option.unit}]" if option.unit else ""
-        lines.append(textwrap.fill(f"{name} : {option.words}{told}{unit}", 110, subsequent_indent="    "))
+        lines.append(f"{name} : {option.words}{told}{unit}")
     return "\n".join([words, "", "Parameters", "----------", *lines]) + others

@@ -15,7 +15,6 @@ from ballpass.runtime.contract.options import (
     TightRtol,
     Transient,
 )
-from ballpass.runtime.point.run_start import run_numbers
 from ballpass.runtime.questions.question import Question
 from ballpass.runtime.show.progress import shown_steps
 
@@ -28,8 +27,8 @@ if TYPE_CHECKING:
 Of = Annotated[
     str | Sequence[str] | None,
     Option(
-        words="Quantity: `max:ball.force` (or `peak_ball_force`); `min:`, `mean:`, `integral:`, `rms:`, `range:` and an "
-        "output; `value:inner.y@240deg`, `amplitude:inner.y@bpfo`, `drive_work`, `static_deflection`, "
+        words="Quantity: `max:ball.force` (or `peak_ball_force`); `min:`, `mean:`, `integral:`, `rms:`, `range:` and "
+        "an output; `value:inner.y@240deg`, `amplitude:inner.y@bpfo`, `drive_work`, `static_deflection`, "
         "`static_peak_ball_force`. May be repeated. Peak ball force and motion of the rings if none is given.",
         shown="Q",
     ),
@@ -97,7 +96,8 @@ def sensitivity(
     >>> f"{pair.derivative:.2f} {pair.unit}, {pair.check.verdict.value}"
     '0.28 m/m, verified'
     """
-    from ballpass.runtime.certify.sensitivity_query import answer, make_query  # SciPy takes longer to read than a run
+    from ballpass.runtime.certify.sensitivity_query import answer, make_query
+    from ballpass.runtime.point.run_start import run_numbers
 
     query = make_query(
         model.manifest,

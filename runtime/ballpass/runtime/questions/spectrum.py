@@ -14,7 +14,6 @@ from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Sa
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.show.progress import Progress
 from ballpass.runtime.show.short import ShortRepr
 
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
 
     from ballpass.runtime.ask.characteristic import CharacteristicLine
     from ballpass.runtime.ask.vibration import DiagnosisStatistics
+    from ballpass.runtime.run.solution import Solution
 
 #: Samples a segment of the spectrogram of a run-up has of the whole, at most.
 SEGMENTS = 40
@@ -230,6 +230,7 @@ def spectrum(
     from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
     from ballpass.runtime.ask.vibration import diagnosis, order_spectrum
     from ballpass.runtime.ask.vibration import envelope as envelope_of
+    from ballpass.runtime.run.solution import Solution
 
     if isinstance(model, Solution):
         if any(item is not None for item in (sample_rate, cycles, duration, rtol, parameters or None)):

@@ -10,11 +10,9 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.options import Option, TightRtol
-from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.questions.question import AnyModel, Question
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run.sensitivity import SENSITIVITY
 from ballpass.runtime.show.progress import Progress
 from ballpass.runtime.show.short import ShortRepr
 
@@ -134,6 +132,9 @@ def steady(
     >>> found.states[0], found.start.shape
     ('inner.x', (8,))
     """
+    from ballpass.runtime.point.evaluate import point
+    from ballpass.runtime.run.sensitivity import SENSITIVITY
+
     manifest = model.manifest
     names, mechanism = manifest.initial, manifest.mechanism
     if not names or (mechanism is not None and mechanism.angle):

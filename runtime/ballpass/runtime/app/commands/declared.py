@@ -29,7 +29,7 @@ from ballpass.runtime.app.commands.shared import (
     warn,
 )
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.options import Option, is_of, options_of
+from ballpass.runtime.contract.options import Option, is_of, options_in, options_of
 from ballpass.runtime.questions.question import Question, declared, summary_of
 from ballpass.runtime.report.plain import json_text, to_plain
 from ballpass.runtime.report.text import show as show_report
@@ -37,28 +37,22 @@ from ballpass.runtime.report.text import show as show_report
 
 def as_command(function: Callable[..., None]) -> Callable[..., None]:
     """The command of a function; typer's own options among its parameters stay as they are."""
-    kinds = options_of(function)
+    own = inspect.signature(function, eval_str=True).parameters
+    kinds = options_in({name: item.annotation for name, item in own.items()})
 
     def call(**given: Any) -> None:
         with command(given.get("scene")):
             values = _read(kinds, given)
         function(**{**given, **values})
 
-    return _with_signature(
-        call,
-        function.__name__,
-        function.__doc__ or "",
-        [
-            _typer_option(item, *kinds[item.name]) if item.name in kinds else item
-            for item in inspect.signature(function, eval_str=True).parameters.values()
-        ],
-    )
+    parameters = [_typer_option(item, *kinds[name]) if name in kinds else item for name, item in own.items()]
+    return _with_signature(call, function.__name__, function.__doc__ or "", parameters)
 
 
 def question_command(ask: Callable[..., Any]) -> Callable[..., None]:
     """The command of a question: a scene, the question's options, and what becomes of the report."""
     question, kinds = declared(ask), options_of(ask)
-    own = inspect.signature(ask, eval_str=False).parameters
+    own = inspect.signature(ask).parameters
     parameters = [
         _parameter("scene", options.SceneFolderOrRun if question.takes_runs else options.SceneOrFolder),
         *(own[name].replace(annotation=Annotated[kind]) for name, kind in kinds.items()),

@@ -33,8 +33,8 @@ Of = Annotated[
 Against = Annotated[
     str | None,
     Option(
-        words="Measure another model of the machine instead of methods: `one-way` or `two-way`, the same scene with its "
-        "bearings coupled so, or another scene file.",
+        words="Measure another model of the machine instead of methods: `one-way` or `two-way`, the same scene with "
+        "its bearings coupled so, or another scene file.",
         shown="WHAT",
     ),
 ]
