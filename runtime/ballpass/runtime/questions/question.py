@@ -1,7 +1,7 @@
 """What makes a function a question: its options, its report, how the command line shows it.
 
 A question is a function of a model.  Parameters with a type of `contract.options` are its options; ``parameters`` are
-overrides of the model's numbers; ``progress`` is told how far it is.  Its module imports inside functions what computes:
+overrides of the numbers; ``progress`` is told how far it is.  Its module imports inside functions what computes:
 the command line reads all modules before it knows which question is asked.
 """
 
