@@ -18,7 +18,6 @@ from ballpass.runtime.app.commands.asked import (
     Asked,
     read_asked,
     read_formats,
-    read_turns,
 )
 from ballpass.runtime.app.commands.bearings import bearings
 from ballpass.runtime.app.commands.dataset import dataset
@@ -102,9 +101,10 @@ def run(
     cycles: Cycles = None,
     turns: Annotated[
         str | None,
-        typer.Option(
-            metavar="settle",
-            help="Peaks and rms of the summary are those of as many turns as they take to settle.",
+        Option(
+            words="Peaks and rms of the summary are those of as many turns as they take to settle.",
+            shown="settle",
+            choices=("settle",),
         ),
     ] = None,
     duration: Duration = None,
@@ -166,7 +166,6 @@ def run(
 
         stages("read")
         formats = read_formats(format_)
-        settles = read_turns(turns, duration if cycles is None else cycles)
         asked = read_asked(scene, set_, duration, transient)
         start = _read_start(initial)
         _check_request(asked, cycles, transient, method, goes_on=start not in (None, "equilibrium"))
@@ -206,7 +205,7 @@ def run(
             if growth.uncertain:
                 warn(growth.words)
         longer = None
-        if settles:
+        if turns is not None:
             taken = solution.statistics
             longer = model.settle(
                 transient=transient,
@@ -223,7 +222,7 @@ def run(
             longer = look_further(model, model.numbers(asked.overrides), solution)
         stages("write")
         summary = summarize(model, solution, growth)
-        turned = add_turns(summary, longer, instead=settles) if longer is not None else ""
+        turned = add_turns(summary, longer, instead=turns is not None) if longer is not None else ""
         if solution.accuracy is not None:
             summary["accuracy"] = solution.accuracy.plain()
         summary, files = _write_results(model, solution, summary, folder, stages, formats=formats if figures else ())

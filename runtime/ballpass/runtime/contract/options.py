@@ -52,8 +52,9 @@ class Option:
     def fault(self, name: str, value: Any) -> str | None:
         """What is wrong with a value: what was given, what is allowed; None where nothing is."""
         if self.choices and value is not None:
-            allowed, right = ", ".join(self.choices), value in self.choices
-            given = f"{value!r:.60} is none of the choices"
+            wrong = [item for item in ([value] if isinstance(value, str) else value) if item not in self.choices]
+            allowed, right = ", ".join(self.choices), not wrong
+            given = "" if right else f"{wrong[0]!r:.60} is none of the choices"
         elif isinstance(value, int | float) and not isinstance(value, bool):
             kind = "whole number" if isinstance(value, int) else _KINDS.get(self.unit, "number")
             allowed = self._allowed(kind)

@@ -13,7 +13,7 @@ from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_asked
 from ballpass.runtime.app.commands.shared import command, load_model, results_folder, show, size_words
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.options import Cycles, Duration, Rtol, Transient
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
 from ballpass.runtime.plot import MOVING
 
 
@@ -21,7 +21,12 @@ def animate(
     scene: options.SceneOrFolder,
     format_: Annotated[
         str,
-        typer.Option("--format", metavar="KIND", help="html, a page that needs no network and no server; mp4; or gif."),
+        Option(
+            words="`html`, a page that needs no network and no server; `mp4`; or `gif`.",
+            shown="KIND",
+            flags=("--format",),
+            choices=MOVING,
+        ),
     ] = "html",
     last: Annotated[float, typer.Option(metavar="N", help="Turns to show, the last ones of the run.")] = 1.0,
     bearing: Annotated[
@@ -45,8 +50,6 @@ def animate(
     """
     with command(scene) as stages:
         stages("read")
-        if format_ not in MOVING:
-            raise RequestError(f"--format: {format_!r} is no kind of animation. Allowed: {', '.join(MOVING)}.")
         if pictures is not None and format_ == "html":
             raise RequestError("--pictures is of movies; a page has up to 1000 positions. Omit it, or --format gif.")
         if format_ != "html":

@@ -6,6 +6,7 @@ In: a scene file and texts.  Out: values in SI.  `ballpass.derive` is imported i
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
+from ballpass.runtime.plot import FORMATS
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
@@ -21,9 +23,6 @@ if TYPE_CHECKING:
     from ballpass.runtime.contract import Manifest, RunInfo
 
 _Run = TypeVar("_Run", bound="Run | RunInfo")
-
-#: Word of ``--turns`` for as many turns as peaks and rms take to settle.
-SETTLE = "settle"
 
 #: Lines of a scene's run table that have an option of ``ballpass run``.
 RUN_OPTIONS = {
@@ -194,40 +193,9 @@ def read_with_settings(
         raise SceneError(error.faults, source="--set") from None
 
 
-def read_turns(text: str | None, length: float | str | None) -> bool:
-    """Whether ``--turns settle`` was asked for.
-
-    Raises
-    ------
-    RequestError
-        Another word, or a length of the run as well.
-    """
-    if text is None:
-        return False
-    if text.strip() != SETTLE:
-        raise RequestError(
-            f"--turns: {text!r:.80} was given. Allowed: {SETTLE}, as many turns as peaks and rms take to settle. For a "
-            "number of turns take --cycles."
-        )
-    if length is not None:
-        raise RequestError(f"--turns {SETTLE} finds the length of the run, and {length!r} was given as well.")
-    return True
-
-
-def read_formats(given: list[str] | None) -> tuple[str, ...]:
-    """Kinds of the figures, of ``--format``.
-
-    Raises
-    ------
-    RequestError
-        There is no such kind.
-    """
-    from ballpass.runtime.plot import FORMATS
-
-    for kind in given or ():
-        if kind not in FORMATS:
-            raise RequestError(f"--format: {kind!r} is no kind of figure. Allowed: {', '.join(FORMATS)}.")
-    return tuple(dict.fromkeys(given)) if given else FORMATS[:1]
+def read_formats(given: Sequence[str] | None) -> tuple[str, ...]:
+    """Kinds of the figures: each once, the first one where none was named."""
+    return tuple(dict.fromkeys(given or FORMATS[:1]))
 
 
 def refuse_run_setting(text: str) -> None:

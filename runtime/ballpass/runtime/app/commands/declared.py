@@ -91,7 +91,7 @@ def _read(kinds: Mapping[str, tuple[Any, Option]], given: Mapping[str, Any]) -> 
             value = read_value(flag, text, option.unit)
             # the unit was written out, so that many turns are meant as such
             values[name] = math.fmod(value, math.tau) if option.unit == "rad" else value
-    for pair in (("cycles", "duration"), ("crank_angle", "t")):
+    for pair in (("cycles", "duration"), ("turns", "cycles"), ("turns", "duration"), ("crank_angle", "t")):
         if all(values.get(name) is not None for name in pair):
             flags = " and ".join(kinds[name][1].flag(name) for name in pair)
             raise RequestError(f"{flags} were both given. Allowed: one of them. Leave one away.")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from ballpass.runtime.contract.options import Option
+from ballpass.runtime.plot import FORMATS
 
 SceneFile = Annotated[
     Path, typer.Argument(metavar="SCENE", help="Scene file (TOML); `ballpass new` copies one.", show_default=False)
@@ -49,9 +53,12 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON
 Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")]
 
 FigureFormats = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--format", metavar="KIND", help="Kind of the figures: `png` (default), `svg` or `pdf`. May be repeated."
+    Sequence[str] | None,
+    Option(
+        words="Kind of the figures: `png` (default), `svg` or `pdf`. May be repeated.",
+        shown="KIND",
+        flags=("--format",),
+        choices=FORMATS,
     ),
 ]
 
