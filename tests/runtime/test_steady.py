@@ -78,3 +78,20 @@ def test_the_command_prints_what_the_call_gives(
     assert "multipliers, magnitudes: 0.7788" in told.stdout
     assert "One step only" in told.stdout
     assert CliRunner().invoke(app, [*words[:3], "0"]).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("ask", "given", "words"),
+    [
+        ("steady", {"turns": 0.0}, "turns: 0 lies outside its bounds. Allowed: a number above 0"),
+        ("spectrum", {"of": "inner.x", "top": 0, "scaling": "loud"}, "Allowed: amplitude, power, density"),
+        ("spectrum", {"of": "inner.x", "orders": True, "spectrogram": True}, "both given"),
+        ("checked_jacobian", {"of": "rhs", "wrt": "states", "state": "moving"}, "Allowed: equilibrium, initial"),
+        ("life", {"cycles": float("inf")}, "cycles: inf lies outside its bounds"),
+    ],
+)
+def test_options_are_refused_in_python_as_on_the_command_line(
+    rotor: Model, ask: str, given: dict[str, object], words: str
+) -> None:
+    with pytest.raises(RequestError, match=words):
+        getattr(rotor, ask)(**given)

@@ -6,11 +6,14 @@ checks, docstrings and the reference page come from here.  Flags are the paramet
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, get_args, get_origin
+
+from ballpass.runtime.contract.errors import RequestError
 
 #: What a number with a unit is.
 _KINDS = {"s": "time", "Hz": "frequency", "rad": "angle"}
@@ -50,7 +53,12 @@ class Option:
         return f"{self.words.removesuffix('.')}: `{self.flag(name)} {self.example}`." if self.example else self.words
 
     def fault(self, name: str, value: Any) -> str | None:
-        """What is wrong with a value: what was given, what is allowed; None where nothing is."""
+        """What is wrong with a value: what was given, what is allowed; None where nothing is.
+
+        Parameters
+        ----------
+        name : what the caller calls the option
+        """
         if self.choices and value is not None:
             wrong = [item for item in ([value] if isinstance(value, str) else value) if item not in self.choices]
             allowed, right = ", ".join(self.choices), not wrong
@@ -62,7 +70,7 @@ class Option:
             given = f"{value:g} {self.unit}".rstrip() + " lies outside its bounds"
         else:
             return None
-        return None if right else f"{self.flag(name)}: {given}. Allowed: {allowed}."
+        return None if right else f"{name}: {given}. Allowed: {allowed}."
 
     def _allowed(self, kind: str) -> str:
         if self.most < math.inf:
@@ -85,8 +93,25 @@ def options_in(annotations: Mapping[str, Any]) -> dict[str, tuple[Any, Option]]:
 @cache
 def options_of(function: Callable[..., Any]) -> dict[str, tuple[Any, Option]]:
     """The options among a function's parameters, where they are written as names of types in its module."""
-    known = function.__globals__
+    known = inspect.unwrap(function).__globals__
     return options_in({name: known.get(written) for name, written in function.__annotations__.items()})
+
+
+def refuse_faults(options: Mapping[str, Option], values: Mapping[str, Any]) -> None:
+    """Refuse values that are not allowed, all at once; None always is.
+
+    Parameters
+    ----------
+    options : by what the caller calls them, as are the values
+
+    Raises
+    ------
+    RequestError
+        Numbers out of bounds, words that are none of the choices.
+    """
+    found = [option.fault(name, values[name]) for name, option in options.items() if name in values]
+    if any(found):
+        raise RequestError("\n".join(filter(None, found)))
 
 
 def is_of(kind: Any, container: type) -> bool:

@@ -7,12 +7,13 @@ the command line reads all modules before it knows which question is asked.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from functools import wraps
+from inspect import Parameter, cleandoc, signature
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from ballpass.runtime.contract.options import options_of
+from ballpass.runtime.contract.options import options_of, refuse_faults
 from ballpass.runtime.report.report import Report
 
 if TYPE_CHECKING:
@@ -33,7 +34,8 @@ class Question:
     name : of the command; the function's if there is none
     report : of an answer
     stage : what is announced while it computes
-    check : of values of the options, before anything is derived: RequestError where they contradict each other
+    check : of values of the options: RequestError where they contradict each other; the command does it before anything
+        is derived
     runs : whether it integrates, so that the stepper is compiled first
     takes_runs : whether the solution of a run may stand in place of the model
     figures : of a model, an answer and overrides, by names of files
@@ -51,9 +53,18 @@ class Question:
     always: bool = False
 
     def __call__(self, ask: _Function) -> _Function:
-        _DECLARED[ask] = replace(self, name=self.name or ask.__name__)
-        ask.__doc__ = _with_options(ask)
-        return ask
+        @wraps(ask)
+        def checked(*given: Any, **named: Any) -> Any:
+            values = signature(ask).bind(*given, **named)
+            values.apply_defaults()
+            refuse_faults({name: option for name, (_, option) in options_of(ask).items()}, values.arguments)
+            if self.check is not None:
+                self.check(values.arguments)
+            return ask(*given, **named)
+
+        checked.__doc__ = _with_options(ask)
+        _DECLARED[checked] = replace(self, name=self.name or ask.__name__)
+        return cast("_Function", checked)
 
 
 _DECLARED: dict[Callable[..., Any], Question] = {}
@@ -66,18 +77,18 @@ def declared(ask: Callable[..., Any]) -> Question:
 
 def summary_of(function: Callable[..., Any]) -> str:
     """The docstring's paragraphs in front of its sections, each a line."""
-    paragraphs = inspect.cleandoc(function.__doc__ or "").partition("\n\nParameters\n")[0].split("\n\n")
+    paragraphs = cleandoc(function.__doc__ or "").partition("\n\nParameters\n")[0].split("\n\n")
     return "\n\n".join(" ".join(one.split()) for one in paragraphs)
 
 
 def _with_options(ask: Callable[..., Any]) -> str:
     """The docstring with words, unit and default of each option; other parameters it describes itself."""
-    words, _, others = inspect.cleandoc(ask.__doc__ or "").partition("\n\nParameters\n----------")
-    defaults = inspect.signature(ask).parameters
+    words, _, others = cleandoc(ask.__doc__ or "").partition("\n\nParameters\n----------")
+    defaults = signature(ask).parameters
     lines = []
     for name, (_, option) in options_of(ask).items():
         default = defaults[name].default
-        told = "" if default in (None, inspect.Parameter.empty) else f"  Default: {default!r}"
+        told = "" if default in (None, Parameter.empty) else f"  Default: {default!r}"
         unit = f" [{option.unit}]" if option.unit else ""
         lines.append(f"{name} : {option.words}{told}{unit}")
     return "\n".join([words, "", "Parameters", "----------", *lines]) + others

@@ -29,7 +29,7 @@ from ballpass.runtime.app.commands.shared import (
     warn,
 )
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.options import Option, is_of, options_in, options_of
+from ballpass.runtime.contract.options import Option, is_of, options_in, options_of, refuse_faults
 from ballpass.runtime.questions.question import Question, declared, summary_of
 from ballpass.runtime.report.plain import json_text, to_plain
 from ballpass.runtime.report.text import show as show_report
@@ -93,11 +93,10 @@ def _read(kinds: Mapping[str, tuple[Any, Option]], given: Mapping[str, Any]) -> 
             values[name] = math.fmod(value, math.tau) if option.unit == "rad" else value
     for pair in (("cycles", "duration"), ("turns", "cycles"), ("turns", "duration"), ("crank_angle", "t")):
         if all(values.get(name) is not None for name in pair):
-            flags = " and ".join(kinds[name][1].flag(name) for name in pair)
-            raise RequestError(f"{flags} were both given. Allowed: one of them. Leave one away.")
-    faults = [option.fault(name, values[name]) for name, (_, option) in kinds.items()]
-    if any(faults):
-        raise RequestError("\n".join(filter(None, faults)))
+            both = " and ".join(kinds[name][1].flag(name) for name in pair)
+            raise RequestError(f"{both} were both given. Allowed: one of them. Leave one away.")
+    flags = {option.flag(name): option for name, (_, option) in kinds.items()}
+    refuse_faults(flags, {option.flag(name): values[name] for name, (_, option) in kinds.items()})
     return values
 
 
