@@ -117,8 +117,9 @@ def _state_parts(state: StateStrength) -> _Parts:
     if not state.bearings:
         return [*parts, "  nothing turns: no damage"]
     parts.append(f"  {_turns_words(state)}")
+    parts.append("")  # behind a table there is one
     for bearing in state.bearings:
-        parts += ["", *_bearing_parts(bearing)]
+        parts += _bearing_parts(bearing)
     return [*parts, f"  Wear and P: means of {state.samples} samples; angles from each ring's x axis."]
 
 
