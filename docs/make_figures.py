@@ -14,9 +14,10 @@ from subprocess import run
 
 from ballpass.derive import generate
 from ballpass.runtime import load
-from ballpass.runtime.app.commands.life import draw_life
 from ballpass.runtime.app.figure_run import run_for_figures
 from ballpass.runtime.plot.gallery import draw_all
+from ballpass.runtime.plot.style import write_figures
+from ballpass.runtime.questions.life import life_figures
 
 ROOT = Path(__file__).resolve().parent.parent
 IMAGES = ROOT / "docs" / "images"
@@ -59,7 +60,7 @@ def draw_lives() -> None:
             scene = Path(folder) / "punching_press.toml"
             scene.write_text(written, encoding="utf-8")
             model = load(generate(scene, Path(folder) / "generated"))
-            draw_life(model, model.life(), {}, Path(folder))
+            write_figures(life_figures(model, model.life(), {}), Path(folder), ("png",), "life.md")
             for name in names:
                 target = IMAGES / f"punching_press_{name}.png"
                 shutil.copyfile(Path(folder) / f"{name}.png", target)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import typer.main
 from rich.emoji import Emoji
+from scripts.option_tables import with_tables
 
 from ballpass.runtime.app.cli import app
 
@@ -39,6 +40,12 @@ def accepted(command: str) -> Iterator[tuple[str, str]]:
 def test_page_has_a_section_for_every_command_and_for_nothing_else() -> None:
     assert len(COMMANDS) >= 10
     assert sorted(sections()) == sorted(COMMANDS)
+
+
+def test_tables_of_questions_are_those_of_their_declarations() -> None:
+    """Where this fails: python -m scripts.option_tables."""
+    page = PAGE.read_text(encoding="utf-8")
+    assert page == with_tables(page)
 
 
 @pytest.mark.parametrize("command", sorted(COMMANDS))

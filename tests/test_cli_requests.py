@@ -68,7 +68,7 @@ def test_a_shaft_at_rest_runs_for_a_time_and_comes_to_rest_at_the_static_point(
         (("--set", "load.force.x=1 N", "--set", "load.force.x=2 N"), "1 N and 2 N"),
         (("--set", "load.force.x=1 N", "--set", "load.force.x = 1 N"), "set twice"),
         (("--set", "bearing.clearance=-8 mm"), "preload (a negative clearance) is as large as a ball"),
-        (("--format", "jpg"), "'jpg' is no kind of figure. Allowed: png, svg, pdf"),
+        (("--format", "jpg"), "'jpg' is none of the choices. Allowed: png, svg, pdf"),
     ],
 )
 def test_contradictions_and_nonsense_end_with_exit_code_2_and_no_folder(

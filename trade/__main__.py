@@ -24,7 +24,7 @@ from ballpass.runtime import load
 from ballpass.runtime.app.commands.shared import Stages
 from ballpass.runtime.certify.method_choice import MethodChoice
 from ballpass.runtime.certify.trade import measure_trade
-from ballpass.runtime.certify.trade_report import Measured, Trade, percent, table, to_plain, words
+from ballpass.runtime.certify.trade_report import Measured, Trade, percent, table, words
 from ballpass.runtime.plot.style import caption_of, save
 from ballpass.runtime.plot.trade import draw_trade
 from trade.promise import ROOT, SCENES, markdown
@@ -119,7 +119,7 @@ def measure(scenes: list[str], members: int) -> dict[str, Any]:
         for name in scenes:
             model = load(generate(ROOT / "scenes" / f"{name}.toml", progress=stages))
             stages(f"measuring: {name}")
-            trades.append(to_plain(measure_trade(model, members=members, progress=stages.fraction))["trade"])
+            trades.append(measure_trade(model, members=members, progress=stages.fraction).to_json()["trade"])
     return {"minutes": (time.perf_counter() - started) / 60.0, "trades": trades}
 
 

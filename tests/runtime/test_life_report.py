@@ -113,6 +113,9 @@ def test_a_bearing_that_swings_has_no_life_and_the_others_have(make_model: Calla
     assert lives["main"] is not None
     assert lives["big_end"] is not None
     assert "fretting" in str(report)
+    rows = report.to_pandas()
+    assert np.isnan(rows.loc[("", "pin", ""), ["life", "hours"]].to_numpy(dtype=float)).all()
+    assert rows.loc[("", "main", "sectors"), "life"] == report.bearings[0].lives["sectors"]
     with pytest.raises(RequestError, match="swings"):
         model.simulate_many({"mechanism.gravity": [9.81]}, ["pin.life"], cycles=2, transient=1)
     with pytest.raises(RequestError, match="swings"):

@@ -12,9 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rich.console import Group
-from rich.markup import escape
-from rich.table import Table
 
 import ballpass.derive
 import ballpass.runtime
@@ -27,6 +24,8 @@ from ballpass.runtime.ask.vibration import diagnosis, spectrogram
 from ballpass.runtime.certify.method_choice import MethodChoice
 from ballpass.runtime.certify.trade import measure_trade
 from ballpass.runtime.many.signals import Signals
+from ballpass.runtime.report.html import to_html
+from ballpass.runtime.report.report import Marked, Report, ReportTable
 from ballpass.runtime.show import html
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -174,14 +173,13 @@ def test_reports_are_pandas_tables(reports: dict[str, Any]) -> None:
 
 def test_every_word_of_a_view_is_escaped() -> None:
     words = f"{ATTACK}\"'[bold]"
-    printed = Table(title=escape(words), caption=escape(words))
-    printed.add_column(escape(words), justify="right")
-    printed.add_row(f"[green]{escape(words)}[/] {escape(words)}")
+    marked = Marked(words, "good", words)
+    table = ReportTable(title=words, caption=words, heads=(words,), rows=[(marked,)], right=(words,))
     page = ET.fromstring(
         html.block(
             html.title(words, words),
             html.folded(words, html.table([words], [[words]], right=[words])),
-            html.from_terminal(Group(printed, escape(words))),
+            to_html(Report(parts=(table, words))),
             html.framed_page(words),
         )
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 from collections.abc import Callable, Iterator
@@ -11,15 +10,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from ballpass.runtime import Model, Solution
 from ballpass.runtime.app.summary import add_turns, summarize
 from ballpass.runtime.app.summary_table import render_summary
 from ballpass.runtime.contract.errors import SimulationError
+from ballpass.runtime.report.html import table_html
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.text import show, table_text
 from ballpass.runtime.run.settle import look_further
-from ballpass.runtime.run.tables import printed, show_tables, simple_table
-from ballpass.runtime.show.html import from_terminal
 
 
 @pytest.fixture(scope="module")
@@ -129,9 +128,7 @@ def test_values_that_are_not_finite_are_refused(press: tuple[Model, Solution]) -
 
 
 def test_table_fits_a_terminal_and_shows_micrometres(summary: dict[str, Any]) -> None:
-    out = io.StringIO()
-    Console(file=out, width=80).print(render_summary(summary))
-    text = out.getvalue()
+    text = table_text(render_summary(summary))
     assert "…" not in text
     row = next(line for line in text.splitlines() if line.split()[:1] == ["inner.y"])
     assert float(row.split()[2]) == pytest.approx(1e6 * summary["inner.y"]["max"], rel=1e-3)
@@ -148,17 +145,20 @@ def test_names_and_numbers_of_tables_are_whole_at_any_width(
         ("-2.575e-13", "1.044e+05"),
         "a sentence of six words here",
     )
-    table = simple_table(
-        "T", ("quantity", "value", "another value", "what"), right=("value", "another value"), wrapped=("what",)
+    table = ReportTable(
+        title="T",
+        heads=("quantity", "value", "another value", "what"),
+        rows=[(name, *numbers, words)],
+        right=("value", "another value"),
+        wrapped=("what",),
     )
-    table.add_row(name, *numbers, words)
-    (row,) = (line for line in printed(table, width=20).splitlines() if name in line)
+    (row,) = (line for line in table_text(table, width=20).splitlines() if name in line)
     assert row.split()[3:5] == list(numbers), row
     # a terminal: no line is wider, each block has the name; the sentence takes several lines
     monkeypatch.setenv("COLUMNS", "50")
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm")
-    show_tables(table)
+    show(Report(parts=(table,)))
     lines = re.sub(r"\x1b\[[\d;]*m", "", capsys.readouterr().out).splitlines()
     assert max(len(line.rstrip()) for line in lines) <= 50
     assert sum(name in line for line in lines) == 3
@@ -168,11 +168,11 @@ def test_names_and_numbers_of_tables_are_whole_at_any_width(
 
 def test_no_word_of_a_scene_is_read_as_a_picture_or_as_a_style() -> None:
     words = "Press [old] [/x] :fire:"
-    table = simple_table(words, ("name", "value"), caption=words)
-    table.add_row("rms:x:y", "1")
-    assert printed(table).splitlines()[:: len(printed(table).splitlines()) - 1] == [words, words]
-    assert "rms:x:y" in printed(table)
-    assert from_terminal(table).count(words) == 2
+    table = ReportTable(title=words, heads=("name", "value"), rows=[("rms:x:y", "1")], caption=words)
+    lines = table_text(table).splitlines()
+    assert lines[:: len(lines) - 1] == [words, words]
+    assert "rms:x:y" in table_text(table)
+    assert table_html(table).count(words) == 2
 
 
 def test_a_run_with_some_outputs_has_the_summary_of_these(

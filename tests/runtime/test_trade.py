@@ -14,7 +14,7 @@ import pytest
 from ballpass.runtime import Model, RequestError
 from ballpass.runtime.certify.method_choice import MethodChoice
 from ballpass.runtime.certify.trade import measure_trade, perturbed
-from ballpass.runtime.certify.trade_report import Measured, Trade, percent, table, to_plain, words
+from ballpass.runtime.certify.trade_report import Measured, Trade, percent, table, words
 from ballpass.runtime.plot.style import save
 from ballpass.runtime.plot.trade import draw_trade
 
@@ -79,7 +79,7 @@ def test_what_cannot_be_finished_is_told_and_never_on_the_front(trade: Trade) ->
     )
     more = replace(trade, measured=(*trade.measured, failed))
     assert failed not in more.front()
-    data = json.loads(json.dumps(to_plain(more), allow_nan=False))
+    data = json.loads(json.dumps(more.to_json(), allow_nan=False))
     assert data["trade"]["measured"][-1]["time"] is None
     assert data["trade"]["measured"][0]["promised"][PEAK] == trade.measured[0].promised[PEAK]
     assert data["words"] == words(more)

@@ -13,8 +13,8 @@ from ballpass.runtime.ask.peaks import Peak, refine_peak
 from ballpass.runtime.certify.error_target import simulate_to_error
 from ballpass.runtime.certify.growth import Growth, find_growth, simulate_members
 from ballpass.runtime.contract import Manifest, read_artefact
-from ballpass.runtime.contract.errors import ArtefactError, RequestError
-from ballpass.runtime.contract.parameters import Numbers, vector
+from ballpass.runtime.contract.errors import ArtefactError
+from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.many.ensemble import EnsembleResult, simulate_many
 from ballpass.runtime.many.ensemble_parts import simulate_parts
 from ballpass.runtime.many.members import Table
@@ -22,7 +22,9 @@ from ballpass.runtime.native.compile import CompiledLibrary, compile_model
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.explain import Explanation, explain
 from ballpass.runtime.point.point_model import PointModel
+from ballpass.runtime.point.run_start import Initial, start_of
 from ballpass.runtime.quantity.values import QuantityValue, quantity_values
+from ballpass.runtime.questions import Questions
 from ballpass.runtime.run.choose_method import method_names
 from ballpass.runtime.run.locating import Kinks, refuse_with_error
 from ballpass.runtime.run.reduced_run import reduce_run
@@ -31,16 +33,11 @@ from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.sensitivity import Sensitivities, sensitivities
 from ballpass.runtime.run.settle import MOST, Settled, settle
 from ballpass.runtime.run.simulate import simulate
-from ballpass.runtime.run.start import RunEnd, Start
+from ballpass.runtime.run.start import Start
 from ballpass.runtime.run.stream import stream_run
-from ballpass.runtime.show.progress import Progress, shown, shown_steps
-
-#: State at the start: given, "equilibrium", or the end of a run that another goes on from; None takes the scene's.
-Initial = Sequence[float] | np.ndarray | RunEnd | Literal["equilibrium"] | None
+from ballpass.runtime.show.progress import Progress, shown
 
 if TYPE_CHECKING:
-    from ballpass.runtime.ask.life_text import LifeReport
-    from ballpass.runtime.certify.sensitivity_report import SensitivityReport
     from ballpass.runtime.run.solution import Solution, Statistics
 
 
@@ -96,7 +93,7 @@ def _load_same(folder: str, signature: str, compiler: str | None) -> Model:
     return model
 
 
-class Model(PointModel):
+class Model(PointModel, Questions):
     """Functions of one scene with their names, units and defaults.  All numbers are SI.
 
     For any number of threads at once, with the bits of calls one after the other.  What `kernel` and `loop` give
@@ -140,17 +137,7 @@ class Model(PointModel):
 
     def _start(self, numbers: Numbers, initial: Initial) -> Start:
         """What a run begins with; RequestError for words that are none."""
-        if initial is None or isinstance(initial, RunEnd):
-            return initial
-        if not isinstance(initial, str):
-            return vector(initial)
-        if initial != "equilibrium":
-            raise RequestError(
-                f'initial: {initial!r} was given. Allowed: a state, "equilibrium", or the end of a run (Solution.end).'
-            )
-        from ballpass.runtime.point.equilibrium import start_at_rest  # with SciPy
-
-        return start_at_rest(self, numbers)
+        return start_of(self, numbers, initial)
 
     def simulate(
         self,
@@ -350,77 +337,6 @@ class Model(PointModel):
         with shown("differentiating", progress) as tell:
             return sensitivities(self, numbers, replace(request, progress=tell), names)
 
-    def sensitivity(
-        self,
-        of: str | Sequence[str] | None = None,
-        wrt: str | Sequence[str] | None = None,
-        cycles: float | None = None,
-        *,
-        duration: float | None = None,
-        transient: float | None = None,
-        parameters: Mapping[str, float] | None = None,
-        method: str = "auto",
-        check: bool = True,
-        rtol: float | None = None,
-        sensitivity_rtol: float | None = None,
-        samples_per_cycle: int | None = None,
-        kinks: Literal["stepped-over", "located"] | None = None,
-        agreement: float | None = None,
-        progress: Callable[[str, float], None] | bool | None = None,
-    ) -> SensitivityReport:
-        """Derivatives of quantities of interest by parameters, each with a certificate (see `certificate`).
-
-        Parameters
-        ----------
-        of : quantities (see `ballpass.runtime.quantity.grammar`).  Default: peak ball force and motion of the rings
-        wrt : parameters.  Default: all
-        cycles, duration, transient, parameters : as for `simulate`
-        method : of the derivatives: ``auto``, or one of the stepper's
-        check : compare with differences, the second route; False gives derivatives without certificates
-        rtol, sensitivity_rtol : tolerances of states and derivatives; tight ones by default
-        samples_per_cycle : without effect since quadratures have their nodes in the steps of the run
-        kinks : as for `sensitivities`
-        agreement : relative disagreement of both routes that is allowed
-        progress : called with words and a finished fraction; else as for `simulate`
-
-        Raises
-        ------
-        RequestError
-            A wrong request, unknown names, or a law whose force jumps.
-        SimulationError
-            The computation failed.
-
-        Examples
-        --------
-        >>> report = model.sensitivity("rms:inner.y", "bearing.clearance", cycles=3)
-        >>> pair = report["rms:inner.y", "bearing.clearance"]
-        >>> f"{pair.derivative:.2f} {pair.unit}, {pair.check.verdict.value}"
-        '0.28 m/m, verified'
-        """
-        from ballpass.runtime.certify.sensitivity_query import (  # SciPy takes longer to read than a run
-            answer,
-            make_query,
-        )
-
-        query = make_query(
-            self.manifest,
-            of=of,
-            wrt=wrt,
-            cycles=cycles,
-            duration=duration,
-            transient=transient,
-            method=method,
-            check=check,
-            rtol=rtol,
-            sensitivity_rtol=sensitivity_rtol,
-            kinks=kinks,
-            agreement=agreement,
-            progress=None,
-        )
-        numbers = self._runnable(parameters)
-        with shown_steps("differentiating", progress) as tell:
-            return answer(self, numbers, replace(query, progress=tell))
-
     def quantities(
         self,
         of: str | Sequence[str],
@@ -555,51 +471,6 @@ class Model(PointModel):
         )
         with shown("simulating until settled", progress) as tell:
             return settle(self, numbers, replace(request, progress=tell), most)
-
-    def life(
-        self,
-        cycles: float | None = None,
-        *,
-        transient: float | None = None,
-        parameters: Mapping[str, float] | None = None,
-        rtol: float | None = None,
-        method: str | None = None,
-        initial: Initial = None,
-        progress: Progress = None,
-    ) -> LifeReport:
-        """Strength, rating life and wear of every bearing, over the scene's duty cycle where it has one.
-
-        Parameters
-        ----------
-        cycles : turns.  Default: as many as the lives take to settle (see `ballpass.runtime.run.load_history`); the
-            report says how many that were, and `unsettled` whether more would change a life
-        others : as for `reduce`; overrides of a state of the duty cycle come behind those given here
-
-        Raises
-        ------
-        RequestError
-            A wrong request, a linkage that cannot be assembled, or a scene without bearing.
-        SimulationError
-            The computation failed.
-
-        Examples
-        --------
-        >>> (bearing,) = model.life(cycles=4, transient=2).bearings
-        >>> f"{bearing.static_safety:.1f}, {bearing.lives['sectors'] / 1e6:.0f} million turns"
-        '0.9, 225 million turns'
-        """
-        from ballpass.runtime.ask.life_report import life_report
-
-        numbers = self._runnable(parameters)
-        request = Request(
-            cycles=cycles,
-            transient_cycles=transient,
-            rtol=rtol,
-            method=method,
-            initial=self._start(numbers, initial),
-        )
-        with shown("simulating for life", progress) as tell:
-            return life_report(self, dict(parameters or {}), replace(request, progress=tell))
 
     def simulate_many(
         self,

@@ -17,21 +17,15 @@ from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.animate import animate
 from ballpass.runtime.app.commands.asked import (
     Asked,
-    faults_of_numbers,
     read_asked,
-    read_duration,
     read_formats,
-    read_quantity,
-    read_turns,
 )
 from ballpass.runtime.app.commands.bearings import bearings
 from ballpass.runtime.app.commands.dataset import dataset
+from ballpass.runtime.app.commands.declared import as_command, question_command
 from ballpass.runtime.app.commands.explain import explain
-from ballpass.runtime.app.commands.jacobian import jacobian, linearize
-from ballpass.runtime.app.commands.life import life
 from ballpass.runtime.app.commands.new import new
 from ballpass.runtime.app.commands.schema import schema
-from ballpass.runtime.app.commands.sensitivity import sensitivity
 from ballpass.runtime.app.commands.shared import (
     Stages,
     can_draw,
@@ -47,17 +41,19 @@ from ballpass.runtime.app.commands.shared import (
     results_folder,
     show,
     show_json,
+    show_parts,
     size_words,
     warn,
     warn_of_scene,
 )
-from ballpass.runtime.app.commands.spectrum import spectrum
 from ballpass.runtime.app.commands.stream import stream
 from ballpass.runtime.app.commands.sweep import sweep
 from ballpass.runtime.app.commands.trade import read_error, trade
 from ballpass.runtime.contract import read_artefact, read_manifest
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, SampleRate
 from ballpass.runtime.contract.version import __version__
+from ballpass.runtime.questions import QUESTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -102,22 +98,22 @@ def _common(
 app.command(rich_help_panel=DESCRIBE)(new)
 
 
-@app.command(rich_help_panel=SIMULATE)
 def run(
     scene: options.SceneOrFolder,
-    cycles: options.Cycles = None,
+    cycles: Cycles = None,
     turns: Annotated[
         str | None,
-        typer.Option(
-            metavar="settle",
-            help="Peaks and rms of the summary are those of as many turns as they take to settle.",
+        Option(
+            words="Peaks and rms of the summary are those of as many turns as they take to settle.",
+            shown="settle",
+            choices=("settle",),
         ),
     ] = None,
-    duration: options.Duration = None,
+    duration: Duration = None,
     transient: Annotated[
-        float | None, typer.Option(metavar="N", help="Turns at the start that summary and figures leave out.")
+        float | None, Option(words="Turns at the start that summary and figures leave out.", shown="N", least=0.0)
     ] = None,
-    sample_rate: options.SampleRate = None,
+    sample_rate: SampleRate = None,
     initial: Annotated[
         str | None,
         typer.Option(
@@ -127,7 +123,7 @@ def run(
         ),
     ] = None,
     set_: options.Settings = None,
-    rtol: options.Tolerance = None,
+    rtol: Rtol = None,
     method: Annotated[
         str | None,
         typer.Option(
@@ -173,16 +169,12 @@ def run(
         from ballpass.runtime.app.summary import add_turns, summarize
         from ballpass.runtime.app.summary_table import render_accuracy, render_quantities, render_summary
         from ballpass.runtime.run.settle import look_further
-        from ballpass.runtime.run.tables import show_tables
 
         stages("read")
         formats = read_formats(format_)
-        settles = read_turns(turns, duration if cycles is None else cycles)
-        seconds = read_duration(duration, cycles)
-        asked = read_asked(scene, set_, seconds, transient)
+        asked = read_asked(scene, set_, duration, transient)
         start = _read_start(initial)
-        rate = read_quantity("--sample-rate", sample_rate, "Hz")
-        _check_request(asked, cycles, transient, rtol, method, goes_on=start not in (None, "equilibrium"))
+        _check_request(asked, cycles, transient, method, goes_on=start not in (None, "equilibrium"))
         at_kinks = checked_kinks(kinks, method or asked.run.method, error)
         target = read_error(error, method, rtol)
         folder = results_folder(out, scene)
@@ -191,13 +183,13 @@ def run(
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,
-            duration=seconds,
+            duration=duration,
             transient=transient,
             parameters=asked.overrides,
             method=method,
             rtol=rtol,
             kinks=at_kinks,
-            sample_rate=rate,
+            sample_rate=sample_rate,
             progress=stages.fraction,
             error=target,
             of=of if target is not None else None,
@@ -210,7 +202,7 @@ def run(
         if solution.states and model.has_stepper:
             growth = model.growth(
                 cycles,
-                duration=seconds,
+                duration=duration,
                 transient=transient,
                 parameters=asked.overrides,
                 rtol=solution.statistics.rtol,
@@ -219,7 +211,7 @@ def run(
             if growth.uncertain:
                 warn(growth.words)
         longer = None
-        if settles:
+        if turns is not None:
             taken = solution.statistics
             longer = model.settle(
                 transient=transient,
@@ -239,7 +231,7 @@ def run(
             model.quantities(
                 of,
                 cycles,
-                duration=seconds,
+                duration=duration,
                 transient=transient,
                 parameters=asked.overrides,
                 method=taken.method,
@@ -254,7 +246,7 @@ def run(
         summary = summarize(model, solution, growth)
         if asked_for:
             summary["quantities"] = {name: asdict(one) for name, one in asked_for.items()}
-        turned = add_turns(summary, longer, instead=settles) if longer is not None else ""
+        turned = add_turns(summary, longer, instead=turns is not None) if longer is not None else ""
         if solution.accuracy is not None:
             summary["accuracy"] = solution.accuracy.plain()
         summary, files = _write_results(model, solution, summary, folder, stages, formats=formats if figures else ())
@@ -262,17 +254,20 @@ def run(
         show_json(summary)
         return
     table = render_summary(summary)
-    show_tables(table)
+    show_parts(table)
     if asked_for and solution.accuracy is None:
-        show_tables(render_quantities(asked_for))
+        show_parts(render_quantities(asked_for))
     if turned:
         show(turned)
     if solution.accuracy is not None:
         told = render_accuracy(model, solution.accuracy)
-        show_tables(told)
+        show_parts(told)
         show(solution.accuracy.words)
     size = size_words((folder / "solution.nc").stat().st_size)
     show(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")
+
+
+app.command(rich_help_panel=SIMULATE)(as_command(run))
 
 
 @app.command(rich_help_panel=DESCRIBE)
@@ -370,13 +365,11 @@ def export(
     typer.echo(str(target))
 
 
-for _panel, _commands in {
-    DESCRIBE: (bearings, explain, schema),
-    SIMULATE: (animate, dataset, stream, sweep),
-    ASK: (jacobian, life, linearize, sensitivity, spectrum, trade),
-}.items():
+for _panel, _commands in {DESCRIBE: (bearings, explain, schema), SIMULATE: (animate, dataset, stream, sweep)}.items():
     for _command in _commands:
-        app.command(rich_help_panel=_panel)(_command)
+        app.command(rich_help_panel=_panel)(as_command(_command))
+for _question in (*QUESTIONS, trade):
+    app.command(rich_help_panel=ASK)(question_command(_question))
 
 
 def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:
@@ -394,7 +387,6 @@ def _check_request(
     asked: Asked,
     cycles: float | None,
     transient: float | None,
-    rtol: float | None,
     method: str | None,
     *,
     goes_on: bool = False,
@@ -404,13 +396,9 @@ def _check_request(
     from ballpass.runtime.native.casadi_integrators import METHODS
     from ballpass.runtime.native.stepper import METHODS as STEPPERS
 
-    faults = []
     known = ("auto", *STEPPERS, *METHODS)
     if method is not None and method not in known:
-        faults.append(f"--method: {unknown_name('method', method, known)}")
-    faults += faults_of_numbers(cycles, transient, rtol)
-    if faults:
-        raise RequestError("\n".join(faults))
+        raise RequestError(f"--method: {unknown_name('method', method, known)}")
     speed = abs(asked.speed)
     if cycles is not None and speed == 0.0:
         raise RequestError(

@@ -1,6 +1,6 @@
 """The numbers people read first as a table for the terminal.
 
-In: what `summarize` gave.  Out: tables of `rich`.
+In: what `summarize` gave.  Out: tables of a report.
 """
 
 from __future__ import annotations
@@ -9,11 +9,9 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
-
 from ballpass.runtime.app.summary import TABLE_UNITS
 from ballpass.runtime.quantity.grammar import parse_quantity
-from ballpass.runtime.run.tables import simple_table
+from ballpass.runtime.report.report import ReportTable
 
 if TYPE_CHECKING:
     from ballpass.runtime.model import Model
@@ -37,28 +35,33 @@ _RUN = {
 }
 
 
-def render_summary(summary: Mapping[str, Any]) -> Table:
-    """The summary as a table for a terminal of 80 columns; mean and standard deviation are in the file only.
+def render_summary(summary: Mapping[str, Any]) -> ReportTable:
+    """The summary as a table; mean and standard deviation are in the file only.
 
     Parameters
     ----------
     summary : what `summarize` gave
     """
     columns = ("value", "min", "max", "rms")
-    heads = ("quantity", *columns, "unit")
-    table = simple_table(f"{summary['title']}: {summary['method']}", heads, right=columns, caption=_caption(summary))
+    rows: list[tuple[str, ...]] = []
     for name, item in summary.items():
         if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
             continue
         factor, unit = TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
         cells = [_cell(item, key, factor) for key in columns]
         if any(cells):
-            table.add_row(name, *cells, unit)
+            rows.append((name, *cells, unit))
         for key, value in item.items():
             if key not in _COLUMNS and key != "unit" and not isinstance(value, Mapping):
                 # a named part of a quantity, as the peak's elastic one; what is said of it is in the file
-                table.add_row(f"{name}.{key}", _cell(item, key, factor), "", "", "", unit)
-    return table
+                rows.append((f"{name}.{key}", _cell(item, key, factor), "", "", "", unit))
+    return ReportTable(
+        title=f"{summary['title']}: {summary['method']}",
+        heads=("quantity", *columns, "unit"),
+        rows=rows,
+        right=columns,
+        caption=_caption(summary),
+    )
 
 
 def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
@@ -69,29 +72,31 @@ def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
     return f"{factor * item[key]:z.4g}" if key in item else ""
 
 
-def render_quantities(found: Mapping[str, QuantityValue]) -> Table:
-    """Quantities of ``--of`` as a table for a terminal."""
-    table = simple_table("Quantities", ("quantity", "value", "unit", "at"), right=("value",))
+def render_quantities(found: Mapping[str, QuantityValue]) -> ReportTable:
+    """Quantities of ``--of``."""
+    rows = []
     for name, one in found.items():
         factor, unit = TABLE_UNITS.get(one.unit, (1.0, one.unit))
         time = "" if one.time is None else f"t = {one.time:.6g} s"
         ball = "" if one.ball is None else f"ball {one.ball}"
-        table.add_row(name, f"{factor * one.value:z.6g}", unit, ", ".join(filter(None, [time, ball])))
-    return table
+        rows.append((name, f"{factor * one.value:z.6g}", unit, ", ".join(filter(None, [time, ball]))))
+    return ReportTable(title="Quantities", heads=("quantity", "value", "unit", "at"), rows=rows, right=("value",))
 
 
-def render_accuracy(model: Model, accuracy: Accuracy) -> Table:
-    """Quantities of ``--error`` with their values and estimated errors, as a table for a terminal."""
-    right = ("value", "estimated error")
-    table = simple_table("Extremes between samples included", ("quantity", *right, "unit"), right=right)
+def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
+    """Quantities of ``--error`` with their values and estimated errors."""
+    rows = []
     for name in accuracy.of:
         unit = parse_quantity(model.manifest, name).unit
         factor, unit = TABLE_UNITS.get(unit, (1.0, unit))
         value, error = accuracy.values[name], accuracy.estimates[name]
         # no more digits than the error leaves
         digits = min(max(math.ceil(-math.log10(max(error, 1e-16))), 1), 9) if math.isfinite(error) else 1
-        table.add_row(name, f"{factor * value:z.{digits}g}", f"{100 * error:.2g} %", unit)
-    return table
+        rows.append((name, f"{factor * value:z.{digits}g}", f"{100 * error:.2g} %", unit))
+    right = ("value", "estimated error")
+    return ReportTable(
+        title="Extremes between samples included", heads=("quantity", *right, "unit"), rows=rows, right=right
+    )
 
 
 def _caption(summary: Mapping[str, Any]) -> str:

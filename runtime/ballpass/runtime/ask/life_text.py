@@ -1,33 +1,25 @@
-"""The report on strength and life of a scene's bearings: as text, HTML, JSON and table."""
+"""The report on strength and life of a scene's bearings."""
 
 from __future__ import annotations
 
 import math
-import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from itertools import groupby
-from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.ask.life_records import BearingStrength, DutyLife, StateStrength
-from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.ratings.life import MILLION
 from ballpass.runtime.ratings.wear import COEFFICIENTS
-from ballpass.runtime.show import html
+from ballpass.runtime.report.report import Report, ReportTable, Words
+from ballpass.runtime.report.reported import Reported
 
-if TYPE_CHECKING:
-    import pandas
+#: Behind the reading that gives the shortest life.
+GOVERNS = " (governs)"
 
-#: Beside the reading that gives the shortest life.
-GOVERNS = "  <- governs"
-
-#: A line of a report, or a row of a table: head, two cells, mark.
-_Part = str | tuple[str, str, str, str]
+_Parts = list[Words | ReportTable]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LifeReport:
+class LifeReport(Reported):
     """Strength and life of all bearings of a scene; see `ballpass.runtime.Model.life`.
 
     Attributes
@@ -62,47 +54,22 @@ class LifeReport:
             if not state.settled
         )
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain data, SI; what is infinite becomes None.
-
-        Examples
-        --------
-        >>> sorted(model.life(cycles=4, transient=2).to_json())
-        ['duty', 'scene', 'states', 'title', 'wear_coefficients']
-        """
-        found: dict[str, Any] = finite(asdict(self))
-        for state, plain in zip(self.states, found["states"], strict=True):
+    def _report(self) -> Report:
+        facts = asdict(self)
+        for state, plain in zip(self.states, facts["states"], strict=True):
             for bearing, entry in zip(state.bearings, plain["bearings"], strict=True):
                 entry["governing"] = bearing.governing
-                entry["hours"] = {name: finite(bearing.hours(life)) for name, life in bearing.lives.items()}
-        for life, plain in zip(self.duty, found["duty"], strict=True):
+                entry["hours"] = {name: bearing.hours(life) for name, life in bearing.lives.items()}
+        for life, plain in zip(self.duty, facts["duty"], strict=True):
             plain["governing"] = life.governing
-        found["wear_coefficients"] = list(COEFFICIENTS)
-        return found
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Table indexed by ``state``, ``bearing`` and ``reading``: lives in turns and hours, loads, SI.
-
-        A bearing without rating life has a row of its own, without a reading.
-
-        Raises
-        ------
-        RequestError
-            pandas is not installed.
-
-        Examples
-        --------
-        >>> table = model.life(cycles=4, transient=2).to_pandas()
-        >>> list(table.index.names), list(table.columns[:3])
-        (['state', 'bearing', 'reading'], ['life', 'hours', 'governs'])
-        """
-        rows = [
+        facts["wear_coefficients"] = list(COEFFICIENTS)
+        records = [
             {
                 "state": state.name,
                 "bearing": bearing.name,
                 "reading": reading,
                 "life": turns,
-                "hours": bearing.hours(turns),
+                "hours": bearing.hours(turns) if reading else math.nan,  # the rings may stand still
                 "governs": reading != "" and reading == bearing.governing,
                 "peak_force": bearing.peak_force,
                 "static_safety": bearing.static_safety,
@@ -112,35 +79,16 @@ class LifeReport:
             for bearing in state.bearings
             for reading, turns in (bearing.lives or {"": math.nan}).items()
         ]
-        return need("pandas").DataFrame(rows).set_index(["state", "bearing", "reading"])
-
-    def __str__(self) -> str:
-        return "\n".join(line for part in self._parts() for line in _text(part))
-
-    def _repr_html_(self) -> str:
-        head, *others = self._parts()
-        found = [html.title(str(head))]
-        for rows, group in groupby(others, key=lambda part: isinstance(part, tuple)):
-            parts = list(group)
-            found += [_table(parts)] if rows else [html.paragraph(str(part).strip()) for part in parts if part]
-        return html.block(*found)
-
-    def _parts(self) -> list[_Part]:
-        """What there is to read, in order."""
-        lines: list[_Part] = [f"{self.title}: strength and life of its bearings"]
-        for state in self.states:
-            if state.name:
-                lines += ["", f"State {state.name}, {100.0 * state.share:.3g} % of the time"]
-            if not state.bearings:
-                lines.append("  nothing turns: no damage")
-                continue
-            lines.append(f"  {_turns_words(state)}")
-            for bearing in state.bearings:
-                lines += ["", *_bearing_parts(bearing)]
-            lines += ["", f"  Wear and P: means of {state.samples} samples; angles from each ring's x axis."]
-        for life in self.duty:
-            lines += ["", *_duty_parts(life)]
-        return lines
+        swinging = [bearing.why_no_life for state in self.states for bearing in state.bearings if bearing.why_no_life]
+        return Report(
+            title=f"{self.title}: strength and life of its bearings",
+            parts=[*(part for state in self.states for part in _state_parts(state))]
+            + [part for life in self.duty for part in _duty_parts(life)],
+            facts=facts,
+            records=records,
+            index=("state", "bearing", "reading"),
+            warnings=(*self.unsettled, *dict.fromkeys(swinging)),
+        )
 
     def __repr__(self) -> str:
         parts = []
@@ -162,84 +110,83 @@ def _turns_words(state: StateStrength) -> str:
     return f"{run}, not settled: the second half moved a life or a peak by {100.0 * state.change:.2g} %."
 
 
-def _bearing_parts(bearing: BearingStrength) -> list[_Part]:
+def _state_parts(state: StateStrength) -> _Parts:
+    parts: _Parts = []
+    if state.name:
+        parts += ["", f"State {state.name}, {100.0 * state.share:.3g} % of the time"]
+    if not state.bearings:
+        return [*parts, "  nothing turns: no damage"]
+    parts.append(f"  {_turns_words(state)}")
+    parts.append("")  # behind a table there is one
+    for bearing in state.bearings:
+        parts += _bearing_parts(bearing)
+    return [*parts, f"  Wear and P: means of {state.samples} samples; angles from each ring's x axis."]
+
+
+def _bearing_parts(bearing: BearingStrength) -> _Parts:
     rings = (bearing.inner, bearing.outer)
     at = f"{bearing.peak_time:.5g} s"
     if bearing.peak_angle is not None:
         at += f", {math.degrees(bearing.peak_angle):.1f} deg of crank or shaft"
-    lines: list[_Part] = [
+    rows: list[tuple[str, ...]] = [
+        ("peak pressure", *(f"{ring.peak_pressure / 1e6:.0f} MPa" for ring in rings)),
+        ("ellipse, a x b", *(f"{1e3 * ring.major_axis:.3f} x {1e3 * ring.minor_axis:.3f} mm" for ring in rings)),
+    ]
+    for reading in bearing.lives:
+        mark = GOVERNS if reading == bearing.governing else ""
+        loads = (_force(ring.equivalent_loads[reading]) for ring in rings)
+        rows.append((f"equivalent ball load by {reading}{mark}", *loads))
+    if bearing.lives:
+        rows += [
+            ("place of the most damage", *(f"{math.degrees(ring.worst_angle):.0f} deg" for ring in rings)),
+            ("share of the damage", *(f"{100.0 * sum(ring.damage):.0f} %" for ring in rings)),
+        ]
+    rows += [
+        ("deepest wear, lowest wear coefficient", *(_wear(ring.wear[0]) for ring in rings)),
+        ("deepest wear, highest wear coefficient", *(_wear(ring.wear[1]) for ring in rings)),
+        ("its angle", *(f"{math.degrees(ring.wear_angle):.0f} deg" for ring in rings)),
+        ("its distance from the groove's centre", *(f"{1e3 * ring.wear_across:.2f} mm" for ring in rings)),
+    ]
+    parts: _Parts = [
         f"Bearing {bearing.name}".rstrip() + (" (grooves 0.52 and 0.53, steel: assumed)" if bearing.assumed else ""),
         f"  C_r {_force(bearing.dynamic_rating)} ({_source(bearing, 'dynamic_rating', 'ISO 281')}), "
         f"C_0r {_force(bearing.static_rating)} ({_source(bearing, 'static_rating', 'ISO 76')}), "
         f"C_u {_force(bearing.fatigue_limit)} ({_source(bearing, 'fatigue_limit', 'C_0r/22')})",
         f"  highest ball force {_force(bearing.peak_force)}: ball {bearing.peak_ball}, {at}",
         f"  static safety s_0 {bearing.static_safety:.3g}",
-        "",
-        _row("", "inner ring", "outer ring"),
-        _row("  peak pressure", *(f"{ring.peak_pressure / 1e6:.0f} MPa" for ring in rings)),
-        _row("  ellipse, a x b", *(f"{1e3 * ring.major_axis:.3f} x {1e3 * ring.minor_axis:.3f} mm" for ring in rings)),
+        ReportTable(heads=("", "inner ring", "outer ring"), rows=rows, right=("inner ring", "outer ring")),
     ]
-    for reading in bearing.lives:
-        lines.append(_row(f"  Q_e, {reading}", *(_force(ring.equivalent_loads[reading]) for ring in rings)))
-    if bearing.lives:
-        lines.append(
-            _row("  place of the most damage", *(f"{math.degrees(ring.worst_angle):.0f} deg" for ring in rings))
-        )
-        shares = (100.0 * sum(ring.damage) for ring in rings)
-        lines.append(_row("  share of the damage", *(f"{share:.0f} %" for share in shares)))
-    lines.append(_row("  wear, deepest, least k", *(_wear(ring.wear[0]) for ring in rings)))
-    lines.append(_row("                 most k", *(_wear(ring.wear[1]) for ring in rings)))
-    places = (f"{math.degrees(ring.wear_angle):.0f} deg, {1e3 * ring.wear_across:.2f} mm" for ring in rings)
-    lines += [_row("  there: angle, off the middle", *places), ""]
     if bearing.why_no_life:
-        return [*lines, f"  No rating life. {bearing.why_no_life}"]
-    lines.append(_row("", "million turns", "hours"))
-    lines.append(_life_row(bearing, f"  L_10, P = {_force(bearing.equivalent_load)}", bearing.basic_life))
-    for reading, life in bearing.lives.items():
-        mark = GOVERNS if reading == bearing.governing else ""
-        lines.append(_life_row(bearing, f"  L_10r, {reading}", life, mark))
+        return [*parts, f"  No rating life. {bearing.why_no_life}"]
+    lives = {
+        f"L_10, P = {_force(bearing.equivalent_load)}": bearing.basic_life,
+        **{_reading_words(reading, bearing.governing): life for reading, life in bearing.lives.items()},
+    }
     if bearing.factor is not None:
-        words = f"  L_nmr, a_ISO {bearing.factor:.3g}, kappa {bearing.viscosity_ratio:.3g}"
-        lines.append(_life_row(bearing, words, bearing.modified_life))
-    return lines
+        lives[f"L_nmr, a_ISO {bearing.factor:.3g}, kappa {bearing.viscosity_ratio:.3g}"] = bearing.modified_life
+    known = {name: life for name, life in lives.items() if life is not None}
+    return [*parts, _lives({name: (life, bearing.hours(life)) for name, life in known.items()})]
 
 
-def _duty_parts(life: DutyLife) -> list[_Part]:
-    lines: list[_Part] = [f"Duty cycle, bearing {life.name}".rstrip() + ", Miner's rule over the states"]
+def _duty_parts(life: DutyLife) -> _Parts:
+    head = f"Duty cycle, bearing {life.name}".rstrip() + ", Miner's rule over the states"
     if life.why_no_life:
-        return [*lines, f"  No rating life. {life.why_no_life}"]
-    lines.append(_row("", "million turns", "hours"))
-    for reading in life.hours:
-        mark = GOVERNS if reading == life.governing else ""
-        lines.append(_row(f"  L_10r, {reading}", *_life(life.turns[reading], life.hours[reading]), mark))
+        return ["", head, f"  No rating life. {life.why_no_life}"]
+    lives = {_reading_words(name, life.governing): (life.turns[name], spent) for name, spent in life.hours.items()}
     if life.modified_hours is not None and life.modified_turns is not None:
-        lines.append(_row("  L_nmr", *_life(life.modified_turns, life.modified_hours)))
+        lives["L_nmr"] = life.modified_turns, life.modified_hours
     shares = ", ".join(f"{name} {100.0 * share:.3g} %" for name, share in life.damage.items())
-    return [*lines, f"  Damage: {shares}."]
+    return ["", head, _lives(lives), f"  Damage: {shares}."]
 
 
-def _text(part: _Part) -> list[str]:
-    """Lines of a terminal of 80 columns."""
-    if isinstance(part, tuple):
-        head, first, second, mark = part
-        return [f"{head:<32}{first:>18}{second:>18}{mark}".rstrip()]
-    lead = "  " if part.startswith("  ") else ""
-    return textwrap.wrap(part.strip(), 78, initial_indent=lead, subsequent_indent=lead) or [""]
+def _reading_words(reading: str, governing: str) -> str:
+    return f"L_10r by {reading}{GOVERNS if reading == governing else ''}"
 
 
-def _table(rows: Sequence[Any]) -> str:
-    """Rows as HTML, the first of them heads."""
-    heads, *others = rows
-    return html.table(heads, others, right=heads[1:3])
-
-
-def _row(head: str, first: str, second: str, mark: str = "") -> _Part:
-    return head, first, second, mark
-
-
-def _life_row(bearing: BearingStrength, head: str, life: float | None, mark: str = "") -> _Part:
-    assert life is not None  # the bearing turns
-    return _row(head, *_life(life, bearing.hours(life)), mark)
+def _lives(lives: Mapping[str, tuple[float, float]]) -> ReportTable:
+    """Lives in turns and hours."""
+    heads = ("life", "million turns", "hours")
+    return ReportTable(heads=heads, rows=[(name, *_life(*life)) for name, life in lives.items()], right=heads[1:])
 
 
 def _life(turns: float, spent: float) -> tuple[str, str]:

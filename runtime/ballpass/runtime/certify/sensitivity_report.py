@@ -8,25 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
-
-from rich.console import Group
-from rich.markup import escape
-from rich.table import Table
-from rich.text import Text
+from typing import Any, Literal
 
 from ballpass.runtime.certify.certificate import Check, Verdict
 from ballpass.runtime.certify.grazing import Grazing, describe, merge_grazing
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.quantity.values import QuantityValue
-from ballpass.runtime.run.tables import printed, simple_table
-from ballpass.runtime.show import html
-
-if TYPE_CHECKING:
-    import pandas
+from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
+from ballpass.runtime.report.reported import Reported
 
 #: Grazing places that are listed; the JSON has all.
 LISTED = 3
@@ -34,8 +24,15 @@ LISTED = 3
 #: The route of derivatives of the stepper's own steps.
 STEPS = "steps"
 
-#: Styles of the verdicts.
-_STYLES = {Verdict.VERIFIED: "green", Verdict.DISAGREES: "bold red", Verdict.NOT_CHECKED: "yellow"}
+#: Rows of each section of a table; pairs that disagree are always there, and the JSON has all.
+ROWS = 15
+
+#: What the verdicts mean to a reader.
+_LOOKS: dict[Verdict, Literal["good", "bad", "doubt"]] = {
+    Verdict.VERIFIED: "good",
+    Verdict.DISAGREES: "bad",
+    Verdict.NOT_CHECKED: "doubt",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +79,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class SensitivityReport:
+class SensitivityReport(Reported):
     """Answer to a query: every pair, with what it takes to judge them.
 
     Attributes
@@ -120,13 +117,6 @@ class SensitivityReport:
             f"SensitivityReport({self.scene!r}: {len(self.quantities)} quantities by {len(self.parameters)} "
             f"parameters, {verdicts})"
         )
-
-    def __str__(self) -> str:
-        """The tables of ``ballpass sensitivity``, without colours."""
-        return printed(render_report(self))
-
-    def _repr_html_(self) -> str:
-        return html.block(html.from_terminal(render_report(self)))
 
     def __getitem__(self, key: tuple[str, str]) -> Sensitivity:
         """The pair of a quantity and a parameter.
@@ -170,95 +160,60 @@ class SensitivityReport:
         """Pairs whose two routes disagree."""
         return tuple(pair for pair in self.pairs if pair.check.verdict is Verdict.DISAGREES)
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Table with a row for each pair, indexed by ``quantity`` and ``parameter``: numbers, units and verdicts.
-
-        Raises
-        ------
-        RequestError
-            pandas is not installed.
-
-        Examples
-        --------
-        >>> report = model.sensitivity("rms:inner.y", "bearing.clearance", cycles=3, check=False)
-        >>> report.to_pandas().shape
-        (1, 7)
-        >>> list(report.to_pandas().columns[:4])
-        ['value', 'parameter_value', 'derivative', 'unit']
-        """
-        rows = [
-            {
-                "quantity": pair.quantity,
-                "parameter": pair.parameter,
-                "value": pair.value,
-                "parameter_value": pair.parameter_value,
-                "derivative": pair.derivative,
-                "unit": pair.unit,
-                "dimensionless": pair.dimensionless,
-                "uncertainty": pair.uncertainty,
-                "verdict": pair.check.verdict.value,
-            }
-            for pair in self.pairs
-        ]
-        return need("pandas").DataFrame(rows).set_index(["quantity", "parameter"])
-
-    def to_json(self) -> dict[str, Any]:
-        """The report as JSON-ready mapping; numbers that are not finite are null.
-
-        Examples
-        --------
-        >>> report = model.sensitivity("rms:inner.y", "bearing.clearance", cycles=3, check=False)
-        >>> sorted(report.to_json())
-        ['grazing', 'quantities', 'scene', 'sensitivities', 'settings', 'verdicts']
-        """
-        found: dict[str, Any] = finite(
-            {
+    def _report(self) -> Report:
+        numbers = ("quantity", "parameter", "value", "parameter_value", "derivative", "unit", "dimensionless")
+        common = [{name: getattr(pair, name) for name in (*numbers, "uncertainty")} for pair in self.pairs]
+        pairs = list(zip(self.pairs, common, strict=True))
+        return Report(
+            parts=[*(_table(self, quantity) for quantity in self.quantities), *_remarks(self)],
+            facts={
                 "scene": self.scene,
                 "settings": dict(self.settings),
                 "verdicts": {verdict.value: count for verdict, count in self.verdicts.items()},
                 "quantities": [asdict(item) for item in self.quantities],
-                "sensitivities": [
-                    {
-                        "quantity": pair.quantity,
-                        "parameter": pair.parameter,
-                        "value": pair.value,
-                        "parameter_value": pair.parameter_value,
-                        "derivative": pair.derivative,
-                        "unit": pair.unit,
-                        "dimensionless": pair.dimensionless,
-                        "parameter_scale": pair.scale,
-                        "change_per_scale": pair.change,
-                        "uncertainty": pair.uncertainty,
-                        "route": pair.route,
-                        "by_steps": pair.by_steps,
-                        "certificate": {
-                            "route": pair.check.route,
-                            "value": pair.check.value,
-                            "uncertainty": pair.check.uncertainty,
-                            "disagreement": pair.check.disagreement,
-                            "verdict": pair.check.verdict.value,
-                            "nothing": pair.is_nothing,
-                            "within_bound_only": pair.check.bounded,
-                            "bound": pair.check.quantum,
-                            "reason": pair.check.reason,
-                            "slopes_at_kink": pair.check.sides,
-                        },
-                    }
-                    for pair in self.pairs
-                ],
+                "sensitivities": [known | _facts(pair) for pair, known in pairs],
                 "grazing": [
-                    {
-                        "ball": item.ball,
-                        "time": item.time,
-                        "crank_angle": item.crank_angle,
-                        "depth": item.depth,
-                        "kink": item.kink,
-                    }
-                    for item in self.grazing
+                    {name: value for name, value in asdict(item).items() if name != "bearing"} for item in self.grazing
                 ],
-            }
+            },
+            records=[known | {"verdict": pair.check.verdict.value} for pair, known in pairs],
+            index=("quantity", "parameter"),
+            fault=self._fault(),
         )
-        return found
+
+    def _fault(self) -> str:
+        if not self.disagreements:
+            return ""
+        first = self.disagreements[0]
+        return (
+            f"{len(self.disagreements)} of {len(self.pairs)} derivatives disagree with their second route, "
+            f"{first.check.route}, first d({first.quantity})/d({first.parameter}): {first.derivative:.9g} and "
+            f"{_number(first.check.value)} {first.unit}. "
+            "Do not rely on them; take a tighter --rtol and --sensitivity-rtol, or fewer turns."
+        )
+
+
+def _facts(pair: Sensitivity) -> dict[str, Any]:
+    """What the JSON has of a pair beside its numbers."""
+    check = pair.check
+    return {
+        "parameter_scale": pair.scale,
+        "change_per_scale": pair.change,
+        "route": pair.route,
+        "by_steps": pair.by_steps,
+        "certificate": {
+            "route": check.route,
+            "value": check.value,
+            "uncertainty": check.uncertainty,
+            "disagreement": check.disagreement,
+            "verdict": check.verdict.value,
+            "nothing": pair.is_nothing,
+            "within_bound_only": check.bounded,
+            "bound": check.quantum,
+            "reason": check.reason,
+            "slopes_at_kink": check.sides,
+        },
+    }
 
 
 def ratio_unit(above: str, below: str) -> str:
@@ -276,51 +231,38 @@ def _rank(pair: Sensitivity) -> tuple[bool, float]:
     return not has_one, -abs(size) if math.isfinite(size) else 1.0
 
 
-def render_report(report: SensitivityReport, *, top: int | None = None) -> Group:
-    """Tables of the report, a quantity each, parameters ranked by the size of the dimensionless derivative.
+def _table(report: SensitivityReport, quantity: QuantityValue) -> ReportTable:
+    """Parameters ranked by the size of the dimensionless derivative.
 
     Parameters that are zero have none and stand apart, ranked by dQ/dp times a natural change of the parameter.
-
-    Parameters
-    ----------
-    top : most rows of each section; None for all.  Pairs that disagree are always there
     """
-    parts: list[Table | Text] = []
-    for quantity in report.quantities:
-        table = simple_table(
-            _title(report, quantity.name),
-            ("parameter", "p/Q dQ/dp", "dQ/dp", "unit", "apart", "verdict"),
-            right=("p/Q dQ/dp", "dQ/dp", "apart"),
-            wrapped=("verdict",),
-            caption="; ".join(quantity.notes) or None,
-        )
-        ranked = report.of(quantity.name)
-        _add_rows(table, [pair for pair in ranked if math.isfinite(pair.dimensionless)], top)
-        without = [pair for pair in ranked if not math.isfinite(pair.dimensionless)]
-        if without:
-            what = "quantity" if quantity.value == 0.0 else "parameter"
-            table.add_section()
-            table.add_row(f"{what} is 0: no %/%, see dQ/dp", *[""] * 5, style="italic")
-            _add_rows(table, without, top)
-        parts.append(table)
-    parts += [Text.from_markup(line) for line in _remarks(report)]
-    return Group(*parts)
+    ranked = report.of(quantity.name)
+    rows = _rows([pair for pair in ranked if math.isfinite(pair.dimensionless)])
+    without = [pair for pair in ranked if not math.isfinite(pair.dimensionless)]
+    sections = [len(rows)] if without else []
+    if without:
+        what = "quantity" if quantity.value == 0.0 else "parameter"
+        rows += [(Marked(f"{what} is 0: no %/%, see dQ/dp", "head"),), *_rows(without)]
+    return ReportTable(
+        title=_title(quantity),
+        heads=("parameter", "p/Q dQ/dp", "dQ/dp", "unit", "apart", "verdict"),
+        rows=rows,
+        right=("p/Q dQ/dp", "dQ/dp", "apart"),
+        wrapped=("verdict",),
+        caption="; ".join(quantity.notes),
+        sections=sections,
+    )
 
 
-def _add_rows(table: Table, ranked: Sequence[Sensitivity], top: int | None) -> None:
+def _rows(ranked: Sequence[Sensitivity]) -> list[tuple[Words, ...]]:
     """Rows of one section."""
-    shown = [
-        pair for rank, pair in enumerate(ranked) if top is None or rank < top or pair.check.verdict is Verdict.DISAGREES
-    ]
-    for pair in shown:
-        table.add_row(*_row(pair))
-    if len(shown) < len(ranked):
-        table.add_row(f"{len(ranked) - len(shown)} more, smaller", *[""] * 5, style="dim")
+    shown = [pair for rank, pair in enumerate(ranked) if rank < ROWS or pair.check.verdict is Verdict.DISAGREES]
+    hidden = len(ranked) - len(shown)
+    return [*map(_row, shown), *([(Marked(f"{hidden} more, smaller", "faint"),)] if hidden else [])]
 
 
-def _title(report: SensitivityReport, name: str) -> str:
-    quantity = next(item for item in report.quantities if item.name == name)
-    words = f"{name} = {quantity.value:.6g} {quantity.unit}"
+def _title(quantity: QuantityValue) -> str:
+    words = f"{quantity.name} = {quantity.value:.6g} {quantity.unit}"
     if quantity.time is not None:
         words += f" at t = {quantity.time:.6g} s"
     if quantity.ball is not None:
@@ -328,12 +270,11 @@ def _title(report: SensitivityReport, name: str) -> str:
     return words
 
 
-def _row(pair: Sensitivity) -> tuple[str, ...]:
+def _row(pair: Sensitivity) -> tuple[Words, ...]:
     check = pair.check
     relative = f"{pair.dimensionless:+z.4f}" if math.isfinite(pair.dimensionless) else "–"
     size = max(abs(pair.derivative), abs(check.value or 0.0))
     apart = "-" if check.disagreement is None else f"{check.disagreement / size:.0e}" if size > 0.0 else "0"
-    style = _STYLES[check.verdict]
     number, words = f"{pair.derivative:z.4g}", check.verdict.value
     if pair.is_nothing:
         # digits that nothing vouches for are not shown
@@ -346,10 +287,10 @@ def _row(pair: Sensitivity) -> tuple[str, ...]:
         words += "" if pair.route == STEPS else f": by {pair.route}"
     elif check.bounded:
         words += f" to ±{check.quantum:.0e}"
-    return (escape(pair.parameter), relative, number, escape(pair.unit), apart, f"[{style}]{words}[/]")
+    return (pair.parameter, relative, number, pair.unit, apart, Marked(words, _LOOKS[check.verdict]))
 
 
-def _remarks(report: SensitivityReport) -> list[str]:
+def _remarks(report: SensitivityReport) -> list[Words]:
     """What stands below the tables."""
     counts = report.verdicts
     words = ", ".join(f"{count} {verdict.value}" for verdict, count in counts.items() if count)
@@ -357,11 +298,17 @@ def _remarks(report: SensitivityReport) -> list[str]:
     nothing = sum(pair.is_nothing for pair in report.pairs)
     if nothing:
         words += f" ({nothing} of them ~0: both routes below the bound shown, no digit of the derivative is verified)"
-    lines = [f"{len(report.pairs)} pairs: {words}" + (f"; apart: relative distance to {route}" if route else "")]
+    lines: list[Words] = [
+        f"{len(report.pairs)} pairs: {words}" + (f"; apart: relative distance to {route}" if route else "")
+    ]
     lines.append("p/Q dQ/dp: % per %; dQ/dp in SI units, angles in radians")
     lines += [
-        f"[bold red]disagrees[/]: d({escape(pair.quantity)})/d({escape(pair.parameter)}) is {pair.by_steps:.9g}, by "
-        f"{pair.check.route} {_number(pair.check.value)} ± {_number(pair.check.uncertainty)} {pair.unit}"
+        Marked(
+            "disagrees",
+            "bad",
+            f": d({pair.quantity})/d({pair.parameter}) is {pair.by_steps:.9g}, by "
+            f"{pair.check.route} {_number(pair.check.value)} ± {_number(pair.check.uncertainty)} {pair.unit}",
+        )
         for pair in report.disagreements
     ]
     tolerance = report.settings["sensitivity_rtol"]
@@ -376,15 +323,16 @@ def _remarks(report: SensitivityReport) -> list[str]:
             if pair.check.sides is not None:
                 kind = "a kink: the slopes on both sides are in the table"
             reasons[kind] = reasons.get(kind, 0) + 1
-    lines += [f"[yellow]not checked[/], {count} pairs: {escape(reason)}" for reason, count in reasons.items()]
+    lines += [Marked("not checked", "doubt", f", {count} pairs: {reason}") for reason, count in reasons.items()]
     if report.grazing:
         places = merge_grazing(report.grazing)
         count = f"{len(places)} place{'s' if len(places) > 1 else ''}"
         if len(places) < len(report.grazing):
             count += f" ({len(report.grazing)} counting each ball)"
         more = f"; the first {LISTED} here, --json lists all" if len(places) > LISTED else ""
-        lines.append(f"[yellow]grazing[/] at {count}: a small change moves the motion over a kink there{more}")
-        lines += [f"  {escape(describe(items))}" for items in places[:LISTED]]
+        words = f" at {count}: a small change moves the motion over a kink there{more}"
+        lines.append(Marked("grazing", "doubt", words))
+        lines += [f"  {describe(items)}" for items in places[:LISTED]]
     return lines
 
 

@@ -1,6 +1,6 @@
 """What a trade holds, for people and for files: a table of what no other way beats, sentences, plain data.
 
-In: nothing but numbers.  Out: `Trade`, its text, rows, plain data.
+In: nothing but numbers.  Out: `Trade`, its report, its rows.
 """
 
 from __future__ import annotations
@@ -8,17 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.certify.method_choice import MethodChoice
-from ballpass.runtime.contract.extras import need
-from ballpass.runtime.contract.json_text import finite
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run.locating import LOCATED
-from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
-
-if TYPE_CHECKING:
-    import pandas
 
 #: Errors that people ask for [1].
 TARGETS = (0.1, 0.01, 0.001, 0.0001)
@@ -48,7 +43,7 @@ class Measured(ShortRepr):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Trade:
+class Trade(Reported):
     """Accuracy against time on one scene.
 
     Attributes
@@ -79,34 +74,26 @@ class Trade:
             f"{', '.join(self.quantities)})"
         )
 
-    def __str__(self) -> str:
-        return "\n".join([f"{self.title}: what accuracy costs", *words(self)])
-
-    def _repr_html_(self) -> str:
-        heads, rows = table(self)
-        return html.block(
-            html.title(f"{self.title}: what accuracy costs", f"{self.members} members of {self.cycles:g} cycles"),
-            html.table(heads, rows, right=heads[:3]),
-            html.folded("what each target costs", "".join(map(html.paragraph, words(self)))),
-        )
-
     def error(self, one: Measured, quantity: str | None = None) -> float:
         """95 % point of a quantity's error; of the worst quantity where none is named."""
         return max(one.promised.values()) if quantity is None else one.promised[quantity]
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Table with a row for each way: method, tolerance, kinks, time of a cycle [s], failures, 95 % errors.
-
-        Raises
-        ------
-        RequestError
-            pandas is not installed.
-        """
-        rows = [
+    def _report(self) -> Report:
+        heads, rows = table(self, self.quantities[0])
+        best = ReportTable(
+            title=f"{self.title}: {self.quantities[0]}, what no other way beats",
+            heads=heads,
+            rows=rows,
+            right=heads[:-1],
+            wrapped=heads[-1:],
+            caption=f"{self.members} members of {self.cycles:g} cycles",
+        )
+        records = [
             {**asdict(one.way), "time": one.time, "failures": one.failures, "error": self.error(one), **one.promised}
             for one in self.measured
         ]
-        return need("pandas").DataFrame(rows)
+        said = words(self)
+        return Report(parts=(best, *said), facts={"trade": asdict(self), "words": said}, records=records)
 
     def front(self, quantity: str | None = None) -> tuple[Measured, ...]:
         """Ways that no other beats in both error and time, from cheap to accurate."""
@@ -171,11 +158,6 @@ def table(trade: Trade, quantity: str | None = None) -> tuple[tuple[str, ...], l
         median = max(one.median.values()) if quantity is None else one.median[quantity]
         rows.append((percent(trade.error(one, quantity)), percent(median), milliseconds(one.time), one.way.words))
     return head, rows
-
-
-def to_plain(trade: Trade) -> dict[str, Any]:
-    """Plain data for JSON: the trade and its words; what is infinite becomes None."""
-    return {"trade": finite(asdict(trade)), "words": words(trade)}
 
 
 def percent(error: float) -> str:

@@ -237,6 +237,7 @@ def write_figures(
     """
     written, lines = [], []
     for name, figure in figures:
+        folder.mkdir(parents=True, exist_ok=True)
         written += [save(figure, folder / f"{name}.{kind}") for kind in formats]
         title = " ".join(figure.get_suptitle().split())
         lines += [f"![{title}]({name}.{formats[0]})", "", f"**{title}.** {caption_of(figure)}".rstrip(), ""]

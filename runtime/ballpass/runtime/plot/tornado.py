@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
 
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -18,7 +17,7 @@ from ballpass.runtime.certify.certificate import Verdict
 from ballpass.runtime.certify.grazing import merge_grazing
 from ballpass.runtime.certify.sensitivity_report import Sensitivity, SensitivityReport
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, caption, new_figure, styled, unit_words, write_figures
+from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, caption, new_figure, styled, unit_words
 
 #: Bars of a chart.
 BARS = 15
@@ -91,12 +90,8 @@ def tornado(report: SensitivityReport, quantity: str) -> Figure:
     return figure
 
 
-def draw_tornados(report: SensitivityReport, folder: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
-    """Write a chart for each quantity that has bars, and captions; their paths."""
-    return write_figures(_charts(report), folder, formats, "sensitivity.md")
-
-
-def _charts(report: SensitivityReport) -> Iterator[tuple[str, Figure]]:
+def tornados(report: SensitivityReport) -> Iterator[tuple[str, Figure]]:
+    """A chart for each quantity that has bars, by name of its file."""
     for item in report.quantities:
         if _bars(report, item.name):
             plain = "".join(letter if letter.isalnum() else "_" for letter in item.name).strip("_")

@@ -18,17 +18,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.table import Table
 
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import RHS, Rows, contract, directions_of, rows_of
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.equilibrium_newton import Rest, settle
-from ballpass.runtime.run.tables import printed, simple_table
-from ballpass.runtime.show import html
 
 Array = NDArray[np.float64]
 
@@ -50,7 +49,7 @@ class FreeRingWarning(BallpassWarning):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class StaticEquilibrium:
+class StaticEquilibrium(Reported):
     """Rings at rest under the load of one instant.
 
     Attributes
@@ -96,11 +95,29 @@ class StaticEquilibrium:
             f"peak ball force {self.peak_ball_force:.6g} N)"
         )
 
-    def __str__(self) -> str:
-        return printed(_render(self))
-
-    def _repr_html_(self) -> str:
-        return html.block(html.from_terminal(_render(self)))
+    def _report(self) -> Report:
+        positions = dict(zip(self.coordinates, self.positions.tolist(), strict=True))
+        forces = zip(self.deflection.tolist(), self.ball_force.tolist(), strict=True)
+        balls = [
+            {"ball": k + 1, "deflection": deflection, "elastic_force": force}
+            for k, (deflection, force) in enumerate(forces)
+        ]
+        right = ("position or deflection, µm", "elastic force, N")
+        table = ReportTable(
+            title=f"Static equilibrium at t = {self.time:.6g} s",
+            heads=("position or ball", *right),
+            rows=[
+                *((name, f"{1e6 * q:z.6g}") for name, q in positions.items()),
+                *(
+                    (f"ball {ball['ball']}", f"{1e6 * ball['deflection']:z.6g}", f"{ball['elastic_force']:z.6g}")
+                    for ball in balls
+                ),
+            ],
+            right=right,
+            caption=f"load {', '.join(f'{part:z.6g} N' for part in self.load)}; net force left {self.residual:.2g} N",
+        )
+        facts = {"time": self.time, "load": self.load, "positions": positions, "balls": balls}
+        return Report(parts=(table,), facts=facts, records=balls, index=("ball",))
 
     def __getitem__(self, name: str) -> float:
         """Position by name [m].
@@ -365,22 +382,6 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
         numbers=numbers,
         load_is_given=load is not None,
     )
-
-
-def _render(found: StaticEquilibrium) -> Table:
-    """Positions, load and balls as a table, a row for each."""
-    right = ("position or deflection, µm", "elastic force, N")
-    table = simple_table(
-        f"Static equilibrium at t = {found.time:.6g} s",
-        ("position or ball", *right),
-        right=right,
-        caption=f"load {', '.join(f'{part:z.6g} N' for part in found.load)}; net force left {found.residual:.2g} N",
-    )
-    for name, q in zip(found.coordinates, found.positions.tolist(), strict=True):
-        table.add_row(name, f"{1e6 * q:z.6g}", "")
-    for k, (deflection, force) in enumerate(zip(found.deflection.tolist(), found.ball_force.tolist(), strict=True)):
-        table.add_row(f"ball {k + 1}", f"{1e6 * deflection:z.6g}", f"{force:z.6g}")
-    return table
 
 
 def _force_rows(model: LoadedModel) -> Rows:

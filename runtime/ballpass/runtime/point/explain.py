@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -24,10 +24,11 @@ from ballpass.runtime.point.equilibrium import held_coordinates, static_equilibr
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.point.slopes import jacobian
+from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
+from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.choose_method import STIFF_RATIO, choose_method
 from ballpass.runtime.run.scales import Scales
-from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 
 #: Instants of a turn that are searched for the lightest and the heaviest load.
@@ -78,7 +79,7 @@ class TimeScale:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Explanation(ShortRepr):
+class Explanation(ShortRepr, Reported):
     """What a run of a model consists of.
 
     Attributes
@@ -113,30 +114,54 @@ class Explanation(ShortRepr):
     reason: str
     unusual: tuple[str, ...] = ()
 
-    def _repr_html_(self) -> str:
-        heads = ("angle [deg]", "fastest decay [1/s]", "fastest frequency [Hz]", "slowest rate [1/s]", "stiffness")
-        scales = [
+    def _report(self) -> Report:
+        where = "; ".join(f"{math.degrees(item.angle):.4g}° {item.cause}" for item in self.breakpoints) or "none"
+        laws = "; ".join(f"{law}: {WORDS[kind]}" for law, kind in self.smoothness) or "no contact laws"
+        parts: list[Words | ReportTable] = [
+            Marked("Breakpoints of the first turn", "head", f" {where}"),
+            Marked("Smoothness", "head", f" {laws}"),
+        ]
+        right = ("crank or shaft angle", "fastest decay", "fastest frequency f", "slowest rate", "decay / (2π f)")
+        rows = [
             (
                 item.name,
-                f"{math.degrees(item.angle):.0f}",
-                f"{item.decay:.3g}",
-                f"{item.frequency / math.tau:.3g}",
-                f"{item.slowest:.3g}",
-                f"{item.stiffness:.2g}",
+                f"{math.degrees(item.angle):.0f}°",
+                f"{item.decay:.3g} 1/s",
+                f"{item.frequency / math.tau:.3g} Hz",
+                f"{item.slowest:.3g} 1/s",
+                f"{item.stiffness:.2g}" if math.isfinite(item.stiffness) else "",
             )
             for item in self.scales
         ]
-        breaks = [(f"{item.time:.6g}", f"{math.degrees(item.angle):.4g}", item.cause) for item in self.breakpoints]
-        return html.block(
-            html.title(f"Method: auto takes {self.method}", self.reason),
-            html.table(("time scales of small motions", *heads), scales, right=heads) if scales else "",
-            html.table(("breakpoint [s]", "angle [deg]", "cause"), breaks, right=("breakpoint [s]", "angle [deg]"))
-            if breaks
-            else "",
-            *(html.paragraph(f"{law}: {WORDS[kind]}") for law, kind in self.smoothness),
-            *(html.paragraph(f"no equilibrium at {place}") for place in self.unsupported),
-            *map(html.paragraph, self.unusual),
+        table = ReportTable(
+            title="Time scales of small motions",
+            heads=("at", *right),
+            rows=rows,
+            right=right,
+            caption="decay / (2π f): of a single mode, up to 1, its damping ratio; above 3 decay bounds explicit steps",
         )
+        parts += ["", table] if rows else []
+        parts += [f"no equilibrium at {place}" for place in self.unsupported]
+        parts += ["", Marked("Method", "head", f" auto takes {self.method}: {self.reason}")]
+        parts += [Marked("unusual", "doubt", f" {words}") for words in self.unusual]
+        scales = [
+            asdict(item) | {"angle_deg": math.degrees(item.angle), "stiffness": item.stiffness} for item in self.scales
+        ]
+        facts = {
+            "states": self.states,
+            "outputs": self.outputs,
+            "breakpoints": [
+                {"time": item.time, "angle_deg": math.degrees(item.angle), "cause": item.cause}
+                for item in self.breakpoints
+            ],
+            "turn": self.turn,
+            "smoothness": [{"law": law, "is": kind, "words": WORDS[kind]} for law, kind in self.smoothness],
+            "time_scales": scales,
+            "without_equilibrium": self.unsupported,
+            "method": {"auto": self.method, "reason": self.reason},
+            "warnings": self.unusual,
+        }
+        return Report(parts=parts, facts=facts, records=scales, index=("name",))
 
 
 def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -> Explanation:

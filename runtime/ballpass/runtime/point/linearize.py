@@ -19,8 +19,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Group
-from rich.table import Table
 
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.extras import need
@@ -29,9 +27,9 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import RHS, STATES, directions_of, rows_of
 from ballpass.runtime.point.slopes import Deflections, KinkWarning, Point, Slopes, named, slopes
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run.magnitudes import mass_matrix
-from ballpass.runtime.run.tables import printed, simple_table
-from ballpass.runtime.show import html
 
 Array = NDArray[np.float64]
 
@@ -71,7 +69,7 @@ class Mode:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Linearization:
+class Linearization(Reported):
     """Matrices and modes of small vibrations.
 
     Attributes
@@ -110,12 +108,6 @@ class Linearization:
         where = "equilibrium" if self.at_equilibrium else "given state"
         return f"Linearization({where} at t = {self.time:.6g} s; natural frequencies {frequencies} Hz)"
 
-    def __str__(self) -> str:
-        return printed(Group(render_linearization(self), render_matrices(self)))
-
-    def _repr_html_(self) -> str:
-        return html.block(html.from_terminal(Group(render_linearization(self), render_matrices(self))))
-
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
         """All of them, pairs complete, shape (2 coordinates,) [1/s]."""
@@ -140,7 +132,19 @@ class Linearization:
         >>> model.linearize(crank_angle=4.2).to_dict()["stiffness"]["unit"]
         'N/m'
         """
-        return {
+        return self.to_json()
+
+    def _report(self) -> Report:
+        modes = [
+            {
+                "natural_frequency": mode.natural_frequency,
+                "damped_frequency": mode.damped_frequency,
+                "damping_ratio": mode.damping_ratio,
+            }
+            for mode in self.modes
+        ]
+        units = {"natural_frequency": "Hz", "damped_frequency": "Hz", "damping_ratio": "1"}
+        facts = {
             "time": {"value": self.time, "unit": "s"},
             "at_equilibrium": self.at_equilibrium,
             "coordinates": list(self.coordinates),
@@ -150,16 +154,15 @@ class Linearization:
             "stiffness": {"value": self.stiffness.tolist(), "unit": "N/m"},
             "modes": [
                 {
-                    "eigenvalue": [m.eigenvalue.real, m.eigenvalue.imag],
-                    "natural_frequency": {"value": m.natural_frequency, "unit": "Hz"},
-                    "damped_frequency": {"value": m.damped_frequency, "unit": "Hz"},
-                    "damping_ratio": {"value": None if m.rigid else m.damping_ratio, "unit": "1"},
-                    "shape": [[z.real, z.imag] for z in m.shape.tolist()],
+                    "eigenvalue": [mode.eigenvalue.real, mode.eigenvalue.imag],
+                    **{name: {"value": value, "unit": units[name]} for name, value in numbers.items()},
+                    "shape": [[z.real, z.imag] for z in mode.shape.tolist()],
                 }
-                for m in self.modes
+                for mode, numbers in zip(self.modes, modes, strict=True)
             ],
             "notes": list(self.notes),
         }
+        return Report(parts=(_modes_table(self), _matrices_table(self)), facts=facts, records=modes)
 
 
 def linearize(
@@ -264,22 +267,26 @@ def onset_notes(model: LoadedModel, there: Point) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def render_linearization(result: Linearization) -> Table:
-    """Modes as a table for a terminal of 80 columns."""
+def _modes_table(result: Linearization) -> ReportTable:
     where = "static equilibrium" if result.at_equilibrium else "given state"
     words = "f: natural frequency; ratio: damping over critical damping; shapes: size and phase, the largest 1"
     heads = ("f, Hz", "damped, Hz", "ratio", *result.coordinates)
-    table = simple_table(
-        f"Small vibrations about the {where} at t = {result.time:.6g} s",
-        heads,
+    rows = [
+        (
+            f"{mode.natural_frequency:.6g}",
+            f"{mode.damped_frequency:.6g}",
+            "" if mode.rigid else f"{mode.damping_ratio:.4g}",
+            *map(_polar, mode.shape.tolist()),
+        )
+        for mode in result.modes
+    ]
+    return ReportTable(
+        title=f"Small vibrations about the {where} at t = {result.time:.6g} s",
+        heads=heads,
+        rows=rows,
         right=heads,
         caption="\n".join((words, *result.notes)),
     )
-    for mode in result.modes:
-        ratio = "" if mode.rigid else f"{mode.damping_ratio:.4g}"
-        shape = [_polar(z) for z in mode.shape.tolist()]
-        table.add_row(f"{mode.natural_frequency:.6g}", f"{mode.damped_frequency:.6g}", ratio, *shape)
-    return table
 
 
 def _polar(z: complex) -> str:
@@ -289,14 +296,12 @@ def _polar(z: complex) -> str:
     return "0" if float(size) == 0.0 else f"{size}∠{180 if phase == -180 else phase}°"
 
 
-def render_matrices(result: Linearization) -> Table:
+def _matrices_table(result: Linearization) -> ReportTable:
     """Mass, damping and stiffness as one table, a row for each coordinate."""
-    table = simple_table("", ("matrix", "row", *result.coordinates), right=result.coordinates)
-    for words, matrix in (
-        ("M kg", result.mass),
-        ("C N·s/m", result.damping),
-        ("K N/m", result.stiffness),
-    ):
-        for k, (name, row) in enumerate(zip(result.coordinates, matrix.tolist(), strict=True)):
-            table.add_row(words if k == 0 else "", name, *(f"{value:z.5g}" for value in row))
-    return table
+    matrices = (("M kg", result.mass), ("C N·s/m", result.damping), ("K N/m", result.stiffness))
+    rows = [
+        (words if k == 0 else "", name, *(f"{value:z.5g}" for value in row))
+        for words, matrix in matrices
+        for k, (name, row) in enumerate(zip(result.coordinates, matrix.tolist(), strict=True))
+    ]
+    return ReportTable(heads=("matrix", "row", *result.coordinates), rows=rows, right=result.coordinates)

@@ -21,7 +21,6 @@ from ballpass.runtime.run import inputs as clock
 
 if TYPE_CHECKING:
     from ballpass.runtime.point.equilibrium import StaticEquilibrium
-    from ballpass.runtime.point.linearize import Linearization
 
 
 class PointModel(LoadedModel):
@@ -284,44 +283,3 @@ class PointModel(LoadedModel):
 
         numbers = self.numbers(parameters)
         return static_equilibrium(self, numbers, t=instant(self, numbers, t, crank_angle), load=load)
-
-    def linearize(
-        self,
-        t: float | None = None,
-        *,
-        crank_angle: float | None = None,
-        x: Sequence[float] | np.ndarray | None = None,
-        parameters: Mapping[str, float] | None = None,
-    ) -> Linearization:
-        """Mass, damping and stiffness matrices, natural frequencies and modes about a state.
-
-        Parameters
-        ----------
-        t, crank_angle : the instant: time [s], default 0, or angle of crank or shaft in the first turn in radians,
-            at most two turns
-        x : state, shape (states,).  Default: static equilibrium under the load of that instant
-        parameters : overrides, SI
-
-        Warns
-        -----
-        KinkWarning
-            The damping law has no derivative at this state; the warning says what is given.
-
-        Raises
-        ------
-        RequestError
-            As for `static_equilibrium`.
-
-        Examples
-        --------
-        >>> small = model.linearize(crank_angle=4.2)  # [rad]
-        >>> small.natural_frequencies.round()  # [Hz]
-        array([1064., 1108., 2923., 4180.])
-        """
-        from ballpass.runtime.point.equilibrium import instant, static_equilibrium
-        from ballpass.runtime.point.linearize import linearize  # with SciPy
-
-        numbers = self.numbers(parameters)
-        time = instant(self, numbers, t, crank_angle)
-        state = static_equilibrium(self, numbers, t=time).x if x is None else x
-        return linearize(self, numbers, t=time, x=state, at_equilibrium=x is None)

@@ -1,11 +1,11 @@
 """HTML of objects in notebooks: one look, no script but that of framed pages, everything escaped.
 
-In: heads and rows of text, or the tables of a terminal.  Out: HTML that stands alone, light on dark as dark on light.
+In: heads and rows of text.  Out: HTML that stands alone, light on dark as dark on light.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from html import escape
 from typing import Any
 
@@ -28,10 +28,9 @@ _STYLE = """
 .ballpass .good { color: #2e8b57; }
 .ballpass .bad { color: #d1495b; font-weight: 600; }
 .ballpass .doubt { color: #b7791f; }
+.ballpass .faint { opacity: 0.75; }
+.ballpass .head { font-style: italic; }
 """
-
-#: Styles of the terminal, and the classes that take their place.
-_CLASSES = {"green": "good", "bold red": "bad", "yellow": "doubt"}
 
 
 def block(*parts: str) -> str:
@@ -74,10 +73,12 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]], *, right: Coll
     rows : of cells, shown as ``str`` shows them
     right : heads of the columns that are aligned to the right
     """
-    return _table(heads, ([escape(str(cell)) for cell in row] for row in rows), [head in right for head in heads])
+    return table_of_html(
+        heads, ([escape(str(cell)) for cell in row] for row in rows), [head in right for head in heads]
+    )
 
 
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[bool]) -> str:
+def table_of_html(heads: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[bool]) -> str:
     """A table of cells that are HTML."""
     looks = [' class="number"' if numbers else "" for numbers in right]
     head = "".join(f'<th scope="col"{look}>{escape(name)}</th>' for look, name in zip(looks, heads, strict=True))
@@ -87,43 +88,6 @@ def _table(heads: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[
     return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
-def from_terminal(printed: Any) -> str:
-    """Tables and lines of a terminal (rich's Table, Text, Group of them) as HTML."""
-    return "".join(_parts(printed))
-
-
-def _parts(printed: Any) -> Iterator[str]:
-    from rich.console import Group
-    from rich.table import Table
-
-    if isinstance(printed, Group):
-        for part in printed.renderables:
-            yield from _parts(part)
-    elif isinstance(printed, Table):
-        if printed.title:
-            yield f'<p class="title">{_cell(printed.title)}</p>'
-        columns = [[_cell(cell) for cell in column.cells] for column in printed.columns]
-        heads = [_text(column.header).plain for column in printed.columns]
-        yield _table(heads, list(zip(*columns, strict=True)), [c.justify == "right" for c in printed.columns])
-        if printed.caption:
-            yield f'<p class="note">{_cell(printed.caption)}</p>'
-    else:
-        yield f"<p>{_cell(printed)}</p>"
-
-
-def _text(cell: Any) -> Any:
-    from rich.text import Text
-
-    return cell if isinstance(cell, Text) else Text.from_markup(str(cell), emoji=False)
-
-
-def _cell(cell: Any) -> str:
-    """A cell's text with the colours that mean something."""
-    text = _text(cell)
-    words, at, parts = text.plain, 0, []
-    for span in sorted(text.spans):
-        if str(span.style) in _CLASSES and span.start >= at:
-            parts += [escape(words[at : span.start])]
-            parts += [f'<span class="{_CLASSES[str(span.style)]}">{escape(words[span.start : span.end])}</span>']
-            at = span.end
-    return "".join([*parts, escape(words[at:])])
+def from_terminal(table: Any) -> str:
+    """A table of `ballpass.runtime.run.tables` as HTML."""
+    return str(table.as_html())

@@ -10,9 +10,10 @@ from typing import Annotated
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import read_asked, read_duration
+from ballpass.runtime.app.commands.asked import read_asked
 from ballpass.runtime.app.commands.shared import command, load_model, results_folder, show, size_words
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
 from ballpass.runtime.plot import MOVING
 
 
@@ -20,7 +21,12 @@ def animate(
     scene: options.SceneOrFolder,
     format_: Annotated[
         str,
-        typer.Option("--format", metavar="KIND", help="html, a page that needs no network and no server; mp4; or gif."),
+        Option(
+            words="`html`, a page that needs no network and no server; `mp4`; or `gif`.",
+            shown="KIND",
+            flags=("--format",),
+            choices=MOVING,
+        ),
     ] = "html",
     last: Annotated[float, typer.Option(metavar="N", help="Turns to show, the last ones of the run.")] = 1.0,
     bearing: Annotated[
@@ -31,10 +37,10 @@ def animate(
         int | None, typer.Option(metavar="N", help="Pictures of a movie; 72 a turn if not given.")
     ] = None,
     set_: options.Settings = None,
-    cycles: options.Cycles = None,
-    duration: options.Duration = None,
-    transient: options.Transient = None,
-    rtol: options.Tolerance = None,
+    cycles: Cycles = None,
+    duration: Duration = None,
+    transient: Transient = None,
+    rtol: Rtol = None,
     out: options.ResultsFolder = None,
 ) -> None:
     """Simulate a scene and write its last turn as a moving picture: linkage, bearings, forces and signals.
@@ -44,16 +50,13 @@ def animate(
     """
     with command(scene) as stages:
         stages("read")
-        if format_ not in MOVING:
-            raise RequestError(f"--format: {format_!r} is no kind of animation. Allowed: {', '.join(MOVING)}.")
         if pictures is not None and format_ == "html":
             raise RequestError("--pictures is of movies; a page has up to 1000 positions. Omit it, or --format gif.")
         if format_ != "html":
             from ballpass.runtime.plot.animate import count_pictures
 
             count_pictures(f".{format_}", last, pictures)  # what cannot be made is refused before anything is simulated
-        seconds = read_duration(duration, cycles)
-        asked = read_asked(scene, set_, seconds, transient)
+        asked = read_asked(scene, set_, duration, transient)
         folder = results_folder(out, scene)
         path = folder / f"animation.{format_}"
         model = load_model(scene, stages, asked.run.method, None, rtol, overrides=asked.overrides)
@@ -64,7 +67,7 @@ def animate(
         stages("simulate")
         solution = model.simulate(
             cycles=cycles,
-            duration=seconds,
+            duration=duration,
             transient=transient,
             parameters=asked.overrides,
             rtol=rtol,

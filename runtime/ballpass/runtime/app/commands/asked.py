@@ -6,6 +6,7 @@ In: a scene file and texts.  Out: values in SI.  `ballpass.derive` is imported i
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import can_derive
+from ballpass.runtime.plot import FORMATS
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
@@ -21,9 +23,6 @@ if TYPE_CHECKING:
     from ballpass.runtime.contract import Manifest, RunInfo
 
 _Run = TypeVar("_Run", bound="Run | RunInfo")
-
-#: Word of ``--turns`` for as many turns as peaks and rms take to settle.
-SETTLE = "settle"
 
 #: Lines of a scene's run table that have an option of ``ballpass run``.
 RUN_OPTIONS = {
@@ -119,10 +118,14 @@ def read_value(option: str, text: str, unit: str) -> float:
         if can_derive():
             from ballpass.derive.scene.units import parse_quantity as parse_any
 
-            return parse_any(text, unit)
-        return parse_quantity(text, unit)
+            value = parse_any(text, unit)
+        else:
+            value = parse_quantity(text, unit)
     except QuantityError as error:
         raise RequestError(f"{option}: {error}") from None
+    if not math.isfinite(value):
+        raise RequestError(f"{option}: {text!r} is no finite quantity.")
+    return value
 
 
 def _asked_run(run: _Run, duration: float | None, transient: float | None) -> _Run:
@@ -190,90 +193,9 @@ def read_with_settings(
         raise SceneError(error.faults, source="--set") from None
 
 
-def read_quantity(option: str, text: str | None, unit: str) -> float | None:
-    """A finite quantity of an option [unit], None where it was not given."""
-    if text is None:
-        return None
-    value = read_value(option, text, unit)
-    if not math.isfinite(value):
-        raise RequestError(f"{option}: {text!r} is no finite quantity.")
-    return value
-
-
-def read_turns(text: str | None, length: float | str | None) -> bool:
-    """Whether ``--turns settle`` was asked for.
-
-    Raises
-    ------
-    RequestError
-        Another word, or a length of the run as well.
-    """
-    if text is None:
-        return False
-    if text.strip() != SETTLE:
-        raise RequestError(
-            f"--turns: {text!r:.80} was given. Allowed: {SETTLE}, as many turns as peaks and rms take to settle. For a "
-            "number of turns take --cycles."
-        )
-    if length is not None:
-        raise RequestError(f"--turns {SETTLE} finds the length of the run, and {length!r} was given as well.")
-    return True
-
-
-def read_formats(given: list[str] | None) -> tuple[str, ...]:
-    """Kinds of the figures, of ``--format``.
-
-    Raises
-    ------
-    RequestError
-        There is no such kind.
-    """
-    from ballpass.runtime.plot import FORMATS
-
-    for kind in given or ():
-        if kind not in FORMATS:
-            raise RequestError(f"--format: {kind!r} is no kind of figure. Allowed: {', '.join(FORMATS)}.")
-    return tuple(dict.fromkeys(given)) if given else FORMATS[:1]
-
-
-def read_duration(text: str | None, cycles: float | None) -> float | None:
-    """The time of ``--duration "0.5 s"`` [s].
-
-    Raises
-    ------
-    RequestError
-        No time above 0, or turns were given as well.
-    """
-    if text is None:
-        return None
-    if cycles is not None:
-        raise RequestError(
-            f"--cycles {cycles:g} and --duration {text!r} were both given. Allowed: one of them. Leave one away."
-        )
-    seconds = read_quantity("--duration", text, "s") or 0.0
-    if not seconds > 0.0:
-        raise RequestError(
-            f'--duration: {text!r} cannot be simulated. Allowed: a time above 0, as in --duration "0.5 s".'
-        )
-    return seconds
-
-
-def faults_of_numbers(cycles: float | None, transient: float | None, rtol: float | None) -> list[str]:
-    """What is wrong with ``--cycles``, ``--transient`` and ``--rtol``."""
-    from ballpass.runtime.run.request import TOLERANCES
-
-    least, most = TOLERANCES
-    faults = []
-    if rtol is not None and not least <= rtol <= most:
-        faults.append(
-            f"--rtol: {rtol:g} lies outside its bounds. Allowed: {least:g} to {most:g}. Take 1e-6 where nothing speaks "
-            "for another value."
-        )
-    if cycles is not None and not 0.0 < cycles < math.inf:
-        faults.append(f"--cycles: {cycles:g} turns cannot be simulated. Allowed: a number above 0, as in --cycles 4.")
-    if transient is not None and not 0.0 <= transient < math.inf:
-        faults.append(f"--transient: {transient:g} turns cannot be left out. Allowed: a number from 0 on.")
-    return faults
+def read_formats(given: Sequence[str] | None) -> tuple[str, ...]:
+    """Kinds of the figures: each once, the first one where none was named."""
+    return tuple(dict.fromkeys(given or FORMATS[:1]))
 
 
 def refuse_run_setting(text: str) -> None:

@@ -8,8 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.shared import command, show_json
+from ballpass.runtime.app.commands.shared import command, show_json, show_parts
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.report.report import ReportTable
 
 
 def bearings(
@@ -21,7 +22,6 @@ def bearings(
     """Print the bearings that a scene can name by designation: dimensions, balls, ratings and normal clearance."""
     with command():
         from ballpass.derive.scene.designations import bearing_types
-        from ballpass.runtime.run.tables import show_tables, simple_table
 
         types = bearing_types()
         found = [_row(kind) for name, kind in types.items() if fnmatchcase(name, pattern)]
@@ -34,24 +34,26 @@ def bearings(
             show_json({"bearings": found})
             return
         heads = ("bearing", "d", "D", "B", "balls", "D_w", "D_pw", "C_r", "C_0r", "C_u", "CN")
-        table = simple_table(
-            "Deep groove ball bearings (mm, kN; clearance in µm)",
-            heads,
-            right=heads[1:],
-            caption="Balls, D_w, D_pw: derived from ratings of a catalogue.\n"
-            "C_r, C_0r, C_u: from these, by ISO 281 and ISO 76.",
-        )
-        for row in found:
-            least, most = row["clearance"]["CN"]
-            table.add_row(
+        rows = [
+            (
                 row["designation"],
                 *(f"{1e3 * row[key]:g}" for key in ("bore", "outside_diameter", "width")),
                 str(row["balls"]),
                 *(f"{1e3 * row[key]:.4g}" for key in ("ball_diameter", "pitch_diameter")),
                 *(f"{1e-3 * row[key]:.3g}" for key in ("dynamic_rating", "static_rating", "fatigue_limit")),
-                f"{1e6 * least:.0f}–{1e6 * most:.0f}",
+                "–".join(f"{1e6 * end:.0f}" for end in row["clearance"]["CN"]),
             )
-        show_tables(table)
+            for row in found
+        ]
+        table = ReportTable(
+            title="Deep groove ball bearings (mm, kN; clearance in µm)",
+            heads=heads,
+            rows=rows,
+            right=heads[1:],
+            caption="Balls, D_w, D_pw: derived from ratings of a catalogue.\n"
+            "C_r, C_0r, C_u: from these, by ISO 281 and ISO 76.",
+        )
+        show_parts(table)
 
 
 def _row(kind: Any) -> dict[str, Any]:

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from rich.console import Group
-from rich.markup import escape
-from rich.padding import Padding
-from rich.table import Table
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import read_with_settings
 from ballpass.runtime.app.commands.shared import command, load_model, show_json
-from ballpass.runtime.contract.json_text import finite
-from ballpass.runtime.contract.smoothness import WORDS
-from ballpass.runtime.run.tables import show_tables, simple_table
+from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
+from ballpass.runtime.report.text import show as show_report
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
@@ -57,7 +49,7 @@ def explain(scene: options.SceneFile, set_: options.Settings = None, json_: opti
     if json_:
         show_json(report)
     else:
-        show_tables(_render(report))
+        show_report(_render(report, said))
 
 
 def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest: Manifest) -> dict[str, Any]:
@@ -93,21 +85,9 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
         "file": str(path),
         "modelled": parts,
         "not_modelled": [*_absent(scene), *_NEVER, *_of_drive(scene)],
-        "states": list(said.states),
-        "outputs": list(said.outputs),
         "functions": {f.name: {"operations": f.operations, "what": f.description} for f in manifest.functions},
         "step": _step(kernels, scene.bearings),
-        "breakpoints": [
-            {"time": b.time, "angle_deg": math.degrees(b.angle), "cause": b.cause} for b in said.breakpoints
-        ],
-        "turn": finite(said.turn),
-        "smoothness": [{"law": law, "is": kind, "words": WORDS[kind]} for law, kind in said.smoothness],
-        "time_scales": [
-            asdict(s) | {"angle_deg": math.degrees(s.angle), "stiffness": finite(s.stiffness)} for s in said.scales
-        ],
-        "without_equilibrium": list(said.unsupported),
-        "method": {"auto": said.method, "reason": said.reason},
-        "warnings": list(said.unusual),
+        **said.to_json(),
     }
 
 
@@ -171,70 +151,51 @@ def _absent(scene: Scene) -> list[str]:
     return out
 
 
-def _render(report: dict[str, Any]) -> Group:
-    blocks: list[Any] = [f"[bold]{escape(report['title'])}[/]", "", _modelled(report), "", "[italic]Not modelled[/]"]
-    blocks += [Padding(f"- {escape(text)}", (0, 0, 0, 2)) for text in report["not_modelled"]]
-    blocks += ["", f"[italic]States[/] {', '.join(report['states']) or 'none'}", "", _functions(report)]
+def _render(report: dict[str, Any], said: Explanation) -> Report:
+    parts: list[Words | ReportTable] = ["", _modelled(report), "", Marked("Not modelled", "head")]
+    parts += [f"  - {text}" for text in report["not_modelled"]]
+    parts += ["", Marked("States", "head", f" {', '.join(report['states']) or 'none'}"), "", _functions(report)]
     if report["step"]:
-        parts = ", ".join(f"{name} {count}" for name, count in report["step"].items() if name != "all")
-        blocks += ["", f"[italic]One evaluation in the stepper[/] {report['step']['all']} operations: {parts}"]
-    where = "; ".join(f"{b['angle_deg']:.4g}° {b['cause']}" for b in report["breakpoints"]) or "none"
-    blocks += ["", f"[italic]Breakpoints of the first turn[/] {escape(where)}"]
-    laws = "; ".join(f"{entry['law']}: {entry['words']}" for entry in report["smoothness"]) or "no contact laws"
-    blocks += [f"[italic]Smoothness[/] {escape(laws)}"]
-    if report["time_scales"]:
-        blocks += ["", _scales(report)]
-    blocks += [f"no equilibrium at {escape(text)}" for text in report["without_equilibrium"]]
-    blocks += ["", f"[italic]Method[/] auto takes {report['method']['auto']}: {escape(report['method']['reason'])}"]
-    blocks += [f"[bold yellow]unusual[/] {escape(text)}" for text in report["warnings"]]
-    return Group(*blocks)
+        shares = ", ".join(f"{name} {count}" for name, count in report["step"].items() if name != "all")
+        words = f" {report['step']['all']} operations: {shares}"
+        parts += ["", Marked("One evaluation in the stepper", "head", words)]
+    parts += ["", *said.report().parts]
+    return Report(title=report["title"], parts=parts)
 
 
-def _modelled(report: dict[str, Any]) -> Table:
+def _modelled(report: dict[str, Any]) -> ReportTable:
     """The parts of the model, and how much of the right-hand side each one is."""
-    table = simple_table(
-        "Modelled", ("part", "line", "what", "share of rhs"), right=("line", "share of rhs"), wrapped=("what",)
-    )
     total = report["functions"].get("rhs", {}).get("operations", 0)
     several = sum(part["path"].endswith(".contact") for part in report["modelled"]) > 1
+    rows = []
     for part in report["modelled"]:
         counts, rest = part["operations"], part["rest"]
         name = part["name"] if rest is None else f"rest: ball contacts and rings{' of all' if several else ''}"
         added = rest if counts is None else counts.get("rhs", 0)
         cell = "" if added is None or not total else f"{added} ({100 * added / total:.0f} %)"
-        table.add_row(escape(name), str(part["line"] or ""), escape(part["what"]), cell)
-    return table
-
-
-def _functions(report: dict[str, Any]) -> Table:
-    table = simple_table(
-        "Generated functions", ("function", "operations", "what"), right=("operations",), wrapped=("what",)
+        rows.append((name, str(part["line"] or ""), part["what"], cell))
+    return ReportTable(
+        title="Modelled",
+        heads=("part", "line", "what", "share of rhs"),
+        rows=rows,
+        right=("line", "share of rhs"),
+        wrapped=("what",),
     )
-    queries = sum(_DERIVATIVE.search(name) is not None for name in report["functions"])
-    for name, info in report["functions"].items():
-        if info["operations"] and not _DERIVATIVE.search(name):
-            table.add_row(name, str(info["operations"]), escape(info["what"]))
-    table.add_row("for derivatives", "", f"{queries} functions, compiled when a query first needs them (--json)")
-    return table
 
 
-def _scales(report: dict[str, Any]) -> Table:
-    angle = "crank angle" if report["mechanism"] else "shaft angle"
-    right = (angle, "fastest decay", "fastest frequency f", "slowest rate", "decay / (2π f)")
-    table = simple_table(
-        "Time scales of small motions",
-        ("at", *right),
-        right=right,
-        caption="decay / (2π f): of a single mode, up to 1, its damping ratio; above 3 decay bounds explicit steps",
+def _functions(report: dict[str, Any]) -> ReportTable:
+    functions = report["functions"].items()
+    rows = [
+        (name, str(info["operations"]), info["what"])
+        for name, info in functions
+        if info["operations"] and not _DERIVATIVE.search(name)
+    ]
+    queries = sum(_DERIVATIVE.search(name) is not None for name, _ in functions)
+    rows.append(("for derivatives", "", f"{queries} functions, compiled when a query first needs them (--json)"))
+    return ReportTable(
+        title="Generated functions",
+        heads=("function", "operations", "what"),
+        rows=rows,
+        right=("operations",),
+        wrapped=("what",),
     )
-    for entry in report["time_scales"]:
-        stiffness = entry["stiffness"]
-        table.add_row(
-            entry["name"],
-            f"{entry['angle_deg']:.0f}°",
-            f"{entry['decay']:.3g} 1/s",
-            f"{entry['frequency'] / math.tau:.3g} Hz",
-            f"{entry['slowest']:.3g} 1/s",
-            "" if stiffness is None else f"{stiffness:.2g}",
-        )
-    return table

@@ -1,11 +1,15 @@
-"""Options that several commands of ``ballpass`` have, each with one name, one meaning and one help text."""
+"""Options of the command line alone that several commands have; those of questions are in `contract.options`."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from ballpass.runtime.contract.options import Option
+from ballpass.runtime.plot import FORMATS
 
 SceneFile = Annotated[
     Path, typer.Argument(metavar="SCENE", help="Scene file (TOML); `ballpass new` copies one.", show_default=False)
@@ -17,36 +21,31 @@ SceneOrFolder = Annotated[
     typer.Argument(metavar="SCENE", help="Scene file (TOML), or a generated folder in its place.", show_default=False),
 ]
 
+#: Of questions that take a run that is done as well.
+SceneFolderOrRun = Annotated[
+    Path,
+    typer.Argument(
+        metavar="SCENE",
+        help="Scene file (TOML), or the solution.nc of a run, or what ballpass stream wrote.",
+        show_default=False,
+    ),
+]
+
 Settings = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="PATH=VALUE",
-        help='Another value for a number of the scene: --set bearing.clearance="20 um". May be repeated.',
+        help='Another value for a number of the scene: `--set bearing.clearance="20 um"`. May be repeated.',
     ),
 ]
-
-Cycles = Annotated[float | None, typer.Option(metavar="N", help="Turns of driver or shaft to simulate.")]
-
-Duration = Annotated[
-    str | None,
-    typer.Option(metavar="TIME", help='Time to simulate instead of turns: --duration "0.5 s", also at speed 0.'),
-]
-
-SampleRate = Annotated[
-    str | None,
-    typer.Option(
-        metavar="RATE", help='Samples a second instead of the scene\'s samples in a turn: --sample-rate "25.6 kHz".'
-    ),
-]
-
-#: Of commands that give numbers of the steady motion; ``ballpass run`` keeps the transient in its solution.
-Transient = Annotated[float | None, typer.Option(metavar="N", help="Turns at the start that do not count.")]
-
-Tolerance = Annotated[float | None, typer.Option(metavar="R", help="Relative tolerance of the integrator.")]
 
 ResultsFolder = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Folder of the results; results/<scene> if not given.")
+    Path | None, typer.Option(metavar="DIR", help="Folder of the results; `results/<scene>` if not given.")
+]
+
+ReportFolder = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder for report and figures; none are written if not given.")
 ]
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object on stdout, nothing else.")]
@@ -54,8 +53,13 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON
 Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")]
 
 FigureFormats = Annotated[
-    list[str] | None,
-    typer.Option("--format", metavar="KIND", help="Kind of the figures: png (default), svg or pdf. May be repeated."),
+    Sequence[str] | None,
+    Option(
+        words="Kind of the figures: `png` (default), `svg` or `pdf`. May be repeated.",
+        shown="KIND",
+        flags=("--format",),
+        choices=FORMATS,
+    ),
 ]
 
 Scheduler = Annotated[

@@ -8,7 +8,6 @@ interrupted.
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import os
 import sys
@@ -26,6 +25,9 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from ballpass.runtime.app.interrupted import say_interrupted
 from ballpass.runtime.contract.errors import BallpassError, RequestError
 from ballpass.runtime.contract.extras import can_derive, is_installed, missing
+from ballpass.runtime.report.plain import json_text
+from ballpass.runtime.report.report import Report, ReportTable, Words
+from ballpass.runtime.report.text import show as show_report
 from ballpass.runtime.show.progress import silent
 
 if TYPE_CHECKING:
@@ -139,9 +141,9 @@ def show_json(result: Any) -> None:
     typer.echo(json_text(result), nl=False)
 
 
-def json_text(result: Any) -> str:
-    """Results as JSON for people and programs."""
-    return json.dumps(result, indent=2, allow_nan=False) + "\n"
+def show_parts(*parts: Words | ReportTable) -> None:
+    """Print tables and sentences on stdout."""
+    show_report(Report(parts=parts))
 
 
 def size_words(count: int) -> str:

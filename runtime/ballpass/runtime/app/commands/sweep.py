@@ -13,9 +13,7 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.asked import (
-    faults_of_numbers,
     read_asked,
-    read_duration,
     read_formats,
     read_with_settings,
 )
@@ -29,12 +27,13 @@ from ballpass.runtime.app.commands.shared import (
     results_folder,
     show,
     show_json,
+    show_parts,
     warn,
 )
 from ballpass.runtime.app.interrupted import say_interrupted
 from ballpass.runtime.contract import read_manifest
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.run.tables import show_tables
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient
 
 if TYPE_CHECKING:
     from ballpass.derive import Scene
@@ -69,10 +68,10 @@ def sweep(
         ),
     ] = None,
     set_: options.Settings = None,
-    cycles: options.Cycles = None,
-    duration: options.Duration = None,
-    transient: options.Transient = None,
-    rtol: options.Tolerance = None,
+    cycles: Cycles = None,
+    duration: Duration = None,
+    transient: Transient = None,
+    rtol: Rtol = None,
     method: Annotated[
         str | None, typer.Option(metavar="NAME", help="auto, or a stepper's name as in ballpass run.")
     ] = None,
@@ -94,7 +93,7 @@ def sweep(
         ),
     ] = None,
     threads: Annotated[
-        int | None, typer.Option(metavar="N", help="Threads; as many as processors if not given.")
+        int | None, Option(words="Threads; as many as processors if not given.", shown="N", least=1)
     ] = None,
     scheduler: options.Scheduler = None,
     workers: options.Workers = None,
@@ -117,20 +116,12 @@ def sweep(
 
     with command(scene) as stages:
         stages("read")
-        seconds = read_duration(duration, cycles)
-        faults = faults_of_numbers(cycles, transient, rtol)
-        if threads is not None and threads < 1:
-            faults.append(
-                f"--threads: {threads} threads cannot work. Allowed: a whole number from 1 on, or leave it away."
-            )
-        if faults:
-            raise RequestError("\n".join(faults))
         source: Scene | Manifest
         if scene.is_dir():
-            source, overrides = read_manifest(scene), read_asked(scene, set_, seconds, transient).overrides
+            source, overrides = read_manifest(scene), read_asked(scene, set_, duration, transient).overrides
             usual = source.run.method
         else:
-            read, source, overrides = read_with_settings(scene, set_, seconds, transient)
+            read, source, overrides = read_with_settings(scene, set_, duration, transient)
             usual = read.run.method
         ranges = read_ranges(source, vary or [], overrides)
         at_kinks = checked_kinks(kinks, method or usual)
@@ -148,7 +139,7 @@ def sweep(
                 {**varied, **fixed},
                 of or default_compared(model.manifest) or default_quantities(model.manifest),
                 cycles=cycles,
-                duration=seconds,
+                duration=duration,
                 transient=transient,
                 rtol=rtol,
                 method=method,
@@ -172,7 +163,7 @@ def sweep(
         show_json(swept.report())
     else:
         table = swept.all_members() if count <= ROWS else swept.extremes()
-        show_tables(table)
+        show_parts(table)
         pictures = [name for name in files if name.startswith("sweep_")]
         drawn, told = len(pictures), [name for name in files if name not in pictures]
         told += [f"{drawn} figure{'s' if drawn > 1 else ''}"] if drawn else []

@@ -12,17 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.markup import escape
-from rich.table import Table
 
 from ballpass.runtime.app.commands.ranges import Range
-from ballpass.runtime.app.commands.shared import json_text
 from ballpass.runtime.app.summary import TABLE_UNITS
 from ballpass.runtime.contract.folders import replace_files
 from ballpass.runtime.contract.json_text import finite
 from ballpass.runtime.plot import FORMATS
+from ballpass.runtime.report.plain import json_text
+from ballpass.runtime.report.report import ReportTable
 from ballpass.runtime.run.netcdf import Variable, netcdf_bytes
-from ballpass.runtime.run.tables import simple_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -200,33 +198,34 @@ class Sweep:
             return "-"
         return f"~{value:z.2g}" if quantity in self.uncertain.get(member, ()) else f"{value:z.5g}"
 
-    def all_members(self) -> Table:
+    def all_members(self) -> ReportTable:
         """All members, each a row."""
         columns = {name: self.shown(name) for name in self.result.observables}
         heads = [_head(one.path, one.shown_unit) for one in self.ranges]
         heads += [_head(name, unit) for name, (_, unit) in columns.items()]
-        table = simple_table(self.result.manifest.title, heads, right=heads[len(self.ranges) :])
+        rows = []
         for member in range(math.prod(self.shape)):
             values = zip(self.ranges, self.point(member), strict=True)
             cells = [f"{value / one.factor:z.5g}" for one, value in values]
             cells += [self._cell(name, float(column.flat[member]), member) for name, (column, _) in columns.items()]
-            table.add_row(*cells)
-        return table
+            rows.append(cells)
+        return ReportTable(title=self.result.manifest.title, heads=heads, rows=rows, right=heads[len(self.ranges) :])
 
-    def extremes(self) -> Table:
+    def extremes(self) -> ReportTable:
         """Smallest and largest value of each quantity, and where."""
-        table = simple_table(self.result.manifest.title, ("quantity", "", "value", "unit", "at"), right=("value",))
+        rows: list[tuple[str, ...]] = []
         for name in self.result.observables:
             values, unit = self.shown(name)
             if not np.any(np.isfinite(values)):
-                table.add_row(name, "", "-", "", "no member has a result")
+                rows.append((name, "", "-", "", "no member has a result"))
                 continue
             lowest, highest = int(np.nanargmin(values)), int(np.nanargmax(values))
-            table.add_row(name, "min", self._cell(name, values.flat[lowest], lowest), unit, self.place(lowest))
-            table.add_row("", "max", self._cell(name, values.flat[highest], highest), unit, self.place(highest))
-        return table
+            rows.append((name, "min", self._cell(name, values.flat[lowest], lowest), unit, self.place(lowest)))
+            rows.append(("", "max", self._cell(name, values.flat[highest], highest), unit, self.place(highest)))
+        heads = ("quantity", "", "value", "unit", "at")
+        return ReportTable(title=self.result.manifest.title, heads=heads, rows=rows, right=("value",))
 
 
 def _head(name: str, unit: str) -> str:
     """A column's head, the unit in a line of its own."""
-    return f"{name}\n{escape(f'[{unit}]')}"
+    return f"{name}\n[{unit}]"

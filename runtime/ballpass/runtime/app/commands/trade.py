@@ -4,113 +4,94 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
-import typer
-
-from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import read_asked, read_formats
-from ballpass.runtime.app.commands.shared import Stages, can_draw, command, load_model, results_folder, show, show_json
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.run.tables import show_tables, simple_table
+from ballpass.runtime.contract.options import Option
+from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.show.progress import Progress
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ballpass.derive.reading.recouple import Coupling
     from ballpass.runtime.certify.simplification import Simplification
     from ballpass.runtime.certify.trade_report import Trade
     from ballpass.runtime.model import Model
 
+Of = Annotated[
+    Sequence[str] | None,
+    Option(
+        words="Quantity whose error counts, as for a sweep: `peak_ball_force`, `rms:inner.y`, `range:inner.x`. May be "
+        "repeated. Peak ball force, rms and range of the inner ring's motion if none is given.",
+        shown="Q",
+    ),
+]
+Against = Annotated[
+    str | None,
+    Option(
+        words="Measure another model of the machine instead of methods: `one-way` or `two-way`, the same scene with "
+        "its bearings coupled so, or another scene file.",
+        shown="WHAT",
+    ),
+]
+Members = Annotated[int | None, Option(words="Parameter sets around the scene's; 40 if not given.", shown="N", least=2)]
 
+
+def _report(found: Trade | Simplification) -> Report:
+    from ballpass.runtime.certify.simplification import Simplification, rows, to_plain
+
+    if not isinstance(found, Simplification):
+        return found.report()
+    heads, lines = rows(found)
+    title = f"{found.title}; other: {found.simpler_title}"
+    table = ReportTable(title=title, heads=heads, rows=lines, right=heads[2:])
+    return Report(parts=(table, found.words), facts=to_plain(found))
+
+
+def _figures(_model: AnyModel, found: Trade | Simplification, _parameters: Any) -> Iterator[tuple[str, Figure]]:
+    from ballpass.runtime.certify.trade_report import Trade
+    from ballpass.runtime.plot.trade import draw_trade
+
+    if not isinstance(found, Trade):
+        return
+    for quantity in found.quantities:
+        yield f"trade_{re.sub(r'[^a-z0-9]+', '_', quantity)}", draw_trade(found, quantity)
+
+
+@Question(report=_report, stage="measuring", figures=_figures, always=True)
 def trade(
-    scene: options.SceneOrFolder,
-    of: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--of",
-            metavar="Q",
-            help="Quantity whose error counts: peak_ball_force, rms:inner.y, range:inner.x, mean:, min:. May be "
-            "repeated.",
-        ),
-    ] = None,
-    against: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WHAT",
-            help="Measure another model of the machine instead of methods: one-way or two-way, the same scene with "
-            "its bearings coupled so, or another scene file.",
-        ),
-    ] = None,
-    set_: options.Settings = None,
-    members: Annotated[
-        int | None, typer.Option(metavar="N", help="Parameter sets around the scene's; 40 if not given.")
-    ] = None,
-    out: options.ResultsFolder = None,
-    json_: options.Json = False,
-    figures: options.Figures = True,
-    format_: options.FigureFormats = None,
-) -> None:
+    model: AnyModel,
+    *,
+    scene: Path,
+    of: Of = None,
+    against: Against = None,
+    members: Members = None,
+    parameters: Mapping[str, float],
+    progress: Progress = None,
+) -> Trade | Simplification:
     """Measure error against time on a scene: of methods and tolerances, or of a simpler model (--against)."""
     from ballpass.runtime.certify.simplification import measure_simplification
     from ballpass.runtime.certify.trade import MEMBERS, measure_trade
-    from ballpass.runtime.certify.trade_report import table, to_plain, words
 
-    with command(scene) as stages:
-        stages("read")
-        overrides = read_asked(scene, set_).overrides
-        folder = results_folder(out, scene)
-        figures, formats = figures and can_draw(), read_formats(format_)
-        model = load_model(scene, stages, "stepper", overrides=overrides)
-        count = MEMBERS if members is None else members
-        if against is not None:
-            simpler = _simpler(scene, against, stages)
-            stages("measuring")
-            compared = measure_simplification(
-                model, simpler, of, parameters=overrides, members=count, progress=stages.fraction
-            )
-            _show_simplification(compared, json_=json_)
-            return
-        stages("measuring")
-        measured = measure_trade(model, of, parameters=overrides, members=count, progress=stages.fraction)
-        files = _draw(measured, folder, formats, stages) if figures else []
-    if json_:
-        show_json(to_plain(measured))
-        return
-    heads, rows = table(measured, measured.quantities[0])
-    title = f"{measured.title}: {measured.quantities[0]}, what no other way beats"
-    shown = simple_table(title, heads, right=heads[:-1], wrapped=heads[-1:])
-    for row in rows:
-        shown.add_row(*row)
-    show_tables(shown)
-    for line in words(measured):
-        show(line)
-    if files:
-        show(f"in {folder}: {', '.join(files)}")
+    count = MEMBERS if members is None else members
+    if against is None:
+        return measure_trade(model, of, parameters=parameters, members=count, progress=progress)
+    simpler = _simpler(scene, against)
+    return measure_simplification(model, simpler, of, parameters=parameters, members=count, progress=progress)
 
 
-def _simpler(scene: Path, against: str, stages: Stages) -> Model:
-    """Model of a scene's variant, or of another scene file."""
+def _simpler(scene: Path, against: str) -> Model:
+    """Model of a scene's variant, or of another scene file or generated folder."""
     from ballpass.derive import generate, read_scene
     from ballpass.runtime.model import load
 
     if against in ("one-way", "two-way"):
-        return load(generate(read_scene(scene, coupling=cast("Coupling", against)), progress=stages))
-    return load_model(Path(against), stages, "stepper", overrides={})
-
-
-def _show_simplification(found: Simplification, *, json_: bool) -> None:
-    from ballpass.runtime.certify.simplification import rows, to_plain
-
-    if json_:
-        show_json(to_plain(found))
-        return
-    heads, lines = rows(found)
-    shown = simple_table(f"{found.title}; other: {found.simpler_title}", heads, right=heads[2:])
-    for line in lines:
-        shown.add_row(*line)
-    show_tables(shown)
-    show(found.words)
+        return load(generate(read_scene(scene, coupling=cast("Coupling", against))))
+    return load(against if Path(against).is_dir() else generate(against))
 
 
 def read_error(text: str | None, method: str | None, rtol: float | None) -> float | None:
@@ -135,16 +116,3 @@ def read_error(text: str | None, method: str | None, rtol: float | None) -> floa
     if not 0.0 < value < math.inf:
         raise RequestError(f"--error: {text!r} is no relative error. Allowed: a number above 0 as 1% or 0.01.")
     return value
-
-
-def _draw(measured: Trade, folder: Path, formats: Sequence[str], stages: Stages) -> list[str]:
-    from ballpass.runtime.plot.style import write_figures
-    from ballpass.runtime.plot.trade import draw_trade
-
-    stages("draw")
-    folder.mkdir(parents=True, exist_ok=True)
-    named = (
-        (f"trade_{re.sub(r'[^a-z0-9]+', '_', quantity)}", draw_trade(measured, quantity))
-        for quantity in measured.quantities
-    )
-    return [path.name for path in write_figures(named, folder, formats, "trade.md")]

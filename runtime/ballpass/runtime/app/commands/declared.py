@@ -1,0 +1,236 @@
+"""Commands from functions whose parameters are options declared in `ballpass.runtime.contract.options`.
+
+In: a function, or a question.  Out: a function as typer takes it, whose options are read with their units and checked
+before it is called.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ballpass.runtime.app.commands import options
+from ballpass.runtime.app.commands.asked import read_asked, read_formats, read_value
+from ballpass.runtime.app.commands.shared import (
+    Stages,
+    can_draw,
+    check_folder,
+    command,
+    complain,
+    load_model,
+    name_of,
+    show,
+    show_json,
+    warn,
+)
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.options import Option, is_of, options_in, options_of, refuse_faults
+from ballpass.runtime.questions.question import Question, declared, summary_of
+from ballpass.runtime.report.plain import json_text, to_plain
+from ballpass.runtime.report.text import show as show_report
+
+
+def as_command(function: Callable[..., None]) -> Callable[..., None]:
+    """The command of a function; typer's own options among its parameters stay as they are."""
+    own = inspect.signature(function, eval_str=True).parameters
+    kinds = options_in({name: item.annotation for name, item in own.items()})
+
+    def call(**given: Any) -> None:
+        with command(given.get("scene")):
+            values = _read(kinds, given)
+        function(**{**given, **values})
+
+    parameters = [_typer_option(item, *kinds[name]) if name in kinds else item for name, item in own.items()]
+    return _with_signature(call, function.__name__, function.__doc__ or "", parameters)
+
+
+def question_command(ask: Callable[..., Any]) -> Callable[..., None]:
+    """The command of a question: a scene, the question's options, and what becomes of the report."""
+    question, kinds = declared(ask), options_of(ask)
+    own = inspect.signature(ask).parameters
+    parameters = [
+        _parameter("scene", options.SceneFolderOrRun if question.takes_runs else options.SceneOrFolder),
+        *(own[name].replace(annotation=Annotated[kind]) for name, kind in kinds.items()),
+        _parameter("set_", options.Settings, None),
+        _parameter("json_", options.Json, False),
+    ]
+    if question.figures is not None:
+        parameters.append(_parameter("out", options.ResultsFolder if question.always else options.ReportFolder, None))
+        parameters.append(_parameter("format_", options.FigureFormats, None))
+    if question.always:
+        parameters.append(_parameter("figures", options.Figures, True))
+
+    def call(**given: Any) -> None:
+        values = {name: given.pop(name) for name in kinds}
+        _ask(ask, question, values, **given)
+
+    return as_command(_with_signature(call, question.name, summary_of(ask), parameters))
+
+
+def _read(kinds: Mapping[str, tuple[Any, Option]], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of options from the texts of the command line.
+
+    Raises
+    ------
+    RequestError
+        Texts that are no quantities, values out of their bounds, or two ways to say one thing.
+    """
+    values: dict[str, Any] = {}
+    for name, (kind, option) in kinds.items():
+        text, flag = given[name], option.flag(name)
+        if text is None or not option.unit:
+            values[name] = (text or None) if is_of(kind, Sequence) else text
+        elif is_of(kind, tuple):
+            values[name] = _band(flag, text, option)
+        else:
+            value = read_value(flag, text, option.unit)
+            # the unit was written out, so that many turns are meant as such
+            values[name] = math.fmod(value, math.tau) if option.unit == "rad" else value
+    for pair in (("cycles", "duration"), ("turns", "cycles"), ("turns", "duration"), ("crank_angle", "t")):
+        if all(values.get(name) is not None for name in pair):
+            both = " and ".join(kinds[name][1].flag(name) for name in pair)
+            raise RequestError(f"{both} were both given. Allowed: one of them. Leave one away.")
+    flags = {option.flag(name): option for name, (_, option) in kinds.items()}
+    refuse_faults(flags, {option.flag(name): values[name] for name, (_, option) in kinds.items()})
+    return values
+
+
+def _band(flag: str, text: str, option: Option) -> tuple[float, float]:
+    """Two quantities with a colon between, as 2kHz:8kHz."""
+    edges = text.split(":")
+    if len(edges) != 2:
+        raise RequestError(f"{flag}: {text!r} is no band. Allowed: {option.shown}, as {option.example}.")
+    digits = [edge.strip().rstrip("kMHz ") for edge in edges]
+    low, high = (
+        read_value(flag, f"{number} {edge.strip()[len(number) :].strip()}", option.unit)
+        for number, edge in zip(digits, edges, strict=True)
+    )
+    return low, high
+
+
+def _typer_option(parameter: inspect.Parameter, kind: Any, option: Option) -> inspect.Parameter:
+    """The parameter as typer takes it: quantities are texts, and what may be repeated is a list."""
+    required = parameter.default is inspect.Parameter.empty
+    if is_of(kind, Sequence):
+        kind = list[str] if required else list[str] | None
+    elif option.unit:
+        kind = str if required else str | None
+    flags = option.flags or (option.flag(parameter.name),)
+    info = typer.Option(*flags, metavar=option.shown, help=option.help(parameter.name))
+    return parameter.replace(annotation=Annotated[kind, info])
+
+
+def _parameter(name: str, annotation: Any, default: Any = inspect.Parameter.empty) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default)
+
+
+def _with_signature(
+    call: Callable[..., None], name: str, words: str, parameters: Sequence[inspect.Parameter]
+) -> Callable[..., None]:
+    call.__name__, call.__doc__ = name, words
+    keywords = [item.replace(kind=inspect.Parameter.KEYWORD_ONLY) for item in parameters]
+    call.__signature__ = inspect.Signature(keywords)  # type: ignore[attr-defined]
+    call.__annotations__ = {item.name: item.annotation for item in parameters}
+    return call
+
+
+def _ask(
+    ask: Callable[..., Any],
+    question: Question,
+    values: dict[str, Any],
+    *,
+    scene: Path,
+    set_: list[str] | None,
+    json_: bool,
+    out: Path | None = None,
+    figures: bool = True,
+    format_: list[str] | None = None,
+) -> None:
+    """Ask, write and print."""
+    with command(scene) as stages:
+        if question.check is not None:
+            question.check(values)
+        folder, formats = _place(question, scene, out, format_, figures=figures)
+        stages("read")
+        model, overrides = _source(question, scene, set_, values, stages)
+        stages(question.stage)
+        if "progress" in ask.__annotations__:
+            values["progress"] = _progress(stages)
+        if "scene" in ask.__annotations__:
+            values["scene"] = scene
+        answer = ask(model, **values, parameters=overrides)
+        report = question.report(answer)
+        written: list[Path] = []
+        if folder is not None:
+            if not question.always:
+                folder.mkdir(parents=True, exist_ok=True)
+                written = [folder / f"{question.name}.json"]
+                written[0].write_text(json_text(to_plain(report)), encoding="utf-8")
+            if formats and question.figures is not None:
+                from ballpass.runtime.plot.style import write_figures
+
+                stages("draw")
+                drawn = question.figures(model, answer, overrides)
+                written += write_figures(drawn, folder, formats, f"{question.name}.md")
+        for words in report.warnings:
+            warn(words)
+    if json_:
+        plain = to_plain(report)
+        show_json(plain | ({"figure": str(written[0])} if "figure" in plain and written else {}))
+    else:
+        show_report(report)
+        if written:
+            show(f"results in {folder}: {', '.join(path.name for path in written)}")
+    if report.fault:
+        complain(report.fault)
+        raise typer.Exit(1)
+
+
+def _place(
+    question: Question, scene: Path, out: Path | None, format_: list[str] | None, *, figures: bool
+) -> tuple[Path | None, tuple[str, ...]]:
+    """Folder of the files, None where none are written, and formats of the figures."""
+    formats = read_formats(format_)
+    folder = Path("results") / name_of(scene) if out is None and question.always else out
+    if folder is None or not figures or not can_draw():
+        formats = ()
+    if folder is None or (question.always and not formats):
+        return None, ()
+    check_folder(folder)
+    return folder, formats
+
+
+def _source(
+    question: Question, scene: Path, set_: list[str] | None, values: Mapping[str, Any], stages: Stages
+) -> tuple[Any, dict[str, float]]:
+    """What is asked, the scene's model or the run in a file, and numbers of ``--set``."""
+    if question.takes_runs and scene.suffix == ".nc":
+        from ballpass.runtime.run.solution_file import load_solution
+
+        if set_:
+            raise RequestError(f"--set: {scene} holds a run that is done. Allowed: a scene. Leave --set away.")
+        return load_solution(scene), {}
+    asked = read_asked(scene, set_, values.get("duration"), values.get("transient"))
+    method = (values.get("method") or asked.run.method) if question.runs else "none"
+    model = load_model(scene, stages, method, None, values.get("rtol"), overrides=asked.overrides)
+    return model, asked.overrides
+
+
+def _progress(stages: Stages) -> Callable[..., None]:
+    """Told a finished fraction, and words in front of it by calls with several stages."""
+    begun: list[str] = []
+
+    def tell(*told: Any) -> None:
+        *words, fraction = told
+        for stage in words:
+            if stage not in begun:
+                begun.append(stage)
+                stages(stage)
+        stages.fraction(fraction)
+
+    return tell

@@ -1,0 +1,193 @@
+"""Options of questions and commands, each declared once: words, unit, bounds, the text that people write.
+
+A parameter with one of these types is an option of the command line; its default is in the signature.  Help texts,
+checks, docstrings and the reference page come from here.  Flags are the parameters' names with hyphens.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any, get_args, get_origin
+
+from ballpass.runtime.contract.errors import RequestError
+
+#: What a number with a unit is.
+_KINDS = {"s": "time", "Hz": "frequency", "rad": "angle"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Option:
+    """What an option means and what it allows.
+
+    Attributes
+    ----------
+    words : for its help
+    example : a value, for help on the command line
+    shown : stands for the value in the help
+    flags : on the command line, the first for messages; that of the parameter's name if there is none
+    unit : of a quantity, which the command line takes as text with a unit; empty for what has none
+    least, above, most : bounds of a number
+    choices : allowed words; empty for any
+    """
+
+    words: str
+    example: str = ""
+    shown: str | None = None
+    flags: tuple[str, ...] = ()
+    unit: str = ""
+    least: float = -math.inf
+    above: float = -math.inf
+    most: float = math.inf
+    choices: tuple[str, ...] = ()
+
+    def flag(self, name: str) -> str:
+        """How the command line calls the option of a parameter."""
+        return self.flags[0] if self.flags else f"--{name.strip('_').replace('_', '-')}"
+
+    def help(self, name: str) -> str:
+        """Words for the command line."""
+        return f"{self.words.removesuffix('.')}: `{self.flag(name)} {self.example}`." if self.example else self.words
+
+    def fault(self, name: str, value: Any) -> str | None:
+        """What is wrong with a value: what was given, what is allowed; None where nothing is.
+
+        Parameters
+        ----------
+        name : what the caller calls the option
+        """
+        if self.choices and value is not None:
+            wrong = [item for item in ([value] if isinstance(value, str) else value) if item not in self.choices]
+            allowed, right = ", ".join(self.choices), not wrong
+            given = "" if right else f"{wrong[0]!r:.60} is none of the choices"
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            kind = "whole number" if isinstance(value, int) else _KINDS.get(self.unit, "number")
+            allowed = self._allowed(kind)
+            right = self.least <= value <= self.most and value > self.above and math.isfinite(value)
+            given = f"{value:g} {self.unit}".rstrip() + " lies outside its bounds"
+        else:
+            return None
+        return None if right else f"{name}: {given}. Allowed: {allowed}."
+
+    def _allowed(self, kind: str) -> str:
+        if self.most < math.inf:
+            return f"{self.least:g} to {self.most:g}"
+        if self.above > -math.inf:
+            return f"a {kind} above {self.above:g}"
+        return f"a {kind} from {self.least:g} on" if self.least > -math.inf else f"a finite {kind}"
+
+
+def options_in(annotations: Mapping[str, Any]) -> dict[str, tuple[Any, Option]]:
+    """The options among annotations: the type of each, and what it means."""
+    return {
+        name: (get_args(kind)[0], option)
+        for name, kind in annotations.items()
+        for option in getattr(kind, "__metadata__", ())
+        if isinstance(option, Option)
+    }
+
+
+@cache
+def options_of(function: Callable[..., Any]) -> dict[str, tuple[Any, Option]]:
+    """The options among a function's parameters, where they are written as names of types in its module."""
+    known = inspect.unwrap(function).__globals__
+    return options_in({name: known.get(written) for name, written in function.__annotations__.items()})
+
+
+def refuse_faults(options: Mapping[str, Option], values: Mapping[str, Any]) -> None:
+    """Refuse values that are not allowed, all at once; None always is.
+
+    Parameters
+    ----------
+    options : by what the caller calls them, as are the values
+
+    Raises
+    ------
+    RequestError
+        Numbers out of bounds, words that are none of the choices.
+    """
+    found = [option.fault(name, values[name]) for name, option in options.items() if name in values]
+    if any(found):
+        raise RequestError("\n".join(filter(None, found)))
+
+
+def is_of(kind: Any, container: type) -> bool:
+    """Whether a type is, or may be, one of `Sequence`, `tuple`."""
+    return any(get_origin(item) is container for item in (kind, *get_args(kind)))
+
+
+# ------------------------------------------------------------------------------------------------ how long a run takes
+
+Cycles = Annotated[float | None, Option(words="Turns of driver or shaft to simulate.", shown="N", above=0.0)]
+
+Duration = Annotated[
+    float | None,
+    Option(
+        words="Time to simulate instead of turns, also at speed 0.",
+        example='"0.5 s"',
+        shown="TIME",
+        unit="s",
+        above=0.0,
+    ),
+]
+
+#: Of questions about the steady motion; ``ballpass run`` keeps the transient in its solution.
+Transient = Annotated[float | None, Option(words="Turns at the start that do not count.", shown="N", least=0.0)]
+
+# --------------------------------------------------------------------------------------------------------- how exactly
+
+
+def _tolerance(words: str) -> Option:
+    return Option(words=words, shown="R", least=1e-13, most=1e-1)
+
+
+Rtol = Annotated[float | None, _tolerance("Relative tolerance of the integrator.")]
+
+TightRtol = Annotated[float | None, _tolerance("Tolerance of the states; tight if not given.")]
+
+SensitivityRtol = Annotated[float | None, _tolerance("Tolerance of the derivatives; tight if not given.")]
+
+StepperMethod = Annotated[str | None, Option(words="`auto`, or one of the stepper's.", shown="NAME")]
+
+Check = Annotated[
+    bool, Option(words="Compare each derivative with extrapolated differences.", flags=("--check/--no-check",))
+]
+
+# -------------------------------------------------------------------------------------------------------- what to keep
+
+SampleRate = Annotated[
+    float | None,
+    Option(
+        words="Samples a second instead of the scene's samples in a turn.",
+        example='"25.6 kHz"',
+        shown="RATE",
+        unit="Hz",
+    ),
+]
+
+# ------------------------------------------------------------------------------------------------------- which instant
+
+Instant = Annotated[
+    float | None,
+    Option(
+        words="The instant as a time; the start if none is given.",
+        example='"0.08 s"',
+        shown="TIME",
+        unit="s",
+        flags=("--time",),
+    ),
+]
+
+CrankAngle = Annotated[
+    float | None,
+    Option(
+        words="The instant as an angle of crank or shaft in the first turn.",
+        example='"240 deg"',
+        shown="ANGLE",
+        unit="rad",
+        flags=("--at-angle", "--angle"),
+    ),
+]

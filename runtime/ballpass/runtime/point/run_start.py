@@ -1,0 +1,45 @@
+"""What a run of a model begins with: numbers with which the linkage can be assembled, and a state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.parameters import Numbers, vector
+from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.run.start import RunEnd, Start
+
+#: State at the start: given, "equilibrium", or the end of a run that another goes on from; None takes the scene's.
+Initial = Sequence[float] | np.ndarray | RunEnd | Literal["equilibrium"] | None
+
+
+def run_numbers(model: LoadedModel, parameters: Mapping[str, float] | None) -> Numbers:
+    """Numbers of a run.
+
+    Raises
+    ------
+    RequestError
+        Unknown names, values out of bounds, or a linkage that cannot be assembled.
+    """
+    numbers = model.numbers(parameters)
+    check_assembly(model, numbers)
+    return numbers
+
+
+def start_of(model: LoadedModel, numbers: Numbers, initial: Initial) -> Start:
+    """What a run begins with; RequestError for words that are none."""
+    if initial is None or isinstance(initial, RunEnd):
+        return initial
+    if not isinstance(initial, str):
+        return vector(initial)
+    if initial != "equilibrium":
+        raise RequestError(
+            f'initial: {initial!r} was given. Allowed: a state, "equilibrium", or the end of a run (Solution.end).'
+        )
+    from ballpass.runtime.point.equilibrium import start_at_rest  # with SciPy
+
+    return start_at_rest(model, numbers)

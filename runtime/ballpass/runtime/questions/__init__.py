@@ -1,0 +1,29 @@
+"""Questions: each a file here, a line in `Questions`, a command of ``ballpass`` and a method of `Model`."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from ballpass.runtime.questions.jacobian import checked_jacobian
+from ballpass.runtime.questions.life import life
+from ballpass.runtime.questions.linearize import linearize
+from ballpass.runtime.questions.sensitivity import sensitivity
+from ballpass.runtime.questions.spectrum import spectrum
+from ballpass.runtime.questions.steady import steady
+
+
+class Questions:
+    """What can be asked of a model, as its methods; the command line lists the same."""
+
+    checked_jacobian = checked_jacobian
+    life = life
+    linearize = linearize
+    sensitivity = sensitivity
+    spectrum = spectrum
+    steady = steady
+
+
+#: The same, as a list.
+QUESTIONS: list[Callable[..., Any]] = [item for item in vars(Questions).values() if inspect.isfunction(item)]

@@ -1,0 +1,139 @@
+"""Strength and life of a scene's bearings, and their figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ballpass.runtime.contract.options import Cycles, Rtol, StepperMethod, Transient
+from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.show.progress import Progress, shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ballpass.runtime.ask.life_records import BearingStrength
+    from ballpass.runtime.ask.life_text import LifeReport
+    from ballpass.runtime.contract import BearingInfo
+    from ballpass.runtime.point.point_model import PointModel
+    from ballpass.runtime.point.run_start import Initial
+
+#: Clearances of the figure of life, and steady turns of each.
+POINTS, TURNS = 17, 64
+
+
+def life_figures(model: AnyModel, report: LifeReport, parameters: Mapping[str, float]) -> Iterator[tuple[str, Figure]]:
+    """Figures of every bearing in the first state of the duty cycle in which something turns."""
+    from ballpass.runtime.plot import life as figures
+
+    state = next((state for state in report.states if state.bearings), None)
+    if state is None:
+        return
+    title = f"{report.title}, {state.name}" if state.name else report.title
+    duty = {info.name: dict(info.parameters) for info in model.manifest.duty}
+    numbers = {**parameters, **duty.get(state.name, {})}
+    for info, bearing in zip(model.manifest.bearings, state.bearings, strict=True):
+        ending = f"_{bearing.name}" if bearing.name else ""
+        if bearing.inner.damage:
+            yield f"damage{ending}", figures.damage(title, bearing)
+            yield f"life_of_clearance{ending}", _clearance(model, info, bearing, numbers, title)
+        if state.turns is not None:
+            yield f"pressure{ending}", _pressure(model, info, bearing, numbers, title)
+
+
+@Question(figures=life_figures)
+def life(
+    model: PointModel,
+    cycles: Cycles = None,
+    *,
+    transient: Transient = None,
+    parameters: Mapping[str, float] | None = None,
+    rtol: Rtol = None,
+    method: StepperMethod = None,
+    initial: Initial = None,
+    progress: Progress = None,
+) -> LifeReport:
+    """Strength, rating life by three readings, and wear of every bearing.
+
+    With a duty cycle in the scene one life over all its states, and the damage of each. Without a number of turns the
+    run takes as many as lives and peaks need to settle.
+
+    Parameters
+    ----------
+    parameters : overrides, SI; those of a state of the duty cycle come behind them
+    initial, progress : as for `simulate`
+
+    Raises
+    ------
+    RequestError
+        A wrong request, a linkage that cannot be assembled, or a scene without bearing.
+    SimulationError
+        The computation failed.
+
+    Examples
+    --------
+    >>> (bearing,) = model.life(cycles=4, transient=2).bearings
+    >>> f"{bearing.static_safety:.1f}, {bearing.lives['sectors'] / 1e6:.0f} million turns"
+    '0.9, 225 million turns'
+    """
+    from ballpass.runtime.ask.life_report import life_report
+    from ballpass.runtime.point.run_start import run_numbers, start_of
+    from ballpass.runtime.run.request import Request
+
+    numbers = run_numbers(model, parameters)
+    request = Request(
+        cycles=cycles,
+        transient_cycles=transient,
+        rtol=rtol,
+        method=method,
+        initial=start_of(model, numbers, initial),
+    )
+    with shown("simulating for life", progress) as tell:
+        return life_report(model, dict(parameters or {}), replace(request, progress=tell))
+
+
+def _pressure(
+    model: AnyModel, info: BearingInfo, bearing: BearingStrength, overrides: Mapping[str, float], title: str
+) -> Figure:
+    """The ring with the higher pressure, over a turn behind the transient."""
+    from ballpass.runtime.ask.wear import load_samples
+    from ballpass.runtime.plot import life as figures
+    from ballpass.runtime.ratings.of_bearing import contacts_of
+    from ballpass.runtime.run.request import Request
+
+    numbers = model.numbers(overrides)
+    samples = load_samples(model, numbers, Request(cycles=model.manifest.run.transient_cycles + 1.0))[info.prefix]
+    inner, outer = contacts_of(info, numbers.values)
+    ring, contact = ("inner", inner) if bearing.inner.peak_pressure > bearing.outer.peak_pressure else ("outer", outer)
+    crank = np.unwrap(samples.crank)
+    found = contact.peak_pressure(samples.force)
+    return figures.pressure(title, bearing, crank, found, ring)
+
+
+def _clearance(
+    model: AnyModel, info: BearingInfo, bearing: BearingStrength, overrides: Mapping[str, float], title: str
+) -> Figure:
+    """Life over the bearing's group of clearance and half its width on both sides; else up to twice the clearance."""
+    from ballpass.runtime.plot import life as figures
+    from ballpass.runtime.ratings.readings import READINGS
+
+    name = f"{info.path}.clearance"
+    present = model.numbers(overrides).values[name]
+    taken, group = info.catalogue, None
+    least, most = (0.0, 2.0 * present) if present > 0.0 else (present - 10e-6, present + 20e-6)
+    if taken is not None and taken.clearance_least is not None and taken.clearance_most is not None:
+        group = (taken.clearance_group, taken.clearance_least, taken.clearance_most)
+        half = (taken.clearance_most - taken.clearance_least) / 2.0
+        least, most = min(present, taken.clearance_least - half), max(present, taken.clearance_most + half)
+    clearances = np.linspace(least, most, POINTS)
+    table = {**{key: np.full(POINTS, value) for key, value in overrides.items()}, name: clearances}
+    transient = model.manifest.run.transient_cycles
+    asked = {reading: f"{info.prefix}life_{reading}" for reading in READINGS}
+    found = model.simulate_many(table, list(asked.values()), cycles=transient + TURNS)
+    if found.interrupted:
+        raise KeyboardInterrupt
+    lives = {reading: found[observable] for reading, observable in asked.items()}
+    return figures.life_of_clearance(title, bearing, clearances, lives, present, group, TURNS)

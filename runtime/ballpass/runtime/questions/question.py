@@ -1,0 +1,94 @@
+"""What makes a function a question: its options, its report, how the command line shows it.
+
+A question is a function of a model.  Parameters with a type of `contract.options` are its options; ``parameters`` are
+overrides of the numbers; ``progress`` is told how far it is.  Its module imports inside functions what computes:
+the command line reads all modules before it knows which question is asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import wraps
+from inspect import Parameter, cleandoc, signature
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+from ballpass.runtime.contract.options import options_of, refuse_faults
+from ballpass.runtime.report.report import Report
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: A `Model`.  It lists the questions, and so stands above them.
+AnyModel = Any
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Question:
+    """Declares a function as a question, as its decorator.  The docstring then has the words of all options.
+
+    Attributes
+    ----------
+    name : of the command; the function's if there is none
+    report : of an answer
+    stage : what is announced while it computes
+    check : of values of the options: RequestError where they contradict each other; the command does it before anything
+        is derived
+    runs : whether it integrates, so that the stepper is compiled first
+    takes_runs : whether the solution of a run may stand in place of the model
+    figures : of a model, an answer and overrides, by names of files
+    always : whether figures are drawn into the folder of the results unless they are turned off; otherwise figures and
+        ``<name>.json`` are written where a folder is given
+    """
+
+    name: str = ""
+    report: Callable[[Any], Report] = lambda answer: answer.report()
+    stage: str = "simulate"
+    check: Callable[[Mapping[str, Any]], None] | None = None
+    runs: bool = True
+    takes_runs: bool = False
+    figures: Callable[[Any, Any, Mapping[str, float]], Iterator[tuple[str, Figure]]] | None = None
+    always: bool = False
+
+    def __call__(self, ask: _Function) -> _Function:
+        @wraps(ask)
+        def checked(*given: Any, **named: Any) -> Any:
+            values = signature(ask).bind(*given, **named)
+            values.apply_defaults()
+            refuse_faults({name: option for name, (_, option) in options_of(ask).items()}, values.arguments)
+            if self.check is not None:
+                self.check(values.arguments)
+            return ask(*given, **named)
+
+        checked.__doc__ = _with_options(ask)
+        _DECLARED[checked] = replace(self, name=self.name or ask.__name__)
+        return cast("_Function", checked)
+
+
+_DECLARED: dict[Callable[..., Any], Question] = {}
+
+
+def declared(ask: Callable[..., Any]) -> Question:
+    """How a question was declared."""
+    return _DECLARED[ask]
+
+
+def summary_of(function: Callable[..., Any]) -> str:
+    """The docstring's paragraphs in front of its sections, each a line."""
+    paragraphs = cleandoc(function.__doc__ or "").partition("\n\nParameters\n")[0].split("\n\n")
+    return "\n\n".join(" ".join(one.split()) for one in paragraphs)
+
+
+def _with_options(ask: Callable[..., Any]) -> str:
+    """The docstring with words, unit and default of each option; other parameters it describes itself."""
+    words, _, others = cleandoc(ask.__doc__ or "").partition("\n\nParameters\n----------")
+    defaults = signature(ask).parameters
+    lines = []
+    for name, (_, option) in options_of(ask).items():
+        default = defaults[name].default
+        told = "" if default in (None, Parameter.empty) else f"  Default: {default!r}"
+        unit = f" [{option.unit}]" if option.unit else ""
+        lines.append(f"{name} : {option.words}{told}{unit}")
+    return "\n".join([words, "", "Parameters", "----------", *lines]) + others

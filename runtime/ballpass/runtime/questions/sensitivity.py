@@ -1,0 +1,118 @@
+"""Which parameters move what, with a certificate for each number."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from ballpass.runtime.contract.options import (
+    Check,
+    Cycles,
+    Duration,
+    Option,
+    SensitivityRtol,
+    TightRtol,
+    Transient,
+)
+from ballpass.runtime.questions.question import Question
+from ballpass.runtime.show.progress import shown_steps
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ballpass.runtime.certify.sensitivity_report import SensitivityReport
+    from ballpass.runtime.point.point_model import PointModel
+
+Of = Annotated[
+    str | Sequence[str] | None,
+    Option(
+        words="Quantity: `max:ball.force` (or `peak_ball_force`), `rms:inner.y`, `value:inner.y@240deg`, `drive_work` "
+        "… May be repeated. Peak ball force and motion of the rings if none is given.",
+        shown="Q",
+    ),
+]
+Wrt = Annotated[
+    str | Sequence[str] | None,
+    Option(
+        words='Parameter by its path in the scene, or a pattern, as `"bearing.*"`. May be repeated. All if none is '
+        "given.",
+        shown="P",
+    ),
+]
+Method = Annotated[str, Option(words="Of the derivatives: `auto`, or a stepper's name.", shown="NAME")]
+
+
+def _figures(_model: Any, report: SensitivityReport, _parameters: Any) -> Iterator[tuple[str, Figure]]:
+    from ballpass.runtime.plot.tornado import tornados
+
+    return tornados(report)
+
+
+@Question(stage="differentiate", figures=_figures)
+def sensitivity(
+    model: PointModel,
+    of: Of = None,
+    wrt: Wrt = None,
+    cycles: Cycles = None,
+    *,
+    duration: Duration = None,
+    transient: Transient = None,
+    parameters: Mapping[str, float] | None = None,
+    method: Method = "auto",
+    check: Check = True,
+    rtol: TightRtol = None,
+    sensitivity_rtol: SensitivityRtol = None,
+    samples_per_cycle: int | None = None,
+    kinks: Literal["stepped-over", "located"] | None = None,
+    agreement: float | None = None,
+    progress: Callable[[str, float], None] | bool | None = None,
+) -> SensitivityReport:
+    """Differentiate quantities of interest by parameters, and check every derivative by a second route.
+
+    Where the two routes disagree the command reports both numbers, and its exit code is 1. Charts rank what moves a
+    quantity most.
+
+    Parameters
+    ----------
+    parameters : overrides, SI
+    samples_per_cycle : without effect since quadratures have their nodes in the steps of the run
+    kinks : as for `sensitivities`
+    agreement : relative disagreement of both routes that is allowed
+    progress : called with words and a finished fraction; else as for `simulate`
+
+    Raises
+    ------
+    RequestError
+        A wrong request, unknown names, or a law whose force jumps.
+    SimulationError
+        The computation failed.
+
+    Examples
+    --------
+    >>> report = model.sensitivity("rms:inner.y", "bearing.clearance", cycles=3)
+    >>> pair = report["rms:inner.y", "bearing.clearance"]
+    >>> f"{pair.derivative:.2f} {pair.unit}, {pair.check.verdict.value}"
+    '0.28 m/m, verified'
+    """
+    from ballpass.runtime.certify.sensitivity_query import answer, make_query
+    from ballpass.runtime.point.run_start import run_numbers
+
+    query = make_query(
+        model.manifest,
+        of=of,
+        wrt=wrt,
+        cycles=cycles,
+        duration=duration,
+        transient=transient,
+        method=method,
+        check=check,
+        rtol=rtol,
+        sensitivity_rtol=sensitivity_rtol,
+        kinks=kinks,
+        agreement=agreement,
+        progress=None,
+    )
+    numbers = run_numbers(model, parameters)
+    with shown_steps("differentiating", progress) as tell:
+        return answer(model, numbers, replace(query, progress=tell))

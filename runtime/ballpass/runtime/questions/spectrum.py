@@ -1,0 +1,310 @@
+"""The lines of a signal, and which characteristic frequency of which bearing each is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+
+from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import need
+from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, SampleRate, Transient
+from ballpass.runtime.questions.question import AnyModel, Question
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
+from ballpass.runtime.show.progress import Progress
+from ballpass.runtime.show.short import ShortRepr
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ballpass.runtime.ask.vibration import DiagnosisStatistics
+    from ballpass.runtime.quantity.characteristic import CharacteristicLine
+    from ballpass.runtime.run.solution import Solution
+
+#: Samples a segment of the spectrogram of a run-up has of the whole, at most.
+SEGMENTS = 40
+
+Of = Annotated[str, Option(words="Output or state of the scene with one value: `inner.ax`.", shown="OUTPUT")]
+Band = Annotated[
+    tuple[float, float] | None,
+    Option(words="The envelope of this band instead of the signal.", example="2kHz:8kHz", shown="LOW:HIGH", unit="Hz"),
+]
+Orders = Annotated[
+    bool, Option(words="Over multiples of the shaft's speed, also where that changes.", flags=("--orders",))
+]
+AsMap = Annotated[
+    bool, Option(words="Draw amplitudes over time and frequency instead, as of a run-up.", flags=("--spectrogram",))
+]
+Window = Annotated[
+    str, Option(words="Window of `scipy.signal`: `hann`, `boxcar`, `flattop`, `blackmanharris`.", shown="NAME")
+]
+Scaling = Annotated[
+    str,
+    Option(
+        words="`amplitude`, `power` of the lines, or `density` of the power.",
+        shown="HOW",
+        choices=("amplitude", "power", "density"),
+    ),
+]
+Top = Annotated[int, Option(words="Lines of the table.", shown="N", least=1)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
+class SignalSpectrum(ShortRepr, Reported):
+    """A spectrum with its highest lines named.
+
+    Attributes
+    ----------
+    of, unit : the signal
+    envelope : band whose envelope was taken [Hz], None for the signal itself
+    orders : whether positions are multiples of the shaft's speed instead of frequencies
+    spectrogram : whether the figure is one over time
+    window, scaling : of the spectrum
+    position, height : of all lines [Hz or 1], [`height_unit`]
+    height_unit : SI unit of the heights
+    resolution : distance of two lines
+    highest : places of the highest local maxima, highest first
+    marks : characteristic frequencies or orders
+    statistics : of the signal
+    solution : its steady part
+
+    Examples
+    --------
+    >>> found = model.spectrum("drive_torque", cycles=12, transient=2, orders=True, top=1)
+    >>> found.names
+    ('shaft',)
+    """
+
+    of: str
+    unit: str
+    envelope: tuple[float, float] | None
+    orders: bool
+    spectrogram: bool
+    window: str
+    scaling: str
+    position: np.ndarray
+    height: np.ndarray
+    height_unit: str
+    resolution: float
+    highest: tuple[int, ...]
+    marks: tuple[CharacteristicLine, ...]
+    statistics: DiagnosisStatistics
+    solution: Solution
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the highest lines are: "BPFO", "2 shaft"; empty for what is none."""
+        from ballpass.runtime.quantity.characteristic import identify
+
+        return tuple(identify(float(self.position[k]), self.marks, self.resolution) for k in self.highest)
+
+    def _report(self) -> Report:
+        rows = [
+            {
+                "order" if self.orders else "frequency": float(self.position[k]),
+                self.scaling: float(self.height[k]),
+                "line": name,
+            }
+            for k, name in zip(self.highest, self.names, strict=True)
+        ]
+        across = "order" if self.orders else "frequency [Hz]"
+        table = ReportTable(
+            title=f"Highest lines of {self.of}",
+            heads=(across, self.height_unit, "line"),
+            rows=[
+                (f"{self.position[k]:.6g}", f"{self.height[k]:.4g}", name)
+                for k, name in zip(self.highest, self.names, strict=True)
+            ],
+            right=(across, self.height_unit),
+        )
+        marks = ", ".join(f"{mark.label} {mark.frequency:.6g}" for mark in self.marks)
+        s = self.statistics
+        said = [f"{marks}{'' if self.orders else ' Hz'}; lines {self.resolution:.3g} apart"] if marks else []
+        said.append(
+            f"rms {s.rms:.4g} {self.unit}, peak {s.peak:.4g} {self.unit}, crest factor {s.crest_factor:.3g}, kurtosis "
+            f"{s.kurtosis:.3g}, skewness {s.skewness:.3g}"
+        )
+        facts = {
+            "of": self.of,
+            "unit": self.unit,
+            "window": self.window,
+            "scaling": self.scaling,
+            "envelope": self.envelope,
+            "resolution": self.resolution,
+            "statistics": asdict(s),
+            "characteristic": [asdict(mark) for mark in self.marks],
+            "lines": rows,
+            "figure": None,  # the command puts the file here
+        }
+        return Report(parts=(table, *said), facts=facts, records=rows)
+
+
+def _check(values: Mapping[str, Any]) -> None:
+    need("scipy")
+    if values["orders"] and values["scaling"] != "amplitude":
+        raise RequestError("--orders gives amplitudes, and --scaling was given as well. Leave one of the two away.")
+    if values["orders"] and values["spectrogram"]:
+        raise RequestError("--orders and --spectrogram were both given. Leave one of the two away.")
+
+
+def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Iterator[tuple[str, Figure]]:
+    from ballpass.runtime.plot.style import label, unit_words
+    from ballpass.runtime.plot.vibration import draw_lines, draw_spectrogram
+
+    solution, band = found.solution, found.envelope
+    infos = (*solution.manifest.states, *solution.manifest.outputs)
+    described = next((info.description for info in infos if info.name == found.of), found.of)
+    words = described[:1].lower() + described[1:]
+    what = f"envelope of {found.of}, {band[0]:g} to {band[1]:g} Hz" if band else found.of
+    title = f"{solution.manifest.title}: {what}"
+    if found.spectrogram:
+        from ballpass.runtime.ask.vibration import envelope, spectrogram
+        from ballpass.runtime.quantity.characteristic import characteristic_lines
+
+        signal = solution[found.of]
+        values = envelope(solution.t, signal, band) if band else signal
+        length = float(solution.t[-1] - solution.t[0])
+        over_time = spectrogram(solution.t, values, segment=length / SEGMENTS, window=found.window)
+        numbers = {**solution.parameters, **solution.constants}
+        orders = characteristic_lines(solution.manifest, numbers, orders=True)
+        speed = np.zeros(len(over_time.time))
+        if orders:
+            rate = np.gradient(_angle(solution), solution.t)
+            speed = np.abs(np.interp(over_time.time, solution.t, rate)) / (2.0 * np.pi)
+        yield "spectrogram", draw_spectrogram(over_time, orders, speed, title=title, unit=unit_words(found.unit))
+        return
+    figure = draw_lines(
+        found.position,
+        found.height,
+        found.marks,
+        title=title,
+        across="order of the shaft [1]" if found.orders else "frequency [Hz]",
+        up=label(f"{found.scaling} of {'the envelope of ' if band else ''}{words}", found.height_unit),
+        text=f"{found.window} window, lines {found.resolution:.3g}{'' if found.orders else ' Hz'} apart.",
+    )
+    yield "spectrum", figure
+
+
+@Question(stage="spectrum", check=_check, figures=_figures, always=True, takes_runs=True)
+def spectrum(
+    model: AnyModel,
+    of: Of,
+    *,
+    envelope: Band = None,
+    orders: Orders = False,
+    spectrogram: AsMap = False,
+    window: Window = "hann",
+    scaling: Scaling = "amplitude",
+    top: Top = 10,
+    sample_rate: SampleRate = None,
+    cycles: Cycles = None,
+    duration: Duration = None,
+    transient: Transient = None,
+    parameters: Mapping[str, float] | None = None,
+    rtol: Rtol = None,
+    progress: Progress = None,
+) -> SignalSpectrum:
+    """The highest lines of a signal of the steady motion, and what each is: BPFO, BPFI, 2 BSF, FTF, the shaft.
+
+    Parameters
+    ----------
+    parameters : overrides, SI
+    progress : as for `simulate`
+
+    Raises
+    ------
+    RequestError
+        A wrong request, or a signal that has one value for each ball.
+    IntegrationError
+        The computation failed.
+
+    Examples
+    --------
+    >>> model.spectrum("drive_torque", cycles=12, transient=2, orders=True, top=1).names
+    ('shaft',)
+    """
+    from ballpass.runtime.ask.spectrum import amplitude_spectrum, power_spectrum
+    from ballpass.runtime.ask.vibration import diagnosis, order_spectrum
+    from ballpass.runtime.ask.vibration import envelope as envelope_of
+    from ballpass.runtime.quantity.characteristic import characteristic_lines
+    from ballpass.runtime.run.solution import Solution
+
+    if isinstance(model, Solution):
+        if any(item is not None for item in (sample_rate, cycles, duration, rtol, parameters or None)):
+            raise RequestError(
+                "This is a run that is done: options of a simulation have no place. Allowed: --of, --envelope, "
+                "--orders, --spectrogram, --window, --scaling, --top, --transient."
+            )
+        run = model if transient is None else replace(model, transient_cycles=transient)
+    else:
+        states = [info.name for info in model.manifest.states]
+        run = model.simulate(
+            cycles=cycles,
+            duration=duration,
+            transient=transient,
+            parameters=parameters,
+            rtol=rtol,
+            sample_rate=sample_rate,
+            outputs=[] if of in states and of not in model.outputs else [of],
+            progress=progress,
+        )
+    solution = run.steady()
+    signal = solution[of]
+    if signal.ndim != 1:
+        raise RequestError(f"--of: {of} has one value for each ball. Allowed: an output with one value, as inner.ax.")
+    values = signal if envelope is None else envelope_of(solution.t, signal, envelope)
+    unit = next((i.unit for i in (*solution.manifest.outputs, *solution.manifest.states) if i.name == of), "")
+    if orders or scaling == "amplitude":
+        if orders:
+            lines = order_spectrum(_angle(solution), values, window=window)
+        else:
+            lines = amplitude_spectrum(solution.t, values, window=window)
+        position, height, resolution = lines.frequency, lines.amplitude, lines.resolution
+        height_unit = unit
+    else:
+        kind: Literal["spectrum", "density"] = "spectrum" if scaling == "power" else "density"
+        power = power_spectrum(solution.t, values, window=window, scaling=kind)
+        position, height, resolution = power.frequency, power.power, power.resolution
+        height_unit = f"({unit})^2" + ("/Hz" if scaling == "density" else "")
+    numbers = {**solution.parameters, **solution.constants}
+    changing = run.period is None and run.cycle_length is not None
+    return SignalSpectrum(
+        of=of,
+        unit=unit,
+        envelope=envelope,
+        orders=orders,
+        spectrogram=spectrogram,
+        window=window,
+        scaling=scaling,
+        position=position,
+        height=height,
+        height_unit=height_unit,
+        resolution=resolution,
+        highest=_peaks(height, top),
+        marks=() if changing and not orders else characteristic_lines(solution.manifest, numbers, orders=orders),
+        statistics=diagnosis(signal),
+        solution=solution,
+    )
+
+
+def _angle(solution: Solution) -> np.ndarray:
+    """Angle of driver or shaft at the samples, counted on beyond a turn [rad]."""
+    from ballpass.runtime.run.inputs import shaft_speed
+
+    mechanism = solution.manifest.mechanism
+    if mechanism is not None and mechanism.angle:
+        return solution[mechanism.angle]
+    speed = shaft_speed(solution.manifest, {**solution.parameters, **solution.constants})
+    if speed == 0.0:
+        raise RequestError("--orders: nothing turns in this scene, so that there are no orders. Leave it away.")
+    return np.asarray(speed * solution.t)
+
+
+def _peaks(height: np.ndarray, top: int) -> tuple[int, ...]:
+    """Places of the highest local maxima, highest first; without the line of frequency zero and its neighbour."""
+    inner = np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] > height[2:])) + 1
+    inner = inner[inner > 1]
+    return tuple(int(k) for k in inner[np.argsort(height[inner])[::-1][:top]])
