@@ -3,19 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy as sp
-from scipy.optimize import brentq
-from sympy.physics.mechanics import LagrangesMethod, Point, ReferenceFrame, RigidBody, dynamicsymbols
-
-sys.path.append(str(Path(__file__).parents[1] / "derive"))
-
 from linkages import (
     DEGREE,
     Machine,
@@ -28,6 +21,8 @@ from linkages import (
     slotted_lever,
     watt_six_bar,
 )
+from scipy.optimize import brentq
+from sympy.physics.mechanics import LagrangesMethod, Point, ReferenceFrame, RigidBody, dynamicsymbols
 
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.mechanism.numeric import Evaluator

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
-
-sys.path.append(str(Path(__file__).parents[1] / "derive"))
-
 from linkages import Machine
 
 from ballpass.derive import derive
