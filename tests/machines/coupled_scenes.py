@@ -67,6 +67,8 @@ ball_angle = "17 deg"
 """
 
 
+#: Outputs on request that a balance of powers takes.
+POWERS = ("*.power", "drive_power", "kinetic_energy")
 RUN = '\n[run]\ncycles = 1\noutputs = ["*"]\n'
 
 

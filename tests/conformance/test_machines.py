@@ -1,0 +1,112 @@
+"""What dyads, forces and drives do to a machine, against absolute coordinates with multipliers (tests/machines).
+
+The second implementation knows nothing of dyads, reactions in closed form or virtual work: ideal joints are
+constraints, forces act between points, the driver turns freely under a torque.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+from comparison import drawn, largest_difference, largest_imbalance, power_imbalance
+from coupled_scenes import POWERS, RUN, Derived, linkage_text
+from linkages import MACHINES
+from multibody import Multibody
+from parts import FORCES, TORQUES, shaper
+
+from ballpass.derive.drive.laws import LAWS as DRIVES
+from ballpass.derive.mechanism.dyads import DYADS
+from ballpass.derive.reading.read import scene_from_text
+
+FREE = '[mechanism.driver.torque]\nlaw = "none"\n\n[mechanism.frame.points]'
+
+
+def freely(text: str, driver: str = FREE) -> tuple[Derived, Multibody]:
+    """The mechanism of a scene without its bearing, its driver's angle a coordinate where nothing else is said."""
+    text = text.partition("[bearing]")[0].replace("[mechanism.frame.points]", driver, 1) + RUN
+    derived = Derived(scene_from_text(text, "machine"), further=POWERS)
+    return derived, Multibody(derived.scene, derived.points())
+
+
+@cache
+def idle() -> tuple[Derived, Multibody]:
+    """The crank-shaper that forces are put on, without any."""
+    return freely(shaper(""))
+
+
+def check(derived: Derived, machine: Multibody, count: int, bound: float = 1e-10) -> None:
+    """Accelerations, reactions, torque and powers at random angles of several turns and speeds either way."""
+    rng = np.random.default_rng(14)
+    for _ in range(count):
+        state = drawn(rng, derived, machine)
+        assert largest_difference(derived, machine, *state) < bound
+        assert largest_imbalance(derived, machine, *state) < 1e-11
+        assert power_imbalance(derived, machine, *state) < 1e-10
+
+
+def test_every_dyad_and_each_of_its_branches_is_in_a_machine() -> None:
+    found = {(dyad.kind, dyad.sign) for make in MACHINES.values() for dyad in make().linkage().dyads}
+    missing = {(dyad.kind, sign) for dyad in DYADS for sign in (1, -1)} - found
+    assert not missing, f"MACHINES of tests/machines/linkages.py has no machine with {missing}"
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_linkages_move_and_react_as_in_absolute_coordinates(name: str) -> None:
+    """At constant speed, where the drive's torque is a reaction; and turning freely."""
+    machine = MACHINES[name]()
+    driver = machine.mechanism.joint("A")
+    if driver.bodies[0] != "frame":
+        machine = machine.with_joint("A", bodies=driver.bodies[::-1], points=driver.points[::-1])
+    check(*freely(linkage_text(machine), "[mechanism.frame.points]"), 4)
+    if not name.endswith(("behind", "left", "right")):  # once a machine
+        check(*freely(linkage_text(machine)), 4)
+
+
+@pytest.mark.parametrize("name", FORCES)
+def test_forces_act_as_between_points_in_absolute_coordinates(name: str) -> None:
+    """Also a stop that pushes and one that does not, windows open and shut; it changes the motion somewhere."""
+    derived, machine = freely(shaper(FORCES[name][0]))
+    check(derived, machine, 12)
+    without, rng = idle()[0], np.random.default_rng(14)
+    moved = 0
+    for _ in range(12):
+        t, x, gates = drawn(rng, derived, machine)
+        moved += not np.allclose(derived.rhs(t, x, gates), without.rhs(t, x, {}), rtol=1e-9, atol=0.0)
+    assert moved > 0
+
+
+@pytest.mark.parametrize("law", DRIVES)
+def test_torques_of_drives_turn_the_machine(law: str) -> None:
+    """With a flywheel on the driven body."""
+    torque = f'[mechanism.driver.torque]\nlaw = "{law}"\n{TORQUES[law]}\n'
+    wheel = '[mechanism.driver.flywheel]\ninertia = "0.02 kg*m^2"\n\n[mechanism.frame.points]'
+    check(*freely(shaper(""), torque + wheel), 8)
+
+
+def kloss(speed: float) -> float:
+    slip = 1.0 - speed / 150.0
+    return 2.0 * 9.0 / (slip / 0.2 + 0.2 / slip)
+
+
+#: Torque over the speed, of the numbers in `parts.TORQUES`.
+TORQUE: dict[str, Callable[[float], float]] = {
+    "constant": lambda speed: 5.0,
+    "linear": lambda speed: 8.0 - 0.04 * speed,
+    "table": lambda speed: float(np.interp(speed, [0.0, 50.0, 200.0], [3.0, 4.0, -1.0])),
+    "asynchronous": kloss,
+    "none": lambda speed: 0.0,
+}
+
+
+@pytest.mark.parametrize("law", DRIVES)
+def test_torques_are_those_of_data_sheets(law: str) -> None:
+    """Straight lines, a table by NumPy's interpolation, Kloss's formula with its breakdown point at 120 rad/s."""
+    assert law in TORQUE, "TORQUE needs the law's formula, written by hand"
+    torque = f'[mechanism.driver.torque]\nlaw = "{law}"\n{TORQUES[law]}\n\n[mechanism.frame.points]'
+    derived, _ = freely(shaper(""), torque)
+    for speed in (*np.linspace(-35.0, 225.0, 14), 120.0):
+        found = derived.outputs(0.0, np.array([0.3, speed]), {})["drive_torque"]
+        assert found == pytest.approx(TORQUE[law](float(speed)), rel=1e-12)
