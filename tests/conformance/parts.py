@@ -204,7 +204,13 @@ window = { start = "350 deg", end = "190 deg" }
 _HOOK = ("[mechanism.frame.points]\n", '[mechanism.frame.points]\nhook = ["250 mm", "180 mm"]\n')
 _POINT = '[mechanism.forces.it]\nbody = "lever"\npoint = "tip"\n'
 _BODY = '[mechanism.torques.it]\nbody = "lever"\n'
-_WINDOW = 'window = { start = "350 deg", end = "190 deg" }\n'
+#: One through zero, one in radians below it.
+_WINDOW = """window = [
+    { start = "237 deg", end = "267 deg" },
+    { start = "350 deg", end = "20 deg" },
+    { start = "-3 rad", end = "-1 rad" },
+]
+"""
 _ENDS = 'bodies = ["crank", "lever"]\npoints = ["A", "tip"]\n'
 _TURN = 'bodies = ["crank", "lever"]\n'
 #: Keys of the scene file, and the numbers that scale the force.
@@ -255,6 +261,18 @@ FORCES: dict[str, tuple[str, tuple[str, ...]]] = {
         ("viscous", "force"),
     ),
 }
+#: Further cases of an entry, by what tells them apart.
+FORCE_VARIANTS: dict[tuple[str, str], tuple[str, tuple[str, ...]]] = {
+    ("springs TwoPoints SpringDamper", "damper alone"): (
+        '[mechanism.springs.it]\nbodies = ["frame", "lever"]\npoints = ["hook", "tip"]\ndamping = "40 N*s/m"\n',
+        ("damping",),
+    ),
+    ("springs TwoPoints SpringDamper", "between moving bodies"): (
+        '[mechanism.springs.it]\nbodies = ["crank", "lever"]\npoints = ["B", "tip"]\nstiffness = "2 N/mm"\n'
+        'free_length = "150 mm"\n',
+        ("stiffness",),
+    ),
+}
 
 
 def shaper(force: str) -> str:
@@ -264,7 +282,8 @@ def shaper(force: str) -> str:
 
 def _forces() -> list[Part]:
     found = []
-    for name, (text, scale) in FORCES.items():
+    plain = {(name, ""): case for name, case in FORCES.items()}
+    for (name, variant), (text, scale) in {**plain, **FORCE_VARIANTS}.items():
         table = name.partition(" ")[0]
         path = f"mechanism.{table}.it"
         found.append(
@@ -276,6 +295,7 @@ def _forces() -> list[Part]:
                 path=path,
                 off={f"{path}.{key}": 0.0 for key in scale},
                 docs=("reference/scene.md", f"[mechanism.{table}.<name>]"),
+                variant=variant,
             )
         )
     return found

@@ -15,7 +15,7 @@ from comparison import drawn, largest_difference, largest_imbalance, power_imbal
 from coupled_scenes import POWERS, RUN, Derived, linkage_text
 from linkages import MACHINES
 from multibody import Multibody
-from parts import FORCES, TORQUES, shaper
+from parts import PARTS, TORQUES, Part, shaper
 
 from ballpass.derive.drive.laws import LAWS as DRIVES
 from ballpass.derive.mechanism.dyads import DYADS
@@ -65,10 +65,10 @@ def test_linkages_move_and_react_as_in_absolute_coordinates(name: str) -> None:
         check(*freely(linkage_text(machine)), 4)
 
 
-@pytest.mark.parametrize("name", FORCES)
-def test_forces_act_as_between_points_in_absolute_coordinates(name: str) -> None:
+@pytest.mark.parametrize("part", [part for part in PARTS if part.registry == "force"], ids=str)
+def test_forces_act_as_between_points_in_absolute_coordinates(part: Part) -> None:
     """Also a stop that pushes and one that does not, windows open and shut; it changes the motion somewhere."""
-    derived, machine = freely(shaper(FORCES[name][0]))
+    derived, machine = freely(part.text)
     check(derived, machine, 12)
     without, rng = idle()[0], np.random.default_rng(14)
     moved = 0
