@@ -15,3 +15,12 @@ NAMES = tuple(FAMILIES)
 TABLEAUS: dict[str, Tableau] = {f"stepper-{name}": t for name, t in {**_EXPLICIT, **_ROSENBROCK}.items()}
 EXPLICIT = tuple(name for name, tableau in TABLEAUS.items() if isinstance(tableau, ExplicitTableau))
 IMPLICIT = tuple(name for name, tableau in TABLEAUS.items() if isinstance(tableau, RosenbrockTableau))
+
+#: Order of convergence and order of the dense output, as printed.
+ORDERS: dict[str, tuple[int, int]] = {
+    "stepper-dp54": (5, 4),
+    "stepper-dop853": (8, 7),
+    "stepper-rodas4": (4, 3),
+    "stepper-rodas5p": (5, 4),
+}
+FAMILY_ORDERS = {FAMILIES[name]: orders for name, orders in ORDERS.items()}

@@ -18,6 +18,7 @@ from linkages import MACHINES
 from multibody import Multibody
 from random_machines import random_machine, random_scene
 from scipy.integrate import solve_ivp
+from stepper_methods import NAMES
 
 from ballpass.derive import generate
 from ballpass.derive.reading.read import with_values
@@ -26,7 +27,6 @@ from ballpass.runtime import Model, load, read_manifest
 COUNT = int(os.environ.get("BALLPASS_MACHINES", len(MACHINES)))
 #: Of those that are compiled, which takes longest.
 COMPILED = [13, 32, *range(60, COUNT, 12)]
-FAMILIES = ("stepper-dop853", "stepper-dp54", "stepper-rodas5p", "stepper-rodas4")
 
 
 def states(derived: Derived, machine: Multibody, seed: int) -> Iterator[tuple[float, np.ndarray, dict[str, float]]]:
@@ -60,7 +60,7 @@ def test_random_machines_run_alike_by_every_family_of_methods(seed: int, tmp_pat
     times = np.linspace(end / 8, end, 8)
     runs = [
         model.simulate(duration=end, times=times, method=method, rtol=1e-10, transient=0, outputs=[]).x
-        for method in FAMILIES
+        for method in NAMES
     ]
     # displacements of all rings alike, and the driver's angle; their rates likewise
     kinds = np.repeat([0, 1, 2, 3], [size - machine.free, machine.free] * 2)

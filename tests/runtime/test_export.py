@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from artefact import write_folder
+from stepper_methods import NAMES
 from typer.testing import CliRunner
 
 from ballpass.derive import generate
@@ -183,7 +184,7 @@ def test_options_do_what_the_arguments_of_simulate_do(exported: Callable[..., Pr
     program = exported("varying_compliance")
     model = program.model
     arguments = ["--cycles=2.3", "--rtol=1e-11", "--samples", "37"]
-    for method in ("rodas4", "rodas5p", "dp54", "dop853"):
+    for method in (name.removeprefix("stepper-") for name in NAMES):
         found = program.table(*arguments, "--method", method)
         solution = model.simulate(2.3, rtol=1e-11, samples_per_cycle=37, method=f"stepper-{method}")
         assert np.array_equal(found[:, 0], solution.t)
