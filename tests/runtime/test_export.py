@@ -317,7 +317,12 @@ HARMONIC = (
         # each moves the sizes of the motion by a tenth and more; one keeps none of the scene's own
         ("punching_press", (), {"bearing.clearance": 60e-6}),
         ("punching_press", (), {"mechanism.driver.speed": 5.0, "mechanism.forces.punch.force.y": -2e5}),
-        ("punching_press_tangent", (), {"bearing.clearance": 60e-6, "bearing.outer_ring.stiffness": 4e6}),
+        pytest.param(  # built for this alone
+            "punching_press_tangent",
+            (),
+            {"bearing.clearance": 60e-6, "bearing.outer_ring.stiffness": 4e6},
+            marks=pytest.mark.long,
+        ),
         ("four_bar", (), {"mechanism.driver.speed": 300.0}),
         ("offset_slider", (), {"bearing.clearance": 60e-6}),
         ("varying_compliance", (), {"bearing.clearance": 2e-4, "bearing.initial.inner_velocity.y": 0.3}),
