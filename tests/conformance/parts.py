@@ -125,7 +125,7 @@ EFFECT_TABLES = {
         for on, whose, angle, profile in (
             ("outer", "", 10, "half-sine"),
             ("inner", "", -60, "rectangular"),
-            ("ball", "ball = 2\n", 50, "half-sine"),
+            ("ball", "ball = 2\n", 50, "rectangular"),
         )
     ),
 }
@@ -136,8 +136,12 @@ _OFF = {
     "ball_deviation": {"bearing.ball_deviation.5": 0.0},
     "defects": {f"bearing.defects.{on}.depth": 0.0 for on in ("outer", "inner", "ball")},
 }
-#: With a law that knows the rate: the effects have exact ones.
-_DAMPED = ('law = "none"  ', 'law = "tangent"\nratio = "2e-5 s"  ')
+#: With a law that knows the rate, of which the effects have exact ones; with preload, so that all balls feel them.
+_PRESSED = (
+    ('law = "none"  ', 'law = "tangent"\nratio = "2e-5 s"  '),
+    ('clearance = "0 um"  ', 'clearance = "-20 um"  '),
+    ('["3.9937 um", "0.1 um"]', '["0 um", "0 um"]'),
+)
 
 
 def _effects() -> list[Part]:
@@ -145,8 +149,8 @@ def _effects() -> list[Part]:
         Part(
             registry="effect",
             name=name,
-            text=shipped("varying_compliance", _DAMPED, ("[bearing.inner_ring]", f"{table}[bearing.inner_ring]")),
-            without=shipped("varying_compliance", _DAMPED),
+            text=shipped("varying_compliance", *_PRESSED, ("[bearing.inner_ring]", f"{table}[bearing.inner_ring]")),
+            without=shipped("varying_compliance", *_PRESSED),
             path=f"bearing.{name}",
             off=_OFF[name],
             docs=("reference/scene.md", f"[bearing.{name}"),

@@ -1,11 +1,11 @@
-"""Forces and drives that cannot be: each fault is found in its line, and the message says what to do."""
+"""Forces, drives and laws that cannot be: each fault is found in its line, and the message says what to do."""
 
 from __future__ import annotations
 
 import re
 
 import pytest
-from parts import FORCES, TORQUES, driven, shaper
+from parts import FORCES, TORQUES, driven, press, shaper
 
 from ballpass.derive import derive
 from ballpass.derive.reading.read import scene_from_text
@@ -101,3 +101,18 @@ def test_torques_that_no_motor_has_are_refused(law: str, old: str, new: str, wor
     numbers = TORQUES.get(law, "")
     assert old in numbers
     refused(driven(law, numbers.replace(old, new) if old else new), words)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "remedy"),
+    [
+        ("", 'add hysteresis = "0.2 s/m"'),
+        ("restitution = 0.9", 'add impact_speed = "0.1 m/s"'),
+        ('impact_speed = "0.1 m/s"', "add restitution = 0.8"),
+        ('hysteresis = "1 s/m"\nrestitution = 0.9', "delete hysteresis, or the other two"),
+    ],
+)
+def test_the_factor_of_hunt_and_crossley_is_given_in_one_way(numbers: str, remedy: str) -> None:
+    with pytest.raises(SceneError, match=r"hysteresis .* or restitution") as caught:
+        scene_from_text(press("hunt-crossley", numbers), "press")
+    assert [fault.remedy for fault in caught.value.faults] == [remedy]

@@ -86,21 +86,6 @@ def test_steps_end_at_the_knots_and_a_turn_has_each_of_them(shaper: Model) -> No
     np.testing.assert_allclose(times, [t for t in expected if 0.0 < t < 1.0], rtol=1e-14)
 
 
-@pytest.mark.long
-def test_sensitivities_by_knots_are_those_of_differences(shaper: Model) -> None:
-    """A value of the table, and an angle, which moves the time of a breakpoint."""
-    for name, step in ((f"{TABLE}force.2", 1.0), (f"{TABLE}angle.3", 1e-5)):
-        found = shaper.sensitivities(name, cycles=0.45, rtol=1e-10, samples_per_cycle=50).x[:, :, 0]
-        value = shaper.parameters[name]
-        ahead, behind = (
-            shaper.simulate(cycles=0.45, rtol=1e-10, samples_per_cycle=50, parameters={name: value + s}).x
-            for s in (step, -step)
-        )
-        difference = (ahead - behind) / (2 * step)
-        largest = np.max(np.abs(difference), axis=0)
-        assert np.max(np.abs(found - difference) / largest) < 1e-3
-
-
 @pytest.mark.parametrize("kinks", ["located", pytest.param("stepped-over", marks=pytest.mark.long)])
 def test_members_of_an_ensemble_are_single_runs(shaper: Model, kinks: str) -> None:
     table = {

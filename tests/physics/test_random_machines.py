@@ -34,8 +34,12 @@ def states(derived: Derived, machine: Multibody, seed: int) -> Iterator[tuple[fl
     return (drawn(rng, derived, machine) for _ in range(2))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seed", range(COUNT))
+#: Those that `make test` draws: of other linkages than test_coupled_machines.py.
+DEFAULT = (2, 6, 11, 15)
+SEEDS = [seed if seed in DEFAULT else pytest.param(seed, marks=pytest.mark.long) for seed in range(COUNT)]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_random_machines_move_as_in_absolute_coordinates_and_lose_nothing(seed: int) -> None:
     """Accelerations and reactions; action and reaction; the kinetic energy changes by the sum of all named powers.
 

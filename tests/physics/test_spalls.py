@@ -175,47 +175,6 @@ def test_steps_end_on_every_edge_however_narrow_and_coarse(spalled: Model) -> No
     assert np.all(np.max(np.abs(run.x - fine.x), axis=0) < 0.05 * felt)
 
 
-@pytest.mark.long
-def test_derivatives_by_angle_chord_and_depth_are_those_of_differences(spalled: Model) -> None:
-    numbers = {"bearing.defects.dent.depth": 10e-6, "bearing.defects.flake.depth": 10e-6}
-    numbers["bearing.defects.shallow.depth"] = 15e-6
-    names = [name for name in spalled.parameters if "defects" in name]
-    slopes = []
-    for name in names:
-        value = numbers.get(name, spalled.parameters[name])
-        step = {"angle": 1e-5, "chord": 1e-4, "depth": 1e-2}[name.rpartition(".")[2]] * abs(value)
-        ends = [
-            spalled.simulate(
-                cycles=0.5, transient=0, parameters={**numbers, name: value + s}, rtol=1e-12, method="stepper-dop853"
-            ).x[-1]
-            for s in (step, -step)
-        ]
-        slopes.append((ends[0] - ends[1]) / (2 * step))
-    for method in ("stepper-dp54", "stepper-rodas5p"):
-        found = spalled.sensitivities(names, cycles=0.5, parameters=numbers, method=method, rtol=1e-10).x[-1]
-        for name, column, slope in zip(names, found.T, slopes, strict=True):
-            assert column == pytest.approx(slope, rel=1e-3, abs=2e-4 * np.max(np.abs(slope))), name
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("clearance", [-2 * PRELOAD, 10e-6])
-def test_stepper_lanes_and_virtual_machine_agree(spalled: Model, clearance: float) -> None:
-    numbers = {"bearing.clearance": clearance, "bearing.defects.dent.depth": 5e-6, "bearing.defects.flake.depth": 5e-6}
-    runs = [
-        spalled.simulate(cycles=0.5, transient=0, parameters=numbers, method=m, rtol=1e-11).x
-        for m in ("stepper-dop853", "stepper-rodas5p", "cvodes")
-    ]
-    scale = np.max(np.abs(runs[0]), axis=0)
-    for other in runs[1:]:
-        assert np.max(np.abs(other - runs[0]) / scale) < 2e-6
-    many = spalled.simulate_many(
-        {k: [v] * 2 for k, v in numbers.items()} | {"bearing.defects.deep.chord": [0.6e-3, 1e-3]},
-        ["max:inner.y"], cycles=0.5, transient=0, rtol=1e-11,
-    )  # fmt: skip
-    found = spalled.reduce(cycles=0.5, transient=0, parameters=numbers, rtol=1e-11)["inner.y"].maximum
-    assert many["max:inner.y"][1] == pytest.approx(found, rel=1e-6)
-
-
 def test_a_given_ratio_of_the_cage_takes_the_place_of_rolling(scene_text: Callable[..., str]) -> None:
     text = scene_text(
         "varying_compliance", ("[bearing.inner_ring]", "[bearing.cage]\nratio = 0.4\n[bearing.inner_ring]")
