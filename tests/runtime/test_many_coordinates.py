@@ -1,9 +1,8 @@
-"""Claims about models with numbers of coordinates that fill no vector: the methods do not care."""
+"""The steps of every method in C advance a number of coordinates that fills no vector in the order of the method."""
 
 from __future__ import annotations
 
 import ctypes
-import re
 import subprocess
 from collections.abc import Callable
 
@@ -14,7 +13,6 @@ from stepper_methods import EXPLICIT, IMPLICIT, NAMES, ORDERS
 
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime import Model, load
 from ballpass.runtime.native.compile import find_compiler
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS
 
@@ -127,57 +125,3 @@ def test_five_coordinates_are_advanced_in_the_order_of_the_method(five: ctypes.C
         errors.append(float(np.max(np.abs(x - exact))))
     assert errors[1] < 1e-3
     assert np.log2(errors[0] / errors[1]) > order - 0.5
-
-
-@pytest.fixture(scope="module")
-def models(scene_text: Callable[..., str], tmp_path_factory: pytest.TempPathFactory) -> tuple[Model, Model]:
-    """Three bearings on a shaft that do not know each other, six coordinates; and one by itself."""
-    text, place = scene_text("varying_compliance"), tmp_path_factory.mktemp("six")
-    begin, end = text.index("[bearing]\n"), text.index("[run]")
-    several = [re.sub(r"^\[bearing\b", f"[bearings.{name}", text[begin:end], flags=re.MULTILINE) for name in "abc"]
-    run = re.sub(r"outputs = .*", 'outputs = ["a.inner.*"]', text[end:])
-    three = "".join([text[:begin], *several, run])
-    return tuple(  # type: ignore[return-value]
-        load(generate(scene_from_text(scene, name), place / name)) for scene, name in ((three, "three"), (text, "one"))
-    )
-
-
-CLEARANCES = {"a": 0.0, "b": 1e-6, "c": 2e-6}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("method", NAMES)
-def test_bearings_that_do_not_know_each_other_move_as_each_alone(models: tuple[Model, Model], method: str) -> None:
-    three, one = models
-    given = {f"bearings.{name}.clearance": value for name, value in CLEARANCES.items()}
-    found = three.simulate(cycles=1, method=method, rtol=1e-10, kinks="located", parameters=given)
-    for name, value in CLEARANCES.items():
-        alone = one.simulate(
-            cycles=1, method=method, rtol=1e-10, kinks="located", parameters={"bearing.clearance": value}
-        )
-        for state in one.states:
-            assert np.max(np.abs(found[f"{name}.{state}"] - alone[state])) < 1e-6 * np.max(np.abs(alone[state]))
-
-
-def test_six_coordinates_move_as_casadi_integrates_them(models: tuple[Model, Model]) -> None:
-    three, _ = models
-    given = {f"bearings.{name}.clearance": value for name, value in CLEARANCES.items()}
-    by_driver, by_cvodes = (
-        three.simulate(cycles=1, method=method, rtol=1e-9, parameters=given).x for method in ("stepper", "cvodes")
-    )
-    assert np.all(np.max(np.abs(by_driver - by_cvodes), axis=0) < 1e-4 * np.max(np.abs(by_cvodes), axis=0))
-
-
-@pytest.mark.long
-def test_members_of_six_coordinates_in_lanes_are_single_runs(models: tuple[Model, Model]) -> None:
-    three, _ = models
-    column = np.linspace(0.0, 2e-6, 3)
-    many = three.simulate_many(
-        {"bearings.b.clearance": column}, "end:b.inner.x", cycles=1, transient=0, rtol=1e-8, kinks="stepped-over"
-    )
-    assert many.statistics.lanes > 1
-    for value, found in zip(column, many["end:b.inner.x"], strict=True):
-        alone = three.simulate(
-            cycles=1, rtol=1e-8, kinks="stepped-over", parameters={"bearings.b.clearance": float(value)}
-        )
-        assert found == pytest.approx(alone["b.inner.x"][-1], rel=1e-4)
