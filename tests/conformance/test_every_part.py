@@ -60,7 +60,7 @@ def close(found: np.ndarray, expected: np.ndarray, rtol: float) -> None:
 def test_sympy_casadi_and_compiled_kernels_agree(evaluators: Evaluators) -> None:
     """SymPy in 40 digits at two points; the kernels within a step and across a large angle."""
     for point in evaluators.points(2):
-        close(evaluators.value("rhs", point).ravel(), evaluators.by_sympy(point), 1e-12)
+        close(evaluators.value("rhs", point).ravel(), evaluators.by_sympy(point), 1e-13)
     n = len(evaluators.system.coordinates)
     for point in evaluators.points(30):
         for h in (1e-5, 3e-3):
@@ -86,8 +86,8 @@ def test_kernels_have_the_jacobian_of_the_right_hand_side(evaluators: Evaluators
             t = point.t + h
             close(dx[n:], evaluators.value("rhs", point, t).ravel()[n:], 1e-12)
             jacobian = evaluators.value("rhs_jac_x", point, t)
-            close(a, jacobian[n:, :n], 1e-11)
-            close(b, jacobian[n:, n:], 1e-11)
+            close(a, jacobian[n:, :n], 1e-12)
+            close(b, jacobian[n:, n:], 1e-12)
             by_time = by_name(evaluators, "t", replace(point, t=t))
             close(at, by_time.ravel()[n:], 1e-11)
 
@@ -114,7 +114,7 @@ def test_derivatives_agree_with_differences(evaluators: Evaluators) -> None:
         assert off(by["x"][:, k], "x", k, 1e-6 * max(abs(point.x[k]), 1e-7)) < 1e-5, evaluators.system.states[k].name
     assert off(by["t"][:, 0], "t", 0, 1e-8) < 1e-5
     for k, parameter in enumerate(evaluators.system.parameters):
-        assert off(total[:, k], "p", k, 1e-6 * max(abs(point.p[k]), 1e-7)) < 1e-4, parameter.name
+        assert off(total[:, k], "p", k, 1e-6 * max(abs(point.p[k]), 1e-7)) < 3e-5, parameter.name
 
 
 @pytest.mark.parametrize("part", [part for part in PARTS if part.without], ids=str)
@@ -125,23 +125,28 @@ def test_nothing_is_left_of_it_where_its_numbers_are_zero(
     with_it, without = evaluators_of(part.text), evaluators_of(part.without)
     moved = False
     for point in with_it.points(12):
-        # what a table gives is no number of the scene: it is zero where its rows are
-        inputs = {
-            i.name: (u, 0.0 if i.kind.startswith("table") else u)
-            for i, u in zip(with_it.system.inputs, point.u, strict=True)
-        }
-        numbers = dict(zip((q.name for q in with_it.system.parameters), point.p, strict=True))
-
-        def at(one: Evaluators, changes: Mapping[str, float], which: int) -> np.ndarray:
-            u = [inputs[i.name][which] for i in one.system.inputs]  # noqa: B023
-            p = [{**numbers, **changes}[q.name] for q in one.system.parameters]  # noqa: B023
-            there = replace(point, u=np.array(u), p=np.array(p))  # noqa: B023
-            return np.concatenate([one.value(name, there).ravel() for name in ("rhs", "outputs")])
-
-        plain = at(without, {}, 1)
-        close(at(with_it, part.off, 1), plain, 1e-12)
-        moved |= not np.allclose(at(with_it, {}, 0), plain, rtol=1e-6, atol=0.0)
+        plain = results(without, with_it, point)
+        close(results(with_it, with_it, point, part.off), plain, 1e-12)
+        moved |= not np.allclose(results(with_it, with_it, point), plain, rtol=1e-6, atol=0.0)
     assert moved
+
+
+def results(one: Evaluators, of: Evaluators, point: Point, changes: Mapping[str, float] = {}) -> np.ndarray:
+    """Rates and outputs at a point `of` another scene, at changed numbers.
+
+    What a table gives is an input and no number of the scene: with changes it is zero, as its rows are.
+    """
+    u = {
+        i.name: 0.0 if changes and i.kind.startswith("table") else value
+        for i, value in zip(of.system.inputs, point.u, strict=True)
+    }
+    p = dict(zip((q.name for q in of.system.parameters), point.p, strict=True)) | dict(changes)
+    there = replace(
+        point,
+        u=np.array([u[i.name] for i in one.system.inputs]),
+        p=np.array([p[q.name] for q in one.system.parameters]),
+    )
+    return np.concatenate([one.value(name, there).ravel() for name in ("rhs", "outputs")])
 
 
 @pytest.mark.parametrize("part", [part for part in PARTS if part.path], ids=str)
