@@ -294,10 +294,11 @@ FELL = [
             "bearing.outer_ring.stiffness": 16389897.679792741,
         },
     ),
-    (
+    pytest.param(
         "offset_slider",
         1.1531105622470469e-09,
         {"bearing.damping.ratio": 1.4060242993123647e-05, "bearing.outer_ring.stiffness": 407884022.8325939},
+        marks=pytest.mark.long,
     ),
     (
         "four_bar",
