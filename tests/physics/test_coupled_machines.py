@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -13,7 +12,6 @@ import numpy as np
 import pytest
 from comparison import drawn, largest_difference, largest_imbalance
 from coupled_scenes import (
-    UNDAMPED,
     Derived,
     bearing,
     with_bearings,
@@ -24,28 +22,9 @@ from scipy.optimize import root
 
 from ballpass.derive import derive, generate
 from ballpass.derive.scene.errors import SceneError
-from ballpass.derive.scene.records import Scene
 from ballpass.runtime import Model, load, read_manifest
 
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
-
-SPRINGS = """[mechanism.springs.return]
-bodies = ["frame", "lever"]
-points = ["hook", "tip"]
-stiffness = "2 N/mm"
-free_length = "150 mm"
-damping = "40 N*s/m"
-preload = "20 N"
-
-[mechanism.torsion_springs.twist]
-bodies = ["crank", "lever"]
-stiffness = "30 N*m/rad"
-free_angle = "80 deg"
-damping = "0.5 N*m*s/rad"
-preload = "3 N*m"
-
-[mechanism.forces.cut]
-"""
 
 
 @cache
@@ -65,15 +44,8 @@ DRAG_LINK = (
 )
 #: The pivot lies within the crank's circle: the lever goes round.
 WHITWORTH = (('"-200 mm"', '"-70 mm"'),)
-SPRUNG = (
-    ("[mechanism.frame.points]\n", '[mechanism.frame.points]\nhook = ["250 mm", "180 mm"]\n'),
-    ("[mechanism.forces.cut]\n", SPRINGS),
-)
 OFF_CENTRE = (('{ distance = "0 mm", angle = "0 deg" }', '{ distance = "4 mm", angle = "50 deg" }'),)
 
-
-#: BALLPASS_LONG=1 takes minutes more.
-LONG = bool(os.environ.get("BALLPASS_LONG"))
 
 FRAME_POINTS = "[mechanism.frame.points]"
 MOTOR = """[mechanism.driver.torque]
@@ -86,12 +58,6 @@ synchronous_speed = "520 rpm"
 inertia = "0.2 kg*m^2"
 
 """
-RUN_DOWN = """[mechanism.driver.torque]
-law = "none"
-
-"""
-
-
 #: Up, and down through zero, with what a flywheel takes.
 SPEED = 'speed = "500 rpm"                       # [paper]; positive is counter-clockwise\n'
 RUN_UP = """flywheel.inertia = "0.2 kg*m^2"
@@ -204,95 +170,6 @@ def test_balls_roll_on_without_a_jump_over_several_turns(name: str) -> None:
             rates[k, j] = sum(w * (machine.row(b) @ v) for w, b in zip(machine.weights(one), bodies, strict=True))
     integrated = found[0] + cumulative_simpson(rates, x=times, axis=0, initial=0)
     assert np.max(np.abs(found - integrated)) < 1e-3
-
-
-def energy_drift(scene: Scene, turns: float) -> float:
-    """Of kinetic and potential energy less the drive's work, relative to the kinetic energy that comes and goes."""
-    derived = Derived(scene)
-    machine = Multibody(derived.scene, derived.points())
-    gates, torque, size = derived.gates(), derived.names.index("drive_torque"), len(derived.coordinates)
-
-    def rates(t: float, y: np.ndarray) -> np.ndarray:
-        accelerations, outputs, *_ = derived.at(t, y[:-1], gates)
-        return np.append(accelerations, outputs[torque] * machine.drive(t, y[:-1])[1])
-
-    end = turns * 2 * math.pi / abs(machine.speed)
-    scale = np.concatenate([np.full(size, 1e-6), np.full(size, 1e-2), [1.0]])
-    start = np.append(derived.initial, 0.0)
-    times = np.linspace(0, end, 31)
-    run = solve_ivp(rates, (0, end), start, method="DOP853", rtol=1e-11, atol=1e-11 * scale, t_eval=times)
-    kinetic, potential = np.array([machine.energy(t, y[:-1]) for t, y in zip(run.t, run.y.T, strict=True)]).T
-    balance = kinetic + potential - run.y[-1]
-    return float(np.max(np.abs(balance - balance[0])) / np.ptp(kinetic))
-
-
-def undamped(joint: str, inner: str = "", *, elastic: bool = False, clearance: str = "10 um") -> str:
-    return bearing(joint, inner, law=UNDAMPED, elastic=elastic, clearance=clearance, housing_damping="0 N*s/m")
-
-
-IDLE_PRESS = (('force = ["0 N", "8964.8 N"]', 'force = ["0 N", "0 N"]'),)
-IDLE_FOUR_BAR = (('torque = "-60 N*m"', 'torque = "0 N*m"'),)
-IDLE_SHAPER = (*SPRUNG, ('force = ["1500 N", "0 N"]', 'force = ["0 N", "0 N"]'))
-UNDAMPED_SPRINGS = (('damping = "40 N*s/m"\n', ""), ('damping = "0.5 N*m*s/rad"\n', ""))
-
-
-@pytest.mark.parametrize("clearance", ["0 um", "10 um"])
-def test_energy_changes_by_the_work_of_the_drive_alone(clearance: str) -> None:
-    """Without clearance, and with balls that fly and impact."""
-    press = text("punching_press", *IDLE_PRESS)
-    assert energy_drift(with_bearings(press, undamped("A", clearance=clearance)), 0.04) < 1e-9
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("press, A B C elastic", "motor", pytest.param("run-down", marks=pytest.mark.extreme)),
-        *(("press, A", "four-bar", "sprung shaper") if LONG else ()),
-    ],
-)
-def test_energy_changes_by_the_work_of_the_drive_alone_in_long_runs(name: str) -> None:
-    press = text("punching_press", *IDLE_PRESS)
-    scene, turns = {
-        "press, A": (with_bearings(press, undamped("A")), 1.0),
-        "press, A B C elastic": (
-            with_bearings(
-                press,
-                undamped("A", elastic=True),
-                undamped("B", "rod", elastic=True),
-                undamped("C", "slider", elastic=True),
-            ),
-            0.3,
-        ),
-        "four-bar": (
-            with_bearings(
-                text("four_bar", *IDLE_FOUR_BAR),
-                undamped("A", "frame", clearance="0 um"),
-                undamped("B", "coupler", elastic=True),
-                undamped("D"),
-            ),
-            0.2,
-        ),
-        "sprung shaper": (
-            with_bearings(
-                text("crank_shaper", *IDLE_SHAPER, *UNDAMPED_SPRINGS),
-                undamped("B", "block", elastic=True),
-                undamped("O", "frame"),
-            ),
-            0.1,
-        ),
-        "run-down": (
-            with_bearings(
-                text("punching_press", *IDLE_PRESS, *driven_by(RUN_DOWN)), undamped("A"), undamped("B", "rod")
-            ),
-            0.5,
-        ),
-        "motor": (
-            with_bearings(text("punching_press", *IDLE_PRESS, *driven_by(MOTOR)), undamped("A", "frame", elastic=True)),
-            0.5,
-        ),
-    }[name]
-    assert energy_drift(scene, turns) < 1e-9
 
 
 SMOOTH = ('law = "one-sided"', 'law = "tangent"'), ('ratio = "0.25e-5 s*mm^0.5"', 'ratio = "2.5e-5 s"')
