@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 from hypothesis import HealthCheck, settings
+from virtual import virtual_model
 
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
@@ -118,6 +119,17 @@ def make_model(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..
     def make(name: str, *changes: tuple[str, str]) -> Model:
         folder = tmp_path_factory.mktemp(name) / name
         return load(generate(scene_from_text(scene_text(name, *changes), name), folder))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def make_virtual(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., str]) -> Callable[..., Model]:
+    """Model of a shipped scene with replacements, generated once and run by CasADi's virtual machine."""
+
+    @cache
+    def make(name: str, *changes: tuple[str, str]) -> Model:
+        return virtual_model(scene_text(name, *changes), tmp_path_factory.mktemp(name) / name)
 
     return make
 

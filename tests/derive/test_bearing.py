@@ -1,17 +1,12 @@
-"""The derived bearing equations against the printed ones, and the laws against `physics`: formulas written here by
-hand."""
+"""The derived bearing equations against the printed ones."""
 
 from __future__ import annotations
 
-import math
-
-import casadi as ca
-import numpy as np
 import pytest
 import sympy as sp
 from scene_texts import PRESS, ROTOR
 
-from ballpass.derive.lowering.functions import Functions, lower
+from ballpass.derive.lowering.functions import lower
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.system import System, derive
 
@@ -101,67 +96,6 @@ def test_a_fixed_outer_ring_has_no_coordinates() -> None:
     assert [s.name for s in derived.states] == ["inner.x", "inner.y", "inner.vx", "inner.vy"]
     assert derived.mass.shape == (2, 2)
     assert not any("outer_ring" in p.name for p in derived.parameters)
-
-
-DAMPING = 'law = "one-sided"'
-LAWS = {
-    "one-sided": lambda d, v, k, c: c * max(v, 0.0),
-    "one-sided-gated": lambda d, v, k, c: c * max(v, 0.0) if d > 0 else 0.0,
-    "two-sided-gated": lambda d, v, k, c: c * v if d > 0 else 0.0,
-    "tangent": lambda d, v, k, beta: beta * 1.5 * k * math.sqrt(max(d, 0.0)) * v,
-}
-
-
-def lowered(law: str) -> tuple[System, Functions, np.ndarray, ca.DM]:
-    text = PRESS.replace(DAMPING, f'law = "{law}"')
-    if law == "tangent":
-        text = text.replace('ratio = "0.25e-5 s*mm^0.5"', 'ratio = "0.25e-5 s"')
-    derived = derive(scene_from_text(text, "punching_press"))
-    functions = lower(derived)
-    p = np.array([q.default for q in derived.parameters])
-    return derived, functions, p, functions["constants"](p)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_contact_function_equals_the_law(law: str) -> None:
-    derived, functions, p, c = lowered(law)
-    constants = dict(zip((k.name for k in functions.constants), np.asarray(c).ravel(), strict=True))
-    k_b, coefficient = constants["bearing.k_b"], constants["bearing.c_b"]
-    for delta in (-3e-6, -1e-12, 1e-12, 5e-6):
-        for rate in (-0.02, 0.0, 0.013):
-            elastic, damping = (float(v) for v in functions["contact"](delta, rate, p, c))
-            assert elastic == pytest.approx(k_b * max(delta, 0.0) ** 1.5, rel=1e-14)
-            assert damping == pytest.approx(LAWS[law](delta, rate, k_b, coefficient), rel=1e-14)
-    smoothness = {name: s.value for name, s in derived.smoothness}
-    jump = abs(LAWS[law](1e-30, 1.0, k_b, coefficient) - LAWS[law](-1e-30, 1.0, k_b, coefficient))
-    assert (smoothness["damping"] == "discontinuous") == (jump > 0.1 * coefficient)
-
-
-def test_paper_ratio_in_millimetres_and_in_si() -> None:
-    for ratio, value in (("0.25e-5 s*mm^0.5", 683.4), ("0.25e-5 s*m^0.5", 2.1612e4)):
-        derived = press(('ratio = "0.25e-5 s*mm^0.5"', f'ratio = "{ratio}"'))
-        functions = lower(derived)
-        p = [q.default for q in derived.parameters]
-        c = dict(zip((k.name for k in functions.constants), functions["constants"](p).full().ravel(), strict=True))
-        assert c["bearing.c_b"] == pytest.approx(value, rel=1e-4)
-
-
-def test_ungated_one_sided_balls_are_an_isotropic_dashpot_of_twice_c_b() -> None:
-    """Opposite balls complete each other: with 8 balls that touch nothing, F_c = 2 c_b v, whatever the cage's angle."""
-    derived, functions, p, _ = lowered("one-sided")
-    names = [q.name for q in derived.parameters]
-    p[names.index("bearing.clearance")] = 1e-2
-    p[names.index("mechanism.driver.speed")] = 0.0
-    c = functions["constants"](p)
-    c_b = float(c[[k.name for k in functions.constants].index("bearing.c_b")])
-    mass = float(c[[k.name for k in functions.constants].index("bearing.m_ei")])
-    free = np.zeros(8)
-    moving = np.array([0, 0, 0, 0, 0.3, -0.2, 0.1, 0.4])
-    for phase in (0.0, 0.123, 2.0):
-        u = np.zeros(len(derived.inputs))
-        u[[i.name for i in derived.inputs].index("phase.cage")] = phase
-        change = (functions["rhs"](0, moving, u, p, c) - functions["rhs"](0, free, u, p, c)).full().ravel()
-        assert change[4:6] * mass == pytest.approx(-2 * c_b * np.array([0.2, -0.6]), rel=1e-12)
 
 
 def test_opposite_sums_have_the_number_of_balls_of_the_scene() -> None:

@@ -10,14 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from ballpass.derive import SceneError, check, derive, generate, read_scene
-from ballpass.derive.emit.equations import equations
+from ballpass.derive import SceneError, check, generate
 from ballpass.derive.emit.signature import signature
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime.contract import read_manifest
 
 ROOT = Path(__file__).resolve().parents[2]
-SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "crank_shaper", "varying_compliance")
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -128,17 +126,3 @@ def test_manifest_prices_every_function(tmp_path: Path) -> None:
     assert {"constants", "rhs", "rhs_jac_x", "outputs", "contact", "reaction_system"} <= prices.keys()
     assert prices.pop("mass_matrix") == 0  # of the rings alone: constants
     assert all(price > 0 for price in prices.values())
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_equations_show_the_definitions_the_matrix_and_the_motion(name: str) -> None:
-    system = derive(read_scene(ROOT / "scenes" / f"{name}.toml"))
-    text = equations(system)
-    assert text.count("$$") % 2 == 0
-    assert ("Eq. (1)" in text) == (system.reactions is not None)
-    for state in system.states[: len(system.coordinates)]:
-        assert rf"\ddot {state.latex}" in text
-    # every symbol has a LaTeX name: no dotted path is left inside the formulas
-    formulas = "".join(text.split("$$")[1::2])
-    assert not [p.name for p in system.parameters if p.name in formulas]
-    assert "body." not in formulas

@@ -7,7 +7,7 @@ import math
 import casadi as ca
 import pytest
 import sympy as sp
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ballpass.derive.bearing import hertz
@@ -79,6 +79,7 @@ def test_ellipticity_equals_iso_tr_10657_table_a1(gamma: float, kappa: float, se
     assert float(sp.elliptic_e(1 - computed**-2)) == pytest.approx(second, rel=1e-4)
 
 
+@settings(max_examples=30)
 @given(st.floats(min_value=1e-4, max_value=0.9))
 def test_unrolled_iteration_agrees_with_mpmath(ratio: float) -> None:
     exact = hertz.ellipticity(sp.Float(ratio, 30)).evalf(20)

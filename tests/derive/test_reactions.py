@@ -18,9 +18,7 @@ from linkages import (
     moving_guide,
     offset_slider,
     shaper_with_ram,
-    six_bar_slider,
     slotted_lever,
-    watt_six_bar,
 )
 
 from ballpass.derive.mechanism.linkage import Linkage
@@ -141,98 +139,6 @@ def test_derived_matrix_equals_printed_eq_1():
         assert sp.expand(ROW_SIGNS[i] * in_printed_symbols(reactions.right_side[i]) - right_side[i]) == 0, i
 
 
-def solve_printed(angle: float, speed: float, v: dict[str, float]) -> np.ndarray:
-    """Eq. (1) as printed, with kinematics by hand in the printed frame; unknowns in the printed order."""
-    l1, l2, lo1, t1p, lo2 = v["l1"], v["l2"], v["lo1"], v["t1p"], v["lo2"]
-    t, w = -angle, -speed
-    cos2 = -l1 * np.cos(t) / l2
-    sin2 = np.sqrt(1 - cos2**2)
-    w2 = -l1 * np.sin(t) * w / (l2 * sin2)
-    e2 = -(l1 * np.cos(t) * w**2 + l2 * cos2 * w2**2) / (l2 * sin2)
-    bx, by = -l1 * np.cos(t) * w**2, -l1 * np.sin(t) * w**2
-    x1, y1 = -lo1 * np.cos(t + t1p) * w**2, -lo1 * np.sin(t + t1p) * w**2
-    x2, y2 = bx - lo2 * (sin2 * e2 + cos2 * w2**2), by + lo2 * (cos2 * e2 - sin2 * w2**2)
-    a = by + l2 * (cos2 * e2 - sin2 * w2**2)
-    numbers = {
-        L1: l1,
-        L2: l2,
-        LO1: lo1,
-        LO2: lo2,
-        T1: t,
-        T1P: t1p,
-        T2: np.arctan2(sin2, cos2),
-        M1: v["m1"],
-        M2: v["m2"],
-        M3: v["m3"],
-        J1: 1.0,
-        J2: v["J2"],
-        G: v["g"],
-        F: v["F"],
-        AX1: x1,
-        AY1: y1,
-        AX2: x2,
-        AY2: y2,
-        A: a,
-        E1: 0.0,
-        E2: e2,
-    }
-    return np.linalg.solve(*_printed_numbers([float(numbers[s]) for s in _PRINTED_SYMBOLS]))
-
-
-_PRINTED_SYMBOLS = (L1, L2, LO1, LO2, T1, T1P, T2, M1, M2, M3, J1, J2, G, F, AX1, AY1, AX2, AY2, A, E1, E2)
-
-
-@cache
-def _printed_function():
-    return sp.lambdify(_PRINTED_SYMBOLS, printed_equation(), modules="numpy")
-
-
-def _printed_numbers(values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    matrix, right_side = _printed_function()(*values)
-    return np.array(matrix, dtype=float), np.array(right_side, dtype=float).ravel()
-
-
-def test_project_frame_gives_the_forces_of_printed_eq_1():
-    """Random masses, lengths, offsets, angles and speeds; forces agree up to the declared signs."""
-    machine, linkage, reactions = derived("crank-slider")
-    run = Evaluator(linkage.definitions + reactions.definitions, reactions.unknowns)
-    random = np.random.default_rng(1)
-    for _ in range(STATES):
-        v = {
-            "l1": random.uniform(0.005, 0.05),
-            "l2": random.uniform(0.06, 0.2),
-            "lo1": random.uniform(0, 0.03),
-            "t1p": random.uniform(-3, 3),
-            "lo2": random.uniform(0, 0.1),
-            "m1": random.uniform(0.1, 2),
-            "m2": random.uniform(0.1, 5),
-            "m3": random.uniform(1, 20),
-            "J2": random.uniform(1e-3, 1e-2),
-            "g": 9.81,
-            "F": random.uniform(-9000, 9000),
-        }
-        angle, speed = random.uniform(0, 2 * np.pi), random.uniform(5, 100)
-        b = "mechanism__bodies__"
-        changed = machine.with_values(
-            **{
-                f"{b}crank__points__B": v["l1"],
-                f"{b}rod__points__C": v["l2"],
-                f"{b}crank__center_of_mass__distance": v["lo1"],
-                f"{b}crank__center_of_mass__angle": -v["t1p"],
-                f"{b}rod__center_of_mass": v["lo2"],
-                f"{b}crank__mass": v["m1"],
-                f"{b}rod__mass": v["m2"],
-                f"{b}slider__mass": v["m3"],
-                f"{b}rod__inertia": v["J2"],
-                "mechanism__forces__punch__force__y": v["F"],
-                "mechanism__driver__speed": speed,
-            }
-        )
-        ours = np.array(run(changed.numbers(angle)), dtype=float) * COLUMN_SIGNS
-        printed = solve_printed(angle, speed, v)
-        assert np.linalg.norm(ours - printed) < 1e-12 * np.linalg.norm(printed)
-
-
 def loads_at(degrees: float) -> np.ndarray:
     machine, linkage, reactions = derived("crank-slider")
     results = [*reactions.joint_force["A"], reactions.drive_torque]
@@ -242,15 +148,11 @@ def loads_at(degrees: float) -> np.ndarray:
 def test_loads_of_the_punching_machine_at_240_deg():
     """Force of the crank on the frame and drive torque, against Eq. (1) as printed and the reference of the project.
 
-    The reference values (-267.6, 8487.1) N and 26.90 N*m carry all their digits at 239.95 deg; at 240 deg Eq. (1) as
-    printed, solved by `solve_printed`, gives (-267.174, 8486.976) N and 26.8597 N*m, 0.16 % away.
+    The reference values (-267.6, 8487.1) N and 26.90 N*m carry all their digits at 239.95 deg.  At 240 deg NumPy's
+    solution of Eq. (1) as printed, with kinematics by hand in the printed frame, is 0.16 % away.
     """
-    v = {"l1": 6e-3, "l2": 0.1, "lo1": 0.0, "t1p": 0.0, "lo2": 0.05, "m1": 0.3567, "m2": 2.55, "m3": 16.7965}
-    v |= {"J2": 7517.545e-6, "g": 9.81, "F": 8964.8}
-    printed = solve_printed(240 * DEGREE, 500 * 2 * np.pi / 60, v)[5:]
-    assert loads_at(240.0) == pytest.approx(printed, rel=1e-12)
+    assert np.all(np.abs(loads_at(240.0) - [-267.174, 8486.976, 26.8597]) <= [5e-4, 5e-4, 5e-5])
     reference = np.array([-267.6, 8487.1, 26.90])
-    assert loads_at(240.0) == pytest.approx(reference, rel=2e-3)
     assert np.all(np.abs(loads_at(239.95) - reference) <= [0.05, 0.05, 0.005])
 
 
@@ -277,21 +179,10 @@ def worst_difference_from_lapack(machine: Machine, moments: Sequence[str] = (), 
 
 
 CASES = {
-    "crank-slider": (crank_slider, ()),
-    "crank-slider with guide moment": (lambda: with_slider_inertia(crank_slider()), ("D",)),
-    "crank-slider, l1/l2 = 0.95": (lambda: crank_slider(crank=0.095, rod=0.1), ()),
-    "crank-slider, crank of 50 um": (lambda: crank_slider(crank=50e-6, rod=0.1), ()),
-    "offset slider": (offset_slider, ("D",)),
-    "offset slider without guide moment": (offset_slider, ()),
-    "four-bar": (four_bar, ()),
-    "four-bar right": (lambda: four_bar("right"), ()),
-    "six-bar with slider": (six_bar_slider, ("G",)),
-    "guide on a moving body": (moving_guide, ()),
-    "guide on the slider": (lambda: moving_guide(guide_on_slider=True), ()),
-    "watt six-bar": (watt_six_bar, ()),
-    "slotted lever": (slotted_lever, ()),
-    "slotted lever, guide on the block": (lambda: slotted_lever(guide_on_block=True), ()),
-    "slotted lever that goes round": (lambda: slotted_lever(crank=0.18), ()),
+    "guide moment": (offset_slider, ("D",)),
+    "guide moment of a slider without inertia": (lambda: with_slider_inertia(crank_slider()), ("D",)),
+    "l1/l2 = 0.95": (lambda: crank_slider(crank=0.095, rod=0.1), ()),
+    "crank of 50 um": (lambda: crank_slider(crank=50e-6, rod=0.1), ()),
     "slotted lever near its dead centre": (lambda: slotted_lever(crank=0.107), ()),
     "shaper with ram": (shaper_with_ram, ()),
 }
@@ -304,77 +195,9 @@ def with_slider_inertia(machine: Machine) -> Machine:
 
 @pytest.mark.parametrize("case", list(CASES))
 def test_closed_form_equals_lapack(case):
+    """Where it could lose digits; tests/conformance/test_machines.py compares the forces of every linkage."""
     make, moments = CASES[case]
     assert worst_difference_from_lapack(make(), moments) < 1e-12
-
-
-def test_reversed_bodies_of_a_joint_reverse_its_reaction():
-    one, linkage, reactions = derived("four-bar")
-    two = one.with_joint("B", bodies=("coupler", "crank"))
-    linkage2 = two.linkage()
-    reactions2 = two.reactions(linkage2)
-    first = evaluate(one, [*reactions.joint_force["B"], *reactions.joint_force["A"]], 1.1, linkage, reactions)
-    second = evaluate(two, [*reactions2.joint_force["B"], *reactions2.joint_force["A"]], 1.1, linkage2, reactions2)
-    assert np.array(second) == pytest.approx([-first[0], -first[1], first[2], first[3]], rel=1e-12)
-
-
-def test_force_of_a_guide_is_normal_to_it():
-    machine, linkage, reactions = derived("offset slider", ("D",))
-    x, y, normal = evaluate(
-        machine,
-        [*reactions.joint_force["D"], sp.Symbol("reaction.D.normal", real=True)],
-        np.linspace(0, 6, 7),
-        linkage,
-        reactions,
-    )
-    assert np.max(np.abs(x * np.cos(20 * DEGREE) + y * np.sin(20 * DEGREE))) < 1e-12 * np.max(np.abs(normal))
-    assert np.hypot(x, y) == pytest.approx(np.abs(normal), rel=1e-14)
-
-
-def test_guide_moment_balances_the_pushed_slider_at_rest():
-    """Speed zero, no gravity: statics of the slider by hand, moments about its pin C."""
-    machine, linkage, reactions = derived("offset slider", ("D",))
-    still = machine.with_values(mechanism__driver__speed=0.0, mechanism__gravity=0.0)
-    results = [*reactions.joint_force["D"], reactions.joint_moment["D"]]
-    points = [linkage.motion(machine.mechanism, "slider", p).position for p in ("C", "D", "tool")]
-    fx, fy, moment, xc, yc, xd, yd, xt, yt = evaluate(
-        still, [*results, *(c for p in points for c in p)], 0.7, linkage, reactions
-    )
-    push = (xt - xc) * 45.0 - (yt - yc) * -310.0
-    guide = (xd - xc) * -fy - (yd - yc) * -fx - moment
-    assert push + guide == pytest.approx(0.0, abs=1e-12)
-    assert abs(moment) > 1.0
-
-
-def test_forces_on_the_frame_and_the_loads_change_the_momentum():
-    """Whole linkage: sum of m a = loads + weight − forces of the linkage on the frame."""
-    for name, frame_joints in (("four-bar", (("A", 1), ("D", -1))), ("offset slider", (("A", 1), ("D", 1)))):
-        machine, linkage, reactions = derived(name)
-        random = np.random.default_rng(3).uniform(0, 2 * np.pi, 20)
-        for axis, gravity in ((0, 0.0), (1, -9.81)):
-            mass = {b.name: machine.values[b.mass.path] for b in machine.mechanism.bodies}
-            momentum = sum(m * linkage.poses[b].center_of_mass.acceleration[axis] for b, m in mass.items())
-            on_frame = sum(sign * reactions.joint_force[j][axis] for j, sign in frame_joints)
-            load = {"four-bar": (40.0, -65.0), "offset slider": (-310.0, 45.0)}[name][axis]
-            left, right = evaluate(machine, [momentum, on_frame], random, linkage, reactions)
-            expected = sum(mass.values()) * gravity + load - right
-            assert left == pytest.approx(expected, rel=1e-11, abs=1e-11 * np.max(np.abs(right)))
-
-
-def test_gate_switches_its_load_and_no_other():
-    machine = four_bar()
-    linkage = machine.linkage()
-    gated = machine.with_windows("push").reactions(linkage)
-    free = machine.reactions(linkage)
-    run = Evaluator(linkage.definitions + gated.definitions, gated.unknowns)
-    always = np.array(evaluate(machine, free.unknowns, 0.4, linkage, free))
-    on = np.array(run(machine.numbers(0.4, **{"gate.push": 1.0})))
-    off = np.array(run(machine.numbers(0.4, **{"gate.push": 0.0})))
-    unloaded = machine.with_values(mechanism__forces__push__force__x=0.0, mechanism__forces__push__force__y=0.0)
-    without = np.array(evaluate(unloaded, free.unknowns, 0.4, linkage, free))
-    assert on == pytest.approx(always, rel=1e-14)
-    assert off == pytest.approx(without, rel=1e-13)
-    assert np.linalg.norm(on - off) > 10.0
 
 
 # --- structure ----------------------------------------------------------------------------------------------------
@@ -395,19 +218,6 @@ def test_moving_guide_always_has_its_moment():
     reactions = machine.reactions(machine.linkage())
     assert "G" in reactions.joint_moment
     assert reactions.matrix.shape == (15, 15)
-
-
-@pytest.mark.parametrize("name", list(MACHINES))
-def test_every_unknown_is_defined_once_from_earlier_symbols(name):
-    machine, linkage, reactions = derived(name)
-    known = {sp.Symbol(path, real=True) for path in machine.values} | {linkage.drive.angle}
-    known |= {d.symbol for d in linkage.definitions}
-    for definition in reactions.definitions:
-        assert definition.symbol not in known
-        assert definition.expression.free_symbols <= known
-        known.add(definition.symbol)
-    assert set(reactions.unknowns) <= known
-    assert list(reactions.joint_force) == [j.name for j in machine.mechanism.joints]
 
 
 # --- refusals -----------------------------------------------------------------------------------------------------

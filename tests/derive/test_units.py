@@ -193,8 +193,7 @@ def test_a_number_in_si_keeps_its_value(number: object, unit: str) -> None:
 @pytest.mark.parametrize("name", ["mm", "inch", "kN", "lbf", "GPa", "psi", "minute", "rpm", "deg", "oz", "mile"])
 def test_sizes_agree_with_pints_own_conversion(name: str) -> None:
     """A second route: pint's parser and converter in floating point."""
-    registry: pint.UnitRegistry[float] = pint.UnitRegistry()
-    quantity = registry.Quantity(2.5, name).to_base_units()
+    quantity = pint.get_application_registry().Quantity(2.5, name).to_base_units()
     unit = {"kilogram": "kg", "meter": "m", "second": "s", "radian": "rad"}
     target = "*".join(f"{unit[base]}^{power}" for base, power in quantity.unit_items())
     assert parse_quantity(f"2.5 {name}", target) == pytest.approx(quantity.magnitude, rel=1e-14)

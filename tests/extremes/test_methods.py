@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hand_written_press import Machine
 from replacements import BEFORE_PUNCH, CLEARANCE, CRANK, OUTER, PUNCH, RATIO, ROTOR_LOAD, SPEED, START
+from stepper_methods import EXPLICIT, NAMES, ORDERS
 from test_numbers import difference
 
 from ballpass.runtime import IntegrationError, Model
@@ -21,10 +22,7 @@ pytestmark = pytest.mark.extreme
 Holds = Callable[..., None]
 Press = Callable[..., Model]
 
-STEPPERS = (
-    "stepper",
-    *(pytest.param(f"stepper-{name}", marks=pytest.mark.long) for name in ("rodas5p", "rodas4", "dp54", "dop853")),
-)
+STEPPERS = ("stepper", *(pytest.param(name, marks=pytest.mark.long) for name in NAMES))
 #: CasADi's integrators; erk and rosenbrock run in its virtual machine.
 CASADI = tuple(pytest.param(name, marks=pytest.mark.long) for name in ("rosenbrock", "erk", "cvodes"))
 
@@ -82,9 +80,12 @@ def test_a_hundred_times_stiffer_still(press: Press, holds: Holds, method: str) 
     ("method", "error", "words"),
     [
         ("erk", RequestError, r"damping decays at up to [\d.e+]+ 1/s.*Take method stepper or rosenbrock"),
-        ("stepper-dp54", IntegrationError, r"more steps than allowed.*an explicit method crawls on a stiff model"),
-        pytest.param(
-            "stepper-dop853", IntegrationError, r"more steps than allowed.*crawls", marks=pytest.mark.long
+        *(
+            pytest.param(
+                name, IntegrationError, r"more steps than allowed.*an explicit method crawls on a stiff model",
+                marks=[pytest.mark.long] if ORDERS[name][0] > 5 else [],
+            )
+            for name in EXPLICIT
         ),
     ],
 )  # fmt: skip

@@ -8,10 +8,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ballpass.derive import derive
-from ballpass.derive.features import features
-from ballpass.derive.reading.read import scene_from_text
-from ballpass.derive.scene.errors import SceneError
 from ballpass.runtime import Model
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.point.jacobian import quantity_values
@@ -90,21 +86,6 @@ def test_steps_end_at_the_knots_and_a_turn_has_each_of_them(shaper: Model) -> No
     np.testing.assert_allclose(times, [t for t in expected if 0.0 < t < 1.0], rtol=1e-14)
 
 
-@pytest.mark.long
-def test_sensitivities_by_knots_are_those_of_differences(shaper: Model) -> None:
-    """A value of the table, and an angle, which moves the time of a breakpoint."""
-    for name, step in ((f"{TABLE}force.2", 1.0), (f"{TABLE}angle.3", 1e-5)):
-        found = shaper.sensitivities(name, cycles=0.45, rtol=1e-10, samples_per_cycle=50).x[:, :, 0]
-        value = shaper.parameters[name]
-        ahead, behind = (
-            shaper.simulate(cycles=0.45, rtol=1e-10, samples_per_cycle=50, parameters={name: value + s}).x
-            for s in (step, -step)
-        )
-        difference = (ahead - behind) / (2 * step)
-        largest = np.max(np.abs(difference), axis=0)
-        assert np.max(np.abs(found - difference) / largest) < 1e-3
-
-
 @pytest.mark.parametrize("kinks", ["located", pytest.param("stepped-over", marks=pytest.mark.long)])
 def test_members_of_an_ensemble_are_single_runs(shaper: Model, kinks: str) -> None:
     table = {
@@ -130,58 +111,3 @@ def test_knots_that_do_not_increase_within_a_turn_are_refused_at_run_time(shaper
     ):
         with pytest.raises(RequestError, match=words):
             shaper.simulate(cycles=0.1, parameters=values)
-
-
-@pytest.mark.parametrize(
-    ("change", "key", "words"),
-    [
-        (("[-20, 30,", "[-20, 140,"), "angle.3", "does not increase"),
-        (("190, 250]", "190, 345]"), "angle.5", "cover a whole turn"),
-        (("900, -60]", "900]"), "", "differ in length"),
-        ((', force = { values = [0, 1200, 1700, 900, -60], unit = "N" }', ""), "force", "missing"),
-        (('direction = "10 deg"\n', ""), "direction", "missing"),
-        (("table =", 'force = ["1 N", "2 N"]\ntable ='), "force", "unknown key"),
-    ],
-)
-def test_faults_of_a_table_are_named(
-    scene_text: Callable[..., str], change: tuple[str, str], key: str, words: str
-) -> None:
-    text = scene_text("crank_shaper", *CHANGES)
-    assert change[0] in text
-    with pytest.raises(SceneError) as caught:
-        scene_from_text(text.replace(*change), "shaper")
-    assert any(words in f.problem and f.key.endswith(key) for f in caught.value.faults), str(caught.value)
-
-
-def test_a_torque_table_acts_on_its_body(make_model: Callable[..., Model]) -> None:
-    work = (
-        "[mechanism.forces.cut]",
-        '[mechanism.torques.work]\nbody = "lever"\n'
-        'table = { angle = ["0 deg", "180 deg"], torque = ["0 N*m", "90 N*m"] }\n\n[mechanism.forces.cut]',
-    )
-    model = make_model("crank_shaper", work)
-    t = 1.1 / model.parameters[SPEED]
-    slope = float(model.jacobian("drive_torque", "mechanism.torques.work.table.torque.2", t=t))
-    slot, rate = 0.08 * np.exp(1.1j) + 0.2j, 0.08j * np.exp(1.1j)
-    turned = np.imag(np.conj(slot) * rate) / abs(slot) ** 2
-    assert slope == pytest.approx(-turned * 1.1 / math.pi, rel=1e-9)
-
-
-def test_a_table_costs_two_inputs_however_many_rows_it_has(scene_text: Callable[..., str]) -> None:
-    scene = scene_from_text(scene_text("crank_shaper", *CHANGES), "shaper")
-    assert len(derive(scene).inputs) == len(derive(scene_from_text(scene_text("crank_shaper"), "shaper")).inputs) + 1
-    (cut,) = (f for f in features(scene) if f.name == "force cut")
-    assert cut.modelled == "force on lever.tip, by a table of 5 driver angles"
-
-
-@pytest.mark.parametrize("direction", ['direction = "10 deg"\n', ""])
-@pytest.mark.parametrize("change", [CHANGES[0], ('"0 N"]\nwindow', f'"0 N"]\ntable = {{ {ANGLE}, {FORCE} }}\nwindow')])
-def test_a_window_and_a_table_exclude_each_other(
-    scene_text: Callable[..., str], change: tuple[str, str], direction: str
-) -> None:
-    text = scene_text("crank_shaper", change).replace('direction = "10 deg"\n', direction)
-    with pytest.raises(SceneError) as caught:
-        scene_from_text(text, "shaper")
-    (fault,) = caught.value.faults
-    assert fault.key == "mechanism.forces.cut.table"
-    assert "delete one of the two" in fault.remedy

@@ -15,11 +15,9 @@ import sympy as sp
 from scipy.integrate import simpson
 
 from ballpass.derive import derive, generate, read_scene
-from ballpass.derive.lowering.functions import lower
 from ballpass.derive.mechanism.numeric import Evaluator
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.errors import SceneError
-from ballpass.derive.system import System
 from ballpass.runtime import IntegrationError, Model, Solution, load
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.native.driver_library import DRIVER
@@ -101,65 +99,6 @@ def test_kinetic_energy_of_a_slider_crank_and_its_sensitivities_are_those_of_ida
     assert simpson(energy(angle, speed), x=time) == pytest.approx(3.3366068, abs=1e-8)
     found = [simpson(by_angle * slopes.x[:, 0, k] + by_speed * slopes.x[:, 1, k], x=time) for k in range(2)]
     assert found == pytest.approx([0.3334481, -0.3637540], abs=1e-6)
-
-
-def _with_torque(keys: str) -> str:
-    return CRANK.replace('law = "none"', keys)
-
-
-def _torque(keys: str) -> tuple[System, sp.Expr]:
-    """The torque of a law over the speed, its numbers put in."""
-    system = derive(scene_from_text(_with_torque(keys), "crank"))
-    assert system.linkage is not None
-    (torque,) = system.linkage.drive.definitions
-    return system, torque.expression.subs({p.symbol: p.default for p in system.parameters})
-
-
-def test_torques_of_motors_are_those_of_their_data_sheets() -> None:
-    """Constant; straight lines; a table by NumPy's interpolation; Kloss's formula and its breakdown point."""
-    speeds = np.linspace(-35.0, 225.0, 14)
-
-    def over(keys: str) -> np.ndarray:
-        system, torque = _torque(keys)
-        return np.array([float(torque.subs(system.coordinates[0].velocity, s)) for s in speeds])
-
-    assert over('law = "constant"\ntorque = "5 N*m"') == pytest.approx(np.full(14, 5.0))
-    stall = over('law = "linear"\nstall_torque = "8 N*m"\nno_load_speed = "200 rad/s"')
-    assert stall == pytest.approx(8.0 - 0.04 * speeds)
-    nominal = 'law = "linear"\nnominal_torque = "2 N*m"\nnominal_speed = "150 rad/s"\nno_load_speed = "200 rad/s"'
-    assert over(nominal) == pytest.approx(stall)
-    rows = 'law = "table"\nspeed = ["0 rad/s", "50 rad/s", "200 rad/s"]\ntorque = ["3 N*m", "4 N*m", "-1 N*m"]'
-    assert over(rows) == pytest.approx(np.interp(speeds, [0.0, 50.0, 200.0], [3.0, 4.0, -1.0]))
-    kloss = 'law = "asynchronous"\nbreakdown_torque = "9 N*m"\nbreakdown_slip = 0.2\nsynchronous_speed = "150 rad/s"'
-    slip = 1.0 - speeds / 150.0
-    assert over(kloss) == pytest.approx(2.0 * 9.0 / (slip / 0.2 + 0.2 / slip))
-    system, torque = _torque(kloss)
-    speed = system.coordinates[0].velocity
-    assert float(torque.subs(speed, 120.0)) == pytest.approx(9.0)
-    assert float(sp.diff(torque, speed).subs(speed, 120.0)) == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        ('law = "linear"\nno_load_speed = "150 rad/s"', "the torque is missing"),
-        ('law = "linear"\nno_load_speed = "-150 rad/s"\nstall_torque = "5 N*m"', "the signs of torque"),
-        (
-            'law = "linear"\nno_load_speed = "150 rad/s"\nnominal_torque = "5 N*m"\nnominal_speed = "160 rad/s"',
-            "does not lie between rest and the no-load speed",
-        ),
-        ('law = "table"\nspeed = ["0 rad/s", "0 rad/s"]\ntorque = ["3 N*m", "4 N*m"]', "the speed does not increase"),
-        (
-            'law = "asynchronous"\nbreakdown_torque = "5 N*m"\nbreakdown_slip = 0\nsynchronous_speed = "150 rad/s"',
-            "the value is zero",
-        ),
-        ('law = "servo"', "this is none of the choices"),
-        ('law = "none"\ntorque = "5 N*m"', "unknown key"),
-    ],
-)
-def test_torques_that_no_motor_has_are_refused(keys: str, words: str) -> None:
-    with pytest.raises(SceneError, match=words):
-        scene_from_text(_with_torque(keys), "crank")
 
 
 def test_what_a_torque_has_no_meaning_for_is_refused_with_reason() -> None:
@@ -347,68 +286,3 @@ def test_no_step_passes_over_a_narrow_window(press: Model) -> None:
     run = press.simulate(rtol=1e-3, cycles=3.0, parameters=narrow)
     assert run.statistics.located == 6
     assert run.statistics.steps < 60
-
-
-@pytest.mark.parametrize("bearing", [False, True])
-def test_torque_that_the_reactions_take_is_that_of_the_motor(bearing: bool) -> None:
-    """At random states: the walk over the dyads knows the accelerations, and nothing of the equations of motion."""
-    text = _press(MOTOR)
-    if bearing:
-        press = (ROOT / "scenes/punching_press.toml").read_text()
-        part = press[press.index("[bearing]") : press.index("[run]")].replace(
-            "share = 0.5 ", 'coupling = "two-way"\ncount = 2 #'
-        )
-        ring = part.index("[bearing.inner_ring.equivalent_mass]")
-        part = part[:ring] + part[part.index("[bearing.outer_ring]") :]
-        text = text.replace("[run]", part + "\n[run]")
-    system = derive(scene_from_text(text, "press"))
-    functions = lower(system)
-    names = [c.name for c in system.coordinates]
-    assert names[-1] == "driver.angle"
-    assert len(names) == (5 if bearing else 1)
-    p = [q.default for q in system.parameters]
-    c = functions["constants"](p)
-    draws = np.random.default_rng(4)
-    sizes = np.array([2e-5] * (len(names) - 1) + [6.0] + [0.05] * (len(names) - 1) + [60.0])
-    for _ in range(20):
-        arguments = {"t": 0.0, "x": sizes * draws.uniform(-1.0, 1.0, 2 * len(names)), "u": [0.0], "p": p, "c": c}
-        results = {}
-        for name in ("reaction_system", "outputs"):
-            function = functions[name]
-            results |= function(**{k: arguments[k] for k in function.name_in()})
-        motor = float(results["drive_torque"])
-        assert float(results["r"][-1]) == pytest.approx(motor, rel=1e-9, abs=1e-9)
-        assert float(results["drive_power"]) == pytest.approx(motor * arguments["x"][-1], rel=1e-12)
-
-
-@pytest.mark.long
-def test_windows_and_tables_over_an_angle_that_is_a_state_are_those_of_constant_speed() -> None:
-    """At random angles of several turns either way: windows by arcs, also through zero; a table by NumPy."""
-    loads = """[mechanism.forces.many]
-body = "slider"
-point = "S"
-force = ["1 N", "0 N"]
-window = [
-    { start = "237 deg", end = "267 deg" },
-    { start = "350 deg", end = "20 deg" },
-    { start = "-3 rad", end = "-1 rad" },
-]
-
-[mechanism.torques.rows]
-body = "crank"
-table = { angle = ["10 deg", "90 deg", "300 deg"], torque = ["1 N*m", "5 N*m", "-2 N*m"] }
-
-[run]"""
-    system = derive(scene_from_text(CRANK.replace("[run]", loads), "crank"))
-    numbers = {p.symbol: p.default for p in system.parameters} | {i.symbol: 0.0 for i in system.inputs}
-    wanted = [sp.Symbol(name, real=True) for name in ("gate.many", "torque.rows.value")]
-    known = {d.symbol: d.expression for d in system.definitions}
-    inner = known[sp.Symbol("torque.rows.angle", real=True)]
-    gate, table = (known[s].subs(sp.Symbol("torque.rows.angle", real=True), inner).subs(numbers) for s in wanted)
-    arcs = [(237.0, 30.0), (350.0, 30.0), (math.degrees(-3.0), math.degrees(2.0))]
-    for angle in np.random.default_rng(3).uniform(-20.0, 20.0, 200).tolist():
-        at = {system.coordinates[0].position: angle}
-        degrees = math.degrees(angle)
-        assert float(gate.subs(at)) == any((degrees - start) % 360.0 < width for start, width in arcs)
-        expected = np.interp(degrees, [10.0, 90.0, 300.0], [1.0, 5.0, -2.0], period=360.0)
-        assert float(table.subs(at)) == pytest.approx(expected, abs=1e-12)

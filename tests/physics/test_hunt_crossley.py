@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from ballpass.derive import SceneError, generate
+from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, load
 
@@ -97,27 +96,3 @@ def test_lankarani_and_nikravesh_lose_what_restitution_says(tmp_path: Path) -> N
     speed = elastic.simulate(rtol=1e-10)["inner.vx"][-1]
     # their factor is right to the first order of the loss
     assert 1 - (speed / SPEED) ** 2 == pytest.approx(1 - restitution**2, rel=0.05)
-
-
-def test_the_force_pulls_only_where_the_ball_parts_faster_than_it_may(model: Model) -> None:
-    point = model.evaluate(0.0, np.array([100e-6 + 5e-6, 0.0, -0.5, 0.0]))
-    hertz = STIFFNESS * 5e-6**1.5
-    assert point["ball.force"][0] == pytest.approx(hertz * (1 - FACTOR * 0.5), rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("damping", "remedy"),
-    [
-        ("", 'add hysteresis = "0.2 s/m"'),
-        ("restitution = 0.9", 'add impact_speed = "0.1 m/s"'),
-        ('impact_speed = "0.1 m/s"', "add restitution = 0.8"),
-        (
-            'hysteresis = "1 s/m"\nrestitution = 0.9',
-            "delete one of the two: delete hysteresis, or delete restitution",
-        ),
-    ],
-)
-def test_its_factor_is_given_in_one_way(tmp_path: Path, damping: str, remedy: str) -> None:
-    with pytest.raises(SceneError, match=r"hysteresis .* or restitution|this key is missing") as caught:
-        impact(tmp_path, damping)
-    assert [fault.remedy for fault in caught.value.faults] == [remedy]

@@ -124,10 +124,10 @@ def test_a_preloaded_rotor_answers_its_unbalance_like_a_linear_one(make_model: C
     assert np.max(np.abs(found / expected - 1.0)) < 2e-4
 
 
-def test_loads_beside_a_mechanism_add_to_the_share_of_the_reaction(make_model: Callable[..., Model]) -> None:
+def test_loads_beside_a_mechanism_add_to_the_share_of_the_reaction(make_virtual: Callable[..., Model]) -> None:
     push = '[load]\ntype = "harmonic"\nmean = ["0 N", "10 N"]\namplitude = ["50 N", "0 N"]\nfrequency = "40 Hz"\n'
     push += 'phase = "0 deg"\n[run]'
-    both = (make_model("punching_press"), make_model("punching_press", ("[run]", push)))
+    both = (make_virtual("punching_press"), make_virtual("punching_press", ("[run]", push)))
     for t in np.linspace(0.0, 0.1, 7).tolist():
         found = [[quantity_values(m, m.numbers(), f"load.{a}", t=t, x=None)[0] for a in "xy"] for m in both]
         added = np.subtract(found[1], found[0])

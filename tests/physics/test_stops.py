@@ -1,20 +1,16 @@
-"""Stops: a wheel that bounces between two, against closed forms; a press that closes on one; what is refused."""
+"""Stops: a wheel that bounces between two, against closed forms; a press that closes on one."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 
 import numpy as np
 import pytest
-from coupled_scenes import Derived
 from test_friction import INERTIA, WHEEL
-from test_springs import TURN, lever
 
 from ballpass.derive import derive, equations, generate
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.derive.scene.errors import SceneError
 from ballpass.runtime import Model, load
 
 SPEED, STIFFNESS, UP, DOWN = 2.0, 4e4, math.radians(30.0), math.radians(-40.0)
@@ -101,31 +97,6 @@ def test_stops_are_met_at_loose_tolerances_and_an_error_can_be_named(wheel: Mode
     assert highest == pytest.approx(UP + SPEED * CONTACT / math.pi, rel=1e-6)
 
 
-def test_the_drive_gives_what_a_stop_on_a_turning_wall_takes_and_the_stop_never_pulls(
-    scene_text: Callable[..., str],
-) -> None:
-    """At every angle, at constant speed; away from the wall faster than the hysteresis follows it is without force."""
-    speed = 4.0 * math.pi
-    stopped, bare = (
-        [derived.outputs(a / speed, np.zeros(8), {"cut": 0.0}) for a in TURN]
-        for derived in (
-            Derived(scene_from_text(scene_text("crank_shaper", (CUT, added + CUT)), "s")) for added in (WALL, "")
-        )
-    )
-    closed, normal = lever(TURN, speed), np.exp(1j * (TURN + math.radians(30.0)))
-    arm = 0.38 * np.exp(1j * closed.angle)
-    tip, moved = arm - 0.2j, 1j * closed.angle_rate * arm
-    pressed = 0.05 - np.real(np.conj(normal) * tip)
-    rate = -np.real(np.conj(normal) * moved) - np.real(np.conj(1j * speed * normal) * tip)
-    force = np.where(pressed > 0.0, 2e5 * pressed * np.maximum(1.0 + 3.0 * rate, 0.0), 0.0)
-    assert np.any(force[pressed > 0.0] == 0.0)
-    assert np.any(force > 0.0)
-    assert np.any(pressed < 0.0)
-    assert [one["stop.wall.force"] for one in stopped] == pytest.approx(force, rel=1e-10, abs=1e-9)
-    added = np.array([one["drive_torque"] - other["drive_torque"] for one, other in zip(stopped, bare, strict=True)])
-    assert added * speed == pytest.approx(force * rate, rel=1e-9, abs=1e-9 * float(np.max(np.abs(force * rate))))
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["punching_press", pytest.param("punching_press_two_way", marks=pytest.mark.extreme)])
 def test_a_press_that_closes_on_a_stop_gains_from_steps_that_end_there(
@@ -163,26 +134,3 @@ def test_equations_and_events_name_stops(scene_text: Callable[..., str]) -> None
     (event,) = [event for event in system.events if "stop" in event.name]
     assert (event.kind, event.changes) == ("state", "the slope of `stop.wall.force`")
     assert ("stop.wall.force", "kinked") in [(name, word.value) for name, word in system.smoothness]
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (('stiffness = "2e5 N/m"\n', ""), r"add stiffness = "),
-        (('free_distance = "50 mm"', 'free_length = "50 mm"'), r"add free_distance = \"2 mm\""),
-        (('direction = "30 deg"\n', ""), r"add free_length = \"40 mm\""),
-        (('"2e5 N/m"', '"-2e5 N/m"'), "the value is negative"),
-        (('"3 s/m"', '"-3 s/m"'), "the value is negative"),
-        (('hysteresis = "3 s/m"', 'damping = "30 N*s/m"'), "unknown key"),
-        (('"crank", "lever"', '"lever", "lever"'), "both ends are on one body"),
-        (('"A", "tip"', '"A", "top"'), "has no point"),
-    ],
-)
-def test_stops_that_cannot_be_are_refused_with_a_remedy(
-    scene_text: Callable[..., str], change: tuple[str, str], words: str
-) -> None:
-    assert change[0] in WALL
-    with pytest.raises(SceneError) as caught:
-        scene_from_text(scene_text("crank_shaper", (CUT, WALL.replace(*change) + CUT)), "shaper")
-    assert caught.value.faults[0].line is not None
-    assert re.search(words, str(caught.value))

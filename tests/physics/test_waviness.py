@@ -38,24 +38,18 @@ DAMPED = ('law = "none"  ', 'law = "tangent"\nratio = "2e-5 s"  ')
 
 
 @pytest.fixture(scope="module")
-def held(make_model: Callable[..., Model]) -> Model:
-    return make_model("varying_compliance", WAVY, TIGHT, DAMPED, START, FORCES)
+def held(make_virtual: Callable[..., Model]) -> Model:
+    return make_virtual("varying_compliance", WAVY, TIGHT, DAMPED, START, FORCES)
 
 
-@pytest.fixture(scope="module")
-def moving(make_model: Callable[..., Model]) -> Model:
-    """With some waves only: derivatives compile in no time."""
-    table = """
-[bearing.outer_waviness]
-7 = { amplitude = "0.5 um", phase = "0.4 rad" }
-[bearing.inner_waviness]
-9 = { amplitude = "0.2 um", phase = "0.3 rad" }
-[bearing.ball_waviness.3]
-2 = { amplitude = "0.2 um", phase = "0.6 rad" }
-[bearing.ball_deviation]
-5 = "-0.2 um"
-[bearing.inner_ring]"""
-    return make_model("varying_compliance", (WAVY[0], table), TIGHT, DAMPED, START)
+def over_time(model: Model, t: np.ndarray, names: tuple[str, ...], changes: dict[str, float]) -> np.ndarray:
+    """Outputs with the rings held in the middle, at many instants in one call; shape (names, instants)."""
+    numbers, outputs = model.numbers(changes), model.function("outputs")
+    u = np.column_stack([model.inputs_at(float(at), changes) for at in t])
+    given = {"t": 0.0, "x": np.zeros((4, len(t))), "u": u, "p": numbers.p, "c": numbers.c}  # phases are those of t
+    found = outputs.map(len(t))(*(given[key] for key in outputs.name_in()))
+    values = dict(zip(outputs.name_out(), found, strict=True))
+    return np.array([values[name.replace(".", "_")].full().ravel() for name in names])
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -68,11 +62,10 @@ def test_only_orders_beside_multiples_of_the_balls_push_the_ring(held: Model, ri
     constants = held.constants()
     passing = constants[f"bearing.{ring}_pass_speed" if ring == "inner" else "bearing.cage_speed"]
     turning = held.parameters["shaft.speed"] if ring == "inner" else 0.0
-    wave, rest = {f"bearing.{ring}_waviness.{order}.amplitude": AMPLITUDE}, np.zeros(4)
-    forces = np.zeros(64, dtype=complex)
-    for k, t in enumerate(np.linspace(0.0, 2 * np.pi / abs(passing), 65)[:-1]):
-        seen = held.evaluate(t, rest, ["ring_force.x", "ring_force.y"], wave)
-        forces[k] = (seen["ring_force.x"] + 1j * seen["ring_force.y"]) * np.exp(-1j * turning * t)
+    wave = {f"bearing.{ring}_waviness.{order}.amplitude": AMPLITUDE}
+    t = np.linspace(0.0, 2 * np.pi / abs(passing), 65)[:-1]
+    x, y = over_time(held, t, ("ring_force.x", "ring_force.y"), wave)
+    forces = (x + 1j * y) * np.exp(-1j * turning * t)
     lines = np.abs(np.fft.fft(forces)) / 64
     linear = 0.75 * BALLS * constants["bearing.k_b"] * np.sqrt(PRELOAD) * AMPLITUDE
     expected = np.zeros(64)
@@ -122,41 +115,6 @@ def test_the_rate_is_that_of_the_deflection(held: Model, wave: str) -> None:
     difference = (at(t + h, "ball.deflection") - at(t - h, "ball.deflection")) / (2 * h)
     assert np.max(np.abs(rate)) > 0.0
     assert rate == pytest.approx(difference, rel=1e-7, abs=1e-9 * np.max(np.abs(rate)))
-
-
-@pytest.mark.long
-def test_stepper_lanes_and_virtual_machine_agree(moving: Model) -> None:
-    runs = [moving.simulate(cycles=0.5, transient=0, method=m, rtol=1e-9).x for m in METHODS]
-    scale = np.max(np.abs(runs[0]), axis=0)
-    for other in runs[1:]:
-        assert np.max(np.abs(other - runs[0]) / scale) < 1e-6
-    amplitudes = {"bearing.inner_waviness.9.amplitude": [0.1e-6, 0.2e-6], "bearing.ball_deviation.5": [0.0, -0.2e-6]}
-    many = moving.simulate_many(amplitudes, ["max:inner.y"], cycles=0.5, transient=0, rtol=1e-9)
-    assert many["max:inner.y"][1] == pytest.approx(
-        moving.reduce(cycles=0.5, transient=0, rtol=1e-9)["inner.y"].maximum, rel=1e-6
-    )
-
-
-METHODS = ("stepper-dp54", "stepper-rodas5p", "cvodes")
-
-
-@pytest.mark.long
-def test_derivatives_by_amplitude_and_phase_are_those_of_differences(moving: Model) -> None:
-    names = [name for name in moving.parameters if "waviness" in name or "deviation" in name]
-    assert len(names) == 7
-    slopes = []
-    for name in names:
-        step = 1e-4 if name.endswith("phase") else 1e-9
-        value = moving.parameters[name]
-        ends = [
-            moving.simulate(cycles=0.2, transient=0, parameters={name: value + s}, rtol=1e-11).x[-1]
-            for s in (step, -step)
-        ]
-        slopes.append((ends[0] - ends[1]) / (2 * step))
-    for method in ("stepper-dp54", "stepper-rodas5p"):
-        found = moving.sensitivities(names, cycles=0.2, method=method, rtol=1e-9).x[-1]
-        for column, slope in zip(found.T, slopes, strict=True):
-            assert column == pytest.approx(slope, rel=1e-4, abs=1e-4 * np.max(np.abs(slope)))
 
 
 def test_orders_are_structure_and_amplitudes_numbers(held: Model, scene_text: Callable[..., str]) -> None:

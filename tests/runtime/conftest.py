@@ -1,25 +1,12 @@
-"""Fixtures of the runtime's tests: models in the virtual machine, and the two scenes that most claims are about."""
+"""Fixtures of the runtime's tests: the two scenes that most claims are about."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 
 import pytest
-from virtual import virtual_model
 
 from ballpass.runtime import Model
-
-
-@pytest.fixture(scope="session")
-def make_virtual(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., str]) -> Callable[..., Model]:
-    """Model of a shipped scene with replacements, generated once and run by CasADi's virtual machine."""
-
-    @cache
-    def make(name: str, *changes: tuple[str, str]) -> Model:
-        return virtual_model(scene_text(name, *changes), tmp_path_factory.mktemp(name) / name)
-
-    return make
 
 
 @pytest.fixture(scope="session")

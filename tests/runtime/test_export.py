@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from artefact import write_folder
+from stepper_methods import NAMES
 from typer.testing import CliRunner
 
 from ballpass.derive import generate
@@ -26,7 +27,6 @@ from ballpass.runtime import ArtefactError, IntegrationError, Model, RequestErro
 from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract import ParameterInfo
 from ballpass.runtime.contract.bounds import allowed
-from ballpass.runtime.contract.parameters import resolve_parameters
 from ballpass.runtime.export.c_program import export_c
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.locating import tight_below
@@ -183,7 +183,7 @@ def test_options_do_what_the_arguments_of_simulate_do(exported: Callable[..., Pr
     program = exported("varying_compliance")
     model = program.model
     arguments = ["--cycles=2.3", "--rtol=1e-11", "--samples", "37"]
-    for method in ("rodas4", "rodas5p", "dp54", "dop853"):
+    for method in (name.removeprefix("stepper-") for name in NAMES):
         found = program.table(*arguments, "--method", method)
         solution = model.simulate(2.3, rtol=1e-11, samples_per_cycle=37, method=f"stepper-{method}")
         assert np.array_equal(found[:, 0], solution.t)
@@ -316,7 +316,12 @@ HARMONIC = (
         # each moves the sizes of the motion by a tenth and more; one keeps none of the scene's own
         ("punching_press", (), {"bearing.clearance": 60e-6}),
         ("punching_press", (), {"mechanism.driver.speed": 5.0, "mechanism.forces.punch.force.y": -2e5}),
-        ("punching_press_tangent", (), {"bearing.clearance": 60e-6, "bearing.outer_ring.stiffness": 4e6}),
+        pytest.param(  # built for this alone
+            "punching_press_tangent",
+            (),
+            {"bearing.clearance": 60e-6, "bearing.outer_ring.stiffness": 4e6},
+            marks=pytest.mark.long,
+        ),
         ("four_bar", (), {"mechanism.driver.speed": 300.0}),
         ("offset_slider", (), {"bearing.clearance": 60e-6}),
         ("varying_compliance", (), {"bearing.clearance": 2e-4, "bearing.initial.inner_velocity.y": 0.3}),
@@ -647,31 +652,6 @@ def test_requests_that_say_two_things_or_too_much_are_refused(
     assert done.stderr.startswith(f"error: {words}")
 
 
-CRANK, COUPLER, ROCKER = (
-    f"mechanism.bodies.{name}" for name in ("crank.points.B", "coupler.points.C", "rocker.points.C")
-)
-
-
-@pytest.mark.parametrize(
-    ("coupler", "start", "speed"), [(0.07, 0.0, 55.0), (0.07, 1.234, -55.0), (0.17, 0.0, 55.0), (0.17, 6.1, -55.0)]
-)
-def test_crank_of_a_four_bar_that_cannot_turn_is_refused(
-    exported: Callable[..., Program], coupler: float, start: float, speed: float
-) -> None:
-    """Crank 30 mm, rocker 80 mm, frame 120 mm: the rocker's joint meets from 90 to 150 mm across, a triangle each."""
-    program = exported("four_bar")
-    turned = (f"mechanism.driver.start_angle={start}", f"mechanism.driver.speed={speed}", "--duration=1e-5")
-    inward = 1e-7 if coupler < 0.1 else -1e-7
-    assert program(*turned, f"{COUPLER}={coupler + inward!r}").returncode == 0
-    locked = program(*turned, f"{COUPLER}={coupler - inward!r}")
-    assert (locked.returncode, locked.stdout) == (2, "")
-    worst = "180.00" if coupler < 0.1 else "0.00"
-    assert f"cannot be assembled at joint C, worst at crank angle {worst} deg" in locked.stderr.replace(
-        "360.00", "0.00"
-    )
-    assert "Allowed: lengths" in locked.stderr
-
-
 @pytest.mark.parametrize("scene", ["four_bar", "offset_slider"])
 def test_program_and_model_refuse_the_same_linkages(exported: Callable[..., Program], scene: str) -> None:
     program = exported(scene)
@@ -742,27 +722,6 @@ def test_values_that_no_scene_file_may_have_are_refused_with_what_is_allowed(exp
     both = program("bearing.share=-1", "bearing.outer_ring.mass=0", "--list")
     assert (both.returncode, both.stdout) == (2, "")
     assert both.stderr.count("error: ") == 2
-
-
-def test_program_and_model_refuse_the_same_numbers(exported: Callable[..., Program]) -> None:
-    program = exported("punching_press")
-    model = program.model
-    random = np.random.default_rng(5)
-    names = list(model.parameters)
-    verdicts = []
-    for _ in range(60):
-        chosen = random.choice(names, size=3, replace=False)
-        factors = random.choice([1.0, 0.4, 3.0, -1.0, 0.0], size=3, p=[0.4, 0.2, 0.2, 0.1, 0.1])
-        numbers = {name: float(model.parameters[name] * k) for name, k in zip(chosen, factors, strict=True)}
-        try:
-            resolve_parameters(model.manifest, numbers)
-            expected = 0
-        except RequestError:
-            expected = 2
-        done = program("--list", *(f"{name}={value!r}" for name, value in numbers.items()))
-        assert done.returncode == expected, (numbers, done.stderr)
-        verdicts.append(expected)
-    assert {0, 2} == set(verdicts)
 
 
 def test_failed_run_prints_the_rows_it_reached(exported: Callable[..., Program]) -> None:

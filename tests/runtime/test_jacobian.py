@@ -195,7 +195,7 @@ def test_compiled_blocks_are_those_of_the_virtual_machine(press: Model) -> None:
     x = loaded_state(press, 0.0811)
     numbers = press.numbers()
     point = (0.0, x, press.inputs_at(0.0811), numbers.p, numbers.c)
-    for name in ("ring_quantities_jac_x", "load_quantities_jac_p", "rhs_jac_c", "static_forces_jac_x"):
+    for name in ("rhs", "ring_quantities_jac_x", "load_quantities_jac_p", "rhs_jac_c", "static_forces_jac_x"):
         compiled, virtual = (f(*point).full() for f in (press.function(name), press.symbolic(name)))
         assert compiled == pytest.approx(virtual, rel=1e-12, abs=1e-12 * float(np.max(np.abs(virtual))))
 

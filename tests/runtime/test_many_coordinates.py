@@ -1,19 +1,18 @@
-"""Claims about models with numbers of coordinates that fill no vector: the methods do not care."""
+"""The steps of every method in C advance a number of coordinates that fills no vector in the order of the method."""
 
 from __future__ import annotations
 
 import ctypes
-import re
 import subprocess
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from stepper_methods import EXPLICIT, IMPLICIT, NAMES, ORDERS
 
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.runtime import Model, load
 from ballpass.runtime.native.compile import find_compiler
 from ballpass.runtime.native.driver_library import DRIVER, FLAGS
 
@@ -85,11 +84,12 @@ static void linear_run(const bp_rosenbrock_method *method, int stages, bp_number
         const bp_numbers n = {0, p, c}; \\
         run(&bp_##name, bp_##name.stages, n, x, h, steps); \\
     }
-METHOD(dp54, explicit_run)
-METHOD(dop853, explicit_run)
-METHOD(rodas4, linear_run)
-METHOD(rodas5p, linear_run)
 """
+HARNESS += "".join(
+    f"METHOD({name.removeprefix('stepper-')}, {run}_run)\n"
+    for run, names in (("explicit", EXPLICIT), ("linear", IMPLICIT))
+    for name in names
+)
 
 
 @pytest.fixture(scope="module")
@@ -106,12 +106,8 @@ def five(scene_text: Callable[..., str], tmp_path_factory: pytest.TempPathFactor
     return ctypes.CDLL(str(library))
 
 
-@pytest.mark.parametrize(
-    ("method", "order", "steps"), [("dp54", 5, 32), ("dop853", 8, 6), ("rodas4", 4, 32), ("rodas5p", 5, 32)]
-)
-def test_five_coordinates_are_advanced_in_the_order_of_the_method(
-    five: ctypes.CDLL, method: str, order: int, steps: int
-) -> None:
+@pytest.mark.parametrize("method", NAMES)
+def test_five_coordinates_are_advanced_in_the_order_of_the_method(five: ctypes.CDLL, method: str) -> None:
     """Against the exponential of the matrix; sin t is the output of two more states."""
     random = np.random.default_rng(4)
     A, B = (-np.eye(5) * size + random.normal(size=(5, 5)) for size in (9.0, 1.0))
@@ -120,67 +116,12 @@ def test_five_coordinates_are_advanced_in_the_order_of_the_method(
     whole[:5, 5:10], whole[5:10, :5], whole[5:10, 5:10], whole[5:10, 10] = np.eye(5), A, B, 1.0
     whole[10, 11], whole[11, 10] = 1.0, -1.0
     exact = (expm(whole) @ np.concatenate([start, [0.0, 1.0]]))[:10]
-    errors = []
+    errors, (order, _) = [], ORDERS[method]
+    steps = 32 if order < 8 else 6
     for count in (steps, 2 * steps):
         x = start.copy()
         pointers = (ctypes.c_void_p(array.ctypes.data) for array in (A, B, x))
-        getattr(five, method)(*pointers, ctypes.c_double(1.0 / count), ctypes.c_int(count))
+        getattr(five, method.removeprefix("stepper-"))(*pointers, ctypes.c_double(1.0 / count), ctypes.c_int(count))
         errors.append(float(np.max(np.abs(x - exact))))
     assert errors[1] < 1e-3
     assert np.log2(errors[0] / errors[1]) > order - 0.5
-
-
-@pytest.fixture(scope="module")
-def models(scene_text: Callable[..., str], tmp_path_factory: pytest.TempPathFactory) -> tuple[Model, Model]:
-    """Three bearings on a shaft that do not know each other, six coordinates; and one by itself."""
-    text, place = scene_text("varying_compliance"), tmp_path_factory.mktemp("six")
-    begin, end = text.index("[bearing]\n"), text.index("[run]")
-    several = [re.sub(r"^\[bearing\b", f"[bearings.{name}", text[begin:end], flags=re.MULTILINE) for name in "abc"]
-    run = re.sub(r"outputs = .*", 'outputs = ["a.inner.*"]', text[end:])
-    three = "".join([text[:begin], *several, run])
-    return tuple(  # type: ignore[return-value]
-        load(generate(scene_from_text(scene, name), place / name)) for scene, name in ((three, "three"), (text, "one"))
-    )
-
-
-CLEARANCES = {"a": 0.0, "b": 1e-6, "c": 2e-6}
-
-
-@pytest.mark.parametrize(
-    "method",
-    [pytest.param(f"stepper-{name}", marks=pytest.mark.long) for name in ("rodas5p", "dp54", "dop853", "rodas4")],
-)
-def test_bearings_that_do_not_know_each_other_move_as_each_alone(models: tuple[Model, Model], method: str) -> None:
-    three, one = models
-    given = {f"bearings.{name}.clearance": value for name, value in CLEARANCES.items()}
-    found = three.simulate(cycles=1, method=method, rtol=1e-10, kinks="located", parameters=given)
-    for name, value in CLEARANCES.items():
-        alone = one.simulate(
-            cycles=1, method=method, rtol=1e-10, kinks="located", parameters={"bearing.clearance": value}
-        )
-        for state in one.states:
-            assert np.max(np.abs(found[f"{name}.{state}"] - alone[state])) < 1e-6 * np.max(np.abs(alone[state]))
-
-
-def test_six_coordinates_move_as_casadi_integrates_them(models: tuple[Model, Model]) -> None:
-    three, _ = models
-    given = {f"bearings.{name}.clearance": value for name, value in CLEARANCES.items()}
-    by_driver, by_cvodes = (
-        three.simulate(cycles=1, method=method, rtol=1e-9, parameters=given).x for method in ("stepper", "cvodes")
-    )
-    assert np.all(np.max(np.abs(by_driver - by_cvodes), axis=0) < 1e-4 * np.max(np.abs(by_cvodes), axis=0))
-
-
-@pytest.mark.long
-def test_members_of_six_coordinates_in_lanes_are_single_runs(models: tuple[Model, Model]) -> None:
-    three, _ = models
-    column = np.linspace(0.0, 2e-6, 3)
-    many = three.simulate_many(
-        {"bearings.b.clearance": column}, "end:b.inner.x", cycles=1, transient=0, rtol=1e-8, kinks="stepped-over"
-    )
-    assert many.statistics.lanes > 1
-    for value, found in zip(column, many["end:b.inner.x"], strict=True):
-        alone = three.simulate(
-            cycles=1, rtol=1e-8, kinks="stepped-over", parameters={"bearings.b.clearance": float(value)}
-        )
-        assert found == pytest.approx(alone["b.inner.x"][-1], rel=1e-4)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stepper_methods import NAMES
 from typer.testing import CliRunner
 
 from ballpass.derive import SceneError, generate
@@ -66,9 +67,10 @@ def alone(make_model: Callable[..., Model]) -> dict[str, Model]:
 
 @pytest.mark.parametrize(
     ("method", "bound"),
-    [("stepper", 1e-5), ("stepper-rodas5p", 1e-4), pytest.param("cvodes", 1e-3, marks=pytest.mark.long)],
+    [*((method, 1e-4) for method in NAMES), ("stepper", 1e-5), pytest.param("cvodes", 1e-3, marks=pytest.mark.long)],
 )
 def test_each_moves_as_it_does_alone(pair: Model, alone: dict[str, Model], method: str, bound: float) -> None:
+    """Six coordinates, which fill no vector, and four and two."""
     both = pair.simulate(cycles=0.15, transient=0, method=method, rtol=1e-9)
     for name, model in alone.items():
         own = model.simulate(cycles=0.15, transient=0, method=method, rtol=1e-9)

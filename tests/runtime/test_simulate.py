@@ -346,37 +346,6 @@ def test_linkage_that_locks_between_the_angles_looked_at_is_refused(model: Model
         model.simulate(cycles=1, parameters={"body.weight": 3.0 - 1e-9, "driver.start_angle": 0.1})
 
 
-def test_jacobian_equals_differences_along_states_time_and_every_parameter(model: Model) -> None:
-    changes = {"swing.amplitude": 6.0, "table.y.1": 1.0, "table.y.2": 4.0, "table.y.3": -2.0}
-    t, x = 0.31, np.array([0.02, -0.4])
-    base = dict(model.parameters) | changes
-
-    def rate(parameters: dict[str, float], time: float, state: np.ndarray) -> np.ndarray:
-        numbers = model.numbers(parameters)
-        u = model.inputs_at(time, parameters)
-        return model.kernel("rhs")({"t": 0.0, "x": state, "u": u, "p": numbers.p, "c": numbers.c})
-
-    arguments = {"t": t, "x": x, "parameters": base}
-    by_state = model.jacobian("rhs", "states", **arguments)
-    for k in range(2):
-        step = 1e-6 * np.eye(2)[k]
-        difference = (rate(base, t, x + step) - rate(base, t, x - step)) / 2e-6
-        np.testing.assert_allclose(by_state[:, k], difference, rtol=1e-6, atol=1e-6)
-    difference = (rate(base, t + 1e-7, x) - rate(base, t - 1e-7, x)) / 2e-7
-    np.testing.assert_allclose(model.jacobian("rhs", "time", **arguments), difference, rtol=1e-6, atol=1e-6)
-    names = list(model.parameters)
-    by_parameter = model.jacobian("rhs", names, **arguments)
-    assert by_parameter.shape == (2, len(names))
-    for k, name in enumerate(names):
-        step = 1e-6 * max(1.0, abs(base[name]))
-        sides = [rate(base | {name: base[name] + s * step}, t, x) for s in (1, -1)]
-        np.testing.assert_allclose(
-            by_parameter[:, k], (sides[0] - sides[1]) / (2 * step), rtol=1e-5, atol=1e-6, err_msg=name
-        )
-    np.testing.assert_array_equal(model.jacobian("rhs", names[2], **arguments), by_parameter[:, 2])
-    assert np.any(by_parameter[:, names.index("driver.start_angle")])
-
-
 def test_jacobian_refuses_what_it_does_not_know(model: Model) -> None:
     with pytest.raises(RequestError, match="rhs"):
         model.jacobian("outputs")

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from stepper_methods import NAMES
 
 from ballpass.runtime import Model
 
@@ -23,8 +24,7 @@ def hinges(make_model: Callable[..., Model]) -> Model:
 
 
 @pytest.mark.parametrize(
-    ("method", "bound"),
-    [("stepper-rodas5p", 1e-5), ("stepper-dp54", 1e-5), pytest.param("cvodes", 1e-3, marks=pytest.mark.long)],
+    ("method", "bound"), [*((method, 1e-5) for method in NAMES), pytest.param("cvodes", 1e-3, marks=pytest.mark.long)]
 )
 def test_methods_agree(press: Model, method: str, bound: float) -> None:
     one = press.simulate(method="stepper-dop853", rtol=1e-10, **SHORT)

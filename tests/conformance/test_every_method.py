@@ -1,9 +1,10 @@
-"""Tableaus: the figures have the orders printed for them, by algebra and by experiment, and a wrong digit is found."""
+"""Methods of the stepper: figures have the orders printed for them, a wrong digit is found, docs name the method."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -11,32 +12,57 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from order_conditions import PRECISION, Claims, Tableau, classical_form, dense_weights, faults, stability_polynomial
+from order_conditions import PRECISION, Claims, classical_form, dense_weights, faults, stability_polynomial
+from parts import ROOT
 from reference_steps import ReferenceStep, Vector, explicit_step, floats, rosenbrock_step
 from scipy.integrate import DOP853 as ScipyDop853
 from scipy.integrate import RK45
+from stepper_methods import EXPLICIT, IMPLICIT, NAMES, ORDERS, TABLEAUS, Tableau
 
 from ballpass.derive.methods.explicit import DOP853, DORMAND_PRINCE_54, ExplicitTableau
 from ballpass.derive.methods.rosenbrock import RODAS4, RODAS5P, RosenbrockTableau
 from ballpass.derive.methods.tableaus import Row, TableauError
 
-EXPLICIT = (DORMAND_PRINCE_54, DOP853)
-ROSENBROCK = (RODAS4, RODAS5P)
+#: Beside the orders of `ORDERS`: what is left of them in an algebraic component, and what the rounding of the printed
+#: figures explains.
 CLAIMS = {
-    # The figures are exact; what is left is the arithmetic of the check.
-    "Dormand–Prince 5(4)": Claims(order=5, dense_order=4, rounding=Fraction("1e-45")),
-    # Printed to 30 digits, the dense output to 29: up to 5e-27 each where a figure is above 100; 3e-26 is the largest
-    # residual.
-    "DOP853": Claims(order=8, dense_order=7, rounding=Fraction("1e-25")),
-    # Printed to 16 digits: up to 5e-15 each where a figure is above 10; 1.2e-14 is the largest residual.
-    "Rodas4": Claims(order=4, dense_order=3, algebraic_orders=(4, 3, 2), rounding=Fraction("1e-13")),
-    # Printed from double precision: up to 1.4e-14 each where a figure is above 128; 2.3e-13 is the largest residual.
-    "Rodas5P": Claims(order=5, dense_order=4, algebraic_orders=(4, 3, 3), rounding=Fraction("1e-12")),
+    TABLEAUS[name].name: Claims(
+        order=ORDERS[name][0], dense_order=ORDERS[name][1], rounding=Fraction(rounding), **further
+    )
+    for name, rounding, further in (
+        # The figures are exact; what is left is the arithmetic of the check.
+        ("stepper-dp54", "1e-45", {}),
+        # Printed to 30 digits, the dense output to 29: up to 5e-27 each where a figure is above 100; 3e-26 is the
+        # largest residual.
+        ("stepper-dop853", "1e-25", {}),
+        # Printed to 16 digits: up to 5e-15 each where a figure is above 10; 1.2e-14 is the largest residual.
+        ("stepper-rodas4", "1e-13", {"algebraic_orders": (4, 3, 2)}),
+        # Printed from double precision: up to 1.4e-14 each where a figure is above 128; 2.3e-13 is the largest
+        # residual.
+        ("stepper-rodas5p", "1e-12", {"algebraic_orders": (4, 3, 3)}),
+    )
 }
 
 
-def named(*tableaus: Tableau) -> pytest.MarkDecorator:
-    return pytest.mark.parametrize("tableau", tableaus, ids=lambda tableau: tableau.name)
+def named(names: Iterable[str]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("tableau", [TABLEAUS[name] for name in names], ids=lambda tableau: tableau.name)
+
+
+every_method, explicit_methods, implicit_methods = named(TABLEAUS), named(EXPLICIT), named(IMPLICIT)
+
+
+def test_every_method_has_a_tableau_and_its_orders_and_the_docs_have_a_row() -> None:
+    for table, words in ((TABLEAUS, "a tableau in emit/methods_header.py"), (ORDERS, "its orders in ORDERS")):
+        assert set(table) == set(NAMES), f"every method of the stepper needs {words}"
+    assert set(CLAIMS) == {tableau.name for tableau in TABLEAUS.values()}
+    scene, theory = (
+        (ROOT / "docs" / page).read_text("utf-8") for page in ("reference/scene.md", "theory/integration.md")
+    )
+    (row,) = [line for line in scene.splitlines() if line.startswith("| `method` |")]
+    for name, (order, _) in ORDERS.items():
+        assert f'`"{name}"`' in row, f"docs/reference/scene.md does not name {name}"
+        found = re.search(rf"^\| `{name}` \|.*\| {order}\(", theory, re.MULTILINE)
+        assert found, f"docs/theory/integration.md has no row of {name} with order {order}"
 
 
 # Figures against other prints
@@ -79,7 +105,7 @@ def test_rodas4_has_the_free_parameters_printed_for_it():
 # Order conditions
 
 
-@named(*EXPLICIT, *ROSENBROCK)
+@every_method
 def test_figures_meet_every_condition_of_the_claimed_orders(tableau):
     assert faults(tableau, CLAIMS[tableau.name]) == []
 
@@ -107,12 +133,10 @@ def changes(tableau: Tableau, change: Fraction) -> Iterator[tuple[str, object]]:
                 yield from ((field.name, rows) for rows in changed_rows(value, change))
 
 
-FIGURES = {
-    "Dormand–Prince 5(4)": 15 + 6 + 6 + 7 + 7,
-    "DOP853": 66 + 12 + 12 + 2 * 13 + (13 + 14 + 15) + 3 + 4 * 16,
-    "Rodas4": 1 + 2 * 15 + 4 * 6 + 2 * 6,
-    "Rodas5P": 1 + 2 * 28 + 4 * 8 + 3 * 8,
-}
+def count_figures(tableau: Tableau) -> int:
+    """All that are printed, without the shares of error estimates, which are a choice."""
+    shares = len(tableau.error_estimates) if isinstance(tableau, ExplicitTableau) else 0
+    return repr(tableau).count("Fraction(") - shares
 
 
 def free_figures(tableau: Tableau) -> Row:
@@ -120,7 +144,7 @@ def free_figures(tableau: Tableau) -> Row:
     return tuple(row[-1] for row in tableau.dense_rows) if isinstance(tableau, RosenbrockTableau) else ()
 
 
-@named(*EXPLICIT, *ROSENBROCK)
+@every_method
 def test_any_changed_figure_is_found(tableau):
     claims = CLAIMS[tableau.name]
     found = 0
@@ -129,7 +153,7 @@ def test_any_changed_figure_is_found(tableau):
         free = free_figures(changed) != free_figures(tableau)
         assert (faults(changed, claims) == []) == free, (name, value)
         found += not free
-    assert found == FIGURES[tableau.name] - len(free_figures(tableau))
+    assert found == count_figures(tableau) - len(free_figures(tableau))
 
 
 def test_figures_that_no_condition_fixes_are_the_printed_ones():
@@ -138,7 +162,7 @@ def test_figures_that_no_condition_fixes_are_the_printed_ones():
     assert free_figures(RODAS5P) == tuple(Fraction(number) for number in printed)
 
 
-@named(*EXPLICIT, *ROSENBROCK)
+@every_method
 @pytest.mark.parametrize(("claim", "label"), [("order", "solution: tree"), ("dense_order", "dense output: tree")])
 def test_no_order_is_higher_than_claimed(tableau, claim, label):
     claims = CLAIMS[tableau.name]
@@ -147,7 +171,7 @@ def test_no_order_is_higher_than_claimed(tableau, claim, label):
     assert all(fault.startswith(label) for fault in found)
 
 
-@named(*ROSENBROCK)
+@implicit_methods
 @pytest.mark.parametrize(("place", "label"), list(enumerate(["solution", "error estimate", "dense output"])))
 def test_no_order_in_the_algebraic_component_is_higher_than_claimed(tableau, place, label):
     claims = CLAIMS[tableau.name]
@@ -160,8 +184,8 @@ def test_no_order_in_the_algebraic_component_is_higher_than_claimed(tableau, pla
 
 @pytest.mark.parametrize("off", [-1, 1])
 def test_embedded_order_is_exact(off):
-    others = [(t, replace(t, embedded_order=t.embedded_order + off)) for t in ROSENBROCK]
-    for tableau in EXPLICIT:
+    others = [(t, replace(t, embedded_order=t.embedded_order + off)) for t in map(TABLEAUS.get, IMPLICIT)]
+    for tableau in map(TABLEAUS.get, EXPLICIT):
         for place, estimate in enumerate(tableau.error_estimates):
             estimates = list(tableau.error_estimates)
             estimates[place] = replace(estimate, order=estimate.order + off)
@@ -226,7 +250,7 @@ def slopes_of(steps: list[float], errors: list[list[float]]) -> list[float]:
     return found
 
 
-@named(*EXPLICIT, *ROSENBROCK)
+@every_method
 def test_one_step_converges_with_the_claimed_orders(tableau):
     steps = [0.4 * 2 ** (-k / 2) for k in range(13)]
     starts = np.linspace(0, 3, 13)
@@ -243,7 +267,7 @@ def test_one_step_converges_with_the_claimed_orders(tableau):
     assert slopes_of(steps, errors) == pytest.approx(claimed, abs=0.3)
 
 
-@named(*EXPLICIT, *ROSENBROCK)
+@every_method
 def test_combined_error_shrinks_with_the_exponent_for_the_controller(tableau):
     shares = [1.0]
     if isinstance(tableau, ExplicitTableau):
@@ -257,7 +281,7 @@ def test_combined_error_shrinks_with_the_exponent_for_the_controller(tableau):
     assert order == pytest.approx(tableau.error_exponent, abs=0.3)
 
 
-@named(*EXPLICIT)
+@explicit_methods
 def test_explicit_dense_output_joins_with_continuous_slope(tableau):
     weights = dense_weights(tableau).astype(float)
     degrees = np.arange(1, len(weights) + 1)
@@ -267,7 +291,7 @@ def test_explicit_dense_output_joins_with_continuous_slope(tableau):
     assert np.allclose(degrees @ weights, units[tableau.stages], atol=1e-11)
 
 
-@named(*ROSENBROCK)
+@implicit_methods
 def test_rosenbrock_dense_output_meets_both_ends(tableau):
     weights = dense_weights(tableau).astype(float)
     assert np.allclose(weights.sum(axis=0), floats((tableau.weights,), tableau.stages)[0], rtol=0, atol=1e-13)
@@ -295,14 +319,14 @@ def stability(tableau: RosenbrockTableau, z: complex) -> complex:
     return complex(1 + z * weights @ np.linalg.solve(np.eye(tableau.stages) - z * (alpha + gamma), ones))
 
 
-@named(*ROSENBROCK)
+@implicit_methods
 def test_rosenbrock_methods_are_l_stable(tableau):
     assert max(abs(stability(tableau, 1j * y)) for y in np.logspace(-2, 6, 400)) <= 1 + 1e-13
     assert abs(stability(tableau, -1e9)) < 1e-7
     assert stability(tableau, -0.01) == pytest.approx(math.exp(-0.01), abs=1e-11)
 
 
-@named(*ROSENBROCK)
+@implicit_methods
 def test_one_long_step_of_a_stiff_equation_ends_at_rest(tableau):
     rate = -1e10
     result = rosenbrock_step(tableau, lambda t, y: rate * y, np.array([[rate]]), np.zeros(1), 0.0, np.array([1.0]), 1.0)
@@ -310,7 +334,7 @@ def test_one_long_step_of_a_stiff_equation_ends_at_rest(tableau):
     assert abs(result.end[0] - result.errors[0][0]) < 1e-8  # the embedded solution as well
 
 
-@named(*ROSENBROCK)
+@implicit_methods
 def test_classical_and_transformed_form_take_the_same_step(tableau):
     alpha, gamma, weights, error_weights = classical_arrays(tableau)
     time, step = 0.4, 0.2
@@ -331,7 +355,7 @@ def test_classical_and_transformed_form_take_the_same_step(tableau):
     assert np.allclose(at_middle, transformed.dense(0.5), rtol=1e-13, atol=0)
 
 
-@named(*ROSENBROCK)
+@implicit_methods
 def test_index_one_system_converges_with_the_claimed_orders(tableau):
     # u' = (1 + t / 2) u v and 0 = 1 - v**2 - log(u)**2 have the same solution as above while v > 0.
     def constrained(time: float, state: Vector) -> Vector:
@@ -362,7 +386,7 @@ def test_index_one_system_converges_with_the_claimed_orders(tableau):
 # Stability polynomials
 
 
-@named(*EXPLICIT)
+@explicit_methods
 def test_stability_polynomial_is_the_exponential_series_through_the_order(tableau):
     coefficients = stability_polynomial(tableau)
     claims = CLAIMS[tableau.name]
@@ -381,19 +405,20 @@ def test_stability_polynomial_of_dormand_prince_ends_with_one_six_hundredth():
 
 
 def test_end_slope_enters_the_error_of_dormand_prince_only():
-    ends = [[estimate.weights[-1] for estimate in tableau.error_estimates] for tableau in EXPLICIT]
+    both = (DORMAND_PRINCE_54, DOP853)
+    ends = [[estimate.weights[-1] for estimate in tableau.error_estimates] for tableau in both]
     assert ends == [[Fraction(-1, 40)], [0, 0]]
-    assert [len(tableau.dense_nodes) for tableau in EXPLICIT] == [0, 3]
+    assert [len(tableau.dense_nodes) for tableau in both] == [0, 3]
 
 
-@named(*EXPLICIT)
+@explicit_methods
 def test_first_error_estimate_has_share_one(tableau):
     assert tableau.error_estimates[0].share == 1
 
 
-@named(*ROSENBROCK)
+@implicit_methods
 def test_arguments_of_the_last_stages_continue_one_another(tableau):
-    first = {"Rodas4": 4, "Rodas5P": 5}[tableau.name]
+    first = tableau.nodes.index(1)
     rows = (*tableau.matrix[first:], tableau.weights)
     for before, after in pairwise(rows):
         assert after == (*before, Fraction(1))
@@ -401,7 +426,7 @@ def test_arguments_of_the_last_stages_continue_one_another(tableau):
     assert all(weight == 0 for weight in tableau.time_weights[first:])
 
 
-@named(*ROSENBROCK)
+@implicit_methods
 def test_classical_form_is_stiffly_accurate_to_all_decimals(tableau):
     form = classical_form(tableau)
     with localcontext(prec=PRECISION):

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
-
-sys.path.append(str(Path(__file__).parents[1] / "derive"))
-
 from linkages import Machine
 
 from ballpass.derive import derive
@@ -72,6 +67,8 @@ ball_angle = "17 deg"
 """
 
 
+#: Outputs on request that a balance of powers takes.
+POWERS = ("*.power", "drive_power", "kinetic_energy")
 RUN = '\n[run]\ncycles = 1\noutputs = ["*"]\n'
 
 

@@ -30,6 +30,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from stepper_methods import Tableau
 
 from ballpass.derive.methods.explicit import ExplicitTableau
 from ballpass.derive.methods.rosenbrock import RosenbrockTableau
@@ -38,7 +39,6 @@ from ballpass.derive.methods.tableaus import Row, Rows
 #: Significant digits of the checks; the longest figures have 31, and cancellation takes a few.
 PRECISION = 50
 
-Tableau = ExplicitTableau | RosenbrockTableau
 #: Vector or matrix of `Fraction` or `Decimal`.
 Figures = NDArray[np.object_]
 decimals = np.frompyfunc(lambda number: Decimal(number.numerator) / Decimal(number.denominator), 1, 1)

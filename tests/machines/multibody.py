@@ -19,6 +19,7 @@ from scipy.special import ellipe, ellipk
 
 from ballpass.derive.mechanism.forces import BodyTorque, Friction, PointForce, Windows
 from ballpass.derive.mechanism.forces.along_direction import AlongDirection
+from ballpass.derive.mechanism.forces.angle_table import AngleTable
 from ballpass.derive.mechanism.forces.spring_damper import SpringDamper
 from ballpass.derive.mechanism.forces.stop import Stop
 from ballpass.derive.mechanism.forces.two_bodies import TwoBodies
@@ -185,17 +186,27 @@ class Multibody(Absolute):
                 return 1.0
         return 0.0
 
+    def interpolated(self, law: AngleTable, angle: float) -> float:
+        """Amount by a table over the driver's angle."""
+        columns = ([self.value(q) for q in column] for column in (law.angle, law.values))
+        return float(np.interp(angle, *columns, period=TURN))
+
+    def along(self, direction: object) -> Array:
+        return np.array([math.cos(self.value(direction)), math.sin(self.value(direction))])
+
     def applied(self, q: Array, v: Array, angle: float) -> Array:
         """Generalized forces of loads and springs."""
         out = np.zeros(self.size)
         for force in self.mechanism.forces:
             path, law = force.pathway, force.law
             gate = self.gate(force.name, angle) if isinstance(law, Windows) else 1.0
+            rows = self.interpolated(law, angle) if isinstance(law, AngleTable) else None
             if isinstance(path, PointForce):
                 place = self.place(path.body, self.arm(path.body, path.point), q, v)
-                out += gate * self.vector(path.force) @ place.jacobian
+                vector = gate * self.vector(path.force) if rows is None else rows * self.along(path.direction)
+                out += vector @ place.jacobian
             elif isinstance(path, BodyTorque):
-                out += gate * self.value(path.torque) * self.row(path.body)
+                out += (gate * self.value(path.torque) if rows is None else rows) * self.row(path.body)
             elif isinstance(law, Friction):
                 slope = self._joint_slope(path.joint, q, v)
                 rate = float(slope @ v)

@@ -15,9 +15,6 @@ from ballpass.runtime.native.stepper import Family, Outcome, Segments
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.segments import segment_edges
 
-#: The four methods a user can name, by order of convergence and order of their dense output.
-ORDERS = {Family.RODAS4: (4, 3), Family.RODAS5P: (5, 4), Family.DP54: (5, 4), Family.DOP853: (8, 7)}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
