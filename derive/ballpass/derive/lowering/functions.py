@@ -312,14 +312,14 @@ class _Lowering:
         used = {symbol for o in self.system.outputs for symbol in o.expression.free_symbols}
         if not self._late and used.isdisjoint(c.acceleration for c in self.system.coordinates):
             return visit.child(sums, {})
-        found = accelerations(self.system, visit.child(sums, self._late))
-        named = {c.acceleration: a for c, a in zip(self.system.coordinates, found, strict=True)}
+        found = accelerations(self.system, visit.child(sums, self._late)).value
+        named = {c.acceleration: found[k] for k, c in enumerate(self.system.coordinates)}
         return visit.child({**sums, **named}, self._late)
 
     def _rhs(self, balls: Balls) -> ca.SX:
         """Velocities, then mass^-1 forcing."""
         visit = self.visit.child(self._sums(balls), self._late)
-        return ca.vertcat(self.x[len(self.system.coordinates) :], *accelerations(self.system, visit))
+        return ca.vertcat(self.x[len(self.system.coordinates) :], accelerations(self.system, visit).value)
 
     def _outputs(self, balls: Balls) -> dict[str, ca.SX]:
         outputs = self.system.outputs
