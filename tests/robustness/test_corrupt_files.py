@@ -152,7 +152,7 @@ def test_functions_cut_short_are_an_error_and_no_crash(rotor: Path) -> None:
     (rotor / "model.casadi").write_bytes(stored[: len(stored) // 2])
     code = (
         "import sys; from ballpass.runtime import load; from ballpass.runtime.contract.errors import ArtefactError\n"
-        "try: load(sys.argv[1], verify=False).symbolic('rhs')\n"
+        "try: load(sys.argv[1], verify=False).symbolic('outputs')\n"
         "except ArtefactError as fault: print(fault); sys.exit(2)\n"
     )
     done = subprocess.run(

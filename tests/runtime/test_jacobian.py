@@ -213,7 +213,7 @@ def test_a_run_compiles_no_jacobians(
 
 def test_manifest_says_where_functions_live_and_what_can_be_differentiated(press: Model) -> None:
     where = {info.name: info.library for info in press.manifest.functions}
-    assert where["rhs"] == where["rhs_jac_x"] == "model"
+    assert where["rhs"] == where["rhs_jac_x"] == "equations"
     assert where["rhs_jac_p"] == where["ring_quantities_jac_x"] == where["load_quantities_tangent"] == "jacobians"
     names = {item.name for item in press.manifest.quantities}
     assert set(press.outputs) <= names
