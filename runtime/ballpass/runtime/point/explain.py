@@ -25,7 +25,6 @@ from ballpass.runtime.point.evaluate import point
 from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.point.slopes import jacobian
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.run.simulate import STIFF_RATIO, choose_method
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
@@ -268,7 +267,7 @@ def _method(model: LoadedModel, scales: tuple[TimeScale, ...], turn: float) -> t
         return "none", "the model has no states: its outputs follow from time alone"
     decay = max((s.decay for s in scales), default=0.0)
     frequency = max((s.frequency for s in scales), default=0.0)
-    name, reason = choose_method(model, "auto", Scales(magnitude=np.zeros(0), decay=decay, frequency=frequency))
+    name, reason = choose_method(model, "auto")
     if frequency > 0.0:
         ratio = decay / frequency
         if ratio > STIFF_RATIO:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import INSTALL_COMPILER
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.casadi_integrators import METHODS
@@ -28,13 +29,11 @@ from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.run.failure_location import whereabouts
 from ballpass.runtime.run.integration_error import IntegrationError
-from ballpass.runtime.run.limits import refuse_crawl
 from ballpass.runtime.run.locating import choose_kinks, kinks_with_derivatives
 from ballpass.runtime.run.magnitudes import model_scales, stepper_magnitudes
 from ballpass.runtime.run.pieces import integrate
 from ballpass.runtime.run.reductions import joined, reduced_channels, reductions_of
 from ballpass.runtime.run.request import Plan, Request, make_plan
-from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.run.solution import Solution, Statistics
 from ballpass.runtime.run.stall import stall_words
 from ballpass.runtime.run.stepping import step_through
@@ -43,9 +42,9 @@ from ballpass.runtime.run.trajectory import Cost, Interrupted, Trajectory, evalu
 if TYPE_CHECKING:
     from ballpass.runtime.run.directions import Directions
 
-#: `auto` takes ``rosenbrock`` above this ratio of fastest decay to fastest natural frequency.  Measured on a press with
-#: four degrees of freedom and eight balls at rtol 1e-6: both take equal time at a ratio of 2, ``erk`` twice as long at
-#: 7, because its steps are bounded by 3.3 / decay while each of ``rosenbrock`` costs three of its steps.
+#: Linearly implicit steps suit above this ratio of fastest decay to fastest natural frequency.  Measured on a press
+#: with four degrees of freedom and eight balls at rtol 1e-6: explicit steps take the same time at a ratio of 2, twice
+#: as long at 7, because they are bounded by 3.3 / decay while a linearly implicit one costs three of them.
 STIFF_RATIO = 3.0
 
 
@@ -162,13 +161,9 @@ def _choose(
     if not len(plan.initial):
         return "none", "the model has no states: its outputs follow from time alone", np.zeros(0)
     name = asked or model.manifest.run.method
-    scales = None
-    if not (model.has_stepper and name in ("auto", *STEPPERS)):
+    method, reason = choose_method(model, name)
+    if method not in STEPPERS:
         scales = model_scales(model, numbers, plan.initial, plan.duration, plan.turn, plan.begin)
-    method, reason = choose_method(model, name, scales)
-    if scales is not None:
-        if method == "erk":
-            refuse_crawl(method, scales, plan.duration, plan.turn)
         return method, reason, scales.magnitude
     edges = trajectory.segments.times
     magnitude = stepper_magnitudes(
@@ -179,20 +174,11 @@ def _choose(
 
 def method_names(model: LoadedModel) -> tuple[str, ...]:
     """Integration methods of a model, besides ``auto``."""
-    return (*(STEPPERS if model.has_stepper else ()), *_virtual_methods(model))
+    return (*(STEPPERS if model.has_stepper else ()), *(METHODS if model.has("rhs") else ()))
 
 
-def _virtual_methods(model: LoadedModel) -> tuple[str, ...]:
-    """CasADi's methods: all, where the model has a right-hand side."""
-    return tuple(METHODS) if model.has("rhs") else ()
-
-
-def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tuple[str, str]:
+def choose_method(model: LoadedModel, asked: str) -> tuple[str, str]:
     """Name of the method and the reason for it.
-
-    Parameters
-    ----------
-    scales : what the choice between CasADi's methods depends on; None where the stepper is there to be taken
 
     Raises
     ------
@@ -203,7 +189,6 @@ def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tupl
         return "stepper", "the fastest method that a compiler allows"
     if asked in STEPPERS and model.has_stepper:
         return asked, "asked for"
-    available = _virtual_methods(model)
     if asked == "auto" and model.compiled:
         reason = f" ({model.manifest.unfit})" if model.manifest.unfit else ""
         warnings.warn(
@@ -214,19 +199,18 @@ def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tupl
             NoKernelsWarning,
             stacklevel=4,
         )
-    if asked == "auto" and scales is not None:
-        ratio = f"fastest decay {scales.decay:.3g} 1/s, fastest natural frequency {scales.frequency:.3g} rad/s"
-        name, why = ("rosenbrock", "stiff") if scales.stiffness > STIFF_RATIO else ("erk", "not stiff")
-        if name in available:
-            return name, f"{why}: {ratio}"
+    available = ("auto", *method_names(model))
+    if asked == "auto":
+        if "cvodes" in available:
+            return "cvodes", "the method that runs without the project's own stepper"
         raise RequestError("The model has no right-hand side to integrate. Generate it again with `ballpass derive`.")
     if asked in STEPPERS:
         missing = (
             "the generated folder has no kernels for it; write it again with `ballpass derive`"
             if model.compiled
-            else "it needs a C compiler, and none was found; install gcc or clang, or `pip install ziglang`"
+            else f"it needs a C compiler, and none was found. {INSTALL_COMPILER}"
         )
-        raise RequestError(f"method {asked}: {missing}. Or take one of {', '.join(('auto', *available))}.")
+        raise RequestError(f"method {asked}: {missing}. Or take one of {', '.join(available)}.")
     if asked not in available:
-        raise RequestError(unknown_name("method", asked, ("auto", *method_names(model))))
+        raise RequestError(unknown_name("method", asked, available))
     return asked, "asked for"
