@@ -18,9 +18,9 @@ from scipy.integrate import solve_ivp
 
 from ballpass.runtime import Model, Solution
 
-METHODS = ("erk", "rosenbrock", "cvodes", "stepper")
+METHODS = ("cvodes", "stepper")
 LAWS = {"punching_press": "one-sided", "punching_press_tangent": "tangent"}
-SLOWEST = tuple(("punching_press_tangent", method) for method in ("erk", "rosenbrock", "cvodes", "stepper"))
+SLOWEST = tuple(("punching_press_tangent", method) for method in METHODS)
 
 # The paper's data, and the scene's assumptions where the paper has none; SI.
 GRAVITY, SPEED, TURN = 9.81, 500.0 * 2.0 * math.pi / 60.0, 0.12
@@ -201,7 +201,7 @@ def test_motion_converges_to_the_hand_written_press(press: Callable[[str], Model
 def test_integrators_agree_with_each_other(press: Callable[[str], Model], name: str) -> None:
     model, law = press(name), LAWS[name]
     runs = {method: turn(model, method, 1e-12).x for method in METHODS if method in model.methods}
-    assert len(runs) >= 3
+    assert len(runs) == 2
     # each is off by less than 2e-8 and 3e-6 of the largest value; their sources have nothing in common
     allowed = {"one-sided": 1e-7, "tangent": 1e-5}[law]
     for first, second in combinations(runs, 2):
@@ -210,7 +210,7 @@ def test_integrators_agree_with_each_other(press: Callable[[str], Model], name: 
 
 @pytest.mark.parametrize("name", LAWS)
 def test_outputs_are_those_of_the_hand_written_press(press: Callable[[str], Model], name: str) -> None:
-    solution, law = turn(press(name), "erk", 1e-6), LAWS[name]
+    solution, law = turn(press(name), "cvodes", 1e-6), LAWS[name]
     punch = (START <= SPEED * TIMES) & (SPEED * TIMES < END)
     reaction = np.array([hinge(SPEED * t, bool(on)) for t, on in zip(TIMES, punch, strict=True)])
     for axis, column in zip("xy", reaction.T, strict=True):

@@ -16,8 +16,6 @@ METHODS = (
     "stepper-rodas5p",
     "stepper-dp54",
     "stepper-dop853",
-    "rosenbrock",
-    "erk",
     "cvodes",
 )
 

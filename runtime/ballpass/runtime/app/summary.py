@@ -252,6 +252,7 @@ def _forces(sol: Solution, peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, 
         if (info.name, "min") in peaks:
             low, high = peaks[info.name, "min"], peaks[info.name, "max"]
             found[info.name] = _numbers(info.name, info.unit, min=low.value, max=high.value)
+            found[info.name]["searched"] = {"min": low.searched, "max": high.searched}
     mechanism = sol.manifest.mechanism
     length = sol.period
     if mechanism is not None and "drive_torque" in found and length is not None and turns(sol.t, length):
@@ -310,6 +311,8 @@ def _motions(sol: Solution) -> dict[str, Any]:
         reduced = None if sol.reductions is None else sol.reductions.get(info.name)
         values = reduced or statistics(sol.t, sol[info.name])
         found[info.name] = _numbers(info.name, info.unit, **_moments(values))
+        where = "samples" if reduced is None else "every step"
+        found[info.name]["searched"] = {"min": where, "max": where}
     return found
 
 

@@ -61,11 +61,15 @@ def render_summary(summary: Mapping[str, Any]) -> Table:
 
 
 def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
-    """A number of the table; where it has no digits, mean and standard deviation over the turns."""
+    """A number of the table, with a star where more samples may show more; where it has no digits, mean and standard
+    deviation over the turns."""
     spread = item.get("over_turns", {}).get(key)
     if spread is not None:
         return f"{factor * spread['mean']:z.3g} ± {factor * spread['std']:.1g}"
-    return f"{factor * item[key]:z.4g}" if key in item else ""
+    if key not in item:
+        return ""
+    star = "*" if item.get("searched", {}).get(key) == "samples" else ""
+    return f"{factor * item[key]:z.4g}{star}"
 
 
 def render_accuracy(model: Model, accuracy: Accuracy) -> Table:
@@ -94,5 +98,6 @@ def _caption(summary: Mapping[str, Any]) -> str:
     if any("over_turns" in item for item in summary.values() if isinstance(item, Mapping)):
         law.append("± mean and standard deviation over the steady turns")
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
-    sampled = [] if summary["method"].startswith("stepper") else ["extremes of the samples alone"]
+    searched = [item.get("searched", {}) for item in summary.values() if isinstance(item, Mapping)]
+    sampled = ["* of the samples alone"] if any("samples" in found.values() for found in searched) else []
     return f"{', '.join(run + sampled + law)}.\n{', '.join(tools)}."
