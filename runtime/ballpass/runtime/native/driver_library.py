@@ -26,9 +26,9 @@ DRIVER = Path(__file__).parent.parent / "driver"
 SWITCHES = "switches.h"
 
 #: IEEE arithmetic throughout, without fused multiply-add: contact amplifies the last bit, and another compiler should
-#: give the same motion.  What is given up is errno and traps, and what is gained are vectors of square roots.
+#: give the same motion.  What is given up is traps, and what is gained are vectors of square roots.
 #: Packing scalars of short dependent chains costs more than it saves.
-FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd", "-fno-tree-slp-vectorize")
+FLAGS = ("-O3", "-fno-trapping-math", "-fopenmp-simd", "-fno-tree-slp-vectorize")
 
 #: Of drivers without lanes, behind these: two thirds of the time of -O3 to compile, for the same speed and bits.
 SINGLE = "-O2"
