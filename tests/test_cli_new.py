@@ -103,7 +103,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_generated_folder_runs_where_derive_sympy_pint_and_figures_are_missing(folder: Path, tmp_path: Path) -> None:
     # without a compiler, which takes longer; tests/test_package.py does it as users do and compares the motion
     missing = "ballpass.derive,sympy,pint,matplotlib,scipy,xarray,pandas,ziglang"
-    asked = ("--set", "bearing.clearance=12 um", "--sample-rate", "10 kHz", "--method", "erk", "--cycles", "0.1")
+    asked = ("--set", "bearing.clearance=12 um", "--sample-rate", "10 kHz", "--method", "cvodes", "--cycles", "0.1")
     done = call_without(missing, tmp_path, "run", folder, *asked, "--transient", "0", "--json", "--out", "here")
     assert done.returncode == 0, done.stderr
     assert "matplotlib, which is not installed: pip install 'ballpass-runtime[figures]'" in done.stderr

@@ -12,7 +12,7 @@ import pytest
 from ballpass.runtime import IntegrationError, Model
 from ballpass.runtime.app.summary import summarize
 from ballpass.runtime.app.summary_table import render_summary
-from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.point.conditioning import ConditioningWarning
 from ballpass.runtime.run import inputs as clock
@@ -105,13 +105,6 @@ def test_an_explicit_method_on_a_stiff_model_is_given_up_after_bounded_work(
     steps = caught.value.partial.statistics
     assert 200_000 <= (steps.steps or 0) + (steps.rejected or 0) <= 300_000
     assert len(caught.value.partial.t) > 1
-
-
-def test_erk_on_an_overdamped_model_is_refused_before_it_starts(make_model: ModelMaker) -> None:
-    numbers = {"bearing.damping.ratio": 2.5e-4, f"{OUTER}.mass": 1e-3}
-    words = r"method erk: damping decays at up to [\d.e+]+ 1/s.*are allowed\. Take method stepper or rosenbrock.*unit\."
-    with pytest.raises(RequestError, match=words):
-        make_model("punching_press").simulate(cycles=1, parameters=numbers, method="erk")
 
 
 def test_slow_machines_may_take_as_many_steps_a_second_as_fast_ones() -> None:

@@ -23,8 +23,8 @@ Holds = Callable[..., None]
 Press = Callable[..., Model]
 
 STEPPERS = ("stepper", *(pytest.param(name, marks=pytest.mark.long) for name in NAMES))
-#: CasADi's integrators; erk and rosenbrock run in its virtual machine.
-CASADI = tuple(pytest.param(name, marks=pytest.mark.long) for name in ("rosenbrock", "erk", "cvodes"))
+#: CasADi's integrator, in its virtual machine.
+CASADI = pytest.param("cvodes", marks=pytest.mark.long)
 
 #: Law, numbers, part of a turn, SciPy's method and tolerance.
 CASES = {
@@ -50,7 +50,7 @@ def expected(press: Press) -> Callable[[str], np.ndarray]:
 
 
 @pytest.mark.parametrize("kind", ["stiffest", pytest.param("no damping", marks=pytest.mark.long)])
-@pytest.mark.parametrize("method", [*STEPPERS, *CASADI])
+@pytest.mark.parametrize("method", [*STEPPERS, CASADI])
 def test_every_method(
     press: Press, holds: Holds, expected: Callable[[str], np.ndarray], kind: str, method: str
 ) -> None:
@@ -66,7 +66,7 @@ def test_every_method(
 STIFFER = {RATIO: 2.5e-4, f"{OUTER}.mass": 1e-3, START: BEFORE_PUNCH}
 
 
-@pytest.mark.parametrize("method", ["stepper", *CASADI[::2]])
+@pytest.mark.parametrize("method", ["stepper", CASADI])
 def test_a_hundred_times_stiffer_still(press: Press, holds: Holds, method: str) -> None:
     """A hundred times stiffer still: implicit methods agree with rodas4 at 1e-9."""
     solution, tight = (
@@ -79,7 +79,6 @@ def test_a_hundred_times_stiffer_still(press: Press, holds: Holds, method: str) 
 @pytest.mark.parametrize(
     ("method", "error", "words"),
     [
-        ("erk", RequestError, r"damping decays at up to [\d.e+]+ 1/s.*Take method stepper or rosenbrock"),
         *(
             pytest.param(
                 name, IntegrationError, r"more steps than allowed.*an explicit method crawls on a stiff model",
@@ -110,12 +109,12 @@ def _assert_told(caught: IntegrationError, cause: str, kept: int) -> None:
     assert caught.ball is not None
 
 
-@pytest.mark.parametrize("method", [*STEPPERS, *CASADI])
+@pytest.mark.parametrize("method", [*STEPPERS, CASADI])
 def test_a_start_at_1e200_m(press: Press, method: str) -> None:
     """A start from which forces overflow at once is refused with cause, place and the samples so far."""
     with pytest.raises(IntegrationError) as caught:
         press().simulate(cycles=1, initial=np.full(8, 1e200), method=method, transient=0)
-    _assert_told(caught.value, TOO_SMALL + r"|integrator could not go on.*method=\"rosenbrock\"", 1)
+    _assert_told(caught.value, TOO_SMALL + r"|integrator could not go on.*a looser rtol", 1)
 
 
 @pytest.mark.parametrize("method", STEPPERS[::2])
@@ -159,7 +158,7 @@ def test_refusals_name_cause_and_remedy(
         request_it(press())
 
 
-@pytest.mark.parametrize("method", ["stepper", *STEPPERS[2:4], CASADI[1]])
+@pytest.mark.parametrize("method", ["stepper", *STEPPERS[2:4]])
 def test_growth_without_bound(
     rotor: Press, holds: Holds, boundless: Callable[[Model], Model], method: str
 ) -> None:  # fmt: skip

@@ -152,7 +152,7 @@ def test_functions_cut_short_are_an_error_and_no_crash(rotor: Path) -> None:
     (rotor / "model.casadi").write_bytes(stored[: len(stored) // 2])
     code = (
         "import sys; from ballpass.runtime import load; from ballpass.runtime.contract.errors import ArtefactError\n"
-        "try: load(sys.argv[1], verify=False).symbolic('rhs')\n"
+        "try: load(sys.argv[1], verify=False).symbolic('outputs')\n"
         "except ArtefactError as fault: print(fault); sys.exit(2)\n"
     )
     done = subprocess.run(
@@ -293,10 +293,10 @@ def test_a_damaged_library_never_ends_a_process(cache: Path, rotor: Path, tmp_pa
 
 def test_a_cache_emptied_while_it_is_used_is_no_trouble(cache: Path, rotor: Path) -> None:
     """Functions are looked up when they are first called, the stepper is compiled when it is first asked for."""
-    expected = load(rotor).simulate(cycles=0.2, method="erk").x
+    expected = load(rotor).simulate(cycles=0.2, method="cvodes").x
     code = (
         "import shutil, sys; from ballpass.runtime import load; model = load(sys.argv[1]); shutil.rmtree(sys.argv[2])\n"
-        "print(model.simulate(cycles=0.2, method='erk').x.tobytes().hex()); shutil.rmtree(sys.argv[2])\n"
+        "print(model.simulate(cycles=0.2, method='cvodes').x.tobytes().hex()); shutil.rmtree(sys.argv[2])\n"
         "load(sys.argv[1]).simulate(cycles=0.2)"
     )
     command = [sys.executable, "-W", "error", "-c", code, str(rotor), str(cache)]

@@ -37,7 +37,7 @@ def everything(model: Model, clearance: float) -> list[np.ndarray]:
     """What a caller may ask of a model: each of these once shared memory with every other call."""
     parameters = {"bearing.clearance": clearance}
     found = []
-    for method in ("auto", "erk"):
+    for method in ("auto", "cvodes"):
         run = model.simulate(cycles=0.3, samples_per_cycle=400, parameters=parameters, method=method, rtol=1e-5)
         found += [run.x, *run.outputs.values()]
     reduced = model.reduce(cycles=1, transient=0, parameters=parameters)
@@ -85,7 +85,7 @@ MANY = """
     def run(k):
         return model.simulate(
             cycles=0.05, samples_per_cycle=400, parameters={"bearing.clearance": (1 + k % 20) * 1e-6}, rtol=1e-4,
-            method=("auto", "auto", "auto", "erk")[k % 4],
+            method=("auto", "auto", "auto", "cvodes")[k % 4],
         )
     def others():
         model.reduce(cycles=0.05, transient=0)

@@ -344,7 +344,7 @@ def test_wrong_tables_are_refused_before_anything_runs(
         ({"method": "cvodes"}, "stepper-dp54"),
         ({"rtol": 1.0}, "rtol"),
         ({"kinks": "locate"}, "Did you mean 'located'"),
-        ({"kinks": "located", "method": "erk"}, "stepper-dp54"),
+        ({"kinks": "located", "method": "cvodes"}, "stepper-dp54"),
     ],
 )
 def test_wrong_requests_are_refused_with_a_remedy(

@@ -143,7 +143,7 @@ def logarithmic_decrement(model: Model, x: np.ndarray, frequency: float, turns: 
     start = x.copy()
     start[0] += 1e-9
     times = np.linspace(0.0, (turns + 0.3) / frequency, 1001)
-    run = model.simulate(times=times, parameters=AT_REST, initial=start, rtol=1e-6, method="erk")
+    run = model.simulate(times=times, parameters=AT_REST, initial=start, rtol=1e-10, method="cvodes")
     speed = run["inner.vx"]
     k = np.flatnonzero((speed[:-1] > 0.0) & (speed[1:] <= 0.0))
     tops = run["inner.x"][k] - x[0]

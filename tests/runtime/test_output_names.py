@@ -22,7 +22,7 @@ def model(tmp_path_factory: pytest.TempPathFactory, scene_text: Callable[..., st
 )
 def test_what_the_scene_did_not_ask_for_is_told_with_the_line_that_asks(model: Model, name: str, pattern: str) -> None:
     told = re.escape(f'{name!r} is not among this scene\'s run.outputs: add "{pattern}" there')
-    solution = model.simulate(0.01, method="erk", outputs=[])
+    solution = model.simulate(0.01, method="cvodes", outputs=[])
     for ask in (
         lambda: model.simulate(0.01, outputs=[name]),
         lambda: solution[name],
@@ -56,7 +56,7 @@ def test_the_remedy_works(
 
 
 def test_what_this_run_did_not_keep_is_told_apart_from_what_does_not_exist(model: Model) -> None:
-    solution = model.simulate(0.01, method="erk", outputs=[])
+    solution = model.simulate(0.01, method="cvodes", outputs=[])
     with pytest.raises(RequestError, match="not kept in this run"):
         solution["ball.force"]
     with pytest.raises(RequestError, match=r"There is no output or state 'ball\.farce'"):

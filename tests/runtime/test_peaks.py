@@ -132,11 +132,11 @@ def test_the_summary_tells_a_spike_between_samples_and_where_was_looked(make_mod
     assert told["searched"] == {"elastic": "every step", "total": "every step"}
 
 
-@pytest.mark.parametrize(("method", "kind"), [("erk", "max"), ("cvodes", "max"), ("stepper", "min")])
+@pytest.mark.parametrize(("method", "kind"), [("cvodes", "max"), ("stepper", "min")])
 def test_what_the_samples_alone_show_is_told_as_such(
     make_model: ModelMaker, method: str, kind: Literal["max", "min"]
 ) -> None:
-    """CasADi's integrators reduce nothing, and the stepper not the smallest force of any ball."""
+    """CasADi's integrator reduces nothing, and the stepper not the smallest force of any ball."""
     model = make_model("offset_slider")
     steady = model.simulate(3, transient=2, parameters=SPIKES[0], method=method).steady()
     peak = model.refine_peak(steady, "ball.force", kind=kind)

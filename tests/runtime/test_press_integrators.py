@@ -97,7 +97,7 @@ def test_motion_converges_to_the_hand_written_press(press: Make, name: str, meth
 def test_integrators_agree_with_each_other(press: Make, name: str) -> None:
     model = press(name)
     runs = {method: part_of_a_turn(model, method, 1e-12).x for method in METHODS if method in model.methods}
-    assert len(runs) >= 3
+    assert len(runs) == 2
     # each is off by less than 2e-8 and 3e-6 of the largest value; their sources have nothing in common
     allowed = {"punching_press": 1e-7, "punching_press_tangent": 1e-5}[name]
     for first, second in combinations(runs, 2):

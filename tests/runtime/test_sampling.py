@@ -55,10 +55,9 @@ def test_a_sample_on_the_edge_of_a_load_shows_the_load_behind_it_however_the_run
     assert np.all(np.abs(on - behind) < 1e-2 * np.abs(before - behind))
 
 
-@pytest.mark.parametrize("method", ["erk", "rosenbrock"])
-def test_casadi_methods_follow_the_closed_form_at_chosen_times(oscillator: Model, method: str) -> None:
+def test_casadi_s_method_follows_the_closed_form_at_chosen_times(oscillator: Model) -> None:
     times = np.sort(np.random.default_rng(5).uniform(0.0, 0.6, 23))
-    solution = oscillator.simulate(times=times, method=method, rtol=1e-11)
+    solution = oscillator.simulate(times=times, method="cvodes", rtol=1e-11)
     expected = exact(times)
     error = np.max(np.abs(solution.x - expected), axis=0) / np.max(np.abs(expected), axis=0)
     assert np.all(error < 1e-8), error

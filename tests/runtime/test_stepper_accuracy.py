@@ -198,10 +198,11 @@ def test_stiff_damping_is_followed_by_both_families(make_model: Make) -> None:
     model = make_model("punching_press")
     stiff = {"bearing.damping.ratio": model.parameters["bearing.damping.ratio"] * 10.0**1.5}
     runs = {
-        method: model.simulate(1, parameters=stiff, method=method, rtol=1e-5, samples_per_cycle=250)
-        for method in ("stepper-rodas5p", "stepper-rodas4", "stepper-dp54", "rosenbrock")
+        method: model.simulate(1, parameters=stiff, method=method, rtol=rtol, samples_per_cycle=250)
+        # a multistep method accumulates more error a turn
+        for method, rtol in (*((f"stepper-{name}", 1e-5) for name in ("rodas5p", "rodas4", "dp54")), ("cvodes", 1e-7))
     }
-    magnitude = np.array(runs["rosenbrock"].statistics.magnitudes)
+    magnitude = np.array(runs["cvodes"].statistics.magnitudes)
     for found in runs.values():
         assert np.max(np.abs(found.x - runs["stepper-rodas4"].x) / magnitude) < 1e-4
     linear, explicit = runs["stepper-rodas5p"].statistics.steps, runs["stepper-dp54"].statistics.steps

@@ -104,9 +104,21 @@ def test_peaks_tell_when_which_ball_and_what_the_samples_alone_show(
 
 def test_every_method_tells_its_steps(make_model: Callable[..., Model]) -> None:
     model = make_model("punching_press")
-    for method in ("erk", "cvodes", "stepper"):
+    for method in ("cvodes", "stepper"):
         told = model.simulate(cycles=1, method=method, transient=0)
         assert summarize(model, told)["steps"]["value"] == told.statistics.steps > 500
+
+
+def test_extremes_of_samples_alone_are_marked_where_they_stand(make_model: Callable[..., Model]) -> None:
+    model = make_model("varying_compliance")
+    for method, mark in (("cvodes", "*"), ("stepper", "")):
+        summary = summarize(model, model.simulate(cycles=2, transient=1, method=method))
+        table = render_summary(summary)
+        names, peaks, _, highest, *_ = (list(column.cells) for column in table.columns)
+        for name, unit in (("inner.y", 1e6), ("inner.vy", 1e3)):
+            assert highest[names.index(name)] == f"{unit * summary[name]['max']:z.4g}{mark}"
+        assert str(peaks[names.index("peak_ball_force.total")]).endswith("*") == bool(mark)
+        assert ("* of the samples alone" in str(table.caption)) == bool(mark)
 
 
 def test_a_scene_without_mechanism_has_no_reaction(make_model: Callable[..., Model]) -> None:

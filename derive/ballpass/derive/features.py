@@ -67,7 +67,7 @@ def count_operations(scene: Scene) -> dict[str, int]:
         The scene cannot be derived.
     """
     lowered = lower(derive(scene), derivatives=False)
-    counts = {f.name(): operations(f) for f, _ in lowered.functions}
+    counts = {f.name(): operations(f) for f, _ in (*lowered.functions, *lowered.equations)}
     if lowered.kernels is not None:
         counts |= {f"kernel.{k.function.name()}": operations(k.function) for k in lowered.kernels.functions}
         for balls in lowered.kernels.bearings:

@@ -165,12 +165,12 @@ class Model(PointModel, Questions):
         cycles, duration : turns of driver or shaft, or time [s]; one of them
         parameters : overrides of parameters, SI
         method : ``auto`` or one of `methods`.  ``auto`` takes ``stepper`` where there is a compiler, else
-            ``rosenbrock`` for a stiff model and ``erk`` for others
+            ``cvodes``
         rtol : error allowed per step, relative to the magnitudes of the states (`ballpass.runtime.run.scales`)
         samples_per_cycle : samples in a turn; in the whole run where nothing turns
         times : times of the samples instead, increasing, within the run; where neither cycles nor duration is given,
-            the run ends at the last one.  The stepper takes the same steps however a run of one length is sampled; the
-            other methods go from sample to sample [s]
+            the run ends at the last one.  The stepper takes the same steps however a run of one length is sampled;
+            ``cvodes`` goes from sample to sample [s]
         sample_rate : samples at whole multiples of one over this, instead [Hz]
         outputs : names of the outputs to keep, none of them for ``[]``, where none is evaluated.  Default: all of the
             scene

@@ -53,7 +53,11 @@ def describe(system: System, functions: Functions, source: str, files: tuple[tup
                 description=words,
                 library=library,
             )
-            for library, group in ((mf.MODEL, functions.functions), (mf.JACOBIANS, functions.jacobians))
+            for library, group in (
+                (mf.MODEL, functions.functions),
+                (mf.EQUATIONS, functions.equations),
+                (mf.JACOBIANS, functions.jacobians),
+            )
             for f, words in group
         ),
         smoothness=tuple((name, s.value) for name, s in system.smoothness),

@@ -2,13 +2,14 @@
 
 In: a `System` and its `Functions`.  Out: the files of ``generated/<scene>/``:
 
-model.c, model.h   every function as C99
+model.c, model.h   what every run calls, as C99: constants, outputs, geometry, reactions
+equations.c, .h    right-hand side, its derivatives, mass matrix: compiled when first asked for
 kernels.h          the model cut into inline functions for the project's own stepper
 tangents.h         derivatives of these along several directions at once, for sensitivities
 ensemble_kernels.h the kernels for several members of an ensemble at once, and what reductions need
 methods.h          the stepper's methods
 switches.h         where the laws have kinks, for runs whose steps end there; no such file where they have none
-model.casadi       the same functions serialised, for machines without a compiler
+model.casadi, equations.casadi    the same functions serialised, for machines without a compiler
 jacobians.c, .h    all quantities, their derivatives and those of the right-hand side, compiled when first asked for
 jacobians.casadi   the quantities serialised
 EQUATIONS.md       the derivation for people
@@ -40,10 +41,12 @@ from ballpass.runtime import contract as mf
 def write_folder(folder: Path, system: System, functions: Functions, source: str) -> None:
     """Write all files of a generated folder into an empty one; `source` goes into the manifest."""
     _write_c(folder, "model", functions.functions)
+    _write_c(folder, "equations", functions.equations)
     _write_c(folder, "jacobians", functions.jacobians)
     for name, text in _headers(system, functions).items():
         (folder / name).write_text(text, encoding="utf-8", newline="\n")
     _pack(folder / "model.casadi", functions.functions)
+    _pack(folder / "equations.casadi", functions.equations)
     # values only: where there is no compiler, the runtime makes their derivatives when they are asked for
     values = [entry for entry in functions.jacobians if not entry[0].name().endswith(DERIVATIVES)]
     _pack(folder / "jacobians.casadi", values)

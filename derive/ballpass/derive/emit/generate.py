@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 GENERATED = (
     "EQUATIONS.md",
     "ensemble_kernels.h",
+    "equations.c",
+    "equations.casadi",
+    "equations.h",
     "jacobians.c",
     "jacobians.casadi",
     "jacobians.h",

@@ -29,6 +29,9 @@ from ballpass.derive.terms import TIME
 from ballpass.derive.variables import Output
 from ballpass.runtime.show.short import ShortRepr
 
+#: What no compiled run calls.
+_EQUATIONS = ("rhs", "mass_matrix")
+
 #: A visitor for each ball of each bearing, by the bearing's prefix.
 Balls = dict[str, list[Visitor]]
 
@@ -48,19 +51,20 @@ class Constant:
 class Functions(ShortRepr):
     """Named functions in the order they are written, with a line for people each.
 
-    `jacobians` go to files of their own, read and compiled when a derivative is first asked for; `groups` says which
-    quantities they differentiate.
+    `equations` and `jacobians` go to files of their own, read and compiled when one of them is first asked for: the
+    stepper has the right-hand side in its kernels.  `groups` says which quantities are differentiated.
     """
 
     constants: tuple[Constant, ...]
     functions: tuple[Described, ...]
+    equations: tuple[Described, ...]
     jacobians: tuple[Described, ...]
     groups: tuple[Group, ...]
     kernels: Kernels | None
     unfit: str
 
     def __getitem__(self, name: str) -> ca.Function:
-        for function, _ in (*self.functions, *self.jacobians):
+        for function, _ in (*self.functions, *self.equations, *self.jacobians):
             if function.name() == name:
                 return function
         raise KeyError(name)
@@ -177,12 +181,10 @@ class _Lowering:
         c, once = self._constants()
         arguments = {"t": self.t, "x": self.x, "u": self.u, "p": self.p, "c": c}
         made: list[Described] = [
-            (ca.Function("constants", [self.p], [once], ["p"], ["c"]), "derived constants, once a run"),
-            (
-                ca.Function("constants_jac", [self.p], [ca.jacobian(once, self.p)], ["p"], ["c_p"]),
-                "derivative of the constants by the parameters",
-            ),
+            (ca.Function("constants", [self.p], [ca.cse(once)], ["p"], ["c"]), "derived constants, once a run"),
         ]
+        slopes = ca.Function("constants_jac", [self.p], [ca.cse(ca.jacobian(once, self.p))], ["p"], ["c_p"])
+        equations: list[Described] = [(slopes, "derivative of the constants by the parameters")]
         for name, (delta, rate, forces) in zip((b.names.prefix for b in system.bearings), contacts, strict=True):
             function = ca.Function(
                 output_field(f"{name}contact"),
@@ -194,9 +196,12 @@ class _Lowering:
             made.append((function, "elastic and damping force of one ball [N]"))
         for name, results, words in bodies:
             takes = {k: v for k, v in arguments.items() if k in ("u", "p", "c") or _uses(results, v)}
-            made.append((ca.Function(name, [*takes.values()], [*results.values()], [*takes], [*results]), words))
+            called = name not in _EQUATIONS
+            values = ca.cse([*results.values()]) if called else [*results.values()]
+            function = ca.Function(name, [*takes.values()], values, [*takes], [*results])
+            (made if called else equations).append((function, words))
             if name == "rhs":  # the choice of a method needs these two
-                made += partials(name, "xdot", results["xdot"], arguments, "xt")
+                equations += partials(name, "xdot", results["xdot"], arguments, "xt")
         rhs = bodies[0][1]["xdot"] if system.coordinates else None
         groups, jacobians = self._jacobians(rhs, arguments) if derivatives else ([], [])
         named = [
@@ -207,6 +212,7 @@ class _Lowering:
         return Functions(
             constants=(*named, *found),
             functions=tuple(made),
+            equations=tuple(equations),
             jacobians=tuple(jacobians),
             groups=tuple(groups),
             kernels=builder.kernels(c) if builder else None,
@@ -312,14 +318,14 @@ class _Lowering:
         used = {symbol for o in self.system.outputs for symbol in o.expression.free_symbols}
         if not self._late and used.isdisjoint(c.acceleration for c in self.system.coordinates):
             return visit.child(sums, {})
-        found = accelerations(self.system, visit.child(sums, self._late))
-        named = {c.acceleration: a for c, a in zip(self.system.coordinates, found, strict=True)}
+        found = accelerations(self.system, visit.child(sums, self._late)).value
+        named = {c.acceleration: found[k] for k, c in enumerate(self.system.coordinates)}
         return visit.child({**sums, **named}, self._late)
 
     def _rhs(self, balls: Balls) -> ca.SX:
         """Velocities, then mass^-1 forcing."""
         visit = self.visit.child(self._sums(balls), self._late)
-        return ca.vertcat(self.x[len(self.system.coordinates) :], *accelerations(self.system, visit))
+        return ca.vertcat(self.x[len(self.system.coordinates) :], accelerations(self.system, visit).value)
 
     def _outputs(self, balls: Balls) -> dict[str, ca.SX]:
         outputs = self.system.outputs

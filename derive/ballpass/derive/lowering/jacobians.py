@@ -48,6 +48,8 @@ def partials(
     name: str, result: str, value: ca.SX, arguments: Mapping[str, ca.SX], along: Sequence[str]
 ) -> list[Described]:
     """Sparse derivatives of `value` by the arguments named in `along`; those without entries are left out."""
+    # common subexpressions of the value, not of each derivative: a third of the time, 3 % more operations
+    value = ca.cse(value)
     made = []
     for key in along:
         derivative = ca.jacobian(value, arguments[key])
@@ -56,7 +58,7 @@ def partials(
         jacobian = ca.Function(
             f"{name}_jac_{key}",
             [*arguments.values()],
-            [ca.cse(derivative)],
+            [derivative],
             [*arguments],
             [f"{result}_{key}"],
         )
@@ -66,12 +68,13 @@ def partials(
 
 def tangent(name: str, result: str, value: ca.SX, arguments: Mapping[str, ca.SX]) -> Described:
     """Derivative of `value` along a direction of all arguments, named ``dx`` for ``x``."""
+    value = ca.cse(value)
     directions = {f"d{key}": ca.SX.sym(f"d{key}", argument.numel()) for key, argument in arguments.items()}
     moved = ca.jtimes(value, ca.vertcat(*arguments.values()), ca.vertcat(*directions.values()))
     function = ca.Function(
         f"{name}_tangent",
         [*arguments.values(), *directions.values()],
-        [ca.cse(ca.densify(moved))],
+        [ca.densify(moved)],
         [*arguments, *directions],
         [f"d{result}"],
     )
@@ -80,8 +83,8 @@ def tangent(name: str, result: str, value: ca.SX, arguments: Mapping[str, ca.SX]
 
 def group_functions(name: str, values: Sequence[ca.SX], arguments: Mapping[str, ca.SX]) -> list[Described]:
     """Value, partial derivatives and directional derivative of a group of quantities."""
-    value = ca.densify(ca.vertcat(*values))
-    function = ca.Function(name, [*arguments.values()], [ca.cse(value)], [*arguments], ["y"])
+    value = ca.cse(ca.densify(ca.vertcat(*values)))
+    function = ca.Function(name, [*arguments.values()], [value], [*arguments], ["y"])
     return [
         (function, "quantities, one below the other"),
         *partials(name, "y", value, arguments, tuple(arguments)),

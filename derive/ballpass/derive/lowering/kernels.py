@@ -149,7 +149,8 @@ class KernelBuilder:
         held = ca.SX.sym("r", rings.numel() + len(shared))
         known |= {symbol: held[rings.numel() + k] for k, symbol in enumerate(shared)}
         definitions = {k: v for k, v in self._definitions.items() if k not in known} if shared else system.late
-        acceleration = ca.vertcat(*accelerations(system, self._of_state.child(known, definitions)))
+        found = accelerations(system, self._of_state.child(known, definitions))
+        balance = found.residual
         relative = ca.vertcat(rings, *(self._of_state(symbol) for symbol in shared))
         sizes = [8 if b.ball.own is not None else 6 for b in bearings]
         ends = [sum(sizes[: k + 1]) for k in range(len(sizes))]
@@ -161,18 +162,16 @@ class KernelBuilder:
                 for k, own in enumerate(slopes)
             )
         )
-        by_sums = ca.jacobian(acceleration, sums)
-        by_relative = ca.jacobian(acceleration, held) + by_sums @ ca.horzcat(
-            by_rings, ca.SX(by_rings.size1(), len(shared))
-        )
-        by_state = ca.jacobian(acceleration, x) + by_relative @ ca.jacobian(relative, x)
+        by_sums = ca.jacobian(balance, sums)
+        by_relative = ca.jacobian(balance, held) + by_sums @ ca.horzcat(by_rings, ca.SX(by_rings.size1(), len(shared)))
+        by_state = found.solve(ca.jacobian(balance, x) + by_relative @ ca.jacobian(relative, x))
         own_rate = ca.vertcat(*(sums_by_time(slopes[k], own=b.ball.own is not None) for k, b in enumerate(bearings)))
         w = ca.vertcat(*self._stage.values())
         wt = ca.SX.sym("wt", w.numel())
         # along one direction: the matrices above would cost four times as many operations
         moved = ca.jtimes(relative, w, wt)
         own_rate += by_rings @ moved[: rings.numel()]
-        by_time = ca.jtimes(acceleration, ca.vertcat(w, held, sums), ca.vertcat(wt, moved, own_rate))
+        by_time = found.solve(ca.jtimes(balance, ca.vertcat(w, held, sums), ca.vertcat(wt, moved, own_rate)))
         stage = ca.vertcat(*(self._visit(e) for e in self._stage))
         state = {k: self._arguments[k] for k in "up"} | {"c": ca.SX(0, 1)}
         tail = {**state, "w": w}
@@ -200,7 +199,7 @@ class KernelBuilder:
             (
                 "acceleration",
                 {"x": x, "S": sums, "r": held, **tail},
-                {"a": acceleration},
+                {"a": found.value},
                 "Accelerations from the sums over the balls",
             ),
             (

@@ -33,8 +33,6 @@ METHODS = (
     "stepper-rodas5p",
     "stepper-dp54",
     "stepper-dop853",
-    "rosenbrock",
-    "erk",
     "cvodes",
 )
 

@@ -128,7 +128,7 @@ def run(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Integrator: auto, stepper (or stepper-rodas4, -rodas5p, -dp54, -dop853), erk, rosenbrock, cvodes.",
+            help="Integrator: auto, stepper (or stepper-rodas4, -rodas5p, -dp54, -dop853), cvodes.",
         ),
     ] = None,
     kinks: Annotated[

@@ -250,6 +250,7 @@ def _forces(model: Model, sol: Solution, peaks: Mapping[tuple[str, Kind], Peak])
         if (info.name, "min") in peaks:
             low, high = peaks[info.name, "min"], peaks[info.name, "max"]
             found[info.name] = _numbers(info.name, info.unit, min=low.value, max=high.value)
+            found[info.name]["searched"] = {"min": low.searched, "max": high.searched}
     if "drive_torque" in found and _has_turn(sol):
         found["drive_work"] = _numbers("drive_torque", "J", value=_drive_work(model, sol))
     return found
@@ -305,6 +306,8 @@ def _motions(sol: Solution) -> dict[str, Any]:
         reduced = None if sol.reductions is None else sol.reductions.get(info.name)
         values = reduced or statistics(sol.t, sol[info.name])
         found[info.name] = _numbers(info.name, info.unit, **_moments(values))
+        where = "samples" if reduced is None else "every step"
+        found[info.name]["searched"] = {"min": where, "max": where}
     return found
 
 

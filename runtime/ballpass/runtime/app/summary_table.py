@@ -65,11 +65,15 @@ def render_summary(summary: Mapping[str, Any]) -> ReportTable:
 
 
 def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
-    """A number of the table; where it has no digits, with twice its standard deviation over moved starts."""
+    """A number of the table, with a star where more samples may show more; where it has no digits, with twice its
+    standard deviation over moved starts."""
+    if key not in item:
+        return ""
     spread = item.get("over_starts", {}).get(key)
     if spread is not None:
         return f"{factor * item[key]:z.3g} ± {2.0 * factor * spread['std']:.1g}"
-    return f"{factor * item[key]:z.4g}" if key in item else ""
+    star = "*" if item.get("searched", {}).get(key) == "samples" else ""
+    return f"{factor * item[key]:z.4g}{star}"
 
 
 def render_quantities(found: Mapping[str, QuantityValue]) -> ReportTable:
@@ -114,5 +118,6 @@ def _caption(summary: Mapping[str, Any]) -> str:
     if any("over_starts" in item for item in summary.values() if isinstance(item, Mapping)):
         law.append("± twice the standard deviation over moved starts")
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
-    sampled = [] if summary["method"].startswith("stepper") else ["extremes of the samples alone"]
+    searched = [item.get("searched", {}) for item in summary.values() if isinstance(item, Mapping)]
+    sampled = ["* of the samples alone"] if any("samples" in found.values() for found in searched) else []
     return f"{', '.join(run + sampled + law)}.\n{', '.join(tools)}."

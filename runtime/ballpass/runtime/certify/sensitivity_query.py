@@ -70,8 +70,7 @@ class Query:
     ----------
     of, wrt : names, in `wrt` shell-style patterns too; None for the sensible ones, and for all parameters
     request : how long to run
-    method : of the derivatives: ``auto``, one of the stepper's, ``erk``
-    direction : of ``erk``: "forward" or "adjoint"
+    method : of the derivatives: ``auto`` or one of the stepper's
     check : True (differences), False, or one of `CHECKS`
     rtol, sensitivity_rtol : tolerances of states and derivatives
     kinks : what the steps do at the kinks of the laws; None locates them

@@ -25,6 +25,7 @@ from ballpass.runtime.contract.folder import (
 from ballpass.runtime.contract.manifest import (
     DIGEST,
     DRIVER_ACCELERATION,
+    EQUATIONS,
     FILE_NAME,
     JACOBIANS,
     MODEL,
@@ -53,6 +54,7 @@ from ballpass.runtime.contract.manifest import (
 __all__ = [
     "DIGEST",
     "DRIVER_ACCELERATION",
+    "EQUATIONS",
     "FILE_NAME",
     "JACOBIANS",
     "MODEL",

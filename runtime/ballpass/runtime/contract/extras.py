@@ -21,6 +21,10 @@ EXTRAS = {
 }
 
 
+#: What to do where a compiler is missing.
+INSTALL_COMPILER = 'Install gcc or clang, or a compiler from PyPI: `pip install "ballpass[compiler]"`'
+
+
 def need(module: str) -> Any:
     """A module of a package of `EXTRAS`.
 

@@ -22,7 +22,7 @@ DRIVER_ACCELERATION = "driver.acceleration"
 DIGEST = "digest"
 
 #: Where a generated function lives: ``<library>.c`` and, serialised, ``<library>.casadi``.
-MODEL, JACOBIANS = "model", "jacobians"
+MODEL, EQUATIONS, JACOBIANS = "model", "equations", "jacobians"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,7 +133,8 @@ class InputInfo:
 class FunctionInfo:
     """Signature and cost of a generated function: names with sizes (rows), and the number of SX operations.
 
-    `library` is the generated file that holds it: `MODEL`, or `JACOBIANS`, compiled when first asked for.
+    `library` is the generated file that holds it: `MODEL`, or `EQUATIONS` or `JACOBIANS`, which are compiled when first
+    asked for.
     """
 
     name: str

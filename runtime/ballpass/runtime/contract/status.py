@@ -34,5 +34,5 @@ class Status(Enum):
     )
     INTEGRATOR_FAILED = (
         "The integrator could not go on: the tolerance asks for steps too small or too many. "
-        'Try method="rosenbrock" for a stiff model, a looser rtol, or check initial state and parameters.'
+        "Try a looser rtol, or check initial state and parameters."
     )

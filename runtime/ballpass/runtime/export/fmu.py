@@ -28,6 +28,7 @@ import numpy as np
 
 from ballpass.runtime.contract import Manifest, read_artefact
 from ballpass.runtime.contract.errors import CompileError, RequestError
+from ballpass.runtime.contract.extras import INSTALL_COMPILER
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.export.c_program import LIBRARY_FLAGS, program_texts
 from ballpass.runtime.export.dependencies import dependencies, rates_and_outputs
@@ -244,8 +245,8 @@ def _compiled(sources: Mapping[str, str], identifier: str) -> bytes:
     compiler = find_compiler()
     if compiler is None:
         raise CompileError(
-            "An FMU holds compiled code, and no C compiler was found ($CC, cc, gcc, clang, ziglang). Install gcc or "
-            "clang, or a compiler from PyPI: `pip install ziglang`."
+            "An FMU holds compiled code, and no C compiler was found ($CC, cc, gcc, clang, ziglang). "
+            f"{INSTALL_COMPILER}."
         )
     names = sorted(name for name in sources if name.endswith(".c"))
     own = ("-Wl,-Bsymbolic",) if sys.platform == "linux" else ()

@@ -33,6 +33,7 @@ import platformdirs
 
 from ballpass.runtime.contract import Manifest, read_unchanged
 from ballpass.runtime.contract.errors import BallpassWarning, CompileError, RequestError
+from ballpass.runtime.contract.extras import INSTALL_COMPILER
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.native.compilers import Compiler, find_compiler, run_compiler
 
@@ -98,8 +99,8 @@ def compile_model(folder: str | Path, manifest: Manifest, compiler: str | None =
     if found is None:
         warnings.warn(
             "No C compiler was found ($CC, cc, gcc, clang, ziglang): the model runs in CasADi's virtual machine. "
-            "Results are the same within the tolerance; a simulation takes some ten times as long. Install gcc or "
-            "clang, or a compiler from PyPI: `pip install ziglang`.",
+            "Results are the same within the tolerance; a simulation takes some ten times as long, and extremes are "
+            f"those of samples. {INSTALL_COMPILER}.",
             NoCompilerWarning,
             stacklevel=3,
         )

@@ -65,7 +65,7 @@ class Functions:
         # what is shared is made once: re-entrant, for one function is made from another
         self._making = threading.RLock()
         self._symbolic: dict[str, casadi.Function] = {}
-        self._integrators: dict[tuple[str, int], casadi.Function] = {}
+        self._integrators: dict[int, casadi.Function] = {}
 
     def has(self, name: str) -> bool:
         """Whether the manifest has a function of that name."""
@@ -140,15 +140,15 @@ class Functions:
                 self._symbolic[name] = _differentiate(self.symbolic(derivative["of"]), name, derivative["along"])
             return self._symbolic[name]
 
-    def virtual_integrator(self, plugin: str, intervals: int) -> casadi.Function:
-        """Integrator of one of CasADi's plugins over a grid, in the virtual machine (see `casadi_integrators`)."""
+    def virtual_integrator(self, intervals: int) -> casadi.Function:
+        """CasADi's integrator over a grid, in the virtual machine (see `casadi_integrators`)."""
         with self._making:
-            if (plugin, intervals) not in self._integrators:
+            if intervals not in self._integrators:
                 manifest = self.manifest
                 sizes = {"u": len(manifest.inputs), "p": len(manifest.parameters), "c": len(manifest.constants)}
-                made = make_integrator(self.symbolic("rhs"), sizes, plugin, intervals)
-                self._integrators[plugin, intervals] = made
-            return self._integrators[plugin, intervals]
+                made = make_integrator(self.symbolic("rhs"), sizes, intervals)
+                self._integrators[intervals] = made
+            return self._integrators[intervals]
 
     def _require(self, name: str) -> None:
         if not self.has(name):

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import ArtefactError, BallpassWarning, RequestError
+from ballpass.runtime.contract.extras import INSTALL_COMPILER
 from ballpass.runtime.contract.parameters import Numbers, Parameters, numbers_of, resolve_parameters
 from ballpass.runtime.native.compile import CompiledLibrary
 from ballpass.runtime.native.compilers import find_compiler
@@ -151,15 +152,22 @@ class LoadedModel(Functions):
             if sources not in self._drivers:
                 compiler = find_compiler(self._compiler) if self.has_stepper else None
                 if compiler is None:
-                    raise RequestError(
-                        "method stepper: it needs a C compiler and the kernels in the generated folder. Install gcc or "
-                        "clang, write the folder again, or take another method."
-                    )
+                    raise RequestError(self._without_stepper())
                 library = compile_driver(self.folder, self.manifest, compiler, sources)
                 self._drivers[sources] = kind(library, self.manifest)
             found = self._drivers[sources]
             assert isinstance(found, kind)
             return found
+
+    def _without_stepper(self) -> str:
+        """What to say where the stepper is asked for and cannot be had."""
+        needs = "This needs the project's own stepper:"
+        if not self.compiled:
+            return f"{needs} it is compiled, and no C compiler was found. {INSTALL_COMPILER}."
+        return (
+            f"{needs} the folder {self.folder} has no kernels for it. Write the folder again with `ballpass derive`, "
+            "or run the model with method cvodes, for samples."
+        )
 
     def numbers(self, parameters: Mapping[str, float] | None = None) -> Numbers:
         """Parameters with overrides, checked, and the derived constants that follow."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +31,7 @@ LOAD_POWERS = ("load.cubes", "load.ten_thirds", "load.outer_damage")
 SECTORS = 72
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # without slots: what is asked for some hundred times a run is kept
 class ReductionRows:
     """Layout of the rows of a model.
 
@@ -43,10 +44,15 @@ class ReductionRows:
     balls: tuple[str, ...]
     powers: tuple[str, ...]
 
-    @property
+    @cached_property
     def channels(self) -> tuple[str, ...]:
         """All channels in the driver's order."""
         return (*self.states, *self.balls, *self.powers)
+
+    @cached_property
+    def _columns(self) -> dict[tuple[str, str], int]:
+        named = ((kind, channel) for kind in ROWS for channel in self.channels)
+        return {entry: len(HEAD) + place for place, entry in enumerate(named)}
 
     @property
     def size(self) -> int:
@@ -73,7 +79,7 @@ class ReductionRows:
 
     def column(self, kind: str, channel: str) -> int:
         """Place of an entry of `ROWS` in a row."""
-        return len(HEAD) + ROWS.index(kind) * len(self.channels) + self.channels.index(channel)
+        return self._columns[kind, channel]
 
     def empty(self, count: int, start: ArrayLike, channels: Collection[str]) -> np.ndarray:
         """Rows of reductions of these channels that count from `start` on [s], shape (count, size)."""

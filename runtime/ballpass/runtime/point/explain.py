@@ -28,7 +28,6 @@ from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.choose_method import STIFF_RATIO, choose_method
-from ballpass.runtime.run.scales import Scales
 from ballpass.runtime.show.short import ShortRepr
 
 #: Instants of a turn that are searched for the lightest and the heaviest load.
@@ -293,7 +292,7 @@ def _method(model: LoadedModel, scales: tuple[TimeScale, ...], turn: float) -> t
         return "none", "the model has no states: its outputs follow from time alone"
     decay = max((s.decay for s in scales), default=0.0)
     frequency = max((s.frequency for s in scales), default=0.0)
-    name, reason = choose_method(model, "auto", Scales(magnitude=np.zeros(0), decay=decay, frequency=frequency))
+    name, reason = choose_method(model, "auto")
     if frequency > 0.0:
         ratio = decay / frequency
         if ratio > STIFF_RATIO:

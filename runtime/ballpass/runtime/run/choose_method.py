@@ -1,6 +1,6 @@
 """Which method integrates a run: the one asked for, or for ``auto`` the one that suits the model.
 
-In: a model, a name, the scales of a run.  Out: the name of a method, and the reason for it.
+In: a model, a name.  Out: the name of a method, and the reason for it.
 """
 
 from __future__ import annotations
@@ -8,15 +8,15 @@ from __future__ import annotations
 import warnings
 
 from ballpass.runtime.contract.errors import RequestError
+from ballpass.runtime.contract.extras import INSTALL_COMPILER
 from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.casadi_integrators import METHODS
 from ballpass.runtime.native.loaded_model import LoadedModel, NoKernelsWarning
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
-from ballpass.runtime.run.scales import Scales
 
-#: `auto` takes ``rosenbrock`` above this ratio of fastest decay to fastest natural frequency.  Measured on a press with
-#: four degrees of freedom and eight balls at rtol 1e-6: both take equal time at a ratio of 2, ``erk`` twice as long at
-#: 7, because its steps are bounded by 3.3 / decay while each of ``rosenbrock`` costs three of its steps.
+#: Linearly implicit steps suit above this ratio of fastest decay to fastest natural frequency.  Measured on a press
+#: with four degrees of freedom and eight balls at rtol 1e-6: explicit steps take the same time at a ratio of 2, twice
+#: as long at 7, because they are bounded by 3.3 / decay while a linearly implicit one costs three of them.
 STIFF_RATIO = 3.0
 
 
@@ -40,20 +40,11 @@ def stepper_method(asked: str) -> str:
 
 def method_names(model: LoadedModel) -> tuple[str, ...]:
     """Integration methods of a model, besides ``auto``."""
-    return (*(STEPPERS if model.has_stepper else ()), *_virtual_methods(model))
+    return (*(STEPPERS if model.has_stepper else ()), *(METHODS if model.has("rhs") else ()))
 
 
-def _virtual_methods(model: LoadedModel) -> tuple[str, ...]:
-    """CasADi's methods: all, where the model has a right-hand side."""
-    return tuple(METHODS) if model.has("rhs") else ()
-
-
-def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tuple[str, str]:
+def choose_method(model: LoadedModel, asked: str) -> tuple[str, str]:
     """Name of the method and the reason for it.
-
-    Parameters
-    ----------
-    scales : what the choice between CasADi's methods depends on; None where the stepper is there to be taken
 
     Raises
     ------
@@ -64,7 +55,6 @@ def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tupl
         return "stepper", "the fastest method that a compiler allows"
     if asked in STEPPERS and model.has_stepper:
         return asked, "asked for"
-    available = _virtual_methods(model)
     if asked == "auto" and model.compiled:
         reason = f" ({model.manifest.unfit})" if model.manifest.unfit else ""
         warnings.warn(
@@ -75,19 +65,18 @@ def choose_method(model: LoadedModel, asked: str, scales: Scales | None) -> tupl
             NoKernelsWarning,
             stacklevel=4,
         )
-    if asked == "auto" and scales is not None:
-        ratio = f"fastest decay {scales.decay:.3g} 1/s, fastest natural frequency {scales.frequency:.3g} rad/s"
-        name, why = ("rosenbrock", "stiff") if scales.stiffness > STIFF_RATIO else ("erk", "not stiff")
-        if name in available:
-            return name, f"{why}: {ratio}"
+    available = ("auto", *method_names(model))
+    if asked == "auto":
+        if "cvodes" in available:
+            return "cvodes", "the method that runs without the project's own stepper"
         raise RequestError("The model has no right-hand side to integrate. Generate it again with `ballpass derive`.")
     if asked in STEPPERS:
         missing = (
             "the generated folder has no kernels for it; write it again with `ballpass derive`"
             if model.compiled
-            else "it needs a C compiler, and none was found; install gcc or clang, or `pip install ziglang`"
+            else f"it needs a C compiler, and none was found. {INSTALL_COMPILER}"
         )
-        raise RequestError(f"method {asked}: {missing}. Or take one of {', '.join(('auto', *available))}.")
+        raise RequestError(f"method {asked}: {missing}. Or take one of {', '.join(available)}.")
     if asked not in available:
-        raise RequestError(unknown_name("method", asked, ("auto", *method_names(model))))
+        raise RequestError(unknown_name("method", asked, available))
     return asked, "asked for"

@@ -12,9 +12,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.run.scales import Scales
-
 #: Steps, accepted and rejected, that any run may take, a turn, and a second of the machine's time.
 STEPS_A_RUN = 20_000_000
 STEPS_A_TURN = 10_000_000
@@ -29,9 +26,6 @@ LEAST_PROGRESS = 0.01
 #: Steps of a run that others wait for: a member in lanes, which goes on alone behind them, and one of many trials.
 BRIEF_A_RUN = 1_000_000
 BRIEF_A_TURN = 100_000
-
-#: Step size times fastest decay at which an explicit method of order five becomes unstable [1].
-STABLE = 3.3
 
 
 def step_limit(duration: float, turn: float) -> int:
@@ -100,21 +94,3 @@ def allowance(duration: float, turn: float, begin: float = 0.0, taken: int = 0) 
     """What a run may take that has come to `begin` [s] in so many steps."""
     least = least_progress(duration, turn, LEAST_PROGRESS, STEPS_A_LOOK)
     return Allowance(left=max(step_limit(duration, turn) - taken, 1), least=least, time=begin)
-
-
-def refuse_crawl(method: str, scales: Scales, duration: float, turn: float) -> None:
-    """Refuse an explicit method that tells no steps where stability alone would make it take more than allowed.
-
-    Raises
-    ------
-    RequestError
-        With the number of steps, its reason and the methods to take instead.
-    """
-    needed, allowed = scales.decay * duration / STABLE, step_limit(duration, turn)
-    if needed > allowed:
-        raise RequestError(
-            f"method {method}: damping decays at up to {scales.decay:.3g} 1/s, which bounds the steps of an explicit "
-            f"method to {STABLE / scales.decay:.3g} s: some {needed:.2g} of them for this run, {allowed:.2g} are "
-            "allowed. Take method stepper or rosenbrock, made for stiff models, or a shorter run, and check the "
-            "damping coefficient and its unit."
-        )

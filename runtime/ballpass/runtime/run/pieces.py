@@ -1,10 +1,11 @@
-"""A run by CasADi's integrators: segment after segment, in pieces that end at samples.
+"""A run by CasADi's integrator: segment after segment, in pieces that end at samples.
 
 In: a `Trajectory` and an integrator.  Out: the same, filled.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 
 import numpy as np
@@ -95,16 +96,13 @@ def _segment(
         trajectory.x[k] = state
         k += 1
         trajectory.finished = k
-        # within a piece the samples lie evenly
-        for size in integrator.pieces(stop - k) if trajectory.even else [1] * (stop - k):
-            try:
-                fill(size)
-            except Interrupted:
-                if size == 1:
-                    raise
-                # a call that fails gives nothing: walk through it again, to keep the samples before its failure
-                for _ in range(size):
-                    fill(1)
+        # a multistep method starts with tiny steps: where samples lie evenly, one start for all
+        if trajectory.even and stop - k > 1:
+            # a call that fails gives nothing: its samples are walked through again, to keep those before the failure
+            with contextlib.suppress(Interrupted):
+                fill(stop - k)
+        for _ in range(stop - k):
+            fill(1)
     if right > now + near:
         go(right, 1)
     return state

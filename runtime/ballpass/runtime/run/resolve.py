@@ -18,7 +18,6 @@ from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.native.stepper import Family
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.choose_method import choose_method, stepper_method
-from ballpass.runtime.run.limits import refuse_crawl
 from ballpass.runtime.run.locating import Kinks, choose_kinks
 from ballpass.runtime.run.magnitudes import model_scales, stepper_magnitudes
 from ballpass.runtime.run.request import Request, asked_length, check_length, run_length, tolerance
@@ -167,15 +166,12 @@ def resolve(
             magnitude = stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn, begin)
     elif not model.states:
         method, reason = "none", "the model has no states: its outputs follow from time alone"
-    elif model.has_stepper and asked in ("auto", *STEPPERS):
-        method, reason = choose_method(model, asked, None)
-        magnitude = stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn, begin)
     else:
-        scales = model_scales(model, numbers, initial, looked_at, turn, begin)
-        method, reason = choose_method(model, asked, scales)
-        if method == "erk":
-            refuse_crawl(method, scales, duration, turn)
-        magnitude = scales.magnitude
+        method, reason = choose_method(model, asked)
+        if method in STEPPERS:
+            magnitude = stepper_magnitudes(model, model.stepper, numbers, initial, looked_at, turn, begin)
+        else:
+            magnitude = model_scales(model, numbers, initial, looked_at, turn, begin).magnitude
     return Run(
         model=model,
         numbers=numbers,

@@ -38,7 +38,7 @@ def explain(scene: options.SceneFile, set_: options.Settings = None, json_: opti
     with command(scene) as stages:
         stages("read")
         read, _, overrides = read_with_settings(scene, set_)
-        model = load_model(scene, stages, "erk", overrides=overrides)
+        model = load_model(scene, stages, "cvodes", overrides=overrides)
         from ballpass.derive.features import cost
 
         stages("counting operations")
