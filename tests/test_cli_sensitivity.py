@@ -12,7 +12,7 @@ from matplotlib.image import imread
 from typer.testing import CliRunner, Result
 
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 
 SCENE = Path(__file__).resolve().parent.parent / "scenes" / "punching_press_tangent.toml"
 SHORT = ["--cycles", "0.4", "--transient", "0", "--set", "bearing.clearance=-60 um"]
@@ -80,7 +80,7 @@ def test_a_disagreement_ends_with_exit_code_1_and_both_numbers(
 ) -> None:
     plain = QuantityRun.differentiate
 
-    def wrong(self: QuantityRun, *arguments: object, **more: object) -> Values:
+    def wrong(self: QuantityRun, *arguments: object, **more: object) -> EvaluatedQuantities:
         course = plain(self, *arguments, **more)  # type: ignore[arg-type]
         return replace(course, estimates=tuple(replace(item, slope=1.05 * item.slope) for item in course.estimates))
 

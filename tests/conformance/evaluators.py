@@ -12,7 +12,7 @@ import sympy as sp
 
 from ballpass.derive import derive
 from ballpass.derive.emit.kernel_headers import kernels_header
-from ballpass.derive.lowering.functions import Functions, lower
+from ballpass.derive.lowering.functions import LoweredFunctions, lower
 from ballpass.derive.scene.records import Scene
 from ballpass.derive.system import System
 from ballpass.derive.terms import TIME
@@ -62,7 +62,7 @@ class Evaluators:
     def __init__(self, scene: Scene, folder: Path) -> None:
         self.scene, self.folder = scene, folder
         self.system: System = derive(scene)
-        self.functions: Functions = lower(self.system)
+        self.functions: LoweredFunctions = lower(self.system)
 
     def points(self, count: int) -> list[Point]:
         """Random ones: balls that touch and balls that do not, gates open and shut, parameters off by two percent."""

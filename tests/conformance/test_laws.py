@@ -18,7 +18,7 @@ from parts import DAMPING, ROOT, press, shipped
 
 from ballpass.derive import SceneError, derive, generate
 from ballpass.derive.bearing.laws import LAWS
-from ballpass.derive.bearing.laws.contact import RAMP_ERROR, SMOOTHED_HERTZ_ERROR, Contact, Rest
+from ballpass.derive.bearing.laws.contact import RAMP_ERROR, SMOOTHED_HERTZ_ERROR, Contact, SmoothedRest
 from ballpass.derive.bearing.switching import Switching, find_switching
 from ballpass.derive.lowering.functions import lower
 from ballpass.derive.lowering.visitor import Visitor
@@ -53,7 +53,7 @@ def test_every_law_has_a_formula() -> None:
 def parts_of(law: str, *, contact: bool = False, rate: bool = False) -> tuple[sp.Expr, sp.Expr]:
     """Elastic and damping force of one ball, smoothed over the deflection, over the rate."""
     touch = Contact(stiffness=STIFFNESS, width=WIDTH if contact else None)
-    rest = Rest(width=RATE_WIDTH if rate else None)
+    rest = SmoothedRest(width=RATE_WIDTH if rate else None)
     return touch.force(DELTA), LAWS[law].force(DELTA, RATE, COEFFICIENT, touch, rest)
 
 

@@ -19,7 +19,7 @@ from ballpass.derive.emit.signature import source_key
 from ballpass.derive.reading.read import parse_override, read_scene, scene_from_text, with_values
 from ballpass.derive.scene.bearing_records import EquivalentMass, GivenContact, HertzContact
 from ballpass.derive.scene.errors import SceneError
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.records import HarmonicLoad, Scene, TableLoad
 from ballpass.derive.scene.units import parse_quantity
 
@@ -30,9 +30,9 @@ def values(scene: Scene) -> dict[str, float]:
     return {quantity.path: quantity.value for quantity in scene.quantities}
 
 
-def quantities_in(record: object) -> list[Quantity]:
+def quantities_in(record: object) -> list[SceneNumber]:
     """All quantities of a record, found without the code under test."""
-    if isinstance(record, Quantity):
+    if isinstance(record, SceneNumber):
         return [record]
     if isinstance(record, tuple):
         return [quantity for item in record for quantity in quantities_in(item)]

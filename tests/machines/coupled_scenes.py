@@ -13,7 +13,7 @@ from ballpass.derive import derive
 from ballpass.derive.lowering.functions import _Lowering
 from ballpass.derive.mechanism.forces import PointForce
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.derive.scene.quantity import Quantity, Vector
+from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.records import NamedPoint, Scene
 from ballpass.derive.variables import Input
 
@@ -167,7 +167,7 @@ def linkage_text(machine: Machine) -> str:
     """The mechanism of a linkage built as records, as a scene file has it."""
     mechanism, values = machine.mechanism, machine.values
 
-    def amount(quantity: Quantity) -> str:
+    def amount(quantity: SceneNumber) -> str:
         return f'"{float(values[quantity.path])!r} {"" if quantity.unit == "1" else quantity.unit}"'
 
     def vector(place: Vector) -> str:

@@ -10,12 +10,12 @@ from typing import Any
 import sympy as sp
 
 from ballpass.derive.drive.constant_speed import ConstantSpeed
-from ballpass.derive.mechanism.forces import BodyTorque, Constant, Forces, PointForce, Windows, derive_forces
+from ballpass.derive.mechanism.forces import BodyTorque, ConstantForce, Forces, PointForce, Windows, derive_forces
 from ballpass.derive.mechanism.forces.windows import Window
 from ballpass.derive.mechanism.linkage import Linkage, derive_linkage
 from ballpass.derive.mechanism.numeric import Evaluator
 from ballpass.derive.mechanism.reactions import Reactions, derive_reactions
-from ballpass.derive.scene.quantity import Quantity, Vector
+from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.records import Body, Driver, Force, Joint, Mechanism, NamedPoint
 from ballpass.derive.variables import phase
 
@@ -42,9 +42,9 @@ class Numbers:
 
     values: dict[str, float] = field(default_factory=dict)
 
-    def quantity(self, path: str, value: float, unit: str) -> Quantity:
+    def quantity(self, path: str, value: float, unit: str) -> SceneNumber:
         self.values[path] = value
-        return Quantity(path=path, value=value, unit=unit, description=path, latex="q")
+        return SceneNumber(path=path, value=value, unit=unit, description=path, latex="q")
 
     def vector(self, path: str, place: Place, unit: str) -> Vector:
         if place is None:
@@ -159,7 +159,7 @@ def build(
                     force=numbers.vector(f"{root}.forces.{name}.force", force, "N"),
                     direction=None,
                 ),
-                law=Constant(),
+                law=ConstantForce(),
             )
             for name, (body, point, force) in (forces or {}).items()
         )
@@ -168,7 +168,7 @@ def build(
                 name=name,
                 table="torques",
                 pathway=BodyTorque(body=body, torque=numbers.quantity(f"{root}.torques.{name}.torque", torque, "N*m")),
-                law=Constant(),
+                law=ConstantForce(),
             )
             for name, (body, torque) in (torques or {}).items()
         ),

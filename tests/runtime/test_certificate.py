@@ -11,7 +11,7 @@ import pytest
 
 from ballpass.runtime import Model, RequestError, SimulationError
 from ballpass.runtime.certify.certificate import Verdict, by_differences, compare
-from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 
 PRELOADED = {"bearing.clearance": -60e-6, "mechanism.driver.start_angle": 4.0}
 
@@ -168,7 +168,7 @@ def test_a_right_derivative_is_verified_and_a_wrong_one_disagrees(
     assert right.pairs[0].check.verdict is Verdict.VERIFIED
     plain = QuantityRun.differentiate
 
-    def wrong(self: QuantityRun, *arguments: object, **more: object) -> Values:
+    def wrong(self: QuantityRun, *arguments: object, **more: object) -> EvaluatedQuantities:
         course = plain(self, *arguments, **more)  # type: ignore[arg-type]
         return replace(course, estimates=tuple(replace(item, slope=1.01 * item.slope) for item in course.estimates))
 

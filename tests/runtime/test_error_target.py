@@ -13,7 +13,7 @@ from ballpass.runtime import Model, RequestError
 from ballpass.runtime.certify.error_target import LADDER, TargetMissed, meet_target
 from ballpass.runtime.certify.method_choice import MethodChoice, compared_quantities, stepper_run
 from ballpass.runtime.certify.trade import REFERENCE, perturbed
-from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.run.accuracy import Accuracy
 from ballpass.runtime.run.request import Request
@@ -137,7 +137,7 @@ def test_what_is_added_is_a_few_runs(make_model: Callable[..., Model], monkeypat
     """The chosen run, a tighter one, and one of both from a moved start."""
     runs: list[MethodChoice] = []
 
-    def counted(way: MethodChoice, quantities: QuantityRun, run: Run, *rest: Any) -> Values:
+    def counted(way: MethodChoice, quantities: QuantityRun, run: Run, *rest: Any) -> EvaluatedQuantities:
         runs.append(way)
         return measure(way, quantities, run, *rest)
 

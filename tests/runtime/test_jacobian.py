@@ -19,7 +19,7 @@ from ballpass.runtime.certify.differences import richardson
 from ballpass.runtime.certify.jacobian_check import _quotient, checked_jacobian
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.point import slopes
-from ballpass.runtime.point.jacobian import Directions, directions_of, output_tangents, quantity_values
+from ballpass.runtime.point.jacobian import JacobianDirections, directions_of, output_tangents, quantity_values
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -163,7 +163,7 @@ def test_tangents_of_many_samples_are_the_matrix_along_each_direction(press: Mod
     of, names = ["ball.force", "reaction.A.*", "rhs"], ["bearing.clearance", "mechanism.driver.speed", "inner.y"]
     numbers, times = press.numbers(), np.array([0.0805, 0.0811, 0.0822])
     states = np.array([loaded_state(press, t) for t in times])
-    moves: list[Directions] = [directions_of(press, numbers, names, t) for t in times]
+    moves: list[JacobianDirections] = [directions_of(press, numbers, names, t) for t in times]
     found = output_tangents(
         press,
         numbers,

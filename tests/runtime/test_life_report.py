@@ -15,7 +15,7 @@ from ballpass.runtime.ask.wear import LoadSamples, wear_field
 from ballpass.runtime.contract import DutyInfo, LubricationInfo
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.ratings import groove_slip, life
-from ballpass.runtime.ratings.of_bearing import Contact, contacts_of
+from ballpass.runtime.ratings.of_bearing import RacewayContact, contacts_of
 from ballpass.runtime.ratings.readings import READINGS
 from ballpass.runtime.ratings.wear import depth_of_pass
 from ballpass.runtime.run.request import Request
@@ -122,7 +122,7 @@ def test_a_bearing_that_swings_has_no_life_and_the_others_have(make_model: Calla
         model.sensitivity(of="pin.life", wrt="mechanism.gravity", cycles=2, transient=1)
 
 
-def contact(model: Model) -> Contact:
+def contact(model: Model) -> RacewayContact:
     return contacts_of(model.manifest.bearings[0], model.numbers({}).values)[0]
 
 

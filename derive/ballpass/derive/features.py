@@ -15,7 +15,7 @@ from ballpass.derive.lowering.functions import lower, operations
 from ballpass.derive.outputs import OUTPUTS
 from ballpass.derive.scene.bearing_records import Bearing, Damping, EquivalentMass, InitialState, InnerRing
 from ballpass.derive.scene.errors import SceneError
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.records import FRAME, ConstantLoad, Load, Mechanism, Scene, Shaft
 from ballpass.derive.system import derive
 
@@ -243,7 +243,7 @@ def _without_mechanism(scene: Scene, mechanism: Mechanism) -> Scene | None:
         assert inner is not None  # loaded one-way
         if isinstance(inner.mass, EquivalentMass):
             path = f"{bearing.path}.inner_ring.mass"
-            number = Quantity(path=path, value=1.0, unit="kg", description="Mass of the inner ring", latex="m_i")
+            number = SceneNumber(path=path, value=1.0, unit="kg", description="Mass of the inner ring", latex="m_i")
             inner = InnerRing(mass=number, damping=inner.damping)
         bearings.append(replace(bearing, inner=inner, joint=None, share=None))
     return replace(
@@ -261,8 +261,10 @@ def _one_way(scene: Scene, bearing: Bearing) -> Scene | None:
     joint = mechanism.joint(mechanism.driver.joint)
     if len(scene.bearings) > 1 or bearing.joint != joint.name or bearing.inner_body != joint.other(FRAME):
         return None
-    share = Quantity(path=f"{bearing.path}.share", value=1.0, unit="1", description="Share of the reaction", latex="s")
-    mass = Quantity(
+    share = SceneNumber(
+        path=f"{bearing.path}.share", value=1.0, unit="1", description="Share of the reaction", latex="s"
+    )
+    mass = SceneNumber(
         path=f"{bearing.path}.inner_ring.mass", value=1.0, unit="kg", description="Mass of the inner ring", latex="m_i"
     )
     loaded = replace(

@@ -13,7 +13,7 @@ import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
 from ballpass.derive.bearing.stiffness import ellipse_constants
-from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.kinematics import Pair, cross, dot, quarter_turn, scale, subtract
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import CENTER_OF_MASS, Linkage
@@ -63,7 +63,7 @@ def power_outputs(
     linkage: Linkage,
     reactions: Reactions,
     *,
-    loads: Mapping[str, Sequence[Load]],
+    loads: Mapping[str, Sequence[AppliedLoad]],
     inertias: Sequence[Inertia],
     weights: Sequence[Effort],
 ) -> list[Output]:

@@ -12,7 +12,7 @@ from enum import Enum
 
 import sympy as sp
 
-from ballpass.derive.scene.quantity import Quantity, Vector
+from ballpass.derive.scene.quantity import SceneNumber, Vector
 
 #: Time since the reference time of the phases [s] (see `System.inputs`).
 TIME = sp.Symbol("t", real=True)
@@ -67,7 +67,7 @@ class Names:
         )
 
 
-def symbol_of(quantity: Quantity) -> sp.Symbol:
+def symbol_of(quantity: SceneNumber) -> sp.Symbol:
     """Symbol of a scene quantity: its path, so that two quantities can never share one."""
     return sp.Symbol(quantity.path, real=True)
 

@@ -17,8 +17,8 @@ import sympy as sp
 from ballpass.derive.bearing.cage import Cage
 from ballpass.derive.bearing.effects import EFFECTS, GenericBall
 from ballpass.derive.bearing.laws import LAWS
-from ballpass.derive.bearing.laws.contact import Contact, Rest
-from ballpass.derive.bearing.own_terms import Axes, OwnTerms, own_terms
+from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
+from ballpass.derive.bearing.own_terms import AngleAxes, OwnTerms, own_terms
 from ballpass.derive.bearing.stiffness import stiffness_constants
 from ballpass.derive.bearing.switching import LawSmoothness, Switching, find_switching, smoothness_of
 from ballpass.derive.scene.bearing_records import Bearing
@@ -160,7 +160,7 @@ def _ball(
         return None if quantity is None else symbol_of(quantity)  # type: ignore[arg-type]
 
     contact = Contact(stiffness=names.constant("k_b"), width=optional(bearing.contact.smoothing))
-    rest = Rest(width=optional(bearing.damping.smoothing))
+    rest = SmoothedRest(width=optional(bearing.damping.smoothing))
     delta, delta_rate = names.variable("ball.deflection"), names.variable("ball.deflection_rate")
     elastic, damping, force = (names.variable(f"ball.{n}") for n in ("elastic_force", "damping_force", "force"))
     parts = [contact.force(delta)]
@@ -220,9 +220,9 @@ def _own_terms(bearing: Bearing, names: Names, cage: Cage, cos: sp.Symbol, sin: 
         return None
     still, on_inner, from_first = (sp.Function(n)(TIME) for n in ("theta", "theta_inner", "theta_first"))
     axes = [
-        Axes(angle=still),
-        Axes(angle=on_inner, turned=cage.angle - cage.in_inner, name="inner", words=" as the inner ring sees it"),
-        Axes(angle=from_first, turned=cage.angle, name="first", words=" from ball 1"),
+        AngleAxes(angle=still),
+        AngleAxes(angle=on_inner, turned=cage.angle - cage.in_inner, name="inner", words=" as the inner ring sees it"),
+        AngleAxes(angle=from_first, turned=cage.angle, name="first", words=" from ball 1"),
     ]
     assert cage.in_outer == cage.angle  # effects are refused where the outer ring turns
     ball = GenericBall(balls=bearing.balls, on_outer=still, on_inner=on_inner, from_first=from_first, spin=cage.spin)

@@ -28,7 +28,7 @@ class OwnTerms:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Axes:
+class AngleAxes:
     """Axes in which a ball's angle is measured.
 
     Attributes
@@ -45,7 +45,7 @@ class Axes:
 
 
 def own_terms(
-    taken: sp.Expr, several: Sequence[Axes], cos: sp.Symbol, sin: sp.Symbol, speed: sp.Symbol, names: Names
+    taken: sp.Expr, several: Sequence[AngleAxes], cos: sp.Symbol, sin: sp.Symbol, speed: sp.Symbol, names: Names
 ) -> OwnTerms:
     """Terms of a ball with angles in several axes; its rate in those that stand still is `speed` [rad/s], constant."""
     steps = [taken]
@@ -77,7 +77,7 @@ def own_terms(
 class _Multiples:
     """Cosines and sines of multiples of a ball's angle, defined by each other."""
 
-    def __init__(self, axes: Axes, cos: sp.Symbol, sin: sp.Symbol, names: Names) -> None:
+    def __init__(self, axes: AngleAxes, cos: sp.Symbol, sin: sp.Symbol, names: Names) -> None:
         self.axes, self._direction, self._names = axes, (cos, sin), names
         self._known: dict[int, tuple[sp.Expr, sp.Expr]] = {0: (sp.S.One, sp.S.Zero)}
         self.definitions: list[Definition] = []

@@ -14,7 +14,7 @@ import sympy as sp
 from ballpass.derive.drive.constant_speed import ConstantSpeed
 from ballpass.derive.mechanism.reactions import Reactions
 from ballpass.derive.scene.bearing_records import Bearing
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.records import (
     FRAME,
     ConstantLoad,
@@ -195,7 +195,7 @@ def _harmonic(load: Load, law: HarmonicLoad) -> RingLoad:
         latex=r"\Omega",
     )
 
-    def wave(ending: str, at_start: Quantity, words: str) -> tuple[Input, Definition]:
+    def wave(ending: str, at_start: SceneNumber, words: str) -> tuple[Input, Definition]:
         axis = ending.removeprefix(".")
         turning = phase(
             f"{load.label}{ending}",
@@ -241,7 +241,7 @@ def _over_time(load: Load, law: TableLoad) -> RingLoad:
     inputs: list[Input] = []
     times = tuple(q.path for q in law.rows)
 
-    def column(axis: str, values: tuple[Quantity, ...]) -> sp.Expr:
+    def column(axis: str, values: tuple[SceneNumber, ...]) -> sp.Expr:
         names = tuple(q.path for q in values)
         value = Input(
             name=f"{load.label}.{axis}",

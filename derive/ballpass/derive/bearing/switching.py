@@ -70,7 +70,7 @@ class Switching:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Place:
+class _SwitchPlace:
     order: float  # power of the distance with which the branches differ
     ends_above: bool
     ends_below: bool
@@ -124,10 +124,10 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
     TypeError
         A condition is not of the form deflection or rate against a constant of the run.
     """
-    found: dict[tuple[bool, sp.Expr], list[_Place]] = {}
-    held: list[dict[sp.Basic, tuple[tuple[bool, sp.Expr], _Place]]] = []
+    found: dict[tuple[bool, sp.Expr], list[_SwitchPlace]] = {}
+    held: list[dict[sp.Basic, tuple[tuple[bool, sp.Expr], _SwitchPlace]]] = []
     for part in parts:
-        borders: dict[sp.Basic, tuple[tuple[bool, sp.Expr], _Place]] = {}
+        borders: dict[sp.Basic, tuple[tuple[bool, sp.Expr], _SwitchPlace]] = {}
         for condition in sp.ordered(part.atoms(Relational)):
             of_rate, start = _border(condition, deflection, rate)
             decides, other = (rate, deflection) if of_rate else (deflection, rate)
@@ -162,7 +162,7 @@ def find_switching(parts: Sequence[sp.Expr], deflection: sp.Symbol, rate: sp.Sym
     return Switching(switches=switches, force=force)
 
 
-def _held(function: sp.Expr, border: sp.Symbol, place: _Place) -> sp.logic.boolalg.Boolean:
+def _held(function: sp.Expr, border: sp.Symbol, place: _SwitchPlace) -> sp.logic.boolalg.Boolean:
     """The condition with its sides held, as far as the laws on them can be continued."""
     held, itself = sp.StrictGreaterThan(function, border), sp.StrictGreaterThan(function, 0)
     if place.ends_above:
@@ -184,7 +184,7 @@ def _border(condition: Relational, deflection: sp.Symbol, rate: sp.Symbol) -> tu
 
 def _look(
     part: sp.Expr, condition: Relational, decides: sp.Symbol, start: sp.Expr, other: sp.Symbol, *, paired: bool
-) -> _Place:
+) -> _SwitchPlace:
     """How the two branches of a condition meet, tried with exact numbers of about one for everything else.
 
     Parameters
@@ -208,7 +208,7 @@ def _look(
         least = min(least, _order(difference, decides, meets))
         above = above or not _is_real(branches[0], decides, meets)
         below = below or not _is_real(branches[1], decides, meets)
-    return _Place(order=least, ends_above=above, ends_below=below)
+    return _SwitchPlace(order=least, ends_above=above, ends_below=below)
 
 
 def _beside(expression: sp.Expr, decides: sp.Symbol, meets: sp.Expr, side: int) -> list[mpmath.mpc]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from ballpass.derive.bearing.equations import BearingModel
-from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.kinematics import ZERO, Motion, add, body_point, cross, quarter_turn, scale, subtract
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import Linkage
@@ -39,7 +39,7 @@ class Coupled:
     inertias: tuple[Inertia, ...]
     efforts: tuple[Effort, ...]
     weights: tuple[Effort, ...]
-    loads: tuple[Load, ...]
+    loads: tuple[AppliedLoad, ...]
 
 
 def ring(coordinates: tuple[Coordinate, ...], first: int) -> Motion:
@@ -107,7 +107,7 @@ def couple(bearing: Bearing, model: BearingModel, mechanism: Mechanism, linkage:
         efforts=tuple(efforts),
         weights=tuple(weights),
         loads=tuple(
-            Load(body=body, point=point, force=push, torque=torque)
+            AppliedLoad(body=body, point=point, force=push, torque=torque)
             for body, point, push, torque in zip(bodies, points, forces, torques, strict=True)
             if body != FRAME
         ),

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from ballpass.derive.emit.signature import catalogue_info, duty_info, info_of, lubrication_info, signature, versions
-from ballpass.derive.lowering.functions import Functions, operations
+from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
 from ballpass.derive.reading.usual import usual_ranges
 from ballpass.derive.reading.values import value_bounds, value_relations
@@ -17,7 +17,9 @@ from ballpass.derive.variables import Output
 from ballpass.runtime import contract as mf
 
 
-def describe(system: System, functions: Functions, source: str, files: tuple[tuple[str, str], ...]) -> mf.Manifest:
+def describe(
+    system: System, functions: LoweredFunctions, source: str, files: tuple[tuple[str, str], ...]
+) -> mf.Manifest:
     """Manifest of a model whose files have these digests; `source` is the digest of the scene file."""
     scene = system.scene
     bounds = value_bounds(scene)

@@ -32,13 +32,13 @@ from ballpass.derive.emit.describe import describe
 from ballpass.derive.emit.equations import equations
 from ballpass.derive.emit.kernel_headers import ensemble_header, kernels_header, switches_header, tangents_header
 from ballpass.derive.emit.methods_header import methods_header
-from ballpass.derive.lowering.functions import Functions
+from ballpass.derive.lowering.functions import LoweredFunctions
 from ballpass.derive.lowering.jacobians import DERIVATIVES, Described
 from ballpass.derive.system import System
 from ballpass.runtime import contract as mf
 
 
-def write_folder(folder: Path, system: System, functions: Functions, source: str) -> None:
+def write_folder(folder: Path, system: System, functions: LoweredFunctions, source: str) -> None:
     """Write all files of a generated folder into an empty one; `source` goes into the manifest."""
     _write_c(folder, "model", functions.functions)
     _write_c(folder, "equations", functions.equations)
@@ -55,7 +55,7 @@ def write_folder(folder: Path, system: System, functions: Functions, source: str
     mf.write(folder, describe(system, functions, source, files))
 
 
-def _headers(system: System, functions: Functions) -> dict[str, str]:
+def _headers(system: System, functions: LoweredFunctions) -> dict[str, str]:
     """Texts of the headers for the project's own stepper, by name; none where it does not take the model."""
     kernels = functions.kernels
     if kernels is None:

@@ -30,7 +30,7 @@ from ballpass.runtime.contract.folders import locked, replace_files
 from ballpass.runtime.show.progress import shown
 
 if TYPE_CHECKING:
-    from ballpass.derive.lowering.functions import Functions
+    from ballpass.derive.lowering.functions import LoweredFunctions
     from ballpass.derive.scene.records import Scene
     from ballpass.derive.system import System
 
@@ -56,7 +56,7 @@ GENERATED = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Check:
+class FolderCheck:
     """Result of comparing a folder with what its scene derives today; `stale` names the files that differ."""
 
     folder: Path
@@ -120,7 +120,7 @@ def generate(
     return folder
 
 
-def check(scene: str | Path | Scene, out: str | Path | None = None) -> Check:
+def check(scene: str | Path | Scene, out: str | Path | None = None) -> FolderCheck:
     """Derive a scene afresh and compare with the folder, byte for byte; writes nothing to it.
 
     A file that is not there, as in a clean checkout, is compared by the digest that the folder's manifest gives it.
@@ -144,7 +144,7 @@ def check(scene: str | Path | Scene, out: str | Path | None = None) -> Check:
         write_folder(Path(made), system, functions, source)
         fresh = _digests(Path(made))
     stale = sorted(name for name in fresh.keys() | present.keys() if fresh.get(name) != present.get(name))
-    return Check(folder=folder, stale=tuple(stale))
+    return FolderCheck(folder=folder, stale=tuple(stale))
 
 
 def _read(scene: str | Path | Scene) -> tuple[Scene, str]:
@@ -156,7 +156,7 @@ def _read(scene: str | Path | Scene) -> tuple[Scene, str]:
     return read_scene(scene), source_key(Path(scene))
 
 
-def _derive_and_lower(scene: Scene, say: Callable[[str], None]) -> tuple[System, Functions]:
+def _derive_and_lower(scene: Scene, say: Callable[[str], None]) -> tuple[System, LoweredFunctions]:
     from ballpass.derive.lowering.functions import lower
     from ballpass.derive.system import derive
 

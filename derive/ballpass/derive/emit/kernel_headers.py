@@ -20,7 +20,7 @@ import sympy as sp
 
 from ballpass.derive.emit.c_printer import print_array, print_function
 from ballpass.derive.lowering.ball_kernels import CONTACT, RELATIVE, SUMS, BallKernels
-from ballpass.derive.lowering.functions import Functions, operations
+from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.lowering.kernels import Kernel, Kernels, only_deflections
 from ballpass.derive.system import System
 
@@ -43,7 +43,7 @@ _OF_MEMBERS = (
 )
 
 
-def kernels_header(system: System, functions: Functions, kernels: Kernels) -> str:
+def kernels_header(system: System, functions: LoweredFunctions, kernels: Kernels) -> str:
     """Text of kernels.h."""
     n = len(system.coordinates)
     count = len(kernels.bearings)

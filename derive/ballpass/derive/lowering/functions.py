@@ -37,7 +37,7 @@ Balls = dict[str, list[Visitor]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Constant:
+class DerivedConstant:
     """Entry of the vector c: a named constant of the system, or a subexpression of parameters (name ``h1``, ``h2``
     ...)."""
 
@@ -48,14 +48,14 @@ class Constant:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Functions(ShortRepr):
+class LoweredFunctions(ShortRepr):
     """Named functions in the order they are written, with a line for people each.
 
     `equations` and `jacobians` go to files of their own, read and compiled when one of them is first asked for: the
     stepper has the right-hand side in its kernels.  `groups` says which quantities are differentiated.
     """
 
-    constants: tuple[Constant, ...]
+    constants: tuple[DerivedConstant, ...]
     functions: tuple[Described, ...]
     equations: tuple[Described, ...]
     jacobians: tuple[Described, ...]
@@ -72,7 +72,7 @@ class Functions(ShortRepr):
 
 def lower(
     system: System, *, extra: Mapping[str, Mapping[str, sp.Expr]] | None = None, derivatives: bool = True
-) -> Functions:
+) -> LoweredFunctions:
     """Lower a system.
 
     Parameters
@@ -135,7 +135,7 @@ class _Lowering:
 
     # the functions
 
-    def functions(self, extra: Mapping[str, Mapping[str, sp.Expr]], *, derivatives: bool) -> Functions:
+    def functions(self, extra: Mapping[str, Mapping[str, sp.Expr]], *, derivatives: bool) -> LoweredFunctions:
         system, definitions = self.system, self._definitions
         bodies: list[tuple[str, dict[str, ca.SX], str]] = []
         balls = self._balls(self.visit)
@@ -205,11 +205,14 @@ class _Lowering:
         rhs = bodies[0][1]["xdot"] if system.coordinates else None
         groups, jacobians = self._jacobians(rhs, arguments) if derivatives else ([], [])
         named = [
-            Constant(name=d.symbol.name, unit=d.unit, description=d.description, latex=d.latex)
+            DerivedConstant(name=d.symbol.name, unit=d.unit, description=d.description, latex=d.latex)
             for d in system.constants
         ]
-        found = [Constant(name=f"h{k + 1}", unit="", description=str(e), latex="") for k, e in enumerate(self._hoisted)]
-        return Functions(
+        found = [
+            DerivedConstant(name=f"h{k + 1}", unit="", description=str(e), latex="")
+            for k, e in enumerate(self._hoisted)
+        ]
+        return LoweredFunctions(
             constants=(*named, *found),
             functions=tuple(made),
             equations=tuple(equations),

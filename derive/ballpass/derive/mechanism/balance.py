@@ -61,7 +61,7 @@ class Guide:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Load:
+class AppliedLoad:
     """A force [N] in the frame's axes on a point [m] in body axes, or a torque [N*m], that acts on a moving body."""
 
     body: str
@@ -71,7 +71,7 @@ class Load:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contact:
+class JointAction:
     """What one joint does to the bodies it joins.
 
     `along` holds the unknown force components with their directions.  The force acts on each body at `point` of that
@@ -112,7 +112,7 @@ class Balance:
         poses: Mapping[str, Pose],
         driver: Joint,
         guides: Mapping[str, Guide],
-        loads: Sequence[Load],
+        loads: Sequence[AppliedLoad],
         moments: frozenset[str],
     ) -> None:
         self._mechanism = mechanism
@@ -122,20 +122,20 @@ class Balance:
         self._without_moment = [g.slider for name, g in guides.items() if g.fixed and name not in moments]
         ordered = [j for j in mechanism.joints if j is not driver] + [driver]
         self.contacts = {joint.name: self._contact(joint) for joint in ordered}
-        self._solved: list[Contact] = []
+        self._solved: list[JointAction] = []
 
-    def _contact(self, joint: Joint) -> Contact:
+    def _contact(self, joint: Joint) -> JointAction:
         first, second = (self.point(joint, body) for body in joint.bodies)
         guide = self._guides.get(joint.name)
         prefix = f"reaction.{joint.name}"
         if guide is None:
             x, y = sp.symbols((f"{prefix}.x", f"{prefix}.y"), real=True)
             along: tuple[tuple[sp.Symbol, Pair], ...] = ((x, (sp.S.One, sp.S.Zero)), (y, (sp.S.Zero, sp.S.One)))
-            return Contact(joint=joint, along=along, moment=None, points=(first, second), shifts=(ZERO, ZERO))
+            return JointAction(joint=joint, along=along, moment=None, points=(first, second), shifts=(ZERO, ZERO))
         # The force acts where points[1] is: on bodies[0] that place moves along the guide.
         travel = guide.travel if guide.slider == joint.bodies[1] else -guide.travel
         moment = None if guide.slider in self._without_moment else sp.Symbol(f"{prefix}.moment", real=True)
-        return Contact(
+        return JointAction(
             joint=joint,
             along=((sp.Symbol(f"{prefix}.normal", real=True), guide.normal),),
             moment=moment,
@@ -158,7 +158,7 @@ class Balance:
     def _arm(self, body: str, point: Pair, about: Pair) -> Pair:
         return self._poses[body].rotate(subtract(point, about))
 
-    def contact_arm(self, contact: Contact, body: str, about: Pair) -> Pair:
+    def contact_arm(self, contact: JointAction, body: str, about: Pair) -> Pair:
         """From a body point to where a joint's force acts on the body, in the frame's axes [m]."""
         side = contact.joint.bodies.index(body)
         return add(self._arm(body, contact.points[side], about), contact.shifts[side])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.kinematics import ZERO
 from ballpass.derive.mechanism.linear_forms import Effort, Inertia
 from ballpass.derive.mechanism.linkage import Linkage
@@ -15,7 +15,7 @@ from ballpass.derive.scene.records import Mechanism
 from ballpass.derive.terms import components, symbol_of
 
 
-def work_of(loads: Iterable[Load], linkage: Linkage) -> tuple[Effort, ...]:
+def work_of(loads: Iterable[AppliedLoad], linkage: Linkage) -> tuple[Effort, ...]:
     """Forces and torques on bodies, with the rates along which they work."""
     efforts: list[Effort] = []
     for load in loads:
@@ -36,10 +36,12 @@ def work_of_drive(linkage: Linkage) -> tuple[tuple[Effort, ...], tuple[Inertia, 
     return (Effort(amount=drive.torque, rate=drive.speed),), (wheel,)
 
 
-def loads_of_drive(linkage: Linkage) -> tuple[Load, ...]:
+def loads_of_drive(linkage: Linkage) -> tuple[AppliedLoad, ...]:
     """What a flywheel does to the driven body, besides the torque of the drive."""
     drive = linkage.drive
-    return (Load(body=linkage.driven, torque=-drive.flywheel * drive.acceleration),) if drive.flywheel != 0 else ()
+    return (
+        (AppliedLoad(body=linkage.driven, torque=-drive.flywheel * drive.acceleration),) if drive.flywheel != 0 else ()
+    )
 
 
 def inertia_of(mechanism: Mechanism, linkage: Linkage) -> tuple[tuple[Inertia, ...], tuple[Effort, ...]]:

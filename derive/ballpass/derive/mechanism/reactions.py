@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 import sympy as sp
 
-from ballpass.derive.mechanism.balance import DRIVE_TORQUE, Balance, Guide, Load
+from ballpass.derive.mechanism.balance import DRIVE_TORQUE, AppliedLoad, Balance, Guide
 from ballpass.derive.mechanism.kinematics import Ledger, Pair, joint_point
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.errors import Fault, LinkageError
@@ -50,7 +50,7 @@ class Reactions:
 
 
 def derive_reactions(
-    mechanism: Mechanism, linkage: Linkage, loads: Sequence[Load], moments: frozenset[str]
+    mechanism: Mechanism, linkage: Linkage, loads: Sequence[AppliedLoad], moments: frozenset[str]
 ) -> Reactions:
     """Derive A r = b and its solution.
 

@@ -27,7 +27,7 @@ from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import Fault, SceneError
 from ballpass.derive.scene.file_columns import with_columns
 from ballpass.derive.scene.read_keys import keys_of, read_keys, read_record
-from ballpass.derive.scene.records import OUTPUTS, Load, Mechanism, Run, Scene, quantities_of
+from ballpass.derive.scene.records import OUTPUTS, Load, Mechanism, RunSettings, Scene, quantities_of
 from ballpass.derive.scene.table import Collector, Table, listing
 from ballpass.derive.scene.toml_lines import deep_key, index_lines
 from ballpass.derive.scene.units import show
@@ -232,10 +232,10 @@ def _read(root: Table, name: str) -> Scene:
         return replace(scene, duty=read_duty(root.table("duty"), scene)) if root.has("duty") else scene
 
 
-def _read_run(table: Table) -> tuple[Run, tuple[str, ...]]:
+def _read_run(table: Table) -> tuple[RunSettings, tuple[str, ...]]:
     """Length, samples and method of a run, and the names of its outputs."""
     with table:
-        run = read_record(Run, table)
+        run = read_record(RunSettings, table)
         if run.cycles is not None and 0.0 < run.cycles <= run.transient_cycles:
             table.fault(
                 "transient_cycles",

@@ -27,7 +27,7 @@ from ballpass.derive.scene.bearing_records import (
     OuterRing,
 )
 from ballpass.derive.scene.keys import ChoiceKey, PairKey
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import Either, keys_of, read_keys, read_record
 from ballpass.derive.scene.records import FRAME, Mechanism, Shaft
 from ballpass.derive.scene.table import Table, listing, suggest
@@ -107,7 +107,7 @@ def read_bearing(table: Table, mechanism: Mechanism | None, driven: str | None, 
 
 def _read_place(
     table: Table, mechanism: Mechanism | None, driven: str | None, coupling: str
-) -> tuple[str | None, Quantity | None]:
+) -> tuple[str | None, SceneNumber | None]:
     if mechanism is None:
         table.refuse(
             ("joint", "share"),

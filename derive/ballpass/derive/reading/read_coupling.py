@@ -11,7 +11,7 @@ from typing import Literal
 
 from ballpass.derive.scene.bearing_records import Bearing, InnerRing
 from ballpass.derive.scene.keys import TextKey
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import keys_of
 from ballpass.derive.scene.records import FRAME, Mechanism
 from ballpass.derive.scene.table import Table, listing, suggest
@@ -49,7 +49,7 @@ def read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-way
     return "two-way" if coupling == "two-way" else "one-way"
 
 
-def read_count(table: Table, coupling: str) -> Quantity | None:
+def read_count(table: Table, coupling: str) -> SceneNumber | None:
     """How many bearings stand side by side in a joint with play."""
     if coupling == "one-way":
         table.refuse(

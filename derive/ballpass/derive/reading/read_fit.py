@@ -11,7 +11,7 @@ from typing import Any
 
 from ballpass.derive.scene.bearing_records import Catalogue
 from ballpass.derive.scene.designations import bearing_types
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import keys_of, not_negative, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.runtime.ratings.mounted_clearance import inner_growth, outer_shrinkage, thermal_reduction
@@ -54,8 +54,8 @@ class Fit:
 
 
 def mounted(
-    table: Table, catalogue: Catalogue | None, clearance: Quantity, ball_diameter: float, pitch_diameter: float
-) -> tuple[Quantity, Catalogue | None]:
+    table: Table, catalogue: Catalogue | None, clearance: SceneNumber, ball_diameter: float, pitch_diameter: float
+) -> tuple[SceneNumber, Catalogue | None]:
     """Clearance in operation, and the catalogue with the range of its group in operation."""
     if not table.has("fit"):
         return clearance, catalogue

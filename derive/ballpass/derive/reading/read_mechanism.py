@@ -15,7 +15,7 @@ from ballpass.derive.mechanism.dyads import BRANCHES
 from ballpass.derive.mechanism.forces import FORCE_TABLES
 from ballpass.derive.scene.body_keys import Points, check_two_bodies, refuse_unknown_point
 from ballpass.derive.scene.keys import ChoiceKey, VectorKey
-from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, SceneNumber
 from ballpass.derive.scene.read_keys import keys_of, number, read_record
 from ballpass.derive.scene.records import FRAME, POINT, Body, Driver, Force, Joint, Mechanism, NamedPoint, SpeedOverTime
 from ballpass.derive.scene.table import Table, listing, suggest, upright
@@ -87,7 +87,7 @@ def _read_driver(table: Table) -> Driver:
         )
 
 
-def _read_table(driver: Table) -> tuple[Quantity | None, SpeedOverTime | None]:
+def _read_table(driver: Table) -> tuple[SceneNumber | None, SpeedOverTime | None]:
     """The speed at t = 0, and the table it begins; faults where another key gives the speed."""
     driver.refuse(
         ("speed", "torque"),
@@ -98,7 +98,7 @@ def _read_table(driver: Table) -> tuple[Quantity | None, SpeedOverTime | None]:
     with driver.table("table", "time and speed") as data:
         found = read_record(SpeedOverTime, data)
     if not found.later_speed:  # reported
-        return Quantity(path="", value=math.nan, unit="rad/s", description="", latex=""), None
+        return SceneNumber(path="", value=math.nan, unit="rad/s", description="", latex=""), None
     return found.later_speed[0], replace(found, later_speed=found.later_speed[1:])
 
 
@@ -111,7 +111,7 @@ def _read_torque(driver: Table) -> TorqueLaw | None:
         return read_record(LAWS[name], data)
 
 
-def _read_flywheel(driver: Table, changing: bool) -> Quantity:
+def _read_flywheel(driver: Table, changing: bool) -> SceneNumber:
     if not changing:
         driver.fault(
             "flywheel",

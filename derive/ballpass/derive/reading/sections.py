@@ -69,7 +69,7 @@ def _variants(
 def _top() -> Iterator[Section]:
     yield _of("", records.Scene)
     yield _of("shaft", records.Shaft)
-    yield _of("run", records.Run, outputs=records.OUTPUTS)
+    yield _of("run", records.RunSettings, outputs=records.OUTPUTS)
     yield _of("duty.*", records.DutyState)
     yield Section(path=("duty", "*", "set"), keys={}, free=True)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.records import Scene, quantities_of
 from ballpass.runtime.contract.manifest import UsualInfo
 
@@ -35,7 +35,7 @@ def usual_ranges(scene: Scene) -> tuple[UsualInfo, ...]:
     return tuple(found)
 
 
-def _declared(quantities: Iterable[Quantity], known: set[str]) -> Iterator[UsualInfo]:
+def _declared(quantities: Iterable[SceneNumber], known: set[str]) -> Iterator[UsualInfo]:
     for quantity in quantities:
         usual = quantity.limits.usual
         if usual is not None:

@@ -17,7 +17,7 @@ from ballpass.derive.reading.clearance_groups import clearance_of_group
 from ballpass.derive.scene.bearing_records import Bearing, CageMotion, HertzContact
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.errors import Fault, SceneError
-from ballpass.derive.scene.quantity import Bounds, Quantity
+from ballpass.derive.scene.quantity import Bounds, SceneNumber
 from ballpass.derive.scene.records import Driver, Load, Mechanism, Scene, TableLoad
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 
@@ -80,7 +80,7 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
     """
     known = {quantity.path: quantity for quantity in scene.quantities}
     faults = []
-    changed: dict[str, Quantity] = {}
+    changed: dict[str, SceneNumber] = {}
     for path, value in values.items():
         if path not in known:
             faults.append(_unknown_path(path, list(known)))
@@ -173,9 +173,9 @@ def _unknown_path(path: str, known: Sequence[str]) -> Fault:
     )
 
 
-def replaced(record: Any, changed: Mapping[str, Quantity]) -> Any:
+def replaced(record: Any, changed: Mapping[str, SceneNumber]) -> Any:
     """A record with other quantities, by their paths."""
-    if isinstance(record, Quantity):
+    if isinstance(record, SceneNumber):
         return changed.get(record.path, record)
     if isinstance(record, tuple):
         return tuple(replaced(item, changed) for item in record)
@@ -295,7 +295,7 @@ def _check_preload(checker: Checker, bearing: Bearing) -> None:
     )
 
 
-def _check_grooves(checker: Checker, contact: HertzContact, ball: Quantity) -> None:
+def _check_grooves(checker: Checker, contact: HertzContact, ball: SceneNumber) -> None:
     for radius in (contact.inner_groove_radius, contact.outer_groove_radius):
         if 0.0 < radius.value <= 0.5 * ball.value:
             checker.fault(

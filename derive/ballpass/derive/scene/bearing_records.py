@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.designations import GROUPS
 from ballpass.derive.scene.keys import ChoiceKey, TextKey, WholeKey
-from ballpass.derive.scene.quantity import Bounds, Quantity, UsualRange
+from ballpass.derive.scene.quantity import Bounds, SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import Either, declared, not_negative, positive, quantity
 
 FEWEST_BALLS, MOST_BALLS = 3, 200
@@ -31,8 +31,8 @@ _PERCENTS = "A cage lags by some hundredths: check whether percents were given."
 class Material:
     """Young's modulus [Pa] and Poisson's ratio [1]."""
 
-    young_modulus: Quantity = positive("Pa", "Young's modulus of the PART", "E_OF", "207 GPa", usual=_MODULUS)
-    poisson_ratio: Quantity = quantity(
+    young_modulus: SceneNumber = positive("Pa", "Young's modulus of the PART", "E_OF", "207 GPa", usual=_MODULUS)
+    poisson_ratio: SceneNumber = quantity(
         "1",
         "Poisson's ratio of the PART",
         r"\nu_OF",
@@ -75,21 +75,21 @@ class HertzContact:
     `smoothing` is the half width [m] of the smoothed contact onset; None for Hertz's law itself.
     """
 
-    inner_groove_radius: Quantity = _groove("inner", "r_i", "4.1275 mm")
-    outer_groove_radius: Quantity = _groove("outer", "r_e", "4.206875 mm")
+    inner_groove_radius: SceneNumber = _groove("inner", "r_i", "4.1275 mm")
+    outer_groove_radius: SceneNumber = _groove("outer", "r_e", "4.206875 mm")
     ring: Material
     ball: Material | None
-    smoothing: Quantity | None = _smoothing()
+    smoothing: SceneNumber | None = _smoothing()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GivenContact:
     """Contact stiffness of one ball between both raceways, k_b [N/m^1.5], as a number; `smoothing` as above."""
 
-    stiffness: Quantity = positive(
+    stiffness: SceneNumber = positive(
         "N/m^1.5", "Contact stiffness of a ball between both raceways", "k_b", "8.6e9 N/m^1.5"
     )
-    smoothing: Quantity | None = _smoothing()
+    smoothing: SceneNumber | None = _smoothing()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,8 +100,8 @@ class Damping:
     """
 
     law: str
-    numbers: tuple[Quantity, ...]
-    smoothing: Quantity | None = positive(
+    numbers: tuple[SceneNumber, ...]
+    smoothing: SceneNumber | None = positive(
         "m/s",
         "Half width of the smoothed kink of the damping at rest",
         "w_v",
@@ -128,7 +128,7 @@ class CageMotion:
     `time` [s] until the next; the first is zero.
     """
 
-    ratio: Quantity | None = quantity(
+    ratio: SceneNumber | None = quantity(
         "1",
         "Speed of the cage over that of the inner ring",
         r"\kappa_c",
@@ -137,7 +137,7 @@ class CageMotion:
         when="default: $(1 - D_w/D_{pw})/2$",
         bounds=Bounds(above=0.0, below=1.0),
     )
-    slip: Quantity | None = quantity(
+    slip: SceneNumber | None = quantity(
         "1",
         "Part by which the cage turns slower than by rolling",
         "s_c",
@@ -149,8 +149,8 @@ class CageMotion:
         note="or a table over time, from 0 s on, each value constant until the next row: "
         '`{ time = ["0 s", "0.5 s"], value = [0.0, 0.04] }`',
     )
-    time: tuple[Quantity, ...] = ()
-    slips: tuple[Quantity, ...] = ()
+    time: tuple[SceneNumber, ...] = ()
+    slips: tuple[SceneNumber, ...] = ()
 
     @property
     def slipping(self) -> bool:
@@ -162,8 +162,8 @@ class CageMotion:
 class EquivalentMass:
     """Eq. (3): ring mass m_i, crankpin mass m_x [kg], crank counted whole or halved (a pair of bearings carries it)."""
 
-    ring: Quantity = positive("kg", "Mass of the inner ring", "m_i", "0.032 kg")
-    crankpin: Quantity = not_negative("kg", "Mass of the crankpin", "m_x", "0.05 kg")
+    ring: SceneNumber = positive("kg", "Mass of the inner ring", "m_i", "0.032 kg")
+    crankpin: SceneNumber = not_negative("kg", "Mass of the crankpin", "m_x", "0.05 kg")
     crank: Literal["whole", "half"] = declared(
         ChoiceKey(words="How much of the crank counts", choices=("whole", "half"))
     )
@@ -173,10 +173,10 @@ class EquivalentMass:
 class InnerRing:
     """Mass moved by the inner ring: a number [kg] or Eq. (3).  `damping` to the frame [N*s/m] or None."""
 
-    mass: Quantity | EquivalentMass = positive(
+    mass: SceneNumber | EquivalentMass = positive(
         "kg", "Mass moved by the inner ring", "m_{ei}", "0.4 kg", when="this or `equivalent_mass`"
     )
-    damping: Quantity | None = not_negative(
+    damping: SceneNumber | None = not_negative(
         "N*s/m", "Viscous damping of the inner ring's motion to the frame", "c_i", "200 N*s/m", optional=True
     )
 
@@ -185,7 +185,7 @@ class InnerRing:
 class OuterRing:
     """Outer ring on an elastic housing: mass [kg], stiffness [N/m], damping [N*s/m]."""
 
-    mass: Quantity = positive(
+    mass: SceneNumber = positive(
         "kg",
         "Mass of the outer ring and what moves with it",
         "m_o",
@@ -193,10 +193,10 @@ class OuterRing:
         when="required if elastic",
         remedy='give the moved mass, or write support = "fixed"',
     )
-    stiffness: Quantity = not_negative(
+    stiffness: SceneNumber = not_negative(
         "N/m", "Stiffness between outer ring and frame", "k_p", "50 N/um", when="required if elastic"
     )
-    damping: Quantity = not_negative(
+    damping: SceneNumber = not_negative(
         "N*s/m", "Damping between outer ring and frame", "c_p", "500 N*s/m", when="required if elastic"
     )
 
@@ -205,8 +205,8 @@ class OuterRing:
 class InitialState:
     """Ring centres [m] and velocities [m/s] at t = 0: inner x, y, (outer x, y); outer empty when it is fixed."""
 
-    position: tuple[Quantity, ...]
-    velocity: tuple[Quantity, ...]
+    position: tuple[SceneNumber, ...]
+    velocity: tuple[SceneNumber, ...]
 
 
 def _rating(symbol: str) -> Any:
@@ -299,7 +299,7 @@ class Bearing:
             note="one-way: the driver's joint; two-way: any revolute joint",
         )
     )
-    share: Quantity | None = quantity(
+    share: SceneNumber | None = quantity(
         "1",
         "Share of the joint's reaction that the bearing carries",
         "s",
@@ -318,7 +318,7 @@ class Bearing:
         )
     )
     inner_body: str = ""
-    count: Quantity | None = positive(
+    count: SceneNumber | None = positive(
         "1", "Bearings side by side at the joint", "n_b", 2, optional=True, when="two-way: default 1, else refused"
     )
     balls: int = declared(
@@ -331,11 +331,11 @@ class Bearing:
             note="they must fit on the pitch circle",
         )
     )
-    ball_diameter: Quantity = positive("m", "Ball diameter", "D_w", "7.9375 mm", when=_BY_DESIGNATION)
-    pitch_diameter: Quantity = positive(
+    ball_diameter: SceneNumber = positive("m", "Ball diameter", "D_w", "7.9375 mm", when=_BY_DESIGNATION)
+    pitch_diameter: SceneNumber = positive(
         "m", "Diameter of the circle of ball centres", "D_{pw}", "33.5 mm", when=_BY_DESIGNATION
     )
-    clearance: Quantity = quantity(
+    clearance: SceneNumber = quantity(
         "m",
         "Diametral clearance of the bearing",
         "P_d",
@@ -345,7 +345,7 @@ class Bearing:
         groups=GROUPS,
         note='negative is preload. With a designation also a group: `"C2"`, `"CN"`, `"C3"`, `"C4"`, `"C5"`',
     )
-    ball_angle: Quantity = quantity(
+    ball_angle: SceneNumber = quantity(
         "rad", "Angle of the first ball at the start", r"\theta_0", "0 deg", default="0 deg"
     )
     contact: HertzContact | GivenContact

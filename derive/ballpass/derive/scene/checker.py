@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from ballpass.derive.scene.errors import Fault
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 
 
 class Checker:
@@ -17,7 +17,7 @@ class Checker:
         self.given = given
         self.faults: list[Fault] = []
 
-    def show(self, quantity: Quantity) -> str:
+    def show(self, quantity: SceneNumber) -> str:
         """The value as the file has it, else in SI."""
         unit = "" if quantity.unit == "1" else f" {quantity.unit}"
         return self.given.get(quantity.path, f"{quantity.value:.9g}{unit}")
@@ -26,14 +26,14 @@ class Checker:
         """Note a fault."""
         self.faults.append(Fault(key=path, problem=problem, given=given, allowed=allowed, remedy=remedy))
 
-    def within(self, quantity: Quantity) -> None:
+    def within(self, quantity: SceneNumber) -> None:
         """A value within the bounds of its key."""
         bounds = quantity.limits.bounds
         problem = "" if bounds is None else bounds.problem(quantity.value)
         if bounds is not None and problem:
             self.fault(quantity.path, problem, self.show(quantity), bounds.allowed, quantity.limits.advice)
 
-    def window(self, start: Quantity, end: Quantity) -> None:
+    def window(self, start: SceneNumber, end: SceneNumber) -> None:
         """Two angles that differ, by less than a turn."""
         span = end.value - start.value
         if span == 0.0 or abs(span) >= math.tau * (1.0 - 1e-12):
@@ -45,7 +45,7 @@ class Checker:
                 "give another end, or delete the window for a load that always acts",
             )
 
-    def rows(self, path: str, columns: Mapping[str, Sequence[Quantity]], remedy: str) -> bool:
+    def rows(self, path: str, columns: Mapping[str, Sequence[SceneNumber]], remedy: str) -> bool:
         """Columns of a table: one length, two rows or more, the first one increasing; whether there are rows.
 
         Parameters
@@ -77,7 +77,7 @@ class Checker:
                 )
         return True
 
-    def within_a_turn(self, angles: Sequence[Quantity]) -> None:
+    def within_a_turn(self, angles: Sequence[SceneNumber]) -> None:
         """Angles of a table that is periodic over a turn."""
         if angles[-1].value - angles[0].value >= math.tau * (1.0 - 1e-12):
             self.fault(

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
-from ballpass.derive.scene.quantity import NO_LIMITS, Bounds, Limits, Quantity, UsualRange, Vector
+from ballpass.derive.scene.quantity import NO_LIMITS, Bounds, Limits, SceneNumber, UsualRange, Vector
 from ballpass.derive.scene.table import Table, listing, suggest
 from ballpass.derive.scene.units import show
 
@@ -162,7 +162,7 @@ class QuantityKey(Key):
         if self.setting:
             return math.nan
         path = ".".join((*table.path, name))
-        return Quantity(path=path, value=math.nan, unit=self.unit, description=self.words, latex=self.symbol)
+        return SceneNumber(path=path, value=math.nan, unit=self.unit, description=self.words, latex=self.symbol)
 
     def value(self, table: Table, name: str, given: Any) -> Any:
         """The quantity, whose bounds are checked with those of all others; of a setting the number, checked here."""
@@ -172,7 +172,7 @@ class QuantityKey(Key):
             self.refuse(table, name, problem, given, self.bounds.allowed, self.limits.advice)
         return quantity.value if self.setting else quantity
 
-    def at(self, path: tuple[str, ...], table: Table, given: Any) -> Quantity:
+    def at(self, path: tuple[str, ...], table: Table, given: Any) -> SceneNumber:
         """The quantity of a path."""
         return table.collector.quantity(
             path, given, self.unit, self.words, self.symbol, limits=self.limits, wrong_dimension=self.wrong_dimension

@@ -74,7 +74,7 @@ NO_LIMITS = Limits()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
+class SceneNumber:
     """One number of the scene, in SI.
 
     Attributes
@@ -104,9 +104,9 @@ class Vector:
     """
 
     kind: Literal["zero", "axis", "cartesian", "polar"]
-    first: Quantity | None = None
-    second: Quantity | None = None
+    first: SceneNumber | None = None
+    second: SceneNumber | None = None
 
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[SceneNumber, ...]:
         """The numbers it is made of."""
         return tuple(q for q in (self.first, self.second) if q is not None)

@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Literal
 
 from ballpass.derive.scene.bearing_records import Bearing, Catalogue, Lubrication
 from ballpass.derive.scene.keys import ChoiceKey, NamesKey, TextKey, VectorKey, WholeKey
-from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limits, Quantity, Vector
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limits, SceneNumber, Vector
 from ballpass.derive.scene.read_keys import Either, column, declared, not_negative, positive, quantity
 from ballpass.derive.scene.table import FRAME as FRAME
 from ballpass.derive.scene.toml_lines import LineIndex
@@ -73,14 +73,14 @@ class Body:
     """
 
     name: str
-    mass: Quantity = positive(
+    mass: SceneNumber = positive(
         "kg",
         "Mass of the NAME",
         "m_{INDEX}",
         "0.36 kg",
         remedy="every moving body has a mass: give it, small where it hardly matters",
     )
-    inertia: Quantity | None = positive(
+    inertia: SceneNumber | None = positive(
         "kg*m^2",
         "Moment of inertia of the NAME about its centre of mass",
         "J_{INDEX}",
@@ -140,7 +140,7 @@ class Joint:
             when="default: the joint's own name, twice",
         )
     )
-    direction: Quantity | None = quantity(
+    direction: SceneNumber | None = quantity(
         "rad",
         "Direction of the guide of joint NAME",
         r"\psi_{INDEX}",
@@ -164,10 +164,10 @@ class Joint:
 class SpeedOverTime:
     """Rows of a driver's speed: times [s], increasing, and the speeds behind the first, which is `Driver.speed`."""
 
-    time: tuple[Quantity, ...] = column(
+    time: tuple[SceneNumber, ...] = column(
         "s", "Time in row ROW of the driver's table", "t_{1,ROW}", bounds=NOT_NEGATIVE, note="increasing"
     )
-    later_speed: tuple[Quantity, ...] = column(
+    later_speed: tuple[SceneNumber, ...] = column(
         "rad/s", "Speed in row ROW of the driver's table", r"\omega_{1,ROW}", name="speed"
     )
 
@@ -186,7 +186,7 @@ class Driver:
     joint: str = declared(
         TextKey(words="The joint that turns", example="A", note='revolute, with `bodies = ["frame", <driven body>]`')
     )
-    speed: Quantity = quantity(
+    speed: SceneNumber = quantity(
         "rad/s",
         "Speed of the driverSTART",
         r"\omegaZERO",
@@ -194,12 +194,12 @@ class Driver:
         when="required without `driver.table`, else refused",
         note="counter-clockwise positive; constant, with `[mechanism.driver.torque]` that at t = 0, which may be zero",
     )
-    start_angle: Quantity = quantity(
+    start_angle: SceneNumber = quantity(
         "rad", "Angle of the driver at the start", r"\theta_{1,0}", "0 deg", default="0 deg"
     )
     table: SpeedOverTime | None = None
     torque: Any = None
-    flywheel: Quantity | None = None
+    flywheel: SceneNumber | None = None
 
     @property
     def turns_unevenly(self) -> bool:
@@ -255,7 +255,7 @@ class Mechanism:
 class Shaft:
     """Rotation of the inner ring where no mechanism gives it: constant speed [rad/s]."""
 
-    speed: Quantity = quantity(
+    speed: SceneNumber = quantity(
         "rad/s", "Speed of the shaft", r"\omega", "1200 rpm", note="of the inner ring, whose angle is zero at t = 0"
     )
 
@@ -276,8 +276,8 @@ class HarmonicLoad:
 
     mean: Vector = declared(force_key("the mean load on the inner ring", r"\bar F"))
     amplitude: Vector = declared(force_key("the amplitude of the load on the inner ring", r"\hat F"))
-    frequency: Quantity = positive("Hz", "Frequency of the load", "f", "50 Hz")
-    phase: Quantity | tuple[Quantity, Quantity] = quantity(
+    frequency: SceneNumber = positive("Hz", "Frequency of the load", "f", "50 Hz")
+    phase: SceneNumber | tuple[SceneNumber, SceneNumber] = quantity(
         "rad",
         "Phase of the load at the start",
         r"\varphi",
@@ -297,20 +297,20 @@ class TableLoad:
 
     either: ClassVar[Either] = Either(what="what the rows are over", groups=(("time",), ("angle",)), at="angle")
 
-    time: tuple[Quantity, ...] = column(
+    time: tuple[SceneNumber, ...] = column(
         "s",
         "Time of row ROW of the load's table",
         "t_{ROW}",
         note="strictly increasing, two rows or more; constant outside",
     )
-    angle: tuple[Quantity, ...] = column(
+    angle: tuple[SceneNumber, ...] = column(
         "rad",
         "Angle of the shaft in row ROW of the load's table",
         r"\theta_{ROW}",
         note="within less than a turn; periodic",
     )
-    x: tuple[Quantity, ...] = column("N", "x component of the load in row ROW of its table", "F_{x,ROW}")
-    y: tuple[Quantity, ...] = column("N", "y component of the load in row ROW of its table", "F_{y,ROW}")
+    x: tuple[SceneNumber, ...] = column("N", "x component of the load in row ROW of its table", "F_{x,ROW}")
+    y: tuple[SceneNumber, ...] = column("N", "y component of the load in row ROW of its table", "F_{y,ROW}")
 
     @property
     def over(self) -> Literal["time", "angle"]:
@@ -318,7 +318,7 @@ class TableLoad:
         return "angle" if self.angle else "time"
 
     @property
-    def rows(self) -> tuple[Quantity, ...]:
+    def rows(self) -> tuple[SceneNumber, ...]:
         """Their times or angles."""
         return self.angle or self.time or ()
 
@@ -327,11 +327,11 @@ class TableLoad:
 class UnbalanceLoad:
     """Unbalance of the shaft: a mass [kg] at an eccentricity [m], at an angle of the shaft [rad]."""
 
-    mass: Quantity = not_negative("kg", "Unbalanced mass", "m_u", "5 g")
-    eccentricity: Quantity = not_negative(
+    mass: SceneNumber = not_negative("kg", "Unbalanced mass", "m_u", "5 g")
+    eccentricity: SceneNumber = not_negative(
         "m", "Distance of the unbalanced mass from the axis", "e_u", "20 mm", remedy=AMOUNT.remedy
     )
-    angle: Quantity = quantity("rad", "Angle of the unbalance at t = 0", r"\alpha_u", "0 deg", default="0 deg")
+    angle: SceneNumber = quantity("rad", "Angle of the unbalance at t = 0", r"\alpha_u", "0 deg", default="0 deg")
 
 
 LoadLaw = ConstantLoad | HarmonicLoad | TableLoad | UnbalanceLoad
@@ -341,8 +341,8 @@ LoadLaw = ConstantLoad | HarmonicLoad | TableLoad | UnbalanceLoad
 class LoadWindow:
     """From `start` (inclusive) to `end` (exclusive; None: for ever): times [s], or angles of the shaft [rad]."""
 
-    start: Quantity = quantity("UNIT", "WHAT at which the load begins", "SYMBOL_{on}", "FIRST")
-    end: Quantity | None = quantity(
+    start: SceneNumber = quantity("UNIT", "WHAT at which the load begins", "SYMBOL_{on}", "FIRST")
+    end: SceneNumber | None = quantity(
         "UNIT", "WHAT at which the load ends", "SYMBOL_{off}", "LAST", when="required for angles; without one a step"
     )
 
@@ -377,7 +377,7 @@ class Load:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
+class RunSettings:
     """How long to run and what to keep.  Exactly one of `cycles` (turns of driver or shaft) and `duration` [s]."""
 
     either: ClassVar[Either] = Either(what="the length of the run", groups=(("cycles",), ("duration",)))
@@ -443,9 +443,9 @@ class DutyState:
     parameters: tuple[tuple[str, float], ...]
 
 
-def quantities_of(record: object) -> Iterator[Quantity]:
+def quantities_of(record: object) -> Iterator[SceneNumber]:
     """Every quantity of a record, in the order of its fields."""
-    if isinstance(record, Quantity):
+    if isinstance(record, SceneNumber):
         yield record
     elif isinstance(record, tuple):
         for item in record:
@@ -484,7 +484,7 @@ class Scene:
     loads: tuple[Load, ...]
     bearings: tuple[Bearing, ...]
     outputs: tuple[str, ...]
-    run: Run
+    run: RunSettings
     duty: tuple[DutyState, ...] = ()
     lines: LineIndex = field(default=LineIndex(lines={}), repr=False, compare=False)
 
@@ -510,7 +510,7 @@ class Scene:
         )
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[SceneNumber, ...]:
         """Every number in the order of the file's schema: the model's parameters."""
         return tuple(quantities_of((self.mechanism, self.shaft, self.loads, self.bearings)))
 
@@ -544,7 +544,7 @@ class Scene:
 
 
 def _structure(value: Any) -> object:
-    if isinstance(value, Quantity):
+    if isinstance(value, SceneNumber):
         return (value.path, value.unit, value.description, value.latex)
     if isinstance(value, Catalogue | Lubrication):
         return None

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Any
 
 from ballpass.derive.scene.errors import Fault
-from ballpass.derive.scene.quantity import NO_LIMITS, Limits, Quantity
+from ballpass.derive.scene.quantity import NO_LIMITS, Limits, SceneNumber
 from ballpass.derive.scene.toml_lines import LineIndex
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 
@@ -60,7 +60,7 @@ class Collector:
         *,
         limits: Limits = NO_LIMITS,
         wrong_dimension: str = "",
-    ) -> Quantity:
+    ) -> SceneNumber:
         """Quantity from what stands at `path`; its value is NaN where that is none.
 
         `wrong_dimension` replaces the remedy where number and unit can be read, but measure something else.
@@ -73,7 +73,7 @@ class Collector:
             value = math.nan
             remedy = wrong_dimension if wrong_dimension and "wrong dimension" in error.problem else error.remedy
             self.fault(path, error.problem, given=error.given, allowed=error.allowed, remedy=remedy)
-        return Quantity(path=name, value=value, unit=unit, description=description, latex=latex, limits=limits)
+        return SceneNumber(path=name, value=value, unit=unit, description=description, latex=latex, limits=limits)
 
     def check_name(self, path: Path, name: str, what: str) -> None:
         """Note a fault where `name` cannot be the name of a body, joint, point or force."""

@@ -60,7 +60,7 @@ def index_lines(text: str) -> LineIndex:
     lines: dict[tuple[str, ...], int] = {}
     elements: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
-    state = _State()
+    state = _LineState()
     for number, line in enumerate(text.split("\n"), start=1):
         if state.at_statement():
             header, key = _HEADER.match(line), _KEY.match(line)
@@ -97,7 +97,7 @@ def _element(path: tuple[str, ...], elements: dict[tuple[str, ...], int]) -> tup
 
 
 @dataclass(slots=True)
-class _State:
+class _LineState:
     """What is open at the end of a line: brackets of arrays and inline tables, or a multi-line string."""
 
     depth: int = 0

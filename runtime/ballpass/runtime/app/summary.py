@@ -36,7 +36,7 @@ from ballpass.runtime.run.inputs import TURN
 from ballpass.runtime.run.settle import MEANS, PEAKS
 
 if TYPE_CHECKING:
-    from ballpass.runtime.ask.observables import Statistics
+    from ballpass.runtime.ask.observables import SignalStatistics
     from ballpass.runtime.certify.growth import Growth
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.reductions import Reduction
@@ -210,7 +210,7 @@ def _printed(channel: str, found: Reduction) -> tuple[str, dict[str, float]]:
     return channel, _moments(found)
 
 
-def _moments(of: Reduction | Statistics) -> dict[str, float]:
+def _moments(of: Reduction | SignalStatistics) -> dict[str, float]:
     return {"min": of.minimum, "max": of.maximum, "mean": of.mean, "rms": of.rms, "std": of.std}
 
 

@@ -22,7 +22,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import SECTORS
 from ballpass.runtime.ratings import life
 from ballpass.runtime.ratings.of_bearing import (
-    Contact,
+    RacewayContact,
     Ratings,
     contacts_of,
     geometry_is_assumed,
@@ -169,7 +169,7 @@ def _rings(
     ]
     total = float(sum(np.sum(part) for part in damage))
 
-    def ring(k: int, contact: Contact, place: NDArray[np.float64]) -> RingStrength:
+    def ring(k: int, contact: RacewayContact, place: NDArray[np.float64]) -> RingStrength:
         across, along = contact.semi_axes(force)
         worn, angle, off = wear_field(samples, place, contact).deepest
         return RingStrength(

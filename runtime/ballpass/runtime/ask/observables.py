@@ -43,7 +43,7 @@ def turns(t: ArrayLike, cycle_length: float) -> tuple[slice, ...]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Statistics:
+class SignalStatistics:
     """Extremes of the samples, and means over time, of one signal [unit of the signal].
 
     Attributes
@@ -61,7 +61,7 @@ class Statistics:
     std: float
 
 
-def statistics(t: ArrayLike, signal: ArrayLike) -> Statistics:
+def statistics(t: ArrayLike, signal: ArrayLike) -> SignalStatistics:
     """Statistics of a signal, means by the trapezoidal rule.
 
     On a whole number of cycles the rule counts the end that repeats the start once.
@@ -80,7 +80,7 @@ def statistics(t: ArrayLike, signal: ArrayLike) -> Statistics:
     values = _like(time, signal, "signal")
     length = time[-1] - time[0]
     mean = float(np.trapezoid(values, time) / length)
-    return Statistics(
+    return SignalStatistics(
         minimum=float(np.min(values)),
         maximum=float(np.max(values)),
         mean=mean,

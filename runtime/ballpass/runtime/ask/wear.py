@@ -15,7 +15,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import SECTORS
 from ballpass.runtime.quantity.track import ChannelValues
-from ballpass.runtime.ratings.of_bearing import Contact
+from ballpass.runtime.ratings.of_bearing import RacewayContact
 from ballpass.runtime.ratings.wear import depth_of_pass
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.request import Request
@@ -103,7 +103,7 @@ class WearField:
         return float(self.rate[sector, k]), clock.TURN * (int(sector) + 0.5) / SECTORS, float(self.across[k])
 
 
-def wear_field(samples: LoadSamples, angle: Array, contact: Contact) -> WearField:
+def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> WearField:
     """Wear that the passing balls leave on a raceway, mean over the samples.
 
     Parameters

@@ -13,7 +13,7 @@ from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS
-from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.run import inputs as clock
 from ballpass.runtime.run.choose_method import STIFF_RATIO
@@ -58,7 +58,7 @@ def derivative_run(model: LoadedModel, numbers: Numbers, request: Request) -> tu
 
 def differentiate(
     quantities: QuantityRun, run: Run, names: Sequence[str], sensitivity_rtol: float
-) -> tuple[Values, float]:
+) -> tuple[EvaluatedQuantities, float]:
     """Derivatives at the tightest tolerance that the resolution of time allows; that tolerance."""
     tolerance = sensitivity_rtol
     while True:

@@ -27,7 +27,7 @@ from ballpass.runtime.certify.method_choice import MethodChoice, compared_quanti
 from ballpass.runtime.contract.errors import RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.run.accuracy import Accuracy
 from ballpass.runtime.run.locating import LOCATED
@@ -112,10 +112,10 @@ class _Search:
 
     run: Run
     quantities: QuantityRun
-    done: dict[tuple[MethodChoice, float], Values] = field(default_factory=dict)
+    done: dict[tuple[MethodChoice, float], EvaluatedQuantities] = field(default_factory=dict)
     fault: SimulationError | None = None
 
-    def __call__(self, way: MethodChoice, moved: float = 0.0) -> Values:
+    def __call__(self, way: MethodChoice, moved: float = 0.0) -> EvaluatedQuantities:
         if (way, moved) not in self.done:
             self.done[way, moved] = way.measure(self.quantities, self.run, moved)
         return self.done[way, moved]
@@ -214,7 +214,7 @@ def _apart(search: _Search, one: tuple[MethodChoice, float], other: tuple[Method
     return float(np.abs(first - second).max())
 
 
-def _relative(one: Values, other: Values, least: float = 0.0) -> list[float]:
+def _relative(one: EvaluatedQuantities, other: EvaluatedQuantities, least: float = 0.0) -> list[float]:
     """Relative differences of quantities, at least `least`; infinite where one is zero or no number.
 
     Where both runs say zero, and where they agree to the last bit, it is a rounding.

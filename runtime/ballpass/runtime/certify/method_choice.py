@@ -14,7 +14,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import channels_of, quantities_of
-from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER, Kinks
 from ballpass.runtime.run.request import Request
@@ -34,7 +34,7 @@ class MethodChoice:
         """For people: method, tolerance, and kinks where they are located."""
         return f"{self.method}, rtol {self.rtol:g}" + (", kinks located" if self.kinks == LOCATED else "")
 
-    def measure(self, quantities: QuantityRun, run: Run, moved: float | np.ndarray = 0.0) -> Values:
+    def measure(self, quantities: QuantityRun, run: Run, moved: float | np.ndarray = 0.0) -> EvaluatedQuantities:
         """Quantities of a run that is integrated this way.
 
         Parameters
@@ -79,7 +79,7 @@ def default_compared(manifest: Manifest) -> tuple[str, ...]:
     return (*(f"peak_{name}" for name in peaks), *(f"{kind}_{name}" for kind in ("rms", "range") for name in rings))
 
 
-def motion_of(run: Run, values: Values) -> np.ndarray:
+def motion_of(run: Run, values: EvaluatedQuantities) -> np.ndarray:
     """Largest and smallest value of each state, over its magnitude, shape (2 * states,)."""
     layout = reduction_rows(run.model.manifest)
     assert values.row is not None  # `QuantityRun` with `motion`

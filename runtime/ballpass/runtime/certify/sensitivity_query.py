@@ -44,7 +44,7 @@ from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.quantity.grammar import default_quantities, quantities_of, quantity_words
 from ballpass.runtime.quantity.kinks import DEFLECTION
 from ballpass.runtime.quantity.panels import ROUGH
-from ballpass.runtime.quantity.quantity_run import QuantityRun, Values
+from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.quantity.values import value_of
 from ballpass.runtime.run import inputs as clock
@@ -306,7 +306,9 @@ def _difference_scales(run: Run, names: Sequence[str]) -> Array:
     return np.array(scales)
 
 
-def _grazing(model: LoadedModel, numbers: Numbers, course: Values, tolerance: float = TOLERANCE) -> tuple[Grazing, ...]:
+def _grazing(
+    model: LoadedModel, numbers: Numbers, course: EvaluatedQuantities, tolerance: float = TOLERANCE
+) -> tuple[Grazing, ...]:
     """Where the run grazes a kink, whether or not the scene's outputs name the balls' deflections."""
     manifest, track = model.manifest, course.track
     # without a step the quantities need no motion

@@ -30,8 +30,8 @@ from ballpass.runtime.many.cluster import loaded, run_tasks
 from ballpass.runtime.many.data_set_store import (
     MADE,
     UNFINISHED,
-    Axes,
-    Place,
+    SignalAxes,
+    SignalPlace,
     create_store,
     is_complete,
     marked,
@@ -114,7 +114,7 @@ class DataSetReport(ShortRepr):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Table:
+class _DataSetTable:
     """Class and place in it of each member, and its numbers.
 
     Attributes
@@ -231,7 +231,7 @@ def _check(classes: Sequence[SignalClass], signals: Signals, seed: int, chunk: i
         check_outputs(one.model, signals, one.label)
 
 
-def _draw(classes: Sequence[SignalClass], signals: Signals, seed: int) -> _Table:
+def _draw(classes: Sequence[SignalClass], signals: Signals, seed: int) -> _DataSetTable:
     """Numbers of all members; what is unusual is said once for a class."""
     counts = [one.members for one in classes]
     kinds = np.repeat(np.arange(len(classes)), counts)
@@ -246,7 +246,7 @@ def _draw(classes: Sequence[SignalClass], signals: Signals, seed: int) -> _Table
         defaults = {info.name: np.full(one.members, info.default) for info in one.model.manifest.parameters}
         for text in unusual(one.model.manifest, defaults | drawn):
             warnings.warn(f"class {one.label}: {text}", UnusualWarning, stacklevel=3)
-    return _Table(kinds=kinds[order], places=places[order], columns=tuple(columns))
+    return _DataSetTable(kinds=kinds[order], places=places[order], columns=tuple(columns))
 
 
 def _spec(classes: Sequence[SignalClass], signals: Signals, seed: int, chunk: int, title: str) -> dict[str, Any]:
@@ -274,7 +274,7 @@ def _spec(classes: Sequence[SignalClass], signals: Signals, seed: int, chunk: in
     }
 
 
-def _truth(classes: Sequence[SignalClass], table: _Table, names: Sequence[str]) -> np.ndarray:
+def _truth(classes: Sequence[SignalClass], table: _DataSetTable, names: Sequence[str]) -> np.ndarray:
     """Parameters of all members, shape (members, parameters) [SI]."""
     found = np.full((len(table.kinds), len(names)), np.nan)
     for kind, (one, columns) in enumerate(zip(classes, table.columns, strict=True)):
@@ -285,7 +285,7 @@ def _truth(classes: Sequence[SignalClass], table: _Table, names: Sequence[str]) 
     return found
 
 
-def _entries(classes: Sequence[SignalClass], signals: Signals, table: _Table) -> dict[str, np.ndarray]:
+def _entries(classes: Sequence[SignalClass], signals: Signals, table: _DataSetTable) -> dict[str, np.ndarray]:
     """Times in the record at which a ball reaches a spall, by spall, shape (members, entries); NaN behind the last."""
     end = signals.transient + signals.samples / signals.sample_rate
     found: dict[str, np.ndarray] = {}
@@ -303,7 +303,9 @@ def _entries(classes: Sequence[SignalClass], signals: Signals, table: _Table) ->
     return found
 
 
-def _axes(classes: Sequence[SignalClass], signals: Signals, table: _Table, spec: Mapping[str, Any], chunk: int) -> Axes:
+def _axes(
+    classes: Sequence[SignalClass], signals: Signals, table: _DataSetTable, spec: Mapping[str, Any], chunk: int
+) -> SignalAxes:
     """What is known before anything is simulated."""
     infos = {info.name: info for one in classes for info in one.model.manifest.parameters}
     outputs = {info.name: info for info in classes[0].model.manifest.outputs}
@@ -311,7 +313,7 @@ def _axes(classes: Sequence[SignalClass], signals: Signals, table: _Table, spec:
     for kind, columns in enumerate(table.columns):
         if _SNR in columns:
             snr[table.kinds == kind] = columns[_SNR][table.places[table.kinds == kind]]
-    return Axes(
+    return SignalAxes(
         spec=spec,
         times=signals.times,
         precision=signals.precision,
@@ -326,11 +328,11 @@ def _axes(classes: Sequence[SignalClass], signals: Signals, table: _Table, spec:
 
 
 def _fill(
-    place: Place,
+    place: SignalPlace,
     classes: Sequence[SignalClass],
     signals: Signals,
     seed: int,
-    table: _Table,
+    table: _DataSetTable,
     size: int,
     client: Any,
     progress: Callable[[float], None] | None,
@@ -367,7 +369,7 @@ def _fill(
 
 
 def _make_chunk(
-    place: Place, first: int, keys: Mapping[int, str], signals: Signals, seed: int, members: Sequence[Member]
+    place: SignalPlace, first: int, keys: Mapping[int, str], signals: Signals, seed: int, members: Sequence[Member]
 ) -> tuple[int, Made]:
     """On a worker: the signals of a chunk, without the samples where the worker sees the store and has written them."""
     models = {kind: loaded(keys[kind]) for kind in {member.kind: None for member in members}}

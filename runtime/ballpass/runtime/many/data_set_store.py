@@ -37,7 +37,7 @@ MARK = ".ballpass-mark"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class SignalPlace:
     """A store as a worker finds it.
 
     Attributes
@@ -58,18 +58,18 @@ class Place:
 
 
 @contextlib.contextmanager
-def marked(store: Path) -> Iterator[Place]:
+def marked(store: Path) -> Iterator[SignalPlace]:
     """A store with a mark, as long as this lasts."""
     mark = uuid.uuid4().hex
     (store / MARK).write_text(mark, encoding="utf-8")
     try:
-        yield Place(path=str(store.absolute()), mark=mark)
+        yield SignalPlace(path=str(store.absolute()), mark=mark)
     finally:
         (store / MARK).unlink(missing_ok=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Axes:
+class SignalAxes:
     """What a data set has beside its signals.
 
     Attributes
@@ -108,7 +108,7 @@ def is_complete(store: Path) -> bool:
     return (store / ".zmetadata").exists()
 
 
-def create_store(path: Path, axes: Axes) -> Any:
+def create_store(path: Path, axes: SignalAxes) -> Any:
     """A new store with everything but signals."""
     zarr = need("zarr")
     count, size = len(axes.labels), axes.chunk

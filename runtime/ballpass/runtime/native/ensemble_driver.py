@@ -38,7 +38,7 @@ STOPPED = 5
 LANE_FAMILIES = (Family.AUTO, Family.DP54, Family.RODAS5P)
 
 
-class _Options(ctypes.Structure):
+class _EnsembleOptions(ctypes.Structure):
     _fields_ = (
         ("method", ctypes.c_int),
         ("resume", ctypes.c_int),
@@ -110,7 +110,7 @@ class EnsembleDriver:
         self.stepper = Stepper(library, manifest)
         self.rows = reduction_rows(manifest)
         code, (row, channels, self.lanes) = open_driver(
-            library, "ballpass_ensemble_sizes", 3, (_Options, *SCHEDULE_RECORDS)
+            library, "ballpass_ensemble_sizes", 3, (_EnsembleOptions, *SCHEDULE_RECORDS)
         )
         expected = (self.rows.size, len(self.rows.channels))
         check_sizes(library, "numbers of a reduction and channels", (row, channels), expected)
@@ -123,7 +123,7 @@ class EnsembleDriver:
         declare(code, "ballpass_ensemble_magnitudes", None, long, *states, LONGS, DOUBLES, DOUBLES, DOUBLES)
         segments = (LONGS, DOUBLES, DOUBLES, BYTES)
         told = (DOUBLES, DOUBLES, ArrayOf(RESULT))
-        options = ctypes.POINTER(_Options)
+        options = ctypes.POINTER(_EnsembleOptions)
         declare(code, "ballpass_ensemble", integer, options, long, *states, DOUBLES, *segments, *told)
 
     def with_stepper(self, stepper: Stepper) -> EnsembleDriver:
@@ -172,7 +172,7 @@ class EnsembleDriver:
         count = len(x)
         carried = self.carry(count) if carried is None else carried
         limits = np.full(count, max_steps, dtype=ctypes.c_long)
-        options = _Options(
+        options = _EnsembleOptions(
             method=int(family),
             resume=int(carried.begun),
             max_steps=address(limits, ctypes.c_long),

@@ -20,7 +20,7 @@ from ballpass.runtime.contract.parameters import unknown_name
 from ballpass.runtime.native.casadi_integrators import make_integrator
 from ballpass.runtime.native.compile import CompiledLibrary, compile_sources, digests_of
 from ballpass.runtime.native.compilers import Compiler, find_compiler
-from ballpass.runtime.native.kernel import Array, Kernel, Loop
+from ballpass.runtime.native.kernel import Array, CompiledKernel, Loop
 from ballpass.runtime.native.loops import CompiledLoop, PointLoop
 
 #: Arguments of a function of outputs that change from sample to sample.
@@ -34,11 +34,11 @@ class _OwnMemory(threading.local):
     """Kernels and loops of one thread: a call fills their memory and reads it, so no other thread may have them."""
 
     def __init__(self) -> None:
-        self.kernels: dict[str, Kernel] = {}
+        self.kernels: dict[str, CompiledKernel] = {}
         self.loops: dict[tuple[str, tuple[str, ...]], PointLoop] = {}
 
 
-class Functions:
+class CompiledFunctions:
     """Functions of one generated folder by name.
 
     For any number of threads at once: each has kernels and loops of its own, which it must not hand to another.
@@ -84,10 +84,10 @@ class Functions:
                 self._functions[name] = self.symbolic(name) if self.library is None else self._external(name)
         return self._functions[name]
 
-    def kernel(self, name: str) -> Kernel:
+    def kernel(self, name: str) -> CompiledKernel:
         """Function by name on memory of its own."""
         if name not in self._own.kernels:
-            self._own.kernels[name] = Kernel(self.function(name))
+            self._own.kernels[name] = CompiledKernel(self.function(name))
         return self._own.kernels[name]
 
     def loop(self, name: str, varying: tuple[str, ...]) -> PointLoop:

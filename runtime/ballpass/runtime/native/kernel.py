@@ -23,7 +23,7 @@ class EvaluationError(ArithmeticError):
     """A generated function reported failure."""
 
 
-class Kernel:
+class CompiledKernel:
     """One generated function on fixed memory.
 
     Not for several threads at once: they would share the memory.
@@ -105,7 +105,7 @@ class Loop:
                 raise TypeError(f"{function.name()}: output {name!r} is sparse; a dense one is expected")
         self._varying = [name for name in names if name in varying]
         fixed = [k for k, name in enumerate(names) if name not in varying]
-        self._block = Kernel(function.map(function.name(), "serial", BLOCK, fixed, []))
+        self._block = CompiledKernel(function.map(function.name(), "serial", BLOCK, fixed, []))
 
     def __call__(
         self, count: int, values: Mapping[str, Any], wanted: Collection[str] | None = None

@@ -27,7 +27,7 @@ from ballpass.runtime.native.driver_library import (
     compile_driver,
 )
 from ballpass.runtime.native.ensemble_driver import EnsembleDriver
-from ballpass.runtime.native.functions import Functions
+from ballpass.runtime.native.functions import CompiledFunctions
 from ballpass.runtime.native.stepper import Stepper
 from ballpass.runtime.show import html
 
@@ -38,7 +38,7 @@ class NoKernelsWarning(BallpassWarning):
     """The generated folder has no kernels: CasADi's functions and integrators take the place of the stepper."""
 
 
-class LoadedModel(Functions):
+class LoadedModel(CompiledFunctions):
     """Functions of one scene with their names, units and defaults.  All numbers are SI.
 
     Attributes

@@ -21,7 +21,7 @@ KINDS = ("phase", "gate", "table", "table_rate", "border")
 MOMENTS = 32
 
 
-class _Input(ctypes.Structure):
+class _ScheduleInput(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_int) for name in ("kind", "offset", "rate", "windows")),
         ("edges", ctypes.c_void_p),
@@ -42,7 +42,7 @@ class _Schedule(ctypes.Structure):
 
 
 #: Records as the library declares them, in the order in which it tells their sizes.
-SCHEDULE_RECORDS = (_Schedule, _Input)
+SCHEDULE_RECORDS = (_Schedule, _ScheduleInput)
 
 
 class MemberSchedule:
@@ -65,9 +65,9 @@ class MemberSchedule:
             return int(self._kept[-1].ctypes.data)
 
         self._count = len(manifest.inputs)
-        self._inputs = (_Input * max(self._count, 1))(
+        self._inputs = (_ScheduleInput * max(self._count, 1))(
             *(
-                _Input(
+                _ScheduleInput(
                     KINDS.index(item.kind),
                     place[item.offset],
                     place[item.rate],

@@ -80,7 +80,7 @@ class _Options(ctypes.Structure):
     )
 
 
-class _Tangents(ctypes.Structure):
+class _TangentRecord(ctypes.Structure):
     _fields_ = (
         ("blocks", ctypes.c_long),
         *(
@@ -219,7 +219,7 @@ class Stepper:
 
     def __init__(self, library: CompiledLibrary, manifest: Manifest) -> None:
         self.library = library
-        code, sizes = open_driver(library, "ballpass_sizes", 7, (_Options, _Result, _Tangents))
+        code, sizes = open_driver(library, "ballpass_sizes", 7, (_Options, _Result, _TangentRecord))
         self._inputs = input_columns(manifest)
         expected = (len(manifest.states), self._inputs, len(manifest.parameters), len(manifest.constants))
         check_sizes(library, "states, inputs, parameters and constants", sizes[:4], expected)
@@ -231,7 +231,7 @@ class Stepper:
             *(long, DOUBLES, DOUBLES),
         )
         declare(code, "ballpass_run", integer, *run, result)
-        declare(code, "ballpass_run_tangents", integer, *run, ctypes.POINTER(_Tangents), result)
+        declare(code, "ballpass_run_tangents", integer, *run, ctypes.POINTER(_TangentRecord), result)
         declare(code, "ballpass_tangent_work", long, long)
         magnitudes = (DOUBLES, DOUBLES, DOUBLES, long, DOUBLES, ctypes.c_double, DOUBLES)
         declare(code, "ballpass_magnitudes", None, *magnitudes)
@@ -303,7 +303,7 @@ class Stepper:
             blocks = len(tangents.x)
             work = np.empty(self._code.ballpass_tangent_work(blocks) // 8 + 8)
             names = ("p", "c", "u", "shift", "moved", "stretch", "x", "outputs", "weight")
-            directions = _Tangents(
+            directions = _TangentRecord(
                 blocks=blocks,
                 work=address(work),
                 rtol=tangents.rtol,

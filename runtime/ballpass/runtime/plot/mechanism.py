@@ -29,7 +29,7 @@ _COMPASS = [np.array([np.cos(angle), np.sin(angle)]) for angle in np.radians(np.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class View:
+class MechanismView:
     """What pictures of the mechanism at several samples share.
 
     Attributes
@@ -52,7 +52,7 @@ class View:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Force:
+class _ForceArrow:
     """A force to draw: name, place [m], components [N]; it pulls at the place or, its tip there, pushes."""
 
     name: str
@@ -75,7 +75,7 @@ class _Force:
         return np.asarray(self.at + (-reach if self.pushes else reach) * self.force)
 
 
-def view(record: Record, samples: Sequence[int]) -> View:
+def view(record: Record, samples: Sequence[int]) -> MechanismView:
     """View that holds the mechanism and its arrows at all these samples of the record."""
     poses = [record.points(float(record.t[k]), record.state(k)) for k in samples]
     length = record.cycle_length
@@ -98,7 +98,7 @@ def view(record: Record, samples: Sequence[int]) -> View:
         left = bool(joint[0] <= middle + 0.01 * size)
         corners = np.vstack([corners, joint + np.array([-0.3 if left else 0.3, 0.0]) * size])
     margin = 0.16 * size
-    return View(
+    return MechanismView(
         trace=trace,
         size=size,
         greatest=greatest,
@@ -115,7 +115,7 @@ def _driver_joint(record: Record) -> tuple[str, str] | None:
     return next(found, None) if record.has("drive_torque") else None
 
 
-def draw_mechanism(axes: Axes, record: Record, sample: int, seen: View | None = None) -> None:
+def draw_mechanism(axes: Axes, record: Record, sample: int, seen: MechanismView | None = None) -> None:
     """Draw the mechanism at a sample of the record, with the paths of its joints and the forces.
 
     Parameters
@@ -178,7 +178,7 @@ def draw_mechanism(axes: Axes, record: Record, sample: int, seen: View | None = 
 class _Words:
     """Words of a picture, each where it covers least of what is there."""
 
-    def __init__(self, axes: Axes, seen: View) -> None:
+    def __init__(self, axes: Axes, seen: MechanismView) -> None:
         assert axes.figure is not None  # the axes were made by a figure
         panel, inch = axes.get_window_extent(), axes.figure.dpi
         extent = (seen.high - seen.low) / np.array([panel.width, panel.height]) * inch
@@ -300,14 +300,14 @@ def _put_names(words: _Words, record: Record, now: Points, size: float) -> None:
         words.put(at, ", ".join(names), (0.08 if block else 0.025) * size, fontsize=10)
 
 
-def _forces(record: Record, now: Points, sample: int) -> list[_Force]:
+def _forces(record: Record, now: Points, sample: int) -> list[_ForceArrow]:
     """Reactions on the frame, applied forces that act, and those of springs on what moves."""
     found = [
-        _Force(name="", at=at, force=force, colour=SIGNAL, pushes=False)
+        _ForceArrow(name="", at=at, force=force, colour=SIGNAL, pushes=False)
         for at, force in _reactions(record, now, sample)
     ]
     for name, key, force in record.applied_forces(float(record.t[sample])):
-        found.append(_Force(name=name, at=now[key], force=force, colour=INK, pushes=True))
+        found.append(_ForceArrow(name=name, at=now[key], force=force, colour=INK, pushes=True))
     for label, *ends in record.mechanism.springs:
         tension = record.spring_tension(label)
         pairs = ((ends[0], ends[1]), (ends[2], ends[3]))
@@ -317,11 +317,13 @@ def _forces(record: Record, now: Points, sample: int) -> list[_Force]:
             if tension is not None and key[0] != FRAME and length > 0.0:
                 pull = float(tension[sample])
                 name = label.partition(".")[2]
-                found.append(_Force(name=name, at=now[key], force=pull * way / length, colour=INK, pushes=pull < 0.0))
+                found.append(
+                    _ForceArrow(name=name, at=now[key], force=pull * way / length, colour=INK, pushes=pull < 0.0)
+                )
     return found
 
 
-def _seen(forces: list[_Force], greatest: float) -> list[_Force]:
+def _seen(forces: list[_ForceArrow], greatest: float) -> list[_ForceArrow]:
     """Forces whose arrows are long enough to be seen."""
     return [one for one in forces if one.strength > 0.02 * greatest]
 

@@ -21,7 +21,7 @@ from PIL import Image
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.plot.animation import Frames
 from ballpass.runtime.plot.bearing import LOAD_COLOURS, RING, draw_bearing
-from ballpass.runtime.plot.mechanism import BAR, View, draw_mechanism, view
+from ballpass.runtime.plot.mechanism import BAR, MechanismView, draw_mechanism, view
 from ballpass.runtime.plot.record import Record
 from ballpass.runtime.plot.style import INK, SAND, SIGNAL, TITLE, new_figure, settings, shade_windows
 
@@ -108,7 +108,9 @@ def writer_of(kind: str) -> AbstractMovieWriter:
     return FFMpegWriter(fps=RATE, codec="libx264", extra_args=["-pix_fmt", "yuv420p", "-crf", "20"])
 
 
-def _draw(figure: Figure, record: Record, sample: int, shown: list[int], seen: View | None, *, turning: bool) -> None:
+def _draw(
+    figure: Figure, record: Record, sample: int, shown: list[int], seen: MechanismView | None, *, turning: bool
+) -> None:
     grid = figure.add_gridspec(2, 2, height_ratios=(3.4, 1.0), width_ratios=(0.8, 1.0))
     upper: Any = [grid[0, 0], grid[0, 1]] if seen is not None and record.can_draw_bearing else [grid[0, :]]
     if seen is not None:

@@ -27,7 +27,7 @@ from ballpass.runtime.point.jacobian import RHS, Rows, contract, directions_of, 
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.equilibrium_newton import Rest, settle
+from ballpass.runtime.run.equilibrium_newton import SearchEnd, settle
 
 Array = NDArray[np.float64]
 
@@ -349,7 +349,7 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
         gone=lambda q: float(np.max(np.abs(q - start))) > FAR,
         iterations=ITERATIONS,
     )
-    if found.end is not Rest.FOUND:
+    if found.end is not SearchEnd.FOUND:
         raise SimulationError(
             f"static_equilibrium: {found.end.value}; a net force of {float(np.max(np.abs(found.force))):.3g} N is left "
             f"of a load of {size:.6g} N. Check clearance, load, contact stiffness, and the stiffness of the housing "

@@ -56,7 +56,7 @@ class Rows:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Directions:
+class JacobianDirections:
     """How the arguments of a function move along each direction, shape (size of the argument, directions)."""
 
     labels: tuple[str, ...]
@@ -128,7 +128,7 @@ def _merged(found: Sequence[Rows]) -> list[Rows]:
     return out
 
 
-def directions_of(model: LoadedModel, numbers: Numbers, wrt: str | Sequence[str], t: float) -> Directions:
+def directions_of(model: LoadedModel, numbers: Numbers, wrt: str | Sequence[str], t: float) -> JacobianDirections:
     """Directions along states ("states": all), "time", "crank_angle" or parameters, at time `t` [s].
 
     Raises
@@ -174,7 +174,7 @@ def directions_of(model: LoadedModel, numbers: Numbers, wrt: str | Sequence[str]
     constants = {info.name: row for row, info in enumerate(manifest.constants)}
     for row, name, slope in clock.input_derivatives(manifest.inputs, numbers.values, t):
         along_u[row] += slope * (along_p[rows[name]] if name in rows else along_c[constants[name]])
-    return Directions(
+    return JacobianDirections(
         labels=tuple(names),
         units=tuple(units[name] for name in names),
         t=along_t,
@@ -207,7 +207,7 @@ def turning_speed(model: LoadedModel, numbers: Numbers) -> float:
     return speed
 
 
-def contract(model: LoadedModel, rows: Rows, directions: Directions, there: Mapping[str, object]) -> Array:
+def contract(model: LoadedModel, rows: Rows, directions: JacobianDirections, there: Mapping[str, object]) -> Array:
     """Sum over the arguments of block times direction, shape (rows, directions)."""
     total = np.zeros((len(rows.indices), len(directions.labels)))
     for argument in ARGUMENTS:

@@ -19,7 +19,7 @@ from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
-from ballpass.runtime.point.jacobian import ARGUMENTS, Directions, Rows, directions_of, rows_of
+from ballpass.runtime.point.jacobian import ARGUMENTS, JacobianDirections, Rows, directions_of, rows_of
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -117,7 +117,7 @@ class JacobianFunction:
         self.x = self._memory["x"]
         self._place(numbers, t, directions)
 
-    def _prepare(self, rows: Rows, directions: Directions) -> tuple[casadi.Function, Whole]:
+    def _prepare(self, rows: Rows, directions: JacobianDirections) -> tuple[casadi.Function, Whole]:
         """The function to call and which of its results are entries; sets `sparsity`."""
         model, shape = self._model, (len(rows.labels), len(directions.labels))
         pattern = np.zeros(shape, dtype=bool)
@@ -147,7 +147,7 @@ class JacobianFunction:
             single = single.map(f"{single.name()}_{count}", "serial", count, fixed, [])
         return single, np.asarray(column * size + rows.indices[row], dtype=np.int64)
 
-    def _place(self, numbers: Numbers, t: float, directions: Directions) -> None:
+    def _place(self, numbers: Numbers, t: float, directions: JacobianDirections) -> None:
         """Write everything but the state."""
         values: dict[str, Any] = point(self._model, numbers, t, None)
         for name, memory in self._memory.items():

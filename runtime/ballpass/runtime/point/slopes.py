@@ -25,7 +25,7 @@ from ballpass.runtime.contract.manifest import BearingInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
-from ballpass.runtime.point.jacobian import RHS, STATES, Directions, Rows, contract, directions_of, rows_of
+from ballpass.runtime.point.jacobian import RHS, STATES, JacobianDirections, Rows, contract, directions_of, rows_of
 
 Array = NDArray[np.float64]
 
@@ -107,10 +107,10 @@ def jacobian(
     return np.asarray(dense, dtype=float)
 
 
-def slopes(model: LoadedModel, parts: Sequence[Rows], directions: Directions, there: Point) -> Slopes:
+def slopes(model: LoadedModel, parts: Sequence[Rows], directions: JacobianDirections, there: Point) -> Slopes:
     """Derivatives of rows along directions at a point, from both sides."""
 
-    def along(one: Directions, at: Point) -> Array:
+    def along(one: JacobianDirections, at: Point) -> Array:
         return np.concatenate([contract(model, part, one, at) for part in parts])
 
     value = along(directions, there)
@@ -162,7 +162,7 @@ class Deflections:
         resting = np.abs(self.rate) <= ON_THE_KINK * self.speed
         return np.flatnonzero(resting & (self.value > 0.0) if self._jumps else resting).tolist()
 
-    def reach(self, direction: Directions, balls: Sequence[int]) -> float:
+    def reach(self, direction: JacobianDirections, balls: Sequence[int]) -> float:
         """How far to go along a direction so that these balls are clear of rest; 0 where it leaves them there."""
         sizes = [
             float(np.max(np.abs(np.asarray(self._there[name])[moved]) / np.abs(along[moved])))
@@ -195,18 +195,18 @@ def named(balls: Sequence[int]) -> str:
     return "ball " + ", ".join(str(k + 1) for k in balls)
 
 
-def _arguments(direction: Directions) -> list[tuple[str, Array]]:
+def _arguments(direction: JacobianDirections) -> list[tuple[str, Array]]:
     """How each argument moves along the only direction."""
     return [(name, direction.of(name)[:, 0]) for name in ("t", "x", "u", "p", "c")]
 
 
-def _column(directions: Directions, k: int) -> Directions:
+def _column(directions: JacobianDirections, k: int) -> JacobianDirections:
     """One of the directions."""
     blocks = {name: directions.of(name)[:, k : k + 1] for name in ("t", "x", "u", "p", "c")}
-    return Directions(labels=directions.labels[k : k + 1], units=directions.units[k : k + 1], **blocks)
+    return JacobianDirections(labels=directions.labels[k : k + 1], units=directions.units[k : k + 1], **blocks)
 
 
-def _moved(there: Point, direction: Directions, reach: float) -> dict[str, float | Array]:
+def _moved(there: Point, direction: JacobianDirections, reach: float) -> dict[str, float | Array]:
     """The point moved along the only direction."""
     moved = {name: np.asarray(there[name]) + reach * along for name, along in _arguments(direction)}
     return {**moved, "t": float(moved["t"][0])}

@@ -59,7 +59,7 @@ _now = clocks.thread_time if clocks.get_clock_info("thread_time").resolution < 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Values:
+class EvaluatedQuantities:
     """Quantities of a run.
 
     Attributes
@@ -125,7 +125,7 @@ class QuantityRun:
         # outputs that follow from time alone need no integration
         self._runs = motion or not all(self._layer.is_still(item) for item in self._moving)
 
-    def measure(self, run: Run) -> Values:
+    def measure(self, run: Run) -> EvaluatedQuantities:
         """Values of all quantities.
 
         Raises
@@ -137,7 +137,7 @@ class QuantityRun:
         """
         return self._measure(run, self._noded)[0]
 
-    def differentiate(self, run: Run, names: Sequence[str], sensitivity_rtol: float) -> Values:
+    def differentiate(self, run: Run, names: Sequence[str], sensitivity_rtol: float) -> EvaluatedQuantities:
         """Values of all quantities, those of `measure`, and their derivatives along parameters.
 
         Parameters
@@ -193,7 +193,9 @@ class QuantityRun:
                 estimates.append(self._at_rest(item, run, chain))
         return replace(found, estimates=tuple(estimates))
 
-    def _measure(self, run: Run, noded: Sequence[Quantity], directions: int = 0) -> tuple[Values, list[Layout]]:
+    def _measure(
+        self, run: Run, noded: Sequence[Quantity], directions: int = 0
+    ) -> tuple[EvaluatedQuantities, list[Layout]]:
         """Values, and the nodes of `noded`; what reductions hold is taken from there.
 
         Parameters
@@ -228,7 +230,7 @@ class QuantityRun:
         found |= {item.name: _of_reductions(runs, item) for item in self._reduced}
         estimates = tuple(found.get(item.name) or self._at_rest(item, run, None) for item in self.quantities)
         track = next((one.track for one in layouts if not one.still and one.track is not None), None)
-        values = Values(
+        values = EvaluatedQuantities(
             estimates=estimates,
             track=track,
             row=row if len(row) else None,

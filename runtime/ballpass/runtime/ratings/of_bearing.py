@@ -104,7 +104,7 @@ def refuse_swinging(bearing: BearingInfo, values: Mapping[str, Any], shaft_speed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contact:
+class RacewayContact:
     """Contact of a ball with one ring.
 
     Attributes
@@ -134,7 +134,7 @@ def geometry_is_assumed(bearing: BearingInfo, values: Mapping[str, Any]) -> bool
     return f"{bearing.path}.contact.inner_groove_radius" not in values
 
 
-def contacts_of(bearing: BearingInfo, values: Mapping[str, Any]) -> tuple[Contact, Contact]:
+def contacts_of(bearing: BearingInfo, values: Mapping[str, Any]) -> tuple[RacewayContact, RacewayContact]:
     """Contacts with inner and outer ring; see `geometry_is_assumed`."""
     ball, pitch = values[f"{bearing.path}.ball_diameter"], values[f"{bearing.path}.pitch_diameter"]
     found = []
@@ -142,7 +142,7 @@ def contacts_of(bearing: BearingInfo, values: Mapping[str, Any]) -> tuple[Contac
         raceway = sign * (pitch - sign * ball) / 2.0
         ratio, curvature_sum = ellipse.groove_curvatures(ball, raceway, groove * ball)
         found.append(
-            Contact(
+            RacewayContact(
                 ellipticity=ellipse.ellipticity(ratio),
                 curvature_sum=curvature_sum,
                 compliance=ellipse.compliance(*_steel(bearing, values)),

@@ -11,14 +11,14 @@ import math
 from typing import Any
 
 from ballpass.runtime.ratings.groove_slip import creepage
-from ballpass.runtime.ratings.of_bearing import Contact
+from ballpass.runtime.ratings.of_bearing import RacewayContact
 
 #: Wear coefficient of mild wear, least and most [m^2/N]: 1e-8 to 1e-4 mm^3/(N m).  That of a bearing lies between, by
 #: lubricant and surface.
 COEFFICIENTS = (1e-17, 1e-13)
 
 
-def depth_of_pass(place: Any, load: Any, contact: Contact) -> Any:
+def depth_of_pass(place: Any, load: Any, contact: RacewayContact) -> Any:
     """Depth that a pass of a ball wears off at a place across the groove, over the wear coefficient [N/m].
 
     The pressure along the way of the ball, integrated, times the share of the way that slips:

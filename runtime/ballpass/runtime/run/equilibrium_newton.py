@@ -23,7 +23,7 @@ FIRST_STEP = 1e-9
 FREE = 1e-10
 
 
-class Rest(Enum):
+class SearchEnd(Enum):
     """How a search for rest ended."""
 
     FOUND = "found"
@@ -32,12 +32,12 @@ class Rest(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settled:
+class RestPositions:
     """Positions, the force left there, how the search ended, and its iterations."""
 
     q: np.ndarray
     force: np.ndarray
-    end: Rest
+    end: SearchEnd
     iterations: int
 
 
@@ -51,7 +51,7 @@ def settle(
     gone: Callable[[np.ndarray], bool],
     iterations: int,
     free: float = FREE,
-) -> Settled:
+) -> RestPositions:
     """Positions at rest.
 
     Parameters
@@ -67,7 +67,7 @@ def settle(
     q, net = start.copy(), force(start)
     size = float(np.linalg.norm(weights * net))
     if size == 0.0:
-        return Settled(q=q, force=net, end=Rest.FOUND, iterations=0)
+        return RestPositions(q=q, force=net, end=SearchEnd.FOUND, iterations=0)
     held = float(np.linalg.norm(net)) / (FIRST_STEP * (1.0 + float(np.max(np.abs(q)))))
     matrix = stiffness(q)
     for iteration in range(1, iterations + 1):
@@ -82,10 +82,10 @@ def settle(
             held *= 8.0
             continue
         if gone(trial):
-            return Settled(q=q, force=net, end=Rest.UNHELD, iterations=iteration)
+            return RestPositions(q=q, force=net, end=SearchEnd.UNHELD, iterations=iteration)
         q, net, matrix = trial, there, stiffness(trial)
         if size_there == 0.0 or done(q, net, matrix):
-            return Settled(q=q, force=net, end=Rest.FOUND, iterations=iteration)
+            return RestPositions(q=q, force=net, end=SearchEnd.FOUND, iterations=iteration)
         held /= 4.0 * min(max(size / size_there, 1.0), 16.0)
         size = size_there
-    return Settled(q=q, force=net, end=Rest.STUCK, iterations=iterations)
+    return RestPositions(q=q, force=net, end=SearchEnd.STUCK, iterations=iterations)

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ballpass.runtime.run.equilibrium_newton import Rest, settle
+from ballpass.runtime.run.equilibrium_newton import SearchEnd, settle
 
 #: Moments at which equilibria are sought: the most loaded ones of the run.
 LOADED_MOMENTS = 3
@@ -201,7 +201,7 @@ def _equilibrium(
         iterations=ITERATIONS,
         free=0.0,
     )
-    return None if found.end is Rest.STUCK else (state(found.q), found.end is Rest.FOUND)
+    return None if found.end is SearchEnd.STUCK else (state(found.q), found.end is SearchEnd.FOUND)
 
 
 def _rounded(value: float) -> float:

@@ -10,7 +10,7 @@ from typing import Any
 LONGEST = 800
 
 
-class _Values(reprlib.Repr):
+class _ShortValues(reprlib.Repr):
     """Values of fields: of containers the first few, of arrays the shape."""
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class ShortRepr:
 
     def __repr__(self) -> str:
         assert is_dataclass(self)
-        values = _Values()
+        values = _ShortValues()
         shown = (f"{item.name}={values.repr(getattr(self, item.name))}" for item in fields(self) if item.repr)
         text = f"{type(self).__name__}({', '.join(shown)})"
         return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]}...)"

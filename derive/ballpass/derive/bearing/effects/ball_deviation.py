@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.scene.bearing_records import BallEffect, Bearing
-from ballpass.derive.scene.quantity import Quantity, UsualRange
+from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import number
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Names, symbol_of
@@ -35,7 +35,7 @@ class Deviation:
     """How much thicker a ball is [m], of its number."""
 
     ball: int
-    size: Quantity
+    size: SceneNumber
 
 
 class BallDeviation(Effect):

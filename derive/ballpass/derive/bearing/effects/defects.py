@@ -25,7 +25,7 @@ from ballpass.derive.bearing.effects.effect import Effect, GenericBall
 from ballpass.derive.scene.bearing_records import MOST_BALLS, BallEffect, Bearing
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import ChoiceKey, WholeKey
-from ballpass.derive.scene.quantity import Quantity, UsualRange
+from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import declared, keys_of, not_negative, positive, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.terms import Definition, Names, symbol_of
@@ -47,10 +47,10 @@ class Spall:
     on: str = declared(ChoiceKey(words="What it is on", choices=PLACES, note="a raceway or a ball"))
     ball: int = declared(BALL)
     profile: str = declared(ChoiceKey(words="How deep a ball sinks over it", choices=PROFILES))
-    angle: Quantity = quantity(
+    angle: SceneNumber = quantity(
         "rad", "Angle of the middle of NAME", r"\alpha_d", "270 deg", note="in axes of that raceway or ball"
     )
-    chord: Quantity = positive(
+    chord: SceneNumber = positive(
         "m",
         "Chord of NAME",
         "L_d",
@@ -60,7 +60,7 @@ class Spall:
         ),
         note="from edge to edge, shorter than the room between balls",
     )
-    depth: Quantity | None = not_negative(
+    depth: SceneNumber | None = not_negative(
         "m",
         "Depth of NAME",
         "h_d",
@@ -159,7 +159,7 @@ def _room(spall: Spall, bearing: Bearing) -> float:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Contact:
+class _SpallContact:
     """A spall as one kind of contact meets it: once with every ball, or, on a ball, with one of the two raceways.
 
     Attributes
@@ -334,10 +334,10 @@ class _Contact:
         return ball - raceway + (aside - own * cosine if self.spall.on == "ball" else own * cosine - aside)
 
 
-def _contacts(spall: Spall, bearing: Bearing, names: Names) -> Iterator[_Contact]:
+def _contacts(spall: Spall, bearing: Bearing, names: Names) -> Iterator[_SpallContact]:
     import sympy as sp
 
     angle = symbol_of(spall.angle)
     rings = [("outer", sp.S.Zero), ("inner", sp.pi)] if spall.on == "ball" else [(spall.on, sp.S.Zero)]
     for ring, opposite in rings:
-        yield _Contact(spall=spall, bearing=bearing, names=names, ring=ring, middle=angle + opposite)
+        yield _SpallContact(spall=spall, bearing=bearing, names=names, ring=ring, middle=angle + opposite)

@@ -10,7 +10,7 @@ import random
 from dataclasses import dataclass
 
 from ballpass.derive.scene.keys import Key, WholeKey
-from ballpass.derive.scene.quantity import Quantity, UsualRange
+from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import declared, keys_of, not_negative, quantity, read_record
 from ballpass.derive.scene.table import Table
 from ballpass.derive.scene.units import show
@@ -28,7 +28,7 @@ class Wave:
     order: int
     whose: str
 
-    amplitude: Quantity = not_negative(
+    amplitude: SceneNumber = not_negative(
         "m",
         "Amplitude of ORDER waves WHERE",
         "AMPLITUDE_{MARK}",
@@ -36,7 +36,7 @@ class Wave:
         remedy="give the amount, and turn the phase by 180 deg",
         usual=UsualRange(most=0.001, of="ball_diameter", hint="Waves are some tenths of a micrometre: check the unit."),
     )
-    phase: Quantity = quantity("rad", "Phase of ORDER waves WHERE", "PHASE_{MARK}", "0 deg", default="0 deg")
+    phase: SceneNumber = quantity("rad", "Phase of ORDER waves WHERE", "PHASE_{MARK}", "0 deg", default="0 deg")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

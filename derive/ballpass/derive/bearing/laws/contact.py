@@ -56,7 +56,7 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Rest:
+class SmoothedRest:
     """What one-sided laws do where the rate passes zero; `width` is the half width of their smoothed kink [m/s]."""
 
     width: sp.Expr | None = None

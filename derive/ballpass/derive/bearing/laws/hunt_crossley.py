@@ -18,7 +18,7 @@ from ballpass.derive.scene.read_keys import Either, number
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ballpass.derive.bearing.laws.contact import Contact, Rest
+    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class HuntCrossley(DampingLaw):
@@ -57,5 +57,7 @@ class HuntCrossley(DampingLaw):
             return numbers["hysteresis"]
         return 3 * (1 - numbers["restitution"] ** 2) / (4 * numbers["impact_speed"])
 
-    def force(self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: Rest) -> sp.Expr:
+    def force(
+        self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: SmoothedRest
+    ) -> sp.Expr:
         return coefficient * contact.force(delta) * rate

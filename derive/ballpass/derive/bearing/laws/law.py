@@ -12,14 +12,14 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
 from ballpass.derive.scene.keys import QuantityKey
-from ballpass.derive.scene.quantity import NOT_NEGATIVE, Quantity
+from ballpass.derive.scene.quantity import NOT_NEGATIVE, SceneNumber
 from ballpass.derive.scene.read_keys import Either, number, read_keys
 from ballpass.derive.scene.table import Table
 
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ballpass.derive.bearing.laws.contact import Contact, Rest
+    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class DampingLaw(ABC):
@@ -43,7 +43,7 @@ class DampingLaw(ABC):
     keys: ClassVar[Mapping[str, QuantityKey]] = MappingProxyType({})
     either: ClassVar[Either | None] = None
 
-    def read(self, table: Table) -> tuple[Quantity, ...]:
+    def read(self, table: Table) -> tuple[SceneNumber, ...]:
         """The law's numbers out of ``[bearing.damping]``; faults are noted."""
         keys = {name: key.told({"LAW": self.name}) for name, key in self.keys.items()}
         return tuple(number for number in read_keys(table, keys, self.either).values() if number is not None)
@@ -53,7 +53,9 @@ class DampingLaw(ABC):
         """The coefficient from the law's numbers, by key, and the contact stiffness k_b [N/m^1.5]."""
 
     @abstractmethod
-    def force(self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: Rest) -> sp.Expr:
+    def force(
+        self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: SmoothedRest
+    ) -> sp.Expr:
         """Damping force [N]; positive pushes the rings apart.  Zero is a law without a force."""
 
 

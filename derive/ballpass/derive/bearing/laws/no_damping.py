@@ -10,7 +10,7 @@ from ballpass.derive.bearing.laws.law import DampingLaw
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ballpass.derive.bearing.laws.contact import Contact, Rest
+    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class NoDamping(DampingLaw):
@@ -22,5 +22,7 @@ class NoDamping(DampingLaw):
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
         return 0 * stiffness
 
-    def force(self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: Rest) -> sp.Expr:
+    def force(
+        self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: SmoothedRest
+    ) -> sp.Expr:
         return 0 * rate

@@ -9,7 +9,7 @@ from ballpass.derive.bearing.laws.law import ViscousLaw
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ballpass.derive.bearing.laws.contact import Contact, Rest
+    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class OneSided(ViscousLaw):
@@ -19,5 +19,7 @@ class OneSided(ViscousLaw):
     description = "Eq. (10) as printed: resists approach only, whether the ball touches or not"
     kinked_at_rest = True
 
-    def force(self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: Rest) -> sp.Expr:
+    def force(
+        self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: SmoothedRest
+    ) -> sp.Expr:
         return coefficient * rest.positive(rate)

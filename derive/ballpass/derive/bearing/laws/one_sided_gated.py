@@ -9,7 +9,7 @@ from ballpass.derive.bearing.laws.law import ViscousLaw
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ballpass.derive.bearing.laws.contact import Contact, Rest
+    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class OneSidedGated(ViscousLaw):
@@ -19,5 +19,7 @@ class OneSidedGated(ViscousLaw):
     description = "Eq. (10) only while the ball is loaded; the force jumps at contact"
     kinked_at_rest = True
 
-    def force(self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: Rest) -> sp.Expr:
+    def force(
+        self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: SmoothedRest
+    ) -> sp.Expr:
         return coefficient * rest.positive(rate) * contact.gate(delta)

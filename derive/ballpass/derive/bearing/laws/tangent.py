@@ -16,7 +16,7 @@ from ballpass.derive.scene.read_keys import number
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ballpass.derive.bearing.laws.contact import Contact, Rest
+    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class Tangent(DampingLaw):
@@ -45,5 +45,7 @@ class Tangent(DampingLaw):
     def coefficient(self, numbers: Mapping[str, sp.Expr], stiffness: sp.Expr) -> sp.Expr:
         return numbers["ratio"]
 
-    def force(self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: Rest) -> sp.Expr:
+    def force(
+        self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: SmoothedRest
+    ) -> sp.Expr:
         return coefficient * contact.slope(delta) * rate

@@ -9,7 +9,7 @@ from ballpass.derive.bearing.laws.law import ViscousLaw
 if TYPE_CHECKING:
     import sympy as sp
 
-    from ballpass.derive.bearing.laws.contact import Contact, Rest
+    from ballpass.derive.bearing.laws.contact import Contact, SmoothedRest
 
 
 class TwoSidedGated(ViscousLaw):
@@ -18,5 +18,7 @@ class TwoSidedGated(ViscousLaw):
     name = "two-sided-gated"
     description = "viscous while the ball is loaded; the force jumps at contact"
 
-    def force(self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: Rest) -> sp.Expr:
+    def force(
+        self, delta: sp.Expr, rate: sp.Expr, coefficient: sp.Expr, contact: Contact, rest: SmoothedRest
+    ) -> sp.Expr:
         return coefficient * rate * contact.gate(delta)

@@ -9,7 +9,7 @@ import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw, not_zero, same_sign
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import positive, quantity
 from ballpass.derive.terms import symbol_of
 
@@ -25,9 +25,9 @@ class Asynchronous(TorqueLaw):
 
     name: ClassVar[str] = "asynchronous"
 
-    breakdown_torque: Quantity = quantity("N*m", "Breakdown torque of the motor", "M_b", "20 N*m")
-    breakdown_slip: Quantity = positive("1", "Slip at the breakdown torque", "s_b", 0.2)
-    synchronous_speed: Quantity = quantity("rad/s", "Synchronous speed of the motor", r"\omega_s", "1500 rpm")
+    breakdown_torque: SceneNumber = quantity("N*m", "Breakdown torque of the motor", "M_b", "20 N*m")
+    breakdown_slip: SceneNumber = positive("1", "Slip at the breakdown torque", "s_b", 0.2)
+    synchronous_speed: SceneNumber = quantity("rad/s", "Synchronous speed of the motor", r"\omega_s", "1500 rpm")
 
     def torque(self, speed: sp.Expr) -> sp.Expr:
         slip, most = 1 - speed / symbol_of(self.synchronous_speed), symbol_of(self.breakdown_slip)

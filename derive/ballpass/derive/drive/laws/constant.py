@@ -8,7 +8,7 @@ from typing import ClassVar
 import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import quantity
 from ballpass.derive.terms import symbol_of
 
@@ -19,7 +19,7 @@ class ConstantTorque(TorqueLaw):
 
     name: ClassVar[str] = "constant"
 
-    amount: Quantity = quantity("N*m", "Torque of the drive, counter-clockwise", "M_d", "5 N*m", name="torque")
+    amount: SceneNumber = quantity("N*m", "Torque of the drive, counter-clockwise", "M_d", "5 N*m", name="torque")
 
     def torque(self, speed: sp.Expr) -> sp.Expr:
         del speed

@@ -8,7 +8,7 @@ from typing import ClassVar
 import sympy as sp
 
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.terms import Smoothness
 
 
@@ -37,7 +37,7 @@ class TorqueLaw(ABC):
         """Note faults of its numbers."""
 
 
-def not_zero(checker: Checker, speed: Quantity, word: str) -> None:
+def not_zero(checker: Checker, speed: SceneNumber, word: str) -> None:
     """Note a fault where a speed is zero."""
     if speed.value == 0.0:
         checker.fault(
@@ -49,7 +49,7 @@ def not_zero(checker: Checker, speed: Quantity, word: str) -> None:
         )
 
 
-def same_sign(checker: Checker, torque: Quantity, speed: Quantity, words: str) -> None:
+def same_sign(checker: Checker, torque: SceneNumber, speed: SceneNumber, words: str) -> None:
     """Note a fault where a motor turns the other way than its torque."""
     if torque.value * speed.value < 0.0:
         checker.fault(

@@ -9,7 +9,7 @@ import sympy as sp
 
 from ballpass.derive.drive.laws.law import TorqueLaw, not_zero, same_sign
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import Either, quantity
 from ballpass.derive.terms import symbol_of
 
@@ -24,13 +24,15 @@ class LinearCharacteristic(TorqueLaw):
         what="the torque", groups=(("stall_torque",), ("nominal_torque", "nominal_speed"))
     )
 
-    no_load_speed: Quantity = quantity("rad/s", "No-load speed of the motor", r"\omega_0", "1500 rpm")
-    stall_torque: Quantity | None = quantity("N*m", "Torque of the motor at rest", "M_0", "20 N*m")
-    nominal_torque: Quantity | None = quantity("N*m", "Nominal torque of the motor", "M_N", "5 N*m")
-    at: Quantity | None = quantity("rad/s", "Nominal speed of the motor", r"\omega_N", "1400 rpm", name="nominal_speed")
+    no_load_speed: SceneNumber = quantity("rad/s", "No-load speed of the motor", r"\omega_0", "1500 rpm")
+    stall_torque: SceneNumber | None = quantity("N*m", "Torque of the motor at rest", "M_0", "20 N*m")
+    nominal_torque: SceneNumber | None = quantity("N*m", "Nominal torque of the motor", "M_N", "5 N*m")
+    at: SceneNumber | None = quantity(
+        "rad/s", "Nominal speed of the motor", r"\omega_N", "1400 rpm", name="nominal_speed"
+    )
 
     @property
-    def amount(self) -> Quantity:
+    def amount(self) -> SceneNumber:
         """The torque at rest, or the nominal one."""
         amount = self.stall_torque or self.nominal_torque
         assert amount is not None  # `either`

@@ -10,7 +10,7 @@ import sympy as sp
 from ballpass.derive.drive.laws.law import TorqueLaw
 from ballpass.derive.drive.piecewise_linear import piecewise_linear
 from ballpass.derive.scene.checker import Checker
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import column
 from ballpass.derive.terms import Smoothness, symbol_of
 
@@ -22,8 +22,10 @@ class SpeedTable(TorqueLaw):
     name: ClassVar[str] = "table"
     smoothness: ClassVar[Smoothness] = Smoothness.KINKED
 
-    speed: tuple[Quantity, ...] = column("rad/s", "Speed in row ROW of the drive's table", r"\omega_{d,ROW}")
-    amount: tuple[Quantity, ...] = column("N*m", "Torque in row ROW of the drive's table", "M_{d,ROW}", name="torque")
+    speed: tuple[SceneNumber, ...] = column("rad/s", "Speed in row ROW of the drive's table", r"\omega_{d,ROW}")
+    amount: tuple[SceneNumber, ...] = column(
+        "N*m", "Torque in row ROW of the drive's table", "M_{d,ROW}", name="torque"
+    )
 
     def torque(self, speed: sp.Expr) -> sp.Expr:
         return piecewise_linear(speed, [symbol_of(q) for q in self.speed], [symbol_of(q) for q in self.amount])

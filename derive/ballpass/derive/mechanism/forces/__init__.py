@@ -7,7 +7,7 @@ from ballpass.derive.mechanism.forces.along_direction import AlongDirection
 from ballpass.derive.mechanism.forces.angle_table import AngleTable
 from ballpass.derive.mechanism.forces.applied import Forces, derive_forces, drawn_forces, drawn_springs
 from ballpass.derive.mechanism.forces.body_torque import BodyTorque
-from ballpass.derive.mechanism.forces.constant import Constant
+from ballpass.derive.mechanism.forces.constant import ConstantForce
 from ballpass.derive.mechanism.forces.force import ForceTable, Law, Pathway
 from ballpass.derive.mechanism.forces.friction import Friction
 from ballpass.derive.mechanism.forces.joint_motion import JointMotion, JointTravel, JointTurn
@@ -33,8 +33,8 @@ __all__ += ["PointForce", "Windows", "derive_forces", "drawn_forces", "drawn_spr
 
 #: In the order in which their numbers are listed; of its pathways and laws those whose key is there, else the last.
 FORCE_TABLES: tuple[ForceTable, ...] = (
-    ForceTable("forces", "force", "body, point and force", (PointForce,), (Windows, AngleTable, Constant)),
-    ForceTable("torques", "torque", "body and torque", (BodyTorque,), (Windows, AngleTable, Constant)),
+    ForceTable("forces", "force", "body, point and force", (PointForce,), (Windows, AngleTable, ConstantForce)),
+    ForceTable("torques", "torque", "body and torque", (BodyTorque,), (Windows, AngleTable, ConstantForce)),
     ForceTable("springs", "spring", "bodies, points and stiffness", (TwoPoints,), (SpringDamper,)),
     ForceTable("torsion_springs", "spring", "bodies and stiffness", (TwoBodies,), (SpringDamper,)),
     ForceTable("stops", "stop", "bodies, points, stiffness and free_length", (AlongDirection, TwoPoints), (Stop,)),

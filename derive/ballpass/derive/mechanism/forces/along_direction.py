@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import sympy as sp
 
-from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import body_point, cross, dot, scale, subscript, subtract
 from ballpass.derive.scene.body_keys import BODIES, POINTS
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import declared, quantity
 from ballpass.derive.scene.records import FRAME, Force
 from ballpass.derive.terms import symbol_of
@@ -32,7 +32,7 @@ class AlongDirection(Pathway):
 
     bodies: tuple[str, str] = declared(BODIES)
     points: tuple[str, str] = declared(POINTS)
-    direction: Quantity = quantity(
+    direction: SceneNumber = quantity(
         "rad", "Direction of NAME in the axes of its first body", r"\alpha_{INDEX}", "90 deg"
     )
 
@@ -56,11 +56,11 @@ class AlongDirection(Pathway):
             Output(name=distance.name, expression=distance, unit="m", description=f"Distance of {words}")
         )
 
-        def loads(tension: sp.Expr) -> tuple[Load, ...]:
+        def loads(tension: sp.Expr) -> tuple[AppliedLoad, ...]:
             pull = scale(tension, along)
             both = (
-                Load(body=self.bodies[0], point=places[0], force=pull, torque=cross(line, pull)),
-                Load(body=self.bodies[1], point=places[1], force=scale(sp.Integer(-1), pull)),
+                AppliedLoad(body=self.bodies[0], point=places[0], force=pull, torque=cross(line, pull)),
+                AppliedLoad(body=self.bodies[1], point=places[1], force=scale(sp.Integer(-1), pull)),
             )
             return tuple(load for load in both if load.body != FRAME)
 

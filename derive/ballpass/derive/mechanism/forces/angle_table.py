@@ -10,7 +10,7 @@ import sympy as sp
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import column, read_record
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import Table
@@ -22,8 +22,10 @@ class AngleTable(Law):
 
     key: ClassVar[str] = "table"
 
-    angle: tuple[Quantity, ...] = column("rad", "Driver angle in row ROW of the table of NAME", r"\theta_{INDEX,ROW}")
-    values: tuple[Quantity, ...] = column(
+    angle: tuple[SceneNumber, ...] = column(
+        "rad", "Driver angle in row ROW of the table of NAME", r"\theta_{INDEX,ROW}"
+    )
+    values: tuple[SceneNumber, ...] = column(
         "COLUMN_UNIT", "THE_COLUMN in row ROW of the table of NAME", "T_{INDEX,ROW}", name="COLUMN"
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from ballpass.derive.drive import Drive
-from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Setting
 from ballpass.derive.mechanism.forces.point_force import PointForce
 from ballpass.derive.mechanism.forces.two_points import TwoPoints
@@ -25,8 +25,8 @@ class Forces:
     what jumps or has a kink where the motion decides, by name, and `switches` are the places.
     """
 
-    loads: tuple[Load, ...]
-    of_each: Mapping[str, tuple[Load, ...]]
+    loads: tuple[AppliedLoad, ...]
+    of_each: Mapping[str, tuple[AppliedLoad, ...]]
     definitions: tuple[Definition, ...]
     inputs: tuple[Input, ...]
     outputs: tuple[Output, ...]
@@ -38,7 +38,7 @@ class Forces:
 def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Forces:
     """Derive the loads of all forces and torques of a mechanism."""
     setting = Setting(mechanism=mechanism, linkage=linkage, drive=drive)
-    loads: dict[str, tuple[Load, ...]] = {}
+    loads: dict[str, tuple[AppliedLoad, ...]] = {}
     for force in mechanism.forces:
         action = force.pathway.act(force, setting)
         loads[force.label] = action.loads(force.law.amount(force, action, setting))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
 from ballpass.derive.scene.body_keys import BODY
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import declared, quantity
 from ballpass.derive.scene.records import Force
 from ballpass.derive.terms import symbol_of
@@ -22,7 +22,7 @@ class BodyTorque(Pathway):
     unit: ClassVar[str] = "N*m"
 
     body: str = declared(BODY)
-    torque: Quantity | None = quantity(
+    torque: SceneNumber | None = quantity(
         "N*m", "Torque NAME on the BODY, counter-clockwise", "M_{INDEX}", "20 N*m", when="required without `table`"
     )
 
@@ -34,7 +34,7 @@ class BodyTorque(Pathway):
     def act(self, force: Force, setting: Setting) -> Action:
         """The torque times the law's factor, or the law's torque."""
         torque = 1 if self.torque is None else symbol_of(self.torque)
-        return Action(loads=lambda amount: (Load(body=self.body, torque=amount * torque),))
+        return Action(loads=lambda amount: (AppliedLoad(body=self.body, torque=amount * torque),))
 
     def words(self) -> str:
         """Torque and body."""

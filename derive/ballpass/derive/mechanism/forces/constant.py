@@ -12,7 +12,7 @@ from ballpass.derive.scene.records import Force
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Constant(Law):
+class ConstantForce(Law):
     """The factor 1."""
 
     factor: ClassVar[bool] = True

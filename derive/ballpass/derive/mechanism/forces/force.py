@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Self
 import sympy as sp
 
 from ballpass.derive.drive import Drive, OverAngle
-from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.kinematics import Ledger
 from ballpass.derive.mechanism.linkage import Linkage
 from ballpass.derive.scene.body_keys import Points, check_names
@@ -84,7 +84,7 @@ class Action:
     rate : of the size [m/s] or [rad/s]
     """
 
-    loads: Callable[[sp.Expr], tuple[Load, ...]]
+    loads: Callable[[sp.Expr], tuple[AppliedLoad, ...]]
     excess: Callable[[sp.Expr], sp.Expr] | None = None
     rate: sp.Expr | None = None
 

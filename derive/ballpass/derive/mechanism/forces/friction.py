@@ -11,7 +11,7 @@ import sympy as sp
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.keys import Fill
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import not_negative, positive, read_record
 from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table
@@ -27,7 +27,7 @@ class Friction(Law):
     At a revolute joint in [N*m*s/rad], [N*m] and [rad/s], at a guide in [N*s/m], [N] and [m/s].
     """
 
-    viscous: Quantity | None = not_negative(
+    viscous: SceneNumber | None = not_negative(
         "AMOUNT_UNIT*s/SIZE_UNIT",
         "Viscous friction of NAME",
         "c_{INDEX}",
@@ -35,7 +35,7 @@ class Friction(Law):
         optional=True,
         when="this, `AMOUNT`, or both",
     )
-    coulomb: Quantity | None = not_negative(
+    coulomb: SceneNumber | None = not_negative(
         "AMOUNT_UNIT",
         "Coulomb friction of NAME",
         "F_{c,INDEX}",
@@ -44,7 +44,7 @@ class Friction(Law):
         optional=True,
         when="this, `viscous`, or both",
     )
-    smoothing: Quantity | None = positive(
+    smoothing: SceneNumber | None = positive(
         "SIZE_UNIT/s",
         "Rate over which the Coulomb friction of NAME turns round",
         r"\epsilon_{INDEX}",

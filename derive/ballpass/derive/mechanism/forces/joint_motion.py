@@ -6,7 +6,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import dot, joint_point, scale, subtract
 from ballpass.derive.scene.errors import Fault, LinkageError
@@ -72,7 +72,7 @@ class JointTurn(JointMotion):
         one, two = (setting.linkage.pose(body) for body in joint.bodies)
         return Action(
             loads=lambda torque: tuple(
-                Load(body=body, torque=on)
+                AppliedLoad(body=body, torque=on)
                 for body, on in zip(joint.bodies, (torque, -torque), strict=True)
                 if body != FRAME
             ),
@@ -98,7 +98,7 @@ class JointTravel(JointMotion):
         one, two = (setting.linkage.pose(body).motion(place) for body, place in zip(joint.bodies, places, strict=True))
         return Action(
             loads=lambda force: tuple(
-                Load(body=body, point=place, force=scale(on, guide.direction))
+                AppliedLoad(body=body, point=place, force=scale(on, guide.direction))
                 for body, place, on in zip(joint.bodies, places, (force, -force), strict=True)
                 if body != FRAME
             ),

@@ -7,12 +7,12 @@ from typing import Any
 
 import sympy as sp
 
-from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Law, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import body_point, scale
 from ballpass.derive.scene.body_keys import BODY
 from ballpass.derive.scene.keys import TextKey
-from ballpass.derive.scene.quantity import Quantity, Vector
+from ballpass.derive.scene.quantity import SceneNumber, Vector
 from ballpass.derive.scene.read_keys import declared, quantity
 from ballpass.derive.scene.records import AMOUNT, Force, force_key
 from ballpass.derive.terms import components, symbol_of
@@ -27,7 +27,7 @@ class PointForce(Pathway):
     force: Vector = declared(
         force_key("the force NAME on the BODY", "F", "INDEX", when="required without `table`", length_limits=AMOUNT)
     )
-    direction: Quantity | None = quantity(
+    direction: SceneNumber | None = quantity(
         "rad",
         "Direction of the force NAME on the BODY",
         r"\alpha_{INDEX}",
@@ -47,7 +47,7 @@ class PointForce(Pathway):
         if self.direction is not None:
             angle = symbol_of(self.direction)
             vector = sp.cos(angle), sp.sin(angle)
-        return Action(loads=lambda amount: (Load(body=self.body, point=point, force=scale(amount, vector)),))
+        return Action(loads=lambda amount: (AppliedLoad(body=self.body, point=point, force=scale(amount, vector)),))
 
     def words(self) -> str:
         """Force and point."""

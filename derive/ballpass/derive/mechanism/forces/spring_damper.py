@@ -10,7 +10,7 @@ import sympy as sp
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
 from ballpass.derive.scene.keys import Fill
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import not_negative, quantity, read_record
 from ballpass.derive.scene.records import Force
 from ballpass.derive.scene.table import Table
@@ -26,7 +26,7 @@ class SpringDamper(Law):
     in [N*m], [N*m/rad], [N*m/rad^3], [N*m*s/rad] and [rad].
     """
 
-    stiffness: Quantity | None = not_negative(
+    stiffness: SceneNumber | None = not_negative(
         "AMOUNT_UNIT/SIZE_UNIT",
         "Stiffness of NAME",
         "k_{INDEX}",
@@ -34,7 +34,7 @@ class SpringDamper(Law):
         optional=True,
         when="this, `damping`, or both",
     )
-    free: Quantity | None = quantity(
+    free: SceneNumber | None = quantity(
         "SIZE_UNIT",
         "THE_SIZE of NAME without force",
         "L_{0,INDEX}",
@@ -42,7 +42,7 @@ class SpringDamper(Law):
         name="free_SIZE",
         when="required with `stiffness`, else refused",
     )
-    cubic_stiffness: Quantity | None = quantity(
+    cubic_stiffness: SceneNumber | None = quantity(
         "AMOUNT_UNIT/SIZE_UNIT^3",
         "Cubic stiffness of NAME",
         "k_{3,INDEX}",
@@ -51,7 +51,7 @@ class SpringDamper(Law):
         when="optional with `stiffness`, else refused",
         note="times the third power of what is beyond the free size; a negative one softens",
     )
-    damping: Quantity | None = not_negative(
+    damping: SceneNumber | None = not_negative(
         "AMOUNT_UNIT*s/SIZE_UNIT",
         "Damping of NAME",
         "c_{INDEX}",
@@ -59,7 +59,7 @@ class SpringDamper(Law):
         optional=True,
         when="this, `stiffness`, or both",
     )
-    preload: Quantity | None = quantity(
+    preload: SceneNumber | None = quantity(
         "AMOUNT_UNIT", "THE_AMOUNT of NAME at its free SIZE", "F_{0,INDEX}", "5 AMOUNT_UNIT", optional=True
     )
 

@@ -12,7 +12,7 @@ import sympy as sp
 
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.mechanism.kinematics import subscript
-from ballpass.derive.scene.quantity import Quantity
+from ballpass.derive.scene.quantity import SceneNumber
 from ballpass.derive.scene.read_keys import not_negative, quantity
 from ballpass.derive.scene.records import Force
 from ballpass.derive.terms import Smoothness, symbol_of
@@ -26,13 +26,13 @@ class Stop(Law):
     In [N/m], [m] and [s/m], between two bodies in [N*m/rad], [rad] and [s/rad].
     """
 
-    stiffness: Quantity = not_negative(
+    stiffness: SceneNumber = not_negative(
         "AMOUNT_UNIT/SIZE_UNIT", "Stiffness of the stop NAME", "k_{INDEX}", "1e6 AMOUNT_UNIT/SIZE_UNIT"
     )
-    free: Quantity = quantity(
+    free: SceneNumber = quantity(
         "SIZE_UNIT", "THE_SIZE of the stop NAME below which it pushes", "L_{0,INDEX}", "EXAMPLE", name="free_SIZE"
     )
-    hysteresis: Quantity | None = not_negative(
+    hysteresis: SceneNumber | None = not_negative(
         "s/SIZE_UNIT",
         "Hysteresis damping factor of the stop NAME",
         r"\alpha_{INDEX}",

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import sympy as sp
 
-from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import cross, dot
 from ballpass.derive.scene.body_keys import BODIES
@@ -38,9 +38,9 @@ class TwoBodies(Pathway):
             turned = (dot(first, second), cross(first, second))
             return sp.atan2(cross(from_free, turned), dot(from_free, turned))
 
-        def loads(torque: sp.Expr) -> tuple[Load, ...]:
+        def loads(torque: sp.Expr) -> tuple[AppliedLoad, ...]:
             signed = zip(self.bodies, (torque, -torque), strict=True)
-            return tuple(Load(body=body, torque=on) for body, on in signed if body != FRAME)
+            return tuple(AppliedLoad(body=body, torque=on) for body, on in signed if body != FRAME)
 
         return Action(loads=loads, excess=excess, rate=two.rate - one.rate)
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import sympy as sp
 
-from ballpass.derive.mechanism.balance import Load
+from ballpass.derive.mechanism.balance import AppliedLoad
 from ballpass.derive.mechanism.forces.force import Action, Measure, Pathway, Setting
 from ballpass.derive.mechanism.kinematics import body_point, dot, scale, subscript, subtract
 from ballpass.derive.scene.body_keys import BODIES, POINTS
@@ -42,10 +42,10 @@ class TwoPoints(Pathway):
         rate = dot(along, subtract(two.velocity, one.velocity))
         setting.outputs.append(Output(name=length.name, expression=length, unit="m", description=f"Length of {words}"))
 
-        def loads(tension: sp.Expr) -> tuple[Load, ...]:
+        def loads(tension: sp.Expr) -> tuple[AppliedLoad, ...]:
             pull = scale(tension, along)
             ends = zip(self.bodies, places, (pull, scale(sp.Integer(-1), pull)), strict=True)
-            return tuple(Load(body=body, point=place, force=on) for body, place, on in ends if body != FRAME)
+            return tuple(AppliedLoad(body=body, point=place, force=on) for body, place, on in ends if body != FRAME)
 
         return Action(loads=loads, excess=lambda free: length - free, rate=rate)
 

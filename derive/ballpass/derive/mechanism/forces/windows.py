@@ -12,7 +12,7 @@ import sympy as sp
 from ballpass.derive.mechanism.forces.force import Action, Law, Setting
 from ballpass.derive.scene.checker import Checker
 from ballpass.derive.scene.keys import Fill
-from ballpass.derive.scene.quantity import Quantity, UsualRange
+from ballpass.derive.scene.quantity import SceneNumber, UsualRange
 from ballpass.derive.scene.read_keys import quantity, read_record
 from ballpass.derive.scene.records import Driver, Force
 from ballpass.derive.scene.table import Table
@@ -27,10 +27,10 @@ _RADIANS = math.radians(2.0 * math.pi)
 class Window:
     """Driver angles [rad] between which a load acts: from `start` on, up to and without `end`, modulo a turn."""
 
-    start: Quantity = quantity(
+    start: SceneNumber = quantity(
         "rad", "Driver angle at the start of PLACE", r"\theta_{\mathrm{start},INDEX}", "237 deg", usual=_ANGLE
     )
-    end: Quantity = quantity(
+    end: SceneNumber = quantity(
         "rad", "Driver angle at the end of PLACE", r"\theta_{\mathrm{end},INDEX}", "267 deg", usual=_ANGLE
     )
 

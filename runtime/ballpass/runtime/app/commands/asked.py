@@ -19,10 +19,10 @@ from ballpass.runtime.plot import FORMATS
 if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.derive.scene.errors import Fault
-    from ballpass.derive.scene.records import Run
+    from ballpass.derive.scene.records import RunSettings
     from ballpass.runtime.contract import Manifest, RunInfo
 
-_Run = TypeVar("_Run", bound="Run | RunInfo")
+_Run = TypeVar("_Run", bound="RunSettings | RunInfo")
 
 #: Lines of a scene's run table that have an option of ``ballpass run``.
 RUN_OPTIONS = {
@@ -45,7 +45,7 @@ class Asked:
     speed : of driver or shaft, with the overrides; 0 where nothing turns [rad/s]
     """
 
-    run: Run | RunInfo
+    run: RunSettings | RunInfo
     overrides: dict[str, float]
     speed: float
 
