@@ -40,7 +40,7 @@ generated: $(VENV)/.ready
 	$(BIN)/ballpass derive scenes/punching_press.toml
 
 trade: $(VENV)/.ready
-	$(BIN)/python -m trade
+	$(BIN)/python -m benchmarks.trade
 
 BENCH_VENV := benchmarks/.venv
 

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from trade.coupling import PAGE, cases, row
+from benchmarks.trade.coupling import PAGE, cases, row
 
 #: Of a prototype in other code, rows as in the table: force [N], y [µm], speed [mm/s], each one-way and two-way.
 PROTOTYPE = (

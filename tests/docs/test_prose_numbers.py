@@ -36,7 +36,7 @@ PAGES = [
 #: Pages with tables of numbers, and what holds these.
 TABLES = {
     "docs/index.md": "test_speeds_of_the_landing_page_are_those_of_the_benchmarks",
-    "docs/howto/accuracy.md": "written by `python -m trade.promise`, a campaign of an hour",
+    "docs/howto/accuracy.md": "written by `python -m benchmarks.trade.promise`, a campaign of an hour",
     "docs/howto/damping.md": "test_damping_table.py",
     "docs/howto/data_sets.md": "written by `python -m benchmarks.data_sets`: times, which no test repeats",
     "docs/howto/install.md": "sizes of installations, which its script prints",

@@ -1,9 +1,9 @@
 """Measure the trade of accuracy against time on the shipped scenes, and write its page of the documentation.
 
-    python -m trade [--scenes NAME ...] [--members N]
-    python -m trade --draw
+    python -m benchmarks.trade [--scenes NAME ...] [--members N]
+    python -m benchmarks.trade --draw
 
-Writes trade/measured.json, docs/trade.md and docs/images/trade_<scene>.png; ``--draw`` measures nothing and writes page
+Writes benchmarks/trade/measured.json, docs/trade.md and docs/images/trade_<scene>.png; ``--draw`` measures nothing and writes page
 and pictures of what was measured last.  How to read it: every number on the page comes from here;
 errors are relative to a reference made by two methods, times are of the processor for the integration alone, and all
 ratios are of times measured in one run, interleaved.
@@ -27,7 +27,7 @@ from ballpass.runtime.certify.trade import measure_trade
 from ballpass.runtime.certify.trade_report import Measured, Trade, percent, table, words
 from ballpass.runtime.plot.style import caption_of, save
 from ballpass.runtime.plot.trade import draw_trade
-from trade.promise import ROOT, SCENES, markdown
+from benchmarks.trade.promise import ROOT, SCENES, markdown
 
 PEAK = "peak_ball_force"
 
@@ -96,7 +96,7 @@ def page(trades: list[Trade], minutes: float, captions: Mapping[str, str]) -> st
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="trade", description=__doc__)
+    parser = argparse.ArgumentParser(prog="benchmarks.trade", description=__doc__)
     parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=SCENES)
     parser.add_argument("--members", type=int, default=30, help="parameter sets of each trade")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "trade.md", help="page to write")

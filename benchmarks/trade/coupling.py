@@ -1,6 +1,6 @@
 """What the paper's one-way model leaves out on its press: laws and housings, one-way beside two-way.
 
-    python -m trade.coupling
+    python -m benchmarks.trade.coupling
 
 Writes docs/howto/two_way_numbers.md.  Ten steady turns of each: the mean of the highest ball force of each turn, rms of
 the inner ring's motion along the guide and of its speed.  `ballpass trade SCENE --against one-way` measures another
@@ -18,7 +18,7 @@ import numpy as np
 from ballpass.derive import generate
 from ballpass.derive.reading.read import scene_from_text
 from ballpass.runtime import Model, load
-from trade.promise import ROOT
+from benchmarks.trade.promise import ROOT
 
 PAGE = ROOT / "docs" / "howto" / "two_way_numbers.md"
 SCENES = ("punching_press", "punching_press_two_way")

@@ -1,6 +1,6 @@
 """Are named errors kept?  `--error` asked on random parameter sets near the shipped scenes and far from them.
 
-    python -m trade.promise [--scenes NAME ...] [--sets N] [--seed N]
+    python -m benchmarks.trade.promise [--scenes NAME ...] [--sets N] [--seed N]
 
 Writes docs/howto/accuracy_numbers.md.  The true error is that against another method at rtol 1e-12, located kinks and
 all; a third run from a start moved by a picometre tells what has a value at all.
@@ -29,7 +29,7 @@ from ballpass.runtime.quantity.records import Quantity
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "howto" / "accuracy_numbers.md"
 SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
 TARGETS = (0.1, 0.03, 0.01, 0.003, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -181,7 +181,7 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="trade.promise", description=__doc__)
+    parser = argparse.ArgumentParser(prog="benchmarks.trade.promise", description=__doc__)
     parser.add_argument("--scenes", nargs="+", default=list(SCENES), choices=SCENES)
     parser.add_argument("--sets", type=int, default=40, help="parameter sets far from each scene; a fifth near it")
     parser.add_argument("--seed", type=int, default=7)
@@ -197,7 +197,7 @@ def main() -> None:
                 rows.append(row(name, kind, count(model, sets, wanted, stages.fraction)))
     targets = ", ".join(percent(target) for target in TARGETS)
     text = (
-        f"<!-- Written by `python -m trade.promise --sets {given.sets} --seed {given.seed}`. Do not edit. -->\n\n"
+        f"<!-- Written by `python -m benchmarks.trade.promise --sets {given.sets} --seed {given.seed}`. Do not edit. -->\n\n"
         f"On {given.sets} random parameter sets far from each scene and a fifth as many near it: targets of {targets}, "
         f"each of the peak ball force alone and of five quantities together.\n\n"
         f"{markdown(HEAD[:SPLIT], [cells[:SPLIT] for cells in rows])}\n\n"
