@@ -30,7 +30,7 @@ def test_there_is_one_version() -> None:
     assert runtime.__version__ == derive.__version__
     for path, pattern in {
         "CITATION.cff": r"^version: (\S+)$",
-        "recipe/recipe.yaml": r'^  version: "(\S+)"$',
+        "packaging/recipe/recipe.yaml": r'^  version: "(\S+)"$',
     }.items():
         (found,) = re.findall(pattern, (ROOT / path).read_text(encoding="utf-8"), flags=re.MULTILINE)
         assert found == runtime.__version__, path
@@ -46,7 +46,7 @@ def test_what_the_runtime_needs_is_said_once_more_by_the_whole_and_by_the_recipe
         assert small == set(PROJECT["project"]["optional-dependencies"][extra])
     names = {re.split(r"\W", item)[0] for item in needed}
     assert not names & {"sympy", "pint", "matplotlib", "pandas", "scipy", "xarray"}
-    recipe = (ROOT / "recipe" / "recipe.yaml").read_text(encoding="utf-8")
+    recipe = (ROOT / "packaging" / "recipe" / "recipe.yaml").read_text(encoding="utf-8")
     for item in PROJECT["project"]["dependencies"]:
         name, bounds = re.fullmatch(r"([\w-]+)(.*)", item).groups()  # type: ignore[union-attr]
         assert f"- {'matplotlib-base' if name == 'matplotlib' else name} {bounds}\n" in recipe

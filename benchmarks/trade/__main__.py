@@ -3,8 +3,8 @@
     python -m benchmarks.trade [--scenes NAME ...] [--members N]
     python -m benchmarks.trade --draw
 
-Writes benchmarks/trade/measured.json, docs/trade.md and docs/images/trade_<scene>.png; ``--draw`` measures nothing and writes page
-and pictures of what was measured last.  How to read it: every number on the page comes from here;
+Writes benchmarks/trade/measured.json, docs/trade.md and docs/images/trade_<scene>.png; ``--draw`` measures nothing and
+writes page and pictures of what was measured last.  How to read it: every number on the page comes from here;
 errors are relative to a reference made by two methods, times are of the processor for the integration alone, and all
 ratios are of times measured in one run, interleaved.
 """

@@ -197,7 +197,8 @@ def main() -> None:
                 rows.append(row(name, kind, count(model, sets, wanted, stages.fraction)))
     targets = ", ".join(percent(target) for target in TARGETS)
     text = (
-        f"<!-- Written by `python -m benchmarks.trade.promise --sets {given.sets} --seed {given.seed}`. Do not edit. -->\n\n"
+        f"<!-- Written by `python -m benchmarks.trade.promise --sets {given.sets} --seed {given.seed}`. "
+        "Do not edit. -->\n\n"
         f"On {given.sets} random parameter sets far from each scene and a fifth as many near it: targets of {targets}, "
         f"each of the peak ball force alone and of five quantities together.\n\n"
         f"{markdown(HEAD[:SPLIT], [cells[:SPLIT] for cells in rows])}\n\n"
