@@ -22,7 +22,7 @@ from ballpass.runtime import load
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.model import Model
 from ballpass.runtime.native.stepper import Segments
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.segments import segment_edges
 from benchmarks.press import Press, press_numbers
 
@@ -119,7 +119,8 @@ class Cycle:
         """The cycle as the project's stepper takes it."""
         infos = self.model.manifest.inputs
         inputs = [
-            clock.inputs_at(infos, self.numbers.values, float(a), 0.5 * float(a + b)) for a, b in pairwise(self.edges)
+            driver_angle.inputs_at(infos, self.numbers.values, float(a), 0.5 * float(a + b))
+            for a, b in pairwise(self.edges)
         ]
         return Segments(times=self.edges, inputs=np.array(inputs), restarts=np.ones(len(inputs), dtype=bool))
 

@@ -15,8 +15,8 @@ from ballpass.runtime.app.summary_table import render_summary
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.point.conditioning import ConditioningWarning
-from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.failure_location import whereabouts
+from ballpass.runtime.run import driver_angle
+from ballpass.runtime.run.failure_location import locate_failure
 from ballpass.runtime.run.limits import brief_limit, step_limit
 from ballpass.runtime.run.magnitudes import model_scales
 from ballpass.runtime.run.segments import LARGEST_PHASE, segment_edges
@@ -55,7 +55,7 @@ def test_magnitudes_in_c_and_python_are_the_same_at_the_edges(
     model = needs_stepper(make_model("punching_press"))
     values = {f"{OUTER}.mass": mass, f"{OUTER}.stiffness": stiffness}
     numbers = model.numbers(values)
-    turn = clock.period(model.manifest, numbers.values)
+    turn = driver_angle.period(model.manifest, numbers.values)
     by_python = model_scales(model, numbers, model.initial(values), turn, turn).magnitude
     by_c = model.simulate(cycles=1, parameters=values, samples_per_cycle=16, transient=0).statistics.magnitudes
     np.testing.assert_allclose(by_c, by_python, rtol=1e-3)
@@ -76,7 +76,7 @@ def test_a_rotor_thrown_through_its_clearance_flies_straight_for_many_turns(
     solution = model.simulate(duration=10.0, parameters=numbers, transient=0, rtol=1e-9, samples_per_cycle=16)
     np.testing.assert_allclose(solution["inner.x"][-1], start + 0.5 * force * 10.0**2, rtol=1e-6)
     np.testing.assert_allclose(solution["inner.y"][-1], 1e-3 * 10.0, rtol=1e-9)
-    turn = clock.period(model.manifest, model.numbers(numbers).values)
+    turn = driver_angle.period(model.manifest, model.numbers(numbers).values)
     by_python = model_scales(model, model.numbers(numbers), model.initial(numbers), 10.0, turn).magnitude
     np.testing.assert_allclose(solution.statistics.magnitudes, by_python, rtol=1e-3)
 
@@ -84,7 +84,7 @@ def test_a_rotor_thrown_through_its_clearance_flies_straight_for_many_turns(
 def test_a_load_that_overflows_ends_in_words_without_warnings_of_numpy(make_model: ModelMaker) -> None:
     model = make_model("punching_press")
     numbers = {"mechanism.forces.punch.force.y": 1e300}
-    turn = clock.period(model.manifest, model.numbers().values)
+    turn = driver_angle.period(model.manifest, model.numbers().values)
     model_scales(model, model.numbers(numbers), model.initial(), turn, turn)  # warnings are errors here
     with pytest.raises(IntegrationError, match="stopped being finite"):
         needs_stepper(model).simulate(cycles=1, parameters=numbers, transient=0)
@@ -139,10 +139,10 @@ def test_the_most_deflected_ball_is_the_one_the_ring_presses_on(make_model: Mode
     for ball, angle in ((1, 0.0), (3, math.pi / 2.0), (6, 5.0 * math.pi / 4.0)):
         x = np.zeros(8)
         x[0], x[1] = 2e-5 * math.cos(angle), 2e-5 * math.sin(angle)
-        place = whereabouts(model, numbers, 0.0, x)
+        place = locate_failure(model, numbers, 0.0, x)
         assert place.ball == ball
         assert place.deflection == pytest.approx(2e-5 - 5e-6, rel=1e-12)  # less half the clearance, Eq. (6)
-    assert whereabouts(model, numbers, 0.0, np.full(8, math.nan)).ball is None
+    assert locate_failure(model, numbers, 0.0, np.full(8, math.nan)).ball is None
 
 
 def test_phases_stay_small_within_a_segment(make_model: ModelMaker, scene_text: Callable[..., str]) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from ballpass.runtime import Model
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.stepper import Family, Outcome, Segments
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.segments import segment_edges
 
 
@@ -30,7 +30,7 @@ def segments_between(model: Model, numbers: Numbers, edges: np.ndarray, gates: n
     inputs = model.manifest.inputs
     middles = [0.5 * (a + b) for a, b in pairwise(edges if gates is None else gates)]
     pairs = zip(edges[:-1], middles, strict=True)
-    u = np.array([clock.inputs_at(inputs, numbers.values, float(a), float(middle)) for a, middle in pairs])
+    u = np.array([driver_angle.inputs_at(inputs, numbers.values, float(a), float(middle)) for a, middle in pairs])
     u = u.reshape(len(edges) - 1, len(inputs))
     switching = [k for k, info in enumerate(inputs) if info.kind != "phase"]
     restarts = np.concatenate([[True], np.any(np.diff(u[:, switching], axis=0) != 0.0, axis=1)])
@@ -39,7 +39,7 @@ def segments_between(model: Model, numbers: Numbers, edges: np.ndarray, gates: n
 
 def edges_of(model: Model, numbers: Numbers, begin: float, end: float) -> np.ndarray:
     """Breakpoints and whole turns of a run, with its begin and end [s]."""
-    return segment_edges(model, numbers, begin, end, clock.period(model.manifest, numbers.values))
+    return segment_edges(model, numbers, begin, end, driver_angle.period(model.manifest, numbers.values))
 
 
 def run(

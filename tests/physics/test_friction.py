@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from ballpass.derive import generate
+from ballpass.derive.reading.plausible_ranges import usual_ranges
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.derive.reading.usual import usual_ranges
 from ballpass.runtime import load
 
 INERTIA, SPEED = 0.04, 50.0

@@ -28,7 +28,7 @@ from ballpass.runtime.app.cli import app
 from ballpass.runtime.contract import ParameterInfo
 from ballpass.runtime.contract.bounds import allowed
 from ballpass.runtime.export.c_program import export_c
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.locating import tight_below
 from ballpass.runtime.run.segments import segment_edges
 
@@ -381,7 +381,7 @@ def test_segments_and_their_inputs_are_those_of_python_to_the_last_bit(
     program = exported(scene, *changes)
     model = program.model
     inputs, resolved = model.manifest.inputs, model.numbers(numbers)
-    turn = clock.period(model.manifest, resolved.values)
+    turn = driver_angle.period(model.manifest, resolved.values)
     edges = segment_edges(model, resolved, 0.0, length, turn)
     angles = [resolved.values[item.offset] if item.offset else 0.0 for item in inputs]
     values = np.concatenate([resolved.p, resolved.c, angles])
@@ -403,7 +403,7 @@ def test_segments_and_their_inputs_are_those_of_python_to_the_last_bit(
     u = np.zeros(len(inputs))
     for left, right in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         code.schedule_inputs(*given, left, 0.5 * (left + right), u.ctypes.data)
-        assert np.array_equal(u, clock.inputs_at(inputs, resolved.values, left, 0.5 * (left + right)))
+        assert np.array_equal(u, driver_angle.inputs_at(inputs, resolved.values, left, 0.5 * (left + right)))
 
 
 # as a library

@@ -19,8 +19,7 @@ from ballpass.runtime import IntegrationError, Model
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.many import chunks
 from ballpass.runtime.native.stepper import METHODS, End, Outcome, Stepper
-from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run import limits, loop
+from ballpass.runtime.run import driver_angle, limits, loop
 from ballpass.runtime.run.loop import RunFailed, RunUnderWay
 from ballpass.runtime.run.magnitudes import stepper_magnitudes
 from ballpass.runtime.run.reductions import channel_names
@@ -34,7 +33,7 @@ def in_calls(model: Model, stepper: Stepper, method: str, steps: int) -> tuple[O
     """Two turns in calls of so many steps, every other one in another thread: what the driver tells at the end; state,
     reductions and samples; number of calls."""
     numbers = model.numbers()
-    turn = clock.period(model.manifest, numbers.values)
+    turn = driver_angle.period(model.manifest, numbers.values)
     state = np.array([numbers.values[name] for name in model.manifest.initial])
     tolerance = 1e-6 * stepper_magnitudes(model, model.ensemble_driver.stepper, numbers, state, 2.0 * turn, turn)
     segments = make_segments(model.manifest.inputs, numbers, segment_edges(model, numbers, 0.0, 2.0 * turn, turn))

@@ -15,7 +15,7 @@ import pytest
 from ballpass.runtime import IntegrationError, Model, RequestError, Sensitivities
 from ballpass.runtime.native.stepper import End, Family, Outcome, Segments
 from ballpass.runtime.point.evaluate import neighbour
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.direction_scales import direction_scales
 from ballpass.runtime.run.directions import Directions
 
@@ -30,7 +30,7 @@ def fixed_steps(
     """States at eight times with steps that no parameter changes, and their derivatives along `names`."""
     # differences look a hair beyond values at their bounds
     numbers = neighbour(model, model.numbers(), parameters)
-    u = clock.inputs_at(model.manifest.inputs, numbers.values, 0.0)[None, :]
+    u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, 0.0)[None, :]
     segments = Segments(times=np.array([0.0, duration]), inputs=u, restarts=np.array([True]))
     times = duration * np.arange(1, 9) / 8 - 0.3 * step  # off the steps: dense output takes part
     states = np.zeros((len(times), len(model.states)))
@@ -178,7 +178,7 @@ def test_a_rejected_step_leaves_no_trace_in_the_derivatives(make_model: Callable
     ) -> tuple[Outcome, np.ndarray, np.ndarray]:
         segments = Segments(
             times=np.array([begin, 0.05]),
-            inputs=clock.inputs_at(inputs, numbers.values, begin)[None, :],
+            inputs=driver_angle.inputs_at(inputs, numbers.values, begin)[None, :],
             restarts=np.array([True]),
         )
         directions = Directions(model, numbers, names, 0)

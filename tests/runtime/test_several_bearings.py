@@ -17,7 +17,7 @@ from ballpass.derive.reading.read import scene_from_text
 from ballpass.derive.scene.records import Scene
 from ballpass.runtime import KinkWarning, Model, RequestError, load, load_solution
 from ballpass.runtime.app.cli import app
-from ballpass.runtime.run.failure_location import whereabouts
+from ballpass.runtime.run.failure_location import locate_failure
 
 #: What the right bearing has other than the left one: law, number of balls, clearance, a fixed outer ring.
 OTHER = (
@@ -173,7 +173,7 @@ def test_messages_name_the_bearing_they_speak_of(pair: Model) -> None:
     """The right one's balls are pressed."""
     state = np.zeros(12)
     state[4] = 2e-5  # right.inner.x
-    place = whereabouts(pair, pair.numbers(), 0.0, state)
+    place = locate_failure(pair, pair.numbers(), 0.0, state)
     assert (place.bearing, place.ball) == ("right", 1)
     assert place.deflection == pytest.approx(2e-5 - 3e-6, rel=1e-12)  # less half its clearance, Eq. (6)
     assert "ball 1 of right" in place.words

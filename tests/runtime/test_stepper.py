@@ -19,7 +19,7 @@ from stepper_runs import edges_of, run, segments_between
 from ballpass.runtime import IntegrationError, Model, RequestError, Status
 from ballpass.runtime.native import stepper as stepping
 from ballpass.runtime.native.stepper import End, Family, Segments, Stepper
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 
 TURN = 2.0 * np.pi
 
@@ -178,18 +178,18 @@ def test_last_output_is_written_however_the_times_round(rotor: Model) -> None:
 
 def test_phases_are_exact_after_a_hundred_thousand_turns(press: Model) -> None:
     numbers = press.numbers()
-    turn = clock.period(press.manifest, numbers.values)
+    turn = driver_angle.period(press.manifest, numbers.values)
     with mpmath.workdps(50):
         for turns in (1, 997, 99_999, 100_000):
             t = turns * turn
-            found = clock.inputs_at(press.manifest.inputs, numbers.values, t)
+            found = driver_angle.inputs_at(press.manifest.inputs, numbers.values, t)
             for value, info in zip(found, press.manifest.inputs, strict=True):
                 if info.kind == "phase":
                     angle = mpmath.mpf(numbers.values[info.offset]) + mpmath.mpf(numbers.values[info.rate]) * t
                     away = (mpmath.mpf(value) - angle + mpmath.pi) % (2 * mpmath.pi) - mpmath.pi
                     assert abs(away) < 1e-9, (info.name, turns)
             start = numbers.values[press.manifest.mechanism.start_angle]
-            away = (clock.crank_angle(press.manifest, numbers.values, t) - start + np.pi) % TURN - np.pi
+            away = (driver_angle.crank_angle(press.manifest, numbers.values, t) - start + np.pi) % TURN - np.pi
             assert abs(away) < 1e-9
 
 

@@ -11,11 +11,11 @@ from typing import cast
 import pytest
 
 from ballpass.derive import Scene
+from ballpass.derive.reading.plausible_ranges import usual_ranges
 from ballpass.derive.reading.read import scene_from_text
-from ballpass.derive.reading.usual import usual_ranges
 from ballpass.runtime import Manifest, Model, UnusualWarning
 from ballpass.runtime.app.summary import summarize
-from ballpass.runtime.contract.usual import unusual
+from ballpass.runtime.contract.plausible_ranges import unusual
 
 SCENES = ("crank_shaper", "four_bar", "offset_slider", "punching_press", "punching_press_tangent", "varying_compliance")
 WINDOW = "mechanism.forces.punch.window"

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
         SimulationError,
     )
     from ballpass.runtime.contract.parameters import Parameters
+    from ballpass.runtime.contract.plausible_ranges import UnusualWarning
     from ballpass.runtime.contract.status import Status
-    from ballpass.runtime.contract.usual import UnusualWarning
     from ballpass.runtime.many.chunks import MemberFailure
     from ballpass.runtime.many.data_set import DataSetReport, SignalClass, make_data_set
     from ballpass.runtime.many.distributions import Distribution

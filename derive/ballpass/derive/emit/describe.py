@@ -10,7 +10,7 @@ from dataclasses import asdict
 from ballpass.derive.emit.signature import catalogue_info, duty_info, info_of, lubrication_info, signature, versions
 from ballpass.derive.lowering.functions import LoweredFunctions, operations
 from ballpass.derive.mechanism.forces import drawn_forces, drawn_springs
-from ballpass.derive.reading.usual import usual_ranges
+from ballpass.derive.reading.plausible_ranges import usual_ranges
 from ballpass.derive.reading.values import value_bounds, value_relations
 from ballpass.derive.system import System
 from ballpass.derive.variables import Output

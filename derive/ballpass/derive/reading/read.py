@@ -17,11 +17,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
+from ballpass.derive.reading.change_coupling import Coupling, recoupled
 from ballpass.derive.reading.read_bearing import read_bearing, read_shaft
 from ballpass.derive.reading.read_duty import duty_faults, read_duty
 from ballpass.derive.reading.read_load import read_load
 from ballpass.derive.reading.read_mechanism import read_mechanism
-from ballpass.derive.reading.recouple import Coupling, recoupled
 from ballpass.derive.reading.values import parse_override, replaced, value_faults, with_values
 from ballpass.derive.scene.bearing_records import Bearing
 from ballpass.derive.scene.errors import Fault, SceneError

@@ -15,15 +15,15 @@ import typer
 
 from ballpass.runtime.app.commands import options
 from ballpass.runtime.app.commands.animate import animate
-from ballpass.runtime.app.commands.asked import (
-    Asked,
-    read_asked,
-    read_formats,
-)
 from ballpass.runtime.app.commands.bearings import bearings
 from ballpass.runtime.app.commands.dataset import dataset
 from ballpass.runtime.app.commands.declared import as_command, question_command
 from ballpass.runtime.app.commands.explain import explain
+from ballpass.runtime.app.commands.load_scene import (
+    Asked,
+    read_asked,
+    read_formats,
+)
 from ballpass.runtime.app.commands.new import new
 from ballpass.runtime.app.commands.schema import schema
 from ballpass.runtime.app.commands.shared import (

@@ -25,14 +25,14 @@ from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks, run_of
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.extras import is_installed
-from ballpass.runtime.contract.usual import UnusualWarning, unusual
+from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.contract.version import __version__
 from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.track import depends
-from ballpass.runtime.run.inputs import TURN
+from ballpass.runtime.run.driver_angle import TURN
 from ballpass.runtime.run.settle import MEANS, PEAKS
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ from ballpass.runtime.ratings.of_bearing import (
 )
 from ballpass.runtime.ratings.readings import KILO, LoadPowers, equivalent_loads, lives
 from ballpass.runtime.ratings.wear import COEFFICIENTS
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.load_history import LoadHistory, load_history
 from ballpass.runtime.run.request import Request
 
@@ -67,7 +67,7 @@ def life_report(model: LoadedModel, parameters: Mapping[str, float], request: Re
 
 def _state(model: LoadedModel, parameters: Mapping[str, float], state: DutyInfo, request: Request) -> StateStrength:
     numbers = model.numbers(parameters)
-    if state.name and clock.shaft_speed(model.manifest, numbers.values) == 0.0:
+    if state.name and driver_angle.shaft_speed(model.manifest, numbers.values) == 0.0:
         return StateStrength(
             name=state.name, share=state.share, bearings=(), turns=None, change=0.0, settled=True, samples=0
         )
@@ -88,7 +88,7 @@ def _state(model: LoadedModel, parameters: Mapping[str, float], state: DutyInfo,
 
 def _sampled(model: LoadedModel, history: LoadHistory, request: Request) -> Request:
     """The part of a run that is sampled."""
-    turn = clock.period(model.manifest, model.numbers({}).values)
+    turn = driver_angle.period(model.manifest, model.numbers({}).values)
     if request.duration is not None or not math.isfinite(turn):
         return request
     run = model.manifest.run
@@ -103,7 +103,7 @@ def _bearing(
     manifest, values = model.manifest, numbers.values
     ratings = ratings_of(info, values)
     speed = values[info.ring_speed]
-    initial = clock.shaft_speed(manifest, values)
+    initial = driver_angle.shaft_speed(manifest, values)
     speed *= history.shaft_speed / initial if initial else 1.0
     peak = history.peaks[info.prefix]
     force = max(peak.maximum, 0.0)
@@ -124,7 +124,7 @@ def _bearing(
         peak_force=force,
         peak_time=peak.maximum_time,
         peak_ball=int(peak.maximum_ball or 0),
-        peak_angle=None if uneven else clock.crank_angle(manifest, values, peak.maximum_time),
+        peak_angle=None if uneven else driver_angle.crank_angle(manifest, values, peak.maximum_time),
         static_safety=static_safety(info.balls, float(ratings.static), force),
         inner=inner,
         outer=outer,
@@ -178,7 +178,7 @@ def _rings(
             minor_axis=float(along),
             equivalent_loads={reading: float(pair[k]) for reading, pair in loads.items()} if turns else {},
             damage=tuple((damage[k] / total).tolist()) if turns and total > 0.0 else (),
-            worst_angle=clock.TURN * int(np.argmax(fields[k])) / SECTORS,
+            worst_angle=driver_angle.TURN * int(np.argmax(fields[k])) / SECTORS,
             wear=(COEFFICIENTS[0] * worn, COEFFICIENTS[1] * worn),
             wear_angle=angle,
             wear_across=off,
@@ -223,7 +223,7 @@ def _over_duty(info: BearingInfo, states: list[StateStrength]) -> DutyLife:
         damage = sum(share / each for share, each in zip(shares, spent, strict=True))
         total = 1.0 / damage if damage > 0.0 else math.inf
         speed = sum(share * abs(bearing.speed) for share, (_, bearing) in zip(shares, lasting, strict=True))
-        return total, total * 3600.0 * speed / clock.TURN
+        return total, total * 3600.0 * speed / driver_angle.TURN
 
     readings = lasting[0][1].lives
     by = {name: together([bearing.lives[name] for _, bearing in lasting]) for name in readings}

@@ -25,7 +25,7 @@ from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.track import depends
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.locating import LOCATED, STEPPED_OVER
 from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.run.solution import Solution
@@ -117,7 +117,7 @@ def run_of(model: LoadedModel, numbers: Numbers, solution: Solution) -> Run:
         numbers=numbers,
         begin=statistics.begin,
         end=float(solution.t[-1]),
-        turn=clock.period(model.manifest, numbers.values),
+        turn=driver_angle.period(model.manifest, numbers.values),
         turns=None,
         transient_cycles=solution.transient_cycles,
         start=float(solution.t[0]),

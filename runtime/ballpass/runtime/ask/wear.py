@@ -17,7 +17,7 @@ from ballpass.runtime.native.reduction_rows import SECTORS
 from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.ratings.of_bearing import RacewayContact
 from ballpass.runtime.ratings.wear import depth_of_pass
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.simulate import simulate
 
@@ -65,10 +65,12 @@ def load_samples(model: LoadedModel, numbers: Numbers, request: Request) -> Mapp
     time, states = run.t[counted], run.x[counted]
     names = ("ball.force", "ring_force.x", "ring_force.y", "cage.in_outer", "cage.in_inner")
     channels = ChannelValues(model, [b.prefix + name for b in manifest.bearings for name in names])
-    inputs = clock.inputs_over(manifest.inputs, numbers.values, time, time)
+    inputs = driver_angle.inputs_over(manifest.inputs, numbers.values, time, time)
     given = {"t": np.zeros(len(time)), "x": states, "u": inputs, "p": numbers.p, "c": numbers.c}
     signals = channels.outputs_at(len(time), given)
-    crank = np.array([clock.crank_angle(manifest, numbers.values, t, x) for t, x in zip(time, states, strict=True)])
+    crank = np.array(
+        [driver_angle.crank_angle(manifest, numbers.values, t, x) for t, x in zip(time, states, strict=True)]
+    )
     found = {}
     for bearing in manifest.bearings:
         force, x, y, outer, inner = (signals[bearing.prefix + name] for name in names)
@@ -100,7 +102,7 @@ class WearField:
     def deepest(self) -> tuple[float, float, float]:
         """Largest rate [N/(m s)], its angle in the ring's own coordinates [rad], its place across the groove [m]."""
         sector, k = np.unravel_index(int(np.argmax(self.rate)), self.rate.shape)
-        return float(self.rate[sector, k]), clock.TURN * (int(sector) + 0.5) / SECTORS, float(self.across[k])
+        return float(self.rate[sector, k]), driver_angle.TURN * (int(sector) + 0.5) / SECTORS, float(self.across[k])
 
 
 def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> WearField:
@@ -113,14 +115,14 @@ def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> W
     force = samples.force
     count, balls = force.shape
     step = np.diff(angle, append=angle[-1:])
-    moved = np.abs((step + np.pi) % clock.TURN - np.pi)  # angles come back after a turn
+    moved = np.abs((step + np.pi) % driver_angle.TURN - np.pi)  # angles come back after a turn
     moved[-1] = moved[-2] if count > 1 else 0.0
     length = float(samples.time[-1] - samples.time[0]) * count / max(count - 1, 1)
     widest = float(contact.semi_axes(float(np.max(force)))[0]) if np.max(force) > 0.0 else 0.0
     across = np.linspace(0.0, widest, ACROSS)
     row, ball = np.nonzero(force > 0.0)
     load, passed = force[row, ball], moved[row]
-    place = (angle[row] / clock.TURN + ball / balls) % 1.0
+    place = (angle[row] / driver_angle.TURN + ball / balls) % 1.0
     sector = np.minimum((SECTORS * place).astype(int), SECTORS - 1)
     half = contact.semi_axes(load)[0]
     rate = np.zeros((SECTORS, ACROSS))
@@ -128,4 +130,4 @@ def wear_field(samples: LoadSamples, angle: Array, contact: RacewayContact) -> W
         within = half > x
         worn = passed[within] * depth_of_pass(x, load[within], contact)
         rate[:, k] = np.bincount(sector[within], worn, SECTORS)
-    return WearField(across=across, rate=rate * SECTORS / (clock.TURN * length))
+    return WearField(across=across, rate=rate * SECTORS / (driver_angle.TURN * length))

@@ -15,7 +15,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.records import Quantity
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import STIFF_RATIO
 from ballpass.runtime.run.locating import kinks_with_derivatives
 from ballpass.runtime.run.magnitudes import model_scales
@@ -46,7 +46,7 @@ def derivative_run(model: LoadedModel, numbers: Numbers, request: Request) -> tu
         )
     fine = "stepper-dop853"
     if model.states:
-        turn = clock.period(model.manifest, numbers.values)
+        turn = driver_angle.period(model.manifest, numbers.values)
         looked_at = min(run_length(model, request, turn), SCALED_TURNS * turn)
         scales = model_scales(model, numbers, start_state(model, numbers, request.initial), looked_at, turn)
         fine = "stepper-rodas5p" if scales.stiffness > STIFF_RATIO else fine

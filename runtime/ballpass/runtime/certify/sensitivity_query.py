@@ -47,7 +47,7 @@ from ballpass.runtime.quantity.panels import ROUGH
 from ballpass.runtime.quantity.quantity_run import EvaluatedQuantities, QuantityRun
 from ballpass.runtime.quantity.track import ChannelValues
 from ballpass.runtime.quantity.values import value_of
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.direction_scales import ANGLE
 from ballpass.runtime.run.locating import check_kinks, refuse_jumps
 from ballpass.runtime.run.request import TOLERANCES, Request, asked_length
@@ -298,7 +298,7 @@ def _difference_scales(run: Run, names: Sequence[str]) -> Array:
         if name in at_start:
             value = max(value, START_SHARE * at_start[name])
         elif units[name] == ANGLE:
-            value = min(1.0, clock.TURN * run.duration / run.turn) if math.isfinite(run.turn) else 1.0
+            value = min(1.0, driver_angle.TURN * run.duration / run.turn) if math.isfinite(run.turn) else 1.0
         elif value == 0.0:
             alike = [abs(numbers.parameters[other]) for other, unit in units.items() if unit == units[name]]
             value = position if units[name] == "m" else max(alike, default=0.0)
@@ -320,9 +320,9 @@ def _grazing(
     order = np.lexsort((track.nodes.t, track.nodes.segment))
     times = track.nodes.t[order]
     if state:
-        angles = signals[state].value[order, 0] % clock.TURN
+        angles = signals[state].value[order, 0] % driver_angle.TURN
     else:
-        angles = np.array([clock.crank_angle(manifest, numbers.values, float(time)) for time in times])
+        angles = np.array([driver_angle.crank_angle(manifest, numbers.values, float(time)) for time in times])
     found = [
         item
         for bearing, name in zip(manifest.bearings, names, strict=True)

@@ -24,7 +24,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.folders import locked
 from ballpass.runtime.contract.parameters import unknown_name
-from ballpass.runtime.contract.usual import UnusualWarning, unusual
+from ballpass.runtime.contract.plausible_ranges import UnusualWarning, unusual
 from ballpass.runtime.many.chunks import MemberFailure
 from ballpass.runtime.many.cluster import loaded, run_tasks
 from ballpass.runtime.many.data_set_store import (

@@ -36,7 +36,7 @@ from ballpass.runtime.quantity.layout import is_reduced, needs
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Quantity, ReducedRuns
 from ballpass.runtime.quantity.registry import KINDS
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import stepper_method
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
 from ballpass.runtime.run.loop import RunFailed
@@ -398,7 +398,7 @@ def _span(model: LoadedModel, members: Members, cycles: float | None, duration: 
     mechanism, bearing = model.manifest.mechanism, model.manifest.bearing
     speed = mechanism.speed if mechanism is not None else bearing.ring_speed if bearing is not None else None
     speeds = np.abs(members.columns[speed]) if speed is not None else np.zeros(count)
-    np.divide(clock.TURN, speeds, out=turns, where=speeds > 0.0)
+    np.divide(driver_angle.TURN, speeds, out=turns, where=speeds > 0.0)
     # where there is a run for everybody, in one go; the rules of `check_span`
     if 0.0 <= transient < math.inf and (duration is not None or np.all(np.isfinite(turns))):
         durations = np.full(count, float(duration)) if duration is not None else float(cycles or 0.0) * turns

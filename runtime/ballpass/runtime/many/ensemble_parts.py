@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
-from ballpass.runtime.contract.usual import warn_unusual
+from ballpass.runtime.contract.plausible_ranges import warn_unusual
 from ballpass.runtime.many.chunks import CHUNK, COUNTS, MemberFailure
 from ballpass.runtime.many.cluster import loaded, run_tasks
 from ballpass.runtime.many.ensemble import EnsembleResult, EnsembleStatistics, simulate_many

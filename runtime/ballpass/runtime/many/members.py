@@ -15,10 +15,10 @@ from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.bounds import violations
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, scalar, unknown_name
-from ballpass.runtime.contract.usual import warn_unusual
+from ballpass.runtime.contract.plausible_ranges import warn_unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 
 Table = Mapping[str, object] | Sequence[Mapping[str, float]] | np.ndarray
 
@@ -175,13 +175,13 @@ def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused:
             continue
         knots = np.array([columns[name] for name in item.times])
         wrong = np.any(np.diff(knots, axis=0) <= 0.0, axis=0) | (
-            bool(item.rate) & (knots[-1] - knots[0] >= clock.TURN - clock.ANGLE_RESOLUTION)
+            bool(item.rate) & (knots[-1] - knots[0] >= driver_angle.TURN - driver_angle.ANGLE_RESOLUTION)
         )
         for member in np.flatnonzero(wrong).tolist():
             names = (item.offset, item.rate, *item.times, *item.values)
             values = {name: float(columns[name][member]) for name in names if name}
             try:
-                clock.breakpoints((item,), values, 0.0, 1.0)
+                driver_angle.breakpoints((item,), values, 0.0, 1.0)
             except RequestError as fault:
                 refused[member] = str(fault)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ballpass.runtime.many.members import make_members
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 
 #: What the inputs of spalls are called.
 _GATE = "gate."
@@ -48,10 +48,10 @@ def entry_times(
             continue
         offset, rate = columns[item.offset], columns[item.rate]
         opening = [np.where(rate > 0.0, columns[first], columns[last]) for first, last in item.windows]
-        turn = np.divide(clock.TURN, np.abs(rate), out=np.full(len(rate), np.inf), where=rate != 0.0)
+        turn = np.divide(driver_angle.TURN, np.abs(rate), out=np.full(len(rate), np.inf), where=rate != 0.0)
         count = int(np.ceil(np.max((end - begin) / turn))) + 1
-        phase = np.array([np.mod(np.sign(rate) * (at - offset - rate * begin), clock.TURN) for at in opening])
-        first = begin + phase / clock.TURN * np.where(np.isfinite(turn), turn, np.nan)
+        phase = np.array([np.mod(np.sign(rate) * (at - offset - rate * begin), driver_angle.TURN) for at in opening])
+        first = begin + phase / driver_angle.TURN * np.where(np.isfinite(turn), turn, np.nan)
         times = (first[..., None] + np.arange(count) * turn[:, None]).transpose(1, 0, 2).reshape(len(rate), -1)
         times = np.sort(np.where(times < end, times, np.nan), axis=1)  # NaN last
         found[name] = times[:, : int(np.max(np.sum(np.isfinite(times), axis=1), initial=1))]

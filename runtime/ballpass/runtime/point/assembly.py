@@ -10,7 +10,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
@@ -34,7 +34,7 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
     mechanism = model.manifest.mechanism
     if mechanism is None or not mechanism.margins:
         return
-    turn = clock.TURN if mechanism.angle else clock.period(model.manifest, numbers.values)
+    turn = driver_angle.TURN if mechanism.angle else driver_angle.period(model.manifest, numbers.values)
     times = turn * np.arange(ANGLES) / ANGLES if math.isfinite(turn) else np.zeros(1)
     margins = _margins(model, numbers, times)
     faults = []
@@ -47,7 +47,7 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
             if mechanism.angle:
                 angle = math.degrees(numbers.values[mechanism.start_angle] + time) % 360.0
             else:
-                angle = math.degrees(clock.crank_angle(model.manifest, numbers.values, time))
+                angle = math.degrees(driver_angle.crank_angle(model.manifest, numbers.values, time))
             faults.append(
                 f"The linkage cannot be assembled at joint {info.joint!r}, worst at crank angle {angle:.2f} deg "
                 f"({info.description}: margin {worst:.4g})."
@@ -85,7 +85,7 @@ def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mappi
     heights = margins.tolist()
     if all(height > 0.0 for height in heights):  # no number is no assembly
         return
-    angle = math.degrees(clock.crank_angle(model.manifest, numbers.values, t))
+    angle = math.degrees(driver_angle.crank_angle(model.manifest, numbers.values, t))
     faults = [
         f"The linkage cannot be assembled at joint {info.joint!r} at {t:.6g} s, crank angle {angle:.2f} deg "
         f"({info.description}: margin {height:.4g})."
@@ -104,10 +104,10 @@ def _margins(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> np.ndar
 
     Where the driver's angle is a state, in place of times angles past the start [rad].
     """
-    fixed = {"u": clock.inputs_at(model.manifest.inputs, numbers.values, 0.0), "p": numbers.p, "c": numbers.c}
+    fixed = {"u": driver_angle.inputs_at(model.manifest.inputs, numbers.values, 0.0), "p": numbers.p, "c": numbers.c}
     mechanism = model.manifest.mechanism
     if mechanism is not None and mechanism.angle:
-        x = clock.turned_states(model.manifest, numbers.values, times)
+        x = driver_angle.turned_states(model.manifest, numbers.values, times)
         (found,) = model.loop("assembly", ("x",))(len(times), {"x": x, **fixed}).values()
     else:
         (found,) = model.loop("assembly", ("t",))(len(times), {"t": times, **fixed}).values()

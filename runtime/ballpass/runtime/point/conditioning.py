@@ -20,7 +20,7 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import BallpassWarning
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
@@ -76,17 +76,17 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
     """
     mechanism = model.manifest.mechanism
     by_angle = mechanism is not None and mechanism.angle != ""
-    turn = clock.TURN if by_angle else clock.period(model.manifest, numbers.values)
+    turn = driver_angle.TURN if by_angle else driver_angle.period(model.manifest, numbers.values)
     kernel = model.kernel(FUNCTION)
     span = turn if math.isfinite(turn) else 0.0
 
     def matrix(t: float) -> np.ndarray:
         """At a time, or so far past the start angle."""
         if by_angle:
-            (x,) = clock.turned_states(model.manifest, numbers.values, np.array([t]))
-            u = clock.inputs_at(model.manifest.inputs, numbers.values, 0.0)
+            (x,) = driver_angle.turned_states(model.manifest, numbers.values, np.array([t]))
+            u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, 0.0)
             return np.asarray(kernel({"t": 0.0, "x": x, "u": u, "p": numbers.p, "c": numbers.c}))
-        u = clock.inputs_at(model.manifest.inputs, numbers.values, t)
+        u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, t)
         return np.asarray(kernel({"t": 0.0, "u": u, "p": numbers.p, "c": numbers.c}))
 
     times = span * np.arange(ANGLES) / ANGLES if span else np.zeros(1)
@@ -103,8 +103,8 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
                 values = condition(np.array([matrix(float(t)) for t in near]))
                 k = int(np.argmax(values))
                 time, largest, reach = float(near[k]), float(values[k]), reach / FINE
-        start = clock.crank_angle(model.manifest, numbers.values, 0.0 if by_angle else time)
-        found.append((largest, (start + time) % clock.TURN if by_angle else start))
+        start = driver_angle.crank_angle(model.manifest, numbers.values, 0.0 if by_angle else time)
+        found.append((largest, (start + time) % driver_angle.TURN if by_angle else start))
     (whole, whole_angle), (equal, equal_angle) = found
     if not equal <= BOUND:
         warnings.warn(

@@ -26,7 +26,7 @@ from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import RHS, Rows, contract, directions_of, rows_of
 from ballpass.runtime.report.report import Report, ReportTable
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.equilibrium_newton import SearchEnd, settle
 
 Array = NDArray[np.float64]
@@ -222,13 +222,13 @@ def instant(model: LoadedModel, numbers: Numbers, t: float | None, crank_angle: 
             f"crank_angle: {crank_angle!r} rad is more than two turns. Were degrees meant? Allowed: radians from -4 pi "
             f"to 4 pi; for degrees give math.radians({crank_angle!r})."
         )
-    speed = clock.shaft_speed(model.manifest, numbers.values)
-    past = (angle - clock.crank_angle(model.manifest, numbers.values, 0.0)) * math.copysign(1.0, speed)
+    speed = driver_angle.shaft_speed(model.manifest, numbers.values)
+    past = (angle - driver_angle.crank_angle(model.manifest, numbers.values, 0.0)) * math.copysign(1.0, speed)
     if speed == 0.0:
-        if abs(math.remainder(past, clock.TURN)) < clock.ANGLE_RESOLUTION:
+        if abs(math.remainder(past, driver_angle.TURN)) < driver_angle.ANGLE_RESOLUTION:
             return 0.0
         raise RequestError("crank_angle: nothing turns in this scene. Give the start angle as a parameter instead.")
-    return (past % clock.TURN) / abs(speed)
+    return (past % driver_angle.TURN) / abs(speed)
 
 
 def held_coordinates(model: LoadedModel) -> Array:
@@ -315,7 +315,7 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
     start, velocity = np.zeros(half), np.zeros(half)
     mechanism = model.manifest.mechanism
     if mechanism is not None and mechanism.angle:
-        start[held], velocity[held] = clock.driver_at(model.manifest, numbers.values, t)
+        start[held], velocity[held] = driver_angle.driver_at(model.manifest, numbers.values, t)
 
     def force(q: Array) -> Array:
         there["x"] = np.concatenate([q, velocity])

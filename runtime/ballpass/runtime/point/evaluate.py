@@ -11,7 +11,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, Parameters, real, unchecked_numbers, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembled
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import no_output
 
 
@@ -68,7 +68,7 @@ def point(
             f"x: shape ({len(model.states)},) is expected ({', '.join(model.states)}), not {state.shape}"
             f"{'' if np.all(np.isfinite(state)) else ' with NaN or inf'}."
         )
-    u = clock.inputs_at(model.manifest.inputs, numbers.values, t)
+    u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, t)
     there: dict[str, float | np.ndarray] = {"t": 0.0, "x": state, "u": u, "p": numbers.p, "c": numbers.c}
     check_assembled(model, numbers, t, there)
     return there

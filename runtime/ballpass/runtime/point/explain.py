@@ -16,8 +16,8 @@ import numpy as np
 from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import BallpassError
 from ballpass.runtime.contract.parameters import Numbers
+from ballpass.runtime.contract.plausible_ranges import unusual
 from ballpass.runtime.contract.smoothness import WORDS
-from ballpass.runtime.contract.usual import unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.equilibrium import held_coordinates, static_equilibrium
@@ -26,7 +26,7 @@ from ballpass.runtime.point.jacobian import rows_of
 from ballpass.runtime.point.slopes import jacobian
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.reported import Reported
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import STIFF_RATIO, choose_method
 from ballpass.runtime.show.short import ShortRepr
 
@@ -175,7 +175,7 @@ def explain(model: LoadedModel, parameters: Mapping[str, float] | None = None) -
     check_assembly(model, numbers)
     values = numbers.values
     manifest = model.manifest
-    turn = clock.period(manifest, values)
+    turn = driver_angle.period(manifest, values)
     span = turn if math.isfinite(turn) else (manifest.run.duration or 1.0)
     scales, unsupported = _time_scales(model, parameters, span) if model.states else ((), ())
     method, reason = _method(model, scales, turn)
@@ -197,15 +197,15 @@ def _breakpoints(model: LoadedModel, values: Mapping[str, float], span: float) -
     found = []
     inputs = model.manifest.inputs
     # a little over the turn's end, so that an edge at t = 0 counts once
-    for time in clock.breakpoints(inputs, values, -1e-9 * span, span * (1.0 - 1e-9)):
-        before = clock.inputs_at(inputs, values, time, time - 1e-7 * span)
-        behind = clock.inputs_at(inputs, values, time, time + 1e-7 * span)
+    for time in driver_angle.breakpoints(inputs, values, -1e-9 * span, span * (1.0 - 1e-9)):
+        before = driver_angle.inputs_at(inputs, values, time, time - 1e-7 * span)
+        behind = driver_angle.inputs_at(inputs, values, time, time + 1e-7 * span)
         causes = dict.fromkeys(  # the components of a load share their knots
             f"{item.name.removeprefix('gate.')} {'on' if b > a else 'off'}" if item.kind == "gate" else _knot(item.name)
             for item, a, b in zip(inputs, before, behind, strict=True)
             if a != b and item.kind in ("gate", "table_rate")
         )
-        angle = clock.crank_angle(model.manifest, values, float(time))
+        angle = driver_angle.crank_angle(model.manifest, values, float(time))
         found.append(Breakpoint(time=float(time), angle=angle, cause=", ".join(causes) or "a knot of a table"))
     return tuple(found)
 
@@ -231,7 +231,7 @@ def _time_scales(
     point = {"t": 0.0, "x": rest, "p": numbers.p, "c": numbers.c}
     pull = np.empty(INSTANTS)
     for k, time in enumerate(times):
-        u = clock.inputs_at(model.manifest.inputs, values, float(time))
+        u = driver_angle.inputs_at(model.manifest.inputs, values, float(time))
         free = 1.0 - held_coordinates(model)
         pull[k] = np.linalg.norm(free * model.kernel("rhs")({**point, "u": u})[half:])
     scales, unsupported = [], []
@@ -246,7 +246,7 @@ def _time_scales(
         instants = (("at rest under the load", 0),)
     for name, k in instants:
         time = float(times[k])
-        angle = clock.crank_angle(model.manifest, values, time)
+        angle = driver_angle.crank_angle(model.manifest, values, time)
         try:
             x = static_equilibrium(model, numbers, t=time, load=None).x if model.manifest.bearings else rest
         except BallpassError as fault:

@@ -25,7 +25,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import on_request
 
 Array = NDArray[np.float64]
@@ -172,7 +172,7 @@ def directions_of(model: LoadedModel, numbers: Numbers, wrt: str | Sequence[str]
         along_c = by_parameters @ along_p
     along_u = np.zeros((len(manifest.inputs), count))
     constants = {info.name: row for row, info in enumerate(manifest.constants)}
-    for row, name, slope in clock.input_derivatives(manifest.inputs, numbers.values, t):
+    for row, name, slope in driver_angle.input_derivatives(manifest.inputs, numbers.values, t):
         along_u[row] += slope * (along_p[rows[name]] if name in rows else along_c[constants[name]])
     return JacobianDirections(
         labels=tuple(names),
@@ -198,7 +198,7 @@ def turning_speed(model: LoadedModel, numbers: Numbers) -> float:
         raise RequestError(
             f"crank_angle: the driver's angle is a state of this scene. Differentiate by {mechanism.angle!r} instead."
         )
-    speed = clock.shaft_speed(model.manifest, numbers.values)
+    speed = driver_angle.shaft_speed(model.manifest, numbers.values)
     if speed == 0.0:
         raise RequestError(
             "crank_angle: nothing turns in this scene, so time does not move the angle. Give a speed, or differentiate "

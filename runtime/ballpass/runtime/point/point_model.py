@@ -10,14 +10,14 @@ import numpy as np
 
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
-from ballpass.runtime.contract.usual import warn_unusual
+from ballpass.runtime.contract.plausible_ranges import warn_unusual
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.point.evaluate import checked_time, evaluate_point
 from ballpass.runtime.point.jacobian_function import JacobianFunction
 from ballpass.runtime.point.second_derivatives import hessian
 from ballpass.runtime.point.slopes import jacobian
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 
 if TYPE_CHECKING:
     from ballpass.runtime.point.equilibrium import StaticEquilibrium
@@ -70,7 +70,7 @@ class PointModel(LoadedModel):
         >>> f"{model.period():.4g} s"
         '0.12 s'
         """
-        return clock.period(self.manifest, self.numbers(parameters).values)
+        return driver_angle.period(self.manifest, self.numbers(parameters).values)
 
     def breakpoints(self, t0: float, t1: float, parameters: Mapping[str, float] | None = None) -> np.ndarray:
         """Times in the open interval (t0, t1) at which a load switches or a table has a knot, increasing [s].
@@ -82,7 +82,7 @@ class PointModel(LoadedModel):
         """
         if not (math.isfinite(t0) and math.isfinite(t1) and t0 < t1):
             raise RequestError(f"breakpoints: finite times t0 < t1 are expected, not {t0!r} and {t1!r}.")
-        return clock.breakpoints(self.manifest.inputs, self.numbers(parameters).values, float(t0), float(t1))
+        return driver_angle.breakpoints(self.manifest.inputs, self.numbers(parameters).values, float(t0), float(t1))
 
     def inputs_at(self, t: float, parameters: Mapping[str, float] | None = None) -> np.ndarray:
         """Inputs ``u`` at time `t`, for functions that are then called with ``t = 0``; shape (inputs,).
@@ -92,7 +92,7 @@ class PointModel(LoadedModel):
         >>> model.inputs_at(0.01).shape
         (4,)
         """
-        return clock.inputs_at(self.manifest.inputs, self.numbers(parameters).values, checked_time(t))
+        return driver_angle.inputs_at(self.manifest.inputs, self.numbers(parameters).values, checked_time(t))
 
     def initial(self, parameters: Mapping[str, float] | None = None) -> np.ndarray:
         """State at the start, shape (states,).

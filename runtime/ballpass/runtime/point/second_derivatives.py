@@ -22,7 +22,7 @@ from ballpass.runtime.contract.smoothness import WORDS
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.evaluate import checked_time, point
 from ballpass.runtime.point.jacobian import CRANK_ANGLE, RHS, TIME, directions_of, rows_of, turning_speed
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def hessian(
     local = symbols["moved"]
     if CRANK_ANGLE in wrt:
         turning_speed(model, numbers)
-        speed = clock.speed_name(model.manifest)
+        speed = driver_angle.speed_name(model.manifest)
         assert speed is not None  # something turns
         local = local + symbols["turned"] / known[speed]
     arguments = {"t": local, "x": symbols["x"], "u": ca.SX(u), "p": symbols["p"], "c": c}
@@ -116,15 +116,15 @@ def _symbol(model: LoadedModel, numbers: Numbers, symbols: dict[str, ca.SX], nam
 def _input(item: InputInfo, known: dict[str, ca.SX], numbers: Numbers, t: float) -> ca.SX:
     """An input at the time `t` as a function of parameters: its value there, and what moves it."""
     if item.kind == "phase":
-        now = float(clock.inputs_at([item], numbers.values, t)[0])
+        now = float(driver_angle.inputs_at([item], numbers.values, t)[0])
         # the angle within the turn, for rounding; what is subtracted and added has the same value
         whole = numbers.values[item.offset] + numbers.values[item.rate] * t
         return known[item.offset] + known[item.rate] * t + (now - whole)
     if item.kind == "border":
         return ca.SX(0.0)
     if item.kind == "gate":
-        return ca.SX(float(clock.inputs_at([item], numbers.values, t)[0]))
-    piece = clock.table_piece(item, numbers.values, t)
+        return ca.SX(float(driver_angle.inputs_at([item], numbers.values, t)[0]))
+    piece = driver_angle.table_piece(item, numbers.values, t)
     if piece.rows[0] == piece.rows[1]:
         return ca.SX(0.0) if item.kind == "table_rate" else known[item.values[piece.rows[0]]]
     (t0, t1), (y0, y1) = ([known[names[row]] for row in piece.rows] for names in (item.times, item.values))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 
 #: Multiples that are looked for: of the shaft, of ball passes, of the cage (more are ball passes); and the most shafts
 #: or cages to their sides.  With more of them everything would be something.
@@ -57,9 +57,9 @@ def frequencies_of(bearing: BearingInfo, values: Mapping[str, float]) -> Kinemat
     """
     at = bearing.path
     outer = values.get(f"{at}.outer_pass_speed", values[f"{at}.cage_speed"])
-    cage, inner = abs(outer) / clock.TURN, abs(values[f"{at}.inner_pass_speed"]) / clock.TURN
+    cage, inner = abs(outer) / driver_angle.TURN, abs(values[f"{at}.inner_pass_speed"]) / driver_angle.TURN
     return KinematicFrequencies(
-        shaft=abs(values[bearing.ring_speed]) / clock.TURN,
+        shaft=abs(values[bearing.ring_speed]) / driver_angle.TURN,
         cage=cage,
         ball_pass_outer=bearing.balls * cage,
         ball_pass_inner=bearing.balls * inner,
@@ -81,7 +81,7 @@ def characteristic_lines(
     -----
     Where the speed changes, frequencies are those of the initial one, and orders hold throughout.
     """
-    speed = abs(clock.shaft_speed(manifest, values)) / clock.TURN
+    speed = abs(driver_angle.shaft_speed(manifest, values)) / driver_angle.TURN
     if speed == 0.0:
         return ()
     unit = speed if orders else 1.0

@@ -18,7 +18,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.point.equilibrium import LARGEST_ANGLE
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.records import Array, Place, Quantity, View
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 
 _PLACE = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>deg|rad|s|Hz|x)")
 
@@ -69,14 +69,14 @@ def place_of(manifest: Manifest, numbers: Numbers, end: float, quantity: Quantit
         return number, asked
     angle = asked.number
     check_instant(manifest, numbers.values, quantity)
-    speed = clock.shaft_speed(manifest, numbers.values)
+    speed = driver_angle.shaft_speed(manifest, numbers.values)
     if speed == 0.0:
         raise RequestError(f"{quantity.name}: nothing turns (its speed is zero). Name a time instead, as in @0.41s.")
     start = numbers.values[manifest.mechanism.start_angle] if manifest.mechanism is not None else 0.0
-    turns = (start + speed * end - angle) / clock.TURN
+    turns = (start + speed * end - angle) / driver_angle.TURN
     # the last turn before the end, an angle at the very end included; 1e-9 of a turn is rounding
     whole = math.floor(turns + 1e-9) if speed > 0.0 else math.ceil(turns - 1e-9)
-    time = (angle + clock.TURN * whole - start) / speed
+    time = (angle + driver_angle.TURN * whole - start) / speed
     if time < 0.0:
         raise RequestError(f"{quantity.name}: the run is over before that angle is passed. Run longer.")
     return min(time, end), asked
@@ -115,8 +115,8 @@ def place_slope(
         return end
     if place.kind == "time":
         return np.zeros_like(end)
-    speed = clock.shaft_speed(manifest, numbers.values)
-    name = clock.speed_name(manifest)
+    speed = driver_angle.shaft_speed(manifest, numbers.values)
+    name = driver_angle.speed_name(manifest)
     assert name is not None  # something turns
     moved = time * slopes(name)
     if manifest.mechanism is not None:
@@ -132,13 +132,13 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     if form is not None and form["unit"] == "Hz":
         return float(form["number"]), np.zeros(view.directions)
     check_frequency(manifest, values, quantity)
-    speed = clock.shaft_speed(manifest, values)
-    name = clock.speed_name(manifest)
+    speed = driver_angle.shaft_speed(manifest, values)
+    name = driver_angle.speed_name(manifest)
     assert name is not None  # something turns
     faster = view.slopes(name)
     if form is not None:
         order = float(form["number"])
-        return order * abs(speed) / clock.TURN, order * math.copysign(1.0, speed) * faster / clock.TURN
+        return order * abs(speed) / driver_angle.TURN, order * math.copysign(1.0, speed) * faster / driver_angle.TURN
     # the bearing that the channel is one of, else the first
     bearings = sorted(manifest.bearings, key=lambda one: not (one.prefix and quantity.channel.startswith(one.prefix)))
     bearing = bearings[0]

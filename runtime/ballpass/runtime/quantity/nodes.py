@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ballpass.runtime.native.stepper import Segments
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.resolve import Run
 
@@ -109,7 +109,7 @@ def make_edges(run: Run, segments: Segments, chain: Chain | None) -> Edges:
     if chain is not None:
         turning = turn_slope(run, chain)
         for k, time in enumerate(times[1:-1].tolist(), start=1):
-            moved = clock.breakpoint_derivative(run.model.manifest.inputs, run.numbers.values, time)
+            moved = driver_angle.breakpoint_derivative(run.model.manifest.inputs, run.numbers.values, time)
             if moved and abs(time - run.start) > near:
                 columns[k] = sum(slope * chain.derivative(name) for name, slope in moved)
             elif math.isfinite(run.turn):
@@ -141,7 +141,7 @@ def with_passages(edges: Edges, times: Array, slopes: Array) -> Edges:
 def turn_slope(run: Run, chain: Chain) -> Array:
     """Derivative of the time of a turn, shape (directions,) [s/unit]; zero when nothing turns."""
     manifest, values = run.model.manifest, run.numbers.values
-    speed, name = clock.shaft_speed(manifest, values), clock.speed_name(manifest)
+    speed, name = driver_angle.shaft_speed(manifest, values), driver_angle.speed_name(manifest)
     if name is None or speed == 0.0:
         return np.zeros(len(chain.names))
     return np.asarray(-run.turn / speed * chain.derivative(name))

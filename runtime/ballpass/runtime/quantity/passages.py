@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ballpass.runtime.quantity.kinks import APART, crossings
 from ballpass.runtime.quantity.nodes import Nodes
 from ballpass.runtime.quantity.track import Track, follow
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.directions import Chain
 from ballpass.runtime.run.resolve import Run
 
@@ -59,7 +59,8 @@ def find_passages(run: Run, track: Track) -> Passages:
         seen = _there(run, track, times)
         angle, speed = seen.x[:, driver], seen.x[:, len(run.model.states) // 2 + driver]
         left = [
-            math.remainder(run.numbers.values[edge] - a, clock.TURN) for (_, edge), a in zip(found, angle, strict=True)
+            math.remainder(run.numbers.values[edge] - a, driver_angle.TURN)
+            for (_, edge), a in zip(found, angle, strict=True)
         ]
         times = times + np.array(left) / speed - before
     return Passages(times=times, edges=tuple(edge for _, edge in found), near=10.0 * before)

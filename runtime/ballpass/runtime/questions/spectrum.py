@@ -292,7 +292,7 @@ def spectrum(
 
 def _angle(solution: Solution) -> np.ndarray:
     """Angle of driver or shaft at the samples, counted on beyond a turn [rad]."""
-    from ballpass.runtime.run.inputs import shaft_speed
+    from ballpass.runtime.run.driver_angle import shaft_speed
 
     mechanism = solution.manifest.mechanism
     if mechanism is not None and mechanism.angle:

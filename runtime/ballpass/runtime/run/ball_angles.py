@@ -6,7 +6,7 @@ import numpy as np
 
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 
 
 def ball_angles(model: LoadedModel, numbers: Numbers, time: float, state: np.ndarray) -> list[np.ndarray]:
@@ -22,13 +22,13 @@ def ball_angles(model: LoadedModel, numbers: Numbers, time: float, state: np.nda
     given = {
         "t": 0.0,  # since the reference time of the inputs' phases, which is `time` itself
         "x": state,
-        "u": clock.inputs_at(model.manifest.inputs, numbers.values, time),
+        "u": driver_angle.inputs_at(model.manifest.inputs, numbers.values, time),
         "p": numbers.p,
         "c": numbers.c,
     }
     signature = model.manifest.function("cages").inputs
     first = np.asarray(model.function("cages")(*(given[name] for name, _ in signature)), dtype=float).ravel()
     return [
-        angle + clock.TURN * np.arange(bearing.balls) / bearing.balls
+        angle + driver_angle.TURN * np.arange(bearing.balls) / bearing.balls
         for bearing, angle in zip(model.manifest.bearings, first.tolist(), strict=True)
     ]

@@ -17,7 +17,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments, Tangents
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.direction_scales import direction_scales
 from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, stepper_for
 from ballpass.runtime.run.request import check_memory
@@ -66,7 +66,7 @@ class Chain:
         for row, name in enumerate(model.manifest.initial):
             self.initial[row] = self.p[rows[name]]
         self.moved, self.stretch = np.zeros(len(names)), np.zeros(len(names))
-        speed, mechanism = clock.speed_name(model.manifest), model.manifest.mechanism
+        speed, mechanism = driver_angle.speed_name(model.manifest), model.manifest.mechanism
         if speed is not None and numbers.values[speed] != 0.0 and not (mechanism is not None and mechanism.angle):
             self.stretch = -self.derivative(speed) / numbers.values[speed]
             if mechanism is not None:
@@ -90,7 +90,9 @@ class Chain:
         """
         u = np.zeros((len(times) - 1, len(self._inputs), len(self.names)))
         for k, (start, end) in enumerate(pairwise(times.tolist())):
-            for row, name, slope in clock.input_derivatives(self._inputs, self._values, start, 0.5 * (start + end)):
+            for row, name, slope in driver_angle.input_derivatives(
+                self._inputs, self._values, start, 0.5 * (start + end)
+            ):
                 u[k, row] += slope * self.derivative(name)
         return u
 
@@ -103,7 +105,7 @@ class Chain:
             Several loads switch at that time, each of which could move on its own.
         """
         shift = np.zeros(len(self.names))
-        for name, slope in clock.breakpoint_derivative(self._inputs, self._values, time):
+        for name, slope in driver_angle.breakpoint_derivative(self._inputs, self._values, time):
             shift += slope * self.derivative(name)
         return shift
 

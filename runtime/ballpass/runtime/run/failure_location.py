@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Whereabouts:
+class FailureLocation:
     """An instant of a run.
 
     Attributes
@@ -48,7 +48,7 @@ class Whereabouts:
         return f"Most deflected there: {ball} at {angle:.2f} deg, by {1e6 * self.deflection:.4g} um."
 
 
-def whereabouts(model: LoadedModel, numbers: Numbers, time: float, state: np.ndarray) -> Whereabouts:
+def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.ndarray) -> FailureLocation:
     """Look at a state.
 
     Parameters
@@ -57,18 +57,18 @@ def whereabouts(model: LoadedModel, numbers: Numbers, time: float, state: np.nda
     state : positions and velocities, shape (states,)
     """
     manifest, values = model.manifest, numbers.values
-    crank = clock.crank_angle(manifest, values, time, state)
-    found = Whereabouts(crank_angle=crank, bearing="", ball=None, ball_angle=math.nan, deflection=-math.inf)
+    crank = driver_angle.crank_angle(manifest, values, time, state)
+    found = FailureLocation(crank_angle=crank, bearing="", ball=None, ball_angle=math.nan, deflection=-math.inf)
     if not np.all(np.isfinite(state)):
         return found
     at = {coordinate.name: k for k, coordinate in enumerate(manifest.coordinates)}
     for bearing, turned in zip(manifest.bearings, ball_angles(model, numbers, time, state), strict=True):
-        angles = turned % clock.TURN
+        angles = turned % driver_angle.TURN
         x, y = (_relative(manifest.coordinates[at[f"{bearing.prefix}inner.{axis}"]], at, state) for axis in "xy")
         deflections = x * np.cos(angles) + y * np.sin(angles) - 0.5 * values[f"{bearing.path}.clearance"]  # Eq. (6)
         ball = int(np.argmax(deflections))
         if deflections[ball] > found.deflection:
-            found = Whereabouts(
+            found = FailureLocation(
                 crank_angle=crank,
                 bearing=bearing.name,
                 ball=ball + 1,

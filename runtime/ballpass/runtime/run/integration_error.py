@@ -6,7 +6,7 @@ import math
 
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.status import Status
-from ballpass.runtime.run.failure_location import Whereabouts
+from ballpass.runtime.run.failure_location import FailureLocation
 from ballpass.runtime.run.solution import Solution
 
 
@@ -23,7 +23,7 @@ class IntegrationError(SimulationError):
     """
 
     def __init__(
-        self, status: Status, *, time: float, place: Whereabouts, method: str, detail: str, partial: Solution
+        self, status: Status, *, time: float, place: FailureLocation, method: str, detail: str, partial: Solution
     ) -> None:
         words = f"{detail} {place.words}".strip()
         super().__init__(

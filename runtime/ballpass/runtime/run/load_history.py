@@ -20,7 +20,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import HEAD, LOAD_POWERS, reduction_rows
 from ballpass.runtime.ratings.of_bearing import ratings_of, why_no_life
 from ballpass.runtime.ratings.readings import LoadPowers, lives
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.reduced_run import ReducedRun, start_reducing
 from ballpass.runtime.run.reductions import Reduction, load_powers, reduction_of
 from ballpass.runtime.run.request import Request
@@ -68,7 +68,7 @@ def load_history(model: LoadedModel, numbers: Numbers, request: Request) -> Load
         The computation failed.
     """
     manifest = model.manifest
-    turn = clock.period(manifest, numbers.values)
+    turn = driver_angle.period(manifest, numbers.values)
     run = manifest.run
     transient = run.transient_cycles if request.transient_cycles is None else request.transient_cycles
     timed = any(item.name == DRIVER_ACCELERATION for item in manifest.inputs)
@@ -106,7 +106,7 @@ def _history(going: ReducedRun) -> LoadHistory:
     """Loads so far."""
     manifest, layout = going.run.model.manifest, reduction_rows(going.run.model.manifest)
     duration = float(going.row[HEAD.index("duration")])
-    speed = clock.shaft_speed(manifest, going.run.numbers.values)
+    speed = driver_angle.shaft_speed(manifest, going.run.numbers.values)
     if manifest.mechanism is not None and manifest.mechanism.rate:
         speed = reduction_of(layout, going.row, manifest.mechanism.rate, duration).mean
     powers, peaks = {}, {}
@@ -120,7 +120,7 @@ def _history(going: ReducedRun) -> LoadHistory:
         )
         peaks[bearing.prefix] = reduction_of(layout, going.row, f"{bearing.prefix}ball.force", duration)
     return LoadHistory(
-        turns=duration * abs(speed) / clock.TURN if speed else None,
+        turns=duration * abs(speed) / driver_angle.TURN if speed else None,
         duration=duration,
         shaft_speed=speed,
         change=math.inf,

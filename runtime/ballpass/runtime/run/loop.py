@@ -20,7 +20,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.status import Status
 from ballpass.runtime.native.stepper import End, Family, Outcome, Segments, Stepper
-from ballpass.runtime.run.failure_location import Whereabouts, whereabouts
+from ballpass.runtime.run.failure_location import FailureLocation, locate_failure
 from ballpass.runtime.run.limits import allowance
 from ballpass.runtime.run.locating import LOCATED, stepper_for
 from ballpass.runtime.run.resolve import Run
@@ -53,7 +53,9 @@ class RunFailed(SimulationError):
     detail : what else there is to say
     """
 
-    def __init__(self, end: End, time: float, step: float, state: np.ndarray, place: Whereabouts, detail: str) -> None:
+    def __init__(
+        self, end: End, time: float, step: float, state: np.ndarray, place: FailureLocation, detail: str
+    ) -> None:
         self.end, self.time, self.step, self.state, self.place, self.detail = end, time, step, state, place, detail
         self.status = STATUS_OF_END[end]
         angle = f", crank angle {math.degrees(place.crank_angle):.4f} deg"
@@ -275,7 +277,7 @@ class RunUnderWay:
             detail += " The derivatives took part in the choice of steps: a looser sensitivity_rtol may come through."
         if outcome.end is End.STALLED:
             detail += f" {stall_words(run.model, run.numbers, self.state)}"
-        place = whereabouts(run.model, run.numbers, outcome.time, self.state)
+        place = locate_failure(run.model, run.numbers, outcome.time, self.state)
         return RunFailed(outcome.end, outcome.time, outcome.step, self.state, place, detail)
 
 

@@ -15,7 +15,7 @@ from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.member_schedule import MOMENTS
 from ballpass.runtime.native.stepper import Stepper
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.scales import Groups, Scales, find_scales
 from ballpass.runtime.run.segments import segment_edges
 
@@ -100,4 +100,4 @@ def _moments(
     middles = 0.5 * (edges[:-1] + edges[1:])
     picked = middles[np.linspace(0, len(middles) - 1, min(MOMENTS, len(middles))).astype(int)]
     moments = np.concatenate([picked, begin + horizon * (np.arange(MOMENTS) + 0.5) / MOMENTS])
-    return clock.inputs_over(model.manifest.inputs, numbers.values, moments, moments), horizon
+    return driver_angle.inputs_over(model.manifest.inputs, numbers.values, moments, moments), horizon

@@ -16,7 +16,7 @@ from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
 from ballpass.runtime.native.stepper import Family
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import choose_method, stepper_method
 from ballpass.runtime.run.locating import Kinks, choose_kinks
 from ballpass.runtime.run.magnitudes import model_scales, stepper_magnitudes
@@ -149,7 +149,7 @@ def resolve(
         What was asked for is wrong, with what is allowed.
     """
     settings = model.manifest.run
-    turn = clock.period(model.manifest, numbers.values)
+    turn = driver_angle.period(model.manifest, numbers.values)
     given = settings.transient_cycles if request.transient_cycles is None else request.transient_cycles
     transient = check_transient(given)
     rtol = tolerance("rtol", settings.rtol if request.rtol is None else request.rtol)

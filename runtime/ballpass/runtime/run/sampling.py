@@ -14,7 +14,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import real, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import (
     Request,
     check_length,
@@ -112,7 +112,7 @@ def _sample_times(
             )
     else:
         duration = run_length(model, request, turn)
-        if times[-1] > (begin + duration) * (1.0 + clock.TIME_RESOLUTION):
+        if times[-1] > (begin + duration) * (1.0 + driver_angle.TIME_RESOLUTION):
             raise RequestError(
                 f"times: the run ends at {begin + duration!r} s, and {float(times[-1])!r} s lies behind it. Run "
                 "longer, or leave cycles and duration out: the run then ends at the last time."

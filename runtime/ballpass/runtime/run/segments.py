@@ -17,7 +17,7 @@ from ballpass.runtime.contract import InputInfo
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import Segments
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.request import check_memory
 
 #: Largest angle that a phase may reach within a segment [rad]: sines of larger ones lose digits.
@@ -32,7 +32,7 @@ WORK = 5
 
 def time_resolution(begin: float, end: float, turn: float) -> float:
     """Times of a run closer than this are one time [s].  It does not depend on how the run is sampled."""
-    return clock.TIME_RESOLUTION * max(abs(begin), abs(end), turn if math.isfinite(turn) else 0.0)
+    return driver_angle.TIME_RESOLUTION * max(abs(begin), abs(end), turn if math.isfinite(turn) else 0.0)
 
 
 def segment_edges(model: LoadedModel, numbers: Numbers, begin: float, end: float, turn: float) -> np.ndarray:
@@ -44,7 +44,7 @@ def segment_edges(model: LoadedModel, numbers: Numbers, begin: float, end: float
         They would not fit into memory, or the times of a table do not increase.
     """
     check_count(model.manifest.inputs, numbers, end - begin, turn)
-    cuts = clock.breakpoints(model.manifest.inputs, numbers.values, begin, end)
+    cuts = driver_angle.breakpoints(model.manifest.inputs, numbers.values, begin, end)
     if math.isfinite(turn):
         near = time_resolution(begin, end, turn)
         whole = turn * np.arange(math.floor(begin / turn) + 1, math.ceil(end / turn))
@@ -141,9 +141,9 @@ def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, tu
     count = 1.0 + length / turn + length * _fastest(inputs, numbers) / LARGEST_PHASE
     for item in inputs:
         if item.kind == "gate":
-            count += 2.0 * len(item.windows) * (1.0 + length * abs(numbers.values[item.rate]) / clock.TURN)
+            count += 2.0 * len(item.windows) * (1.0 + length * abs(numbers.values[item.rate]) / driver_angle.TURN)
         else:
-            turns = 1.0 + length * abs(numbers.values[item.rate]) / clock.TURN if item.rate else 1.0
+            turns = 1.0 + length * abs(numbers.values[item.rate]) / driver_angle.TURN if item.rate else 1.0
             count += len(item.times) * turns
     check_memory(
         f"Up to {count:.10g} segments, cut where a load switches and at every whole turn, of",
@@ -181,7 +181,7 @@ def make_segments(
     edges : shape (segments + 1,), increasing [s]
     before : segments that end where these begin; None: the run begins there
     """
-    u = clock.inputs_over(inputs, numbers.values, edges[:-1], 0.5 * (edges[:-1] + edges[1:]))
+    u = driver_angle.inputs_over(inputs, numbers.values, edges[:-1], 0.5 * (edges[:-1] + edges[1:]))
     switching = [k for k, info in enumerate(inputs) if info.kind != "phase"]
     jumps = np.ones(len(u), dtype=bool)
     jumps[1:] = np.any(np.diff(u[:, switching], axis=0) != 0.0, axis=1)
@@ -208,5 +208,5 @@ def rest_of(segments: Segments, time: float, inputs: Sequence[InputInfo], number
     left = part_of(segments, k, len(segments.inputs))
     times, u, restarts = left.times.copy(), left.inputs.copy(), left.restarts.copy()
     times[0], restarts[0] = time, False
-    u[0] = clock.inputs_at(inputs, numbers.values, time, float(middle))
+    u[0] = driver_angle.inputs_at(inputs, numbers.values, time, float(middle))
     return Segments(times=times, inputs=u, restarts=restarts)

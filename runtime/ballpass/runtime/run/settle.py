@@ -17,7 +17,7 @@ from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, real
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.reduced_run import reduce_run, start_reducing
 from ballpass.runtime.run.reductions import Reductions, channel_names
 from ballpass.runtime.run.request import Request
@@ -92,7 +92,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
     settings = model.manifest.run
     transient = settings.transient_cycles if request.transient_cycles is None else request.transient_cycles
     turns = LEAST
-    turn = clock.period(model.manifest, numbers.values)
+    turn = driver_angle.period(model.manifest, numbers.values)
     dropped = _dropped(transient, start_time(request.initial), turn)
     run = resolve(model, numbers, replace(request, cycles=dropped + turns))
     going = start_reducing(run, channel_names(model.manifest))

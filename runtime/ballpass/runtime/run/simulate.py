@@ -23,12 +23,12 @@ from ballpass.runtime.native.casadi_integrators import METHODS
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import METHODS as STEPPERS
-from ballpass.runtime.run import inputs as clock
-from ballpass.runtime.run.failure_location import whereabouts
+from ballpass.runtime.run import driver_angle
+from ballpass.runtime.run.casadi_run import integrate
+from ballpass.runtime.run.failure_location import locate_failure
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.locating import LOCATED, kinks_with_derivatives
 from ballpass.runtime.run.loop import ReductionRow, RunFailed, RunUnderWay, Samples, Sink, start_run
-from ballpass.runtime.run.pieces import integrate
 from ballpass.runtime.run.reductions import joined, reduced_channels, reductions_of
 from ballpass.runtime.run.request import Request, tolerance
 from ballpass.runtime.run.resolve import Run, resolve
@@ -53,7 +53,7 @@ def simulate(
         The computation failed; the samples so far are in its attribute ``partial``.
     """
     started = clocks.perf_counter()
-    sampling = sampling_of(model, request, clock.period(model.manifest, numbers.values))
+    sampling = sampling_of(model, request, driver_angle.period(model.manifest, numbers.values))
     # derivatives first: what would not fit into memory is told before there is memory for the rest
     directions = prepare(len(sampling.times)) if prepare is not None else None
     run = resolve(model, numbers, request, duration=sampling.duration, stepper=False)
@@ -115,7 +115,7 @@ def simulate(
     )
     if failure is not None:
         state = failure.state if isinstance(failure, RunFailed) else last
-        place = whereabouts(model, numbers, failure.time, state)
+        place = locate_failure(model, numbers, failure.time, state)
         raise IntegrationError(
             failure.status, time=failure.time, place=place, method=run.method, detail=failure.detail, partial=solution
         )

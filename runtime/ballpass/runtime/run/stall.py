@@ -8,7 +8,7 @@ import numpy as np
 
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.magnitudes import mass_matrix
 
 
@@ -24,13 +24,13 @@ def stall_words(model: LoadedModel, numbers: Numbers, state: np.ndarray) -> str:
     names, half = [info.name for info in manifest.states], len(manifest.states) // 2
     driver = names.index(manifest.mechanism.angle)
     edges = [
-        (abs(math.remainder(state[driver] - values[path], clock.TURN)), row, path)
+        (abs(math.remainder(state[driver] - values[path], driver_angle.TURN)), row, path)
         for row, item in enumerate(manifest.inputs)
         if item.kind == "border" and item.windows
         for path in item.windows[0]
     ]
     _, row, path = min(edges)
-    u = clock.inputs_at(manifest.inputs, values, 0.0)
+    u = driver_angle.inputs_at(manifest.inputs, values, 0.0)
     u[row] = -math.inf  # open, on either side of the edge
     there = {"t": 0.0, "x": np.concatenate([state[:half], np.zeros(half)]), "u": u, "p": numbers.p, "c": numbers.c}
     acceleration = float(model.kernel("rhs")(there)[half + driver])

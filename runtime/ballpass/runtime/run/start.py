@@ -15,7 +15,7 @@ from ballpass.runtime.contract import DRIVER_ACCELERATION
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, vector
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 from ballpass.runtime.show.short import ShortRepr
 
@@ -93,7 +93,7 @@ def _check_driver(model: LoadedModel, numbers: Numbers, time: float, x: np.ndarr
         return
     assert model.manifest.mechanism is not None  # it has the driver
     given = float(x[[state.name for state in model.manifest.states].index(model.manifest.mechanism.rate)])
-    speed = clock.driver_at(model.manifest, numbers.values, time)[1]
+    speed = driver_angle.driver_at(model.manifest, numbers.values, time)[1]
     if abs(given - speed) > SAME_ANGLE * max(abs(speed), 1.0):
         raise RequestError(
             f"initial: the driver's speed {given:.9g} rad/s was given, and its table has {speed:.9g} rad/s at "
@@ -111,14 +111,14 @@ def _refuse_jump(model: LoadedModel, numbers: Numbers, end: RunEnd) -> None:
     angles, others = (
         np.concatenate(
             [
-                [clock.crank_angle(model.manifest, one.values, end.time, end.x)],
+                [driver_angle.crank_angle(model.manifest, one.values, end.time, end.x)],
                 *ball_angles(model, one, end.time, end.x),
             ]
         )
         for one in (before, numbers)
     )
-    moved = np.abs((others - angles + math.pi) % clock.TURN - math.pi)
-    if np.max(moved) > SAME_ANGLE * max(1.0, end.time / clock.period(model.manifest, numbers.values)):
+    moved = np.abs((others - angles + math.pi) % driver_angle.TURN - math.pi)
+    if np.max(moved) > SAME_ANGLE * max(1.0, end.time / driver_angle.period(model.manifest, numbers.values)):
         what = "the driver" if moved[0] == np.max(moved) else "balls"
         raise RequestError(
             f"initial: with {', '.join(changed)} changed, {what} would jump by "

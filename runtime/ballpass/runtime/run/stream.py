@@ -25,7 +25,7 @@ import numpy as np
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.native.loaded_model import LoadedModel
-from ballpass.runtime.run import inputs as clock
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.netcdf import seal
 from ballpass.runtime.run.request import Request, check_length, run_length
 from ballpass.runtime.run.sampling import checked_rate
@@ -53,7 +53,7 @@ def stream_run(model: LoadedModel, numbers: Numbers, request: Request, path: Pat
         The computation failed; the file is as it was.
     """
     rate = checked_rate(request.sample_rate or 0.0)
-    turn = clock.period(model.manifest, numbers.values)
+    turn = driver_angle.period(model.manifest, numbers.values)
     begin = start_time(request.initial)
     length = run_length(model, request, turn)
     check_length(begin + length, turn)

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import read_asked
+from ballpass.runtime.app.commands.load_scene import read_asked
 from ballpass.runtime.app.commands.shared import command, load_model, results_folder, show, size_words
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol, Transient

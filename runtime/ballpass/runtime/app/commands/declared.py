@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import read_asked, read_formats, read_value
+from ballpass.runtime.app.commands.load_scene import read_asked, read_formats, read_value
 from ballpass.runtime.app.commands.shared import (
     Stages,
     can_draw,

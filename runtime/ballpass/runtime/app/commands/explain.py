@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import read_with_settings
+from ballpass.runtime.app.commands.load_scene import read_with_settings
 from ballpass.runtime.app.commands.shared import command, load_model, show_json
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 from ballpass.runtime.report.text import show as show_report

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ballpass.runtime.app.commands.asked import read_value, refuse_run_setting
+from ballpass.runtime.app.commands.load_scene import read_value, refuse_run_setting
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.bounds import Bounded, outside
 from ballpass.runtime.contract.bounds import allowed as bounds_text

@@ -111,7 +111,7 @@ def command(scene: Path | None = None) -> Iterator[Stages]:
 
 def warn_of_scene(manifest: Manifest) -> None:
     """Warn of a scene's unusual numbers, for commands that compute nothing."""
-    from ballpass.runtime.contract.usual import warn_unusual
+    from ballpass.runtime.contract.plausible_ranges import warn_unusual
 
     warn_unusual(manifest, {info.name: info.default for info in manifest.parameters})
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import read_asked
+from ballpass.runtime.app.commands.load_scene import read_asked
 from ballpass.runtime.app.commands.shared import command, load_model, show
 from ballpass.runtime.contract.options import Cycles, Duration, Option, Rtol
 

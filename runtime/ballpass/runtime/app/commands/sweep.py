@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ballpass.runtime.app.commands import options
-from ballpass.runtime.app.commands.asked import (
+from ballpass.runtime.app.commands.load_scene import (
     read_asked,
     read_formats,
     read_with_settings,

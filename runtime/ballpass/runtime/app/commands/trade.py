@@ -17,7 +17,7 @@ from ballpass.runtime.show.progress import Progress
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ballpass.derive.reading.recouple import Coupling
+    from ballpass.derive.reading.change_coupling import Coupling
     from ballpass.runtime.certify.simplification import Simplification
     from ballpass.runtime.certify.trade_report import Trade
     from ballpass.runtime.model import Model

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, View
-from ballpass.runtime.run.inputs import TURN
+from ballpass.runtime.run.driver_angle import TURN
 
 
 def _drive_work(view: View, quantity: Quantity) -> Estimate:

@@ -18,7 +18,7 @@ from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, ReducedR
 from ballpass.runtime.ratings.of_bearing import Ratings, ratings_of, refuse_swinging
 from ballpass.runtime.ratings.readings import KILO, LoadPowers, lives
 from ballpass.runtime.ratings.readings import KINDS as READINGS_OF
-from ballpass.runtime.run.inputs import TURN, shaft_speed
+from ballpass.runtime.run.driver_angle import TURN, shaft_speed
 from ballpass.runtime.run.reductions import load_powers
 
 Array = NDArray[np.float64]
