@@ -113,10 +113,10 @@ def test_sanitizers_see_a_planted_fault(
 ) -> None:
     """Sanitizers report a write beyond an array that is planted in a copy of the functions, and nothing without it."""
     copy = shutil.copytree(folder, tmp_path / "punching_press")
-    code = (copy / "model.c").read_text(encoding="utf-8")
+    code = (copy / "equations.c").read_text(encoding="utf-8")
     begin = re.search(r"int rhs\([^;{}]*\)\s*\{", code)
     assert begin is not None
-    (copy / "model.c").write_text(code[: begin.end()] + fault + code[begin.end() :], encoding="utf-8")
+    (copy / "equations.c").write_text(code[: begin.end()] + fault + code[begin.end() :], encoding="utf-8")
     program = (
         "import sys\nfrom ballpass.runtime import load\nmodel = load(sys.argv[1], verify=False)\n"
         "numbers = model.numbers()\n"

@@ -276,7 +276,7 @@ def test_command_refuses_wrong_names_and_instants(monkeypatch: pytest.MonkeyPatc
         (["--of", "ball.fore", "--wrt", "inner.x"], "ball.force"),
         (["--of", "ball.fore", "--wrt", "bearing.claerance"], "bearing.clearance"),
         (["--of", "rhs", "--wrt", "states", "--time", "1 kg"], "wrong dimension"),
-        (["--of", "rhs", "--wrt", "states", "--time", "1 s", "--at-angle", "1 deg"], "both were given"),
+        (["--of", "rhs", "--wrt", "states", "--time", "1 s", "--at-angle", "1 deg"], "were both given"),
     ):
         result = CliRunner().invoke(app, ["jacobian", scene, *words])
         assert result.exit_code == 2

@@ -114,7 +114,7 @@ def test_extremes_of_samples_alone_are_marked_where_they_stand(make_model: Calla
     for method, mark in (("cvodes", "*"), ("stepper", "")):
         summary = summarize(model, model.simulate(cycles=2, transient=1, method=method))
         table = render_summary(summary)
-        names, peaks, _, highest, *_ = (list(column.cells) for column in table.columns)
+        names, peaks, _, highest, *_ = (list(column) for column in zip(*table.rows, strict=True))
         for name, unit in (("inner.y", 1e6), ("inner.vy", 1e3)):
             assert highest[names.index(name)] == f"{unit * summary[name]['max']:z.4g}{mark}"
         assert str(peaks[names.index("peak_ball_force.total")]).endswith("*") == bool(mark)

@@ -110,7 +110,7 @@ _HOME = {
     "SimulationError": "contract.errors",
     "Parameters": "contract.parameters",
     "Status": "contract.status",
-    "UnusualWarning": "contract.usual",
+    "UnusualWarning": "contract.plausible_ranges",
     "__version__": "contract.version",
     "MemberFailure": "many.chunks",
     "DataSetReport": "many.data_set",

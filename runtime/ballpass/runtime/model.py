@@ -365,7 +365,8 @@ class Model(PointModel, Questions):
         Examples
         --------
         >>> found = model.quantities(["drive_work", "peak_ball_force"], cycles=3, transient=2)
-        >>> f"{found['drive_work'].value:.3f} {found['drive_work'].unit}, ball {found['peak_ball_force'].ball}"
+        >>> work, force = found["drive_work"], found["peak_ball_force"]
+        >>> f"{work.value:.3f} {work.unit}, ball {force.ball}"
         '9.078 J, ball 3'
         """
         numbers = self._runnable(parameters)

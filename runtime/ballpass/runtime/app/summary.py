@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ballpass.runtime.ask.observables import statistics, turns
-from ballpass.runtime.ask.peaks import Kind, Peak, refine_peaks, run_of
+from ballpass.runtime.ask.peaks import Kind, Peak, has_quantities, refine_peaks, run_of
 from ballpass.runtime.contract import Manifest
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.contract.extras import is_installed
@@ -31,7 +31,6 @@ from ballpass.runtime.point.conditioning import conditioning, has_reactions
 from ballpass.runtime.quantity.characteristic import frequencies_of
 from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
-from ballpass.runtime.quantity.track import depends
 from ballpass.runtime.run.driver_angle import TURN
 from ballpass.runtime.run.settle import MEANS, PEAKS
 
@@ -113,7 +112,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
         for name in growth.uncertain:
             _add_spread(summary, growth, name)
     summary["versions"] = _versions(steady)
-    found = _unusual(steady)
+    found = _unusual(model, steady)
     for text in found:
         warnings.warn(text, UnusualWarning, stacklevel=2)
     grown = [growth.words] if growth is not None and growth.uncertain else []
@@ -121,7 +120,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
     return summary
 
 
-def _unusual(sol: Solution) -> list[str]:
+def _unusual(model: Model, sol: Solution) -> list[str]:
     """What of a run's results is unlike bearings and machines."""
     said = []
     for bearing in sol.manifest.bearings:
@@ -136,14 +135,10 @@ def _unusual(sol: Solution) -> list[str]:
                 "beyond. Check loads, stiffness and their units."
             )
     if "drive_torque" in sol.outputs and _has_turn(sol):
-        assert sol.manifest.mechanism is not None  # it turns
-        sense = math.copysign(1.0, sol.parameters[sol.manifest.mechanism.speed])
-        mean, gross = (
-            statistics(sol.t, torque).mean for torque in (sense * sol["drive_torque"], abs(sol["drive_torque"]))
-        )
-        if mean < -LEAST_WORK * gross:
+        work, gross = _drive_work(model, sol), TURN * statistics(sol.t, np.abs(sol["drive_torque"])).mean
+        if work < -LEAST_WORK * gross:
             said.append(
-                f"the drive takes {-mean * TURN:.4g} J a turn out of the mechanism: unusual. Usual is a drive that "
+                f"the drive takes {-work:.4g} J a turn out of the mechanism: unusual. Usual is a drive that "
                 "gives work. Check the directions of forces and speed, and the windows."
             )
     return said
@@ -265,7 +260,7 @@ def _has_turn(sol: Solution) -> bool:
 def _drive_work(model: Model, sol: Solution) -> float:
     """Work of the drive in a turn [J]: the quantity, where the output follows from time or from steps."""
     numbers = model.numbers(sol.parameters)
-    if model.has_stepper or not depends(model, "drive_torque", "x"):
+    if has_quantities(sol, "drive_torque", model):
         quantities = quantities_of(model, ["drive_work"])
         return float(QuantityRun(model, quantities).measure(run_of(model, numbers, sol)).values[0])
     assert sol.manifest.mechanism is not None  # it has a torque

@@ -96,9 +96,11 @@ def refine_peaks(
     left = [
         k
         for k, ((name, kind), peak) in enumerate(zip(wanted, found, strict=True))
-        if peak.searched == "samples" and name not in model.states and not _of_any_ball(solution, name, kind)
+        if peak.searched == "samples"
+        and not _of_any_ball(solution, name, kind)
+        and has_quantities(solution, name, model)
     ]
-    if left and len(solution) > 1 and (model.has_stepper or all(_is_of_time(model, wanted[k][0]) for k in left)):
+    if left and len(solution) > 1:
         quantities = quantities_of(model, [f"{kind}:{name}" for name, kind in (wanted[k] for k in left)])
         estimates = QuantityRun(model, quantities).measure(run_of(model, numbers, solution)).estimates
         for k, one in zip(left, estimates, strict=True):
@@ -106,6 +108,11 @@ def refine_peaks(
             searched: Searched = "dense samples" if _is_of_time(model, wanted[k][0]) else "every step"
             found[k] = replace(found[k], value=one.value, time=one.time, ball=one.ball, searched=searched)
     return found
+
+
+def has_quantities(solution: Solution, name: str, model: LoadedModel) -> bool:
+    """Whether quantities of an output are those of the very run: it follows from time, or the stepper ran."""
+    return name not in model.states and (solution.statistics.method in STEPPERS or _is_of_time(model, name))
 
 
 def run_of(model: LoadedModel, numbers: Numbers, solution: Solution) -> Run:
@@ -119,7 +126,7 @@ def run_of(model: LoadedModel, numbers: Numbers, solution: Solution) -> Run:
         end=float(solution.t[-1]),
         turn=driver_angle.period(model.manifest, numbers.values),
         turns=None,
-        transient_cycles=solution.transient_cycles,
+        transient_cycles=0.0,
         start=float(solution.t[0]),
         initial=np.array(statistics.initial),
         method=statistics.method if statistics.method in STEPPERS else "stepper",

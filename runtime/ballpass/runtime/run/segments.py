@@ -27,7 +27,7 @@ LARGEST_PHASE = 1e6
 TURNS_A_SEARCH = 64
 
 #: Numbers that a segment takes besides its inputs while segments are made: ends, middles, jumps, samples.
-WORK = 5
+WORK = 6
 
 
 def time_resolution(begin: float, end: float, turn: float) -> float:
