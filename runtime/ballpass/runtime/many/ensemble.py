@@ -12,20 +12,19 @@ from __future__ import annotations
 import ctypes
 import math
 import os
-import threading
 import time as clocks
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ballpass.runtime.contract import Manifest
-from ballpass.runtime.contract.errors import RequestError, SimulationError
+from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.extras import need
 from ballpass.runtime.contract.parameters import real, unknown_name
-from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, member_run, run_chunks
+from ballpass.runtime.many.chunks import COUNTS, MemberFailure, Work, chunk_size, run_chunks
+from ballpass.runtime.many.member_values import measure_members
 from ballpass.runtime.many.members import Members, Span, Table, make_members, read_table
 from ballpass.runtime.native.ensemble_driver import LANE_FAMILIES
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -33,18 +32,16 @@ from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.native.stepper import METHODS
 from ballpass.runtime.quantity.grammar import parse_quantity, quantities_of, quantity_words
 from ballpass.runtime.quantity.layout import is_reduced, needs
-from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Quantity, ReducedRuns
 from ballpass.runtime.quantity.registry import KINDS
+from ballpass.runtime.report.report import Report, ReportTable
+from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.choose_method import stepper_method
 from ballpass.runtime.run.locating import LOCATED, Kinks, choose_kinks, has_kinks
-from ballpass.runtime.run.loop import RunFailed
 from ballpass.runtime.run.request import MOST_TIME, MOST_TURNS, check_memory
 from ballpass.runtime.run.request import tolerance as relative_tolerance
 from ballpass.runtime.run.resolve import check_span
-from ballpass.runtime.run.tables import printed, simple_table
-from ballpass.runtime.show import html
 
 if TYPE_CHECKING:
     import pandas
@@ -89,7 +86,7 @@ class EnsembleStatistics:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EnsembleResult(Mapping[str, np.ndarray]):
+class EnsembleResult(Reported, Mapping[str, np.ndarray]):
     """Observables by the name they were asked for, each of shape (members,); NaN for a member without results.
 
     Attributes
@@ -129,11 +126,28 @@ class EnsembleResult(Mapping[str, np.ndarray]):
             f"observables: {', '.join(self.observables)})"
         )
 
-    def __str__(self) -> str:
-        return printed(_render(self))
-
-    def _repr_html_(self) -> str:
-        return html.block(html.from_terminal(_render(self)))
+    def _report(self) -> Report:
+        """Smallest, middle and largest value of each varied parameter and observable over the members."""
+        statistic, rows = self.statistics, []
+        units = {name: facts["units"] for name, facts in self.attributes().items()}
+        for name, values in (*self.parameters.items(), *self.observables.items()):
+            known = values[np.isfinite(values)]
+            cells = [f"{f(known):z.6g}" for f in (np.min, np.median, np.max)] if len(known) else ["", "", ""]
+            rows.append((name, *cells, units[name]))
+        right = ("min", "median", "max")
+        table = ReportTable(
+            title=f"{self.manifest.title}: {len(next(iter(self.parameters.values())))} members",
+            heads=("parameter or observable", *right, "unit"),
+            rows=rows,
+            right=right,
+            caption=f"{len(self.failures)} without results; {statistic.threads} threads, rtol {statistic.rtol:g}, "
+            f"{statistic.wall_time:.3g} s",
+        )
+        columns = {
+            part: {name: values.tolist() for name, values in getattr(self, part).items()}
+            for part in ("parameters", "observables")
+        }
+        return Report(parts=(table,), facts={**columns, "units": units, "failures": [asdict(f) for f in self.failures]})
 
     def __getitem__(self, name: str) -> np.ndarray:
         try:
@@ -278,7 +292,9 @@ def simulate_many(
         table = np.full((len(members), len(others)), np.nan)
         if not interrupted:
             first = parts[-2]
-            interrupted = _measure(work, others, able, table, workers, lambda done: tell(first + done * (1.0 - first)))
+            interrupted = measure_members(
+                work, others, able, table, workers, lambda done: tell(first + done * (1.0 - first))
+            )
         found |= {item.name: table[:, k] for k, item in enumerate(others)}
     failed = sorted(work.results)
     found = {item.name: found[item.name] for item in chosen}
@@ -313,65 +329,6 @@ def _reduced(runs: ReducedRuns, quantity: Quantity) -> np.ndarray:
     reduced = KINDS[quantity.kind].reduced
     assert reduced is not None  # `is_reduced`
     return reduced(runs, quantity)
-
-
-def _measure(
-    work: Work,
-    quantities: Sequence[Quantity],
-    able: np.ndarray,
-    found: np.ndarray,
-    threads: int,
-    progress: Callable[[float], None],
-) -> bool:
-    """Evaluate quantities that steps do not reduce, member by member; whether the user interrupted.
-
-    Parameters
-    ----------
-    found : filled, NaN for a quantity that is not known, shape (members, quantities)
-    """
-    own = threading.local()  # a `QuantityRun` is not for several threads
-
-    def measure(member: int, which: tuple[int, ...]) -> tuple[dict[int, float], RequestError | SimulationError | None]:
-        """Values by their place, and why some are not known."""
-        runs = own.__dict__.setdefault("runs", {})
-        if which not in runs:
-            runs[which] = QuantityRun(work.model, [quantities[k] for k in which])
-        try:
-            values = runs[which].measure(member_run(work, member)).values.tolist()
-            return dict(zip(which, values, strict=True)), None
-        except (RequestError, SimulationError) as fault:
-            known: dict[int, float] = {}
-            if len(which) > 1:  # each that is known by itself
-                for k in which:
-                    known |= measure(member, (k,))[0]
-            return known, fault
-
-    every = tuple(range(len(quantities)))
-    with ThreadPoolExecutor(max_workers=threads, thread_name_prefix="ballpass") as pool:
-        pending = [pool.submit(measure, member, every) for member in able.tolist()]
-        done = 0
-        try:
-            for member, future in zip(able.tolist(), pending, strict=True):
-                values, fault = future.result()
-                done += 1
-                found[member, list(values)] = list(values.values())
-                if fault is not None and member not in work.results:
-                    work.results[member] = MemberFailure(
-                        member=member,
-                        status=fault.status.name if isinstance(fault, RunFailed) else "REFUSED",
-                        time=fault.time if isinstance(fault, RunFailed) else 0.0,
-                        message=str(fault),
-                    )
-                progress(done / len(pending))
-        except KeyboardInterrupt:
-            for future in pending:
-                future.cancel()
-            for member in able[done:].tolist():
-                work.results[member] = MemberFailure(
-                    member=member, status="INTERRUPTED", time=0.0, message="Interrupted before it was done."
-                )
-            return True
-    return False
 
 
 def _threads(given: int | None) -> int:
@@ -421,24 +378,3 @@ def _span(model: LoadedModel, members: Members, cycles: float | None, duration: 
                 raise
             members.refused.update((int(member), str(fault)) for member in which)
     return Span(durations=durations, turns=turns, starts=starts)
-
-
-def _render(result: EnsembleResult) -> Any:
-    """Smallest, middle and largest value of each varied parameter and observable over the members."""
-    count = len(next(iter(result.parameters.values())))
-    statistic = result.statistics
-    right = ("min", "median", "max")
-    table = simple_table(
-        f"{result.manifest.title}: {count} members",
-        ("parameter or observable", *right, "unit"),
-        right=right,
-        caption=f"{len(result.failures)} without results; {statistic.threads} threads, rtol {statistic.rtol:g}, "
-        f"{statistic.wall_time:.3g} s",
-    )
-    units = {info.name: info.unit for info in result.manifest.parameters}
-    units |= {name: parse_quantity(result.manifest, name).unit for name in result.observables}
-    for name, values in (*result.parameters.items(), *result.observables.items()):
-        known = values[np.isfinite(values)]
-        cells = [f"{f(known):z.6g}" for f in (np.min, np.median, np.max)] if len(known) else ["", "", ""]
-        table.add_row(name, *cells, units[name])
-    return table

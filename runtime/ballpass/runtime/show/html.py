@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from html import escape
-from typing import Any
 
 #: Colours come from the notebook; rules and heads are translucent, so that they fit both a light and a dark page.
 _STYLE = """
@@ -86,8 +85,3 @@ def table_of_html(heads: Sequence[str], rows: Iterable[Sequence[str]], right: Se
         f"<tr>{''.join(f'<td{look}>{cell}</td>' for look, cell in zip(looks, row, strict=True))}</tr>" for row in rows
     )
     return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
-def from_terminal(table: Any) -> str:
-    """A table of `ballpass.runtime.run.tables` as HTML."""
-    return str(table.as_html())
