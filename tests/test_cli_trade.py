@@ -60,6 +60,41 @@ def test_a_trade_is_one_json_object_and_follows_its_settings(place: Path) -> Non
     assert not (place / "lighter").exists()
 
 
+def test_run_and_sweep_take_any_quantity_and_refuse_in_the_same_words(place: Path) -> None:
+    """And at the same options as the summary's own peak; a name that is none is refused alike."""
+    of = ("peak_ball_force", "kurtosis:inner.y", "value:inner.y@240deg", "peak_time:ball.force")
+    asked = [word for name in of for word in ("--of", name)]
+    done = CliRunner().invoke(app, ["run", f"{NAME}.toml", *asked, "--kinks", "located", "--no-figures", "--json"])
+    assert done.exit_code == 0, done.output
+    summary = json.loads(done.stdout)
+    found = {name: one["value"] for name, one in summary["quantities"].items()}
+    assert found["peak_ball_force"] == summary["peak_ball_force"]["total"]
+    vary = [
+        "--vary",
+        "bearing.clearance=9 um:10 um:2",
+        "--set",
+        "load.force.x=0 N",
+        "--kinks",
+        "located",
+        "--no-figures",
+    ]
+    swept = CliRunner().invoke(app, ["sweep", f"{NAME}.toml", *asked, *vary, "--json"])
+    assert swept.exit_code == 0, swept.output
+    told = CliRunner().invoke(app, ["run", f"{NAME}.toml", *asked, "--kinks", "located", "--no-figures"])
+    assert all(any(line.split()[:1] == [name] for line in told.stdout.splitlines()) for name in of)
+    said = set()
+    for command in (
+        ["run"],
+        ["run", "--error", "1%"],
+        ["sweep", "--vary", "bearing.clearance=9 um:10 um:2"],
+        ["trade"],
+    ):
+        wrong = CliRunner().invoke(app, [*command[:1], f"{NAME}.toml", *command[1:], "--of", "mx:inner.y"])
+        assert wrong.exit_code == 2, wrong.output
+        said.add(wrong.stderr.partition("error: ")[2])
+    assert len(said) == 1
+
+
 def test_a_named_error_tells_choice_estimate_and_cost(place: Path) -> None:
     of = ["--of", "peak_ball_force", "--of", "rms:inner.y"]
     arguments = ["run", f"{NAME}.toml", "--error", "1%", *of, "--no-figures"]
