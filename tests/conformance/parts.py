@@ -225,13 +225,13 @@ FORCES: dict[str, tuple[str, tuple[str, ...]]] = {
         'force = ["100 N", "1200 N", "-60 N"] }\n',
         ("table.force.1", "table.force.2", "table.force.3"),
     ),
-    "forces PointForce Constant": (_POINT + 'force = ["300 N", "-40 N"]\n', ("force.x", "force.y")),
+    "forces PointForce ConstantForce": (_POINT + 'force = ["300 N", "-40 N"]\n', ("force.x", "force.y")),
     "torques BodyTorque Windows": (_BODY + 'torque = "20 N*m"\n' + _WINDOW, ("torque",)),
     "torques BodyTorque AngleTable": (
         _BODY + 'table = { angle = ["10 deg", "180 deg"], torque = ["5 N*m", "90 N*m"] }\n',
         ("table.torque.1", "table.torque.2"),
     ),
-    "torques BodyTorque Constant": (_BODY + 'torque = "-7 N*m"\n', ("torque",)),
+    "torques BodyTorque ConstantForce": (_BODY + 'torque = "-7 N*m"\n', ("torque",)),
     "springs TwoPoints SpringDamper": (
         '[mechanism.springs.it]\nbodies = ["frame", "lever"]\npoints = ["hook", "tip"]\nstiffness = "2 N/mm"\n'
         'free_length = "150 mm"\ndamping = "40 N*s/m"\npreload = "20 N"\n',

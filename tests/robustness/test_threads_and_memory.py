@@ -145,8 +145,8 @@ def test_a_process_with_models_at_work_in_threads_ends_well(press: Path) -> None
 LAYOUTS = {
     "ballpass_options": stepper._Options,
     "ballpass_result": stepper._Result,
-    "ballpass_tangents": stepper._Tangents,
-    "ballpass_ensemble_options": ensemble_driver._Options,
+    "ballpass_tangents": stepper._TangentRecord,
+    "ballpass_ensemble_options": ensemble_driver._EnsembleOptions,
 }
 
 
