@@ -277,7 +277,7 @@ def test_a_worker_that_does_not_see_the_store_sends_its_samples(
     rotor: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     make_data_set(tmp_path / "a", classes(rotor), SIGNALS, seed=1)
-    elsewhere = data_set.Place(path=str(tmp_path / "b"), mark="of another disk")
+    elsewhere = data_set.SignalPlace(path=str(tmp_path / "b"), mark="of another disk")
     monkeypatch.setattr(data_set, "marked", lambda _: nullcontext(elsewhere))
     with connected(None, 1) as client:
         make_data_set(tmp_path / "b", classes(rotor), SIGNALS, seed=1, client=client)

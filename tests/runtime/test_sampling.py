@@ -217,7 +217,7 @@ def test_an_interrupt_is_heard_within_a_segment(rotor: Model, monkeypatch: pytes
 @pytest.mark.long
 def test_a_run_that_crawls_ends_with_its_pace(rotor: Model) -> None:
     # decay 5e9 1/s: an explicit method needs steps of a nanosecond, 4e9 of them
-    with pytest.raises(IntegrationError, match="1000000 steps for the last") as caught:
+    with pytest.raises(IntegrationError, match="1000000 steps for the first") as caught:
         rotor.simulate(24, method="stepper-dp54", parameters={"bearing.inner_ring.damping": 1e11})
     assert caught.value.status is Status.TOO_MANY_STEPS
     assert caught.value.time < 0.01 * rotor.period()
@@ -230,8 +230,8 @@ def test_derivatives_do_not_depend_on_how_a_run_is_cut_into_calls(
     model = make_model("punching_press")
     name = "mechanism.forces.punch.window.start"
     whole = model.sensitivities(name, cycles=3, rtol=1e-8)
-    for turns in (1, 2):
-        monkeypatch.setattr("ballpass.runtime.run.segments.TURNS_A_SEARCH", turns)
+    for segments in (1, 2, 4):  # edges of a turn: punch on, punch off, turn
+        monkeypatch.setattr("ballpass.runtime.run.segments.SEGMENTS_A_CALL", segments)
         cut = model.sensitivities(name, cycles=3, rtol=1e-8)
         scale = np.max(np.abs(whole.x), axis=(0, 2))[:, None]
         assert np.max(np.abs(cut.x - whole.x) / scale) < 1e-3

@@ -2,8 +2,8 @@
 
 In: a `Run`, and sinks that take what it passes: samples, reductions, ends of steps.  Out: the sinks, filled.
 
-A run is cut into windows of some turns (`segments.edge_windows`), each of them one run of the driver, made in calls of
-so many steps: between calls progress is shown, and an interrupt or the wish of an ensemble to stop is heard.  What
+A run is cut into windows of so many segments (`segments.run_windows`), each one run of the driver, made in calls
+of so many steps: between calls progress is shown, and an interrupt or the wish of an ensemble to stop is heard.  What
 sinks there are, and how many steps a call takes, changes no bit of the motion.
 """
 

@@ -26,6 +26,9 @@ LARGEST_PHASE = 1e6
 #: Turns whose edges are sought at a time: the search compares all with all.
 TURNS_A_SEARCH = 64
 
+#: Segments of one run of the driver (`driver/standalone/ballpass.c` has the same).
+SEGMENTS_A_CALL = 600
+
 #: Numbers that a segment takes besides its inputs while segments are made: ends, middles, jumps, samples.
 WORK = 6
 
@@ -88,19 +91,27 @@ def edge_windows(
 def run_windows(
     model: LoadedModel, numbers: Numbers, interval: tuple[float, float], turn: float, start: float
 ) -> Iterator[Segments]:
-    """Segments of a run, some turns at a time; else as `edge_windows`.
+    """Segments of a run, so many at a time; else as `edge_windows`.  The exported program cuts runs alike.
 
     Parameters
     ----------
     interval : begin and end of the run [s]
     """
     begin, end = interval
-    inputs, before = model.manifest.inputs, None
+    inputs = model.manifest.inputs
+    before: Segments | None = None
+    held: Segments | None = None
     for edges in edge_windows(model, numbers, end, turn, start, begin):
         before = segments = make_segments(inputs, numbers, edges, before)
         rest = segments if edges[0] >= begin else rest_of(segments, begin, inputs, numbers)
-        if rest is not None:
-            yield rest
+        if rest is None:
+            continue
+        held = rest if held is None else _joined([held, rest])
+        while len(held.inputs) >= SEGMENTS_A_CALL:
+            yield part_of(held, 0, SEGMENTS_A_CALL)
+            held = part_of(held, SEGMENTS_A_CALL, len(held.inputs))
+    if held is not None and len(held.inputs):
+        yield held
 
 
 def joined_segments(windows: Iterable[Segments], *, all_: bool = False) -> Iterator[Segments]:

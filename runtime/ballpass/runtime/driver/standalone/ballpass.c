@@ -14,7 +14,7 @@
 #include "stepper.h"
 
 /* Segments of one call. */
-enum { SEGMENTS_A_CALL = 600 };
+enum { SEGMENTS_A_CALL = 600, SCALED_TURNS = 16 }; /* turns that are looked at for the magnitudes, run/resolve.py */
 
 /* Numbers that segments may take while they are sought, 4 GiB; and how many one takes, in lists that grow twofold. */
 static const double MOST_NUMBERS = 536870912.0, SEGMENT_NUMBERS = 6.0;
@@ -296,8 +296,11 @@ static void find_tolerance(ballpass *s)
 {
     run_state *r = &s->run;
     const double turn = time_of_turn(r->values), length = r->asked.end - r->asked.begin, horizon = length < turn ? length : turn;
+    const double last = (r->asked.begin + SCALED_TURNS * turn) * (1.0 + 1e-12);
+    long segments = s->edge_count;
+    while (segments > 1 && s->edges[segments] > last) segments--;
     double inputs[2 * SCHEDULE_MOMENTS * INPUTS], magnitude[SCENE_STATES];
-    const int moments = schedule_moments(scene_inputs, SCENE_INPUTS, r->values, s->edges, s->edge_count, horizon, inputs);
+    const int moments = schedule_moments(scene_inputs, SCENE_INPUTS, r->values, s->edges, segments, horizon, inputs);
     ballpass_magnitudes(r->values, r->values + SCENE_PARAMETERS, r->x, moments, inputs, horizon, magnitude);
     for (int i = 0; i < SCENE_STATES; i++) r->tolerance[i] = r->asked.rtol * magnitude[i];
 }
