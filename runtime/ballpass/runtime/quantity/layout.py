@@ -172,10 +172,10 @@ class NodeLayer:
         if passages.edges:
             edges = with_passages(edges, passages.times, np.zeros((len(passages.times), 0)))
         for item in layout.items:
-            panels = layout.panels
+            # an extreme where a load begins moves with it, so that extremes need passages as well
+            panels = panels_between(edges, ends, kinks) if passages.edges else layout.panels
             if not self._is_found(item):
-                parts = self._parts(layout, item)
-                panels = panels_between(edges, ends, kinks) if passages.edges else split(panels, parts)
+                panels = panels if passages.edges else split(panels, self._parts(layout, item))
                 panels = cut_at(panels, edges, self._kinks(run, layout.track, layout.signals, item))
             key = panels.low.tobytes() + panels.begin.tobytes()
             shared.setdefault(key, (panels, []))[1].append(item)
