@@ -43,7 +43,10 @@ from ballpass.runtime.run.segments import joined_segments, run_windows
 Array = NDArray[np.float64]
 
 #: Passes that make panels of outputs of time alone finer, and the most nodes that panels may come to.
-PASSES, MOST = 6, 2**17
+PASSES, MOST = 6, 2**19
+
+#: Parts of each panel at least, where balls are followed over places of a raceway.
+HATS = 4
 
 #: Distance of the nodes around an extreme, as a share of its panel; what is nearer to its end is at a kink [1].
 AROUND, NEAREST = 0.1, 1e-3
@@ -198,7 +201,9 @@ class NodeLayer:
         signal = layout.signals[item.channel].value[within]
         # what is integrated of loads is steeper than they are
         each = [signal, *([np.maximum(signal, 0.0) ** 3] if kind_of(item).steep else [])]
-        parts, most = parts_needed(each, self._rough), max(MOST, 2 * len(GAUSS) * len(layout.panels))
+        # places of a raceway are hat functions of the balls' angles, whose corners no panel ends at
+        least = HATS if kind_of(item).beside else 1
+        parts, most = np.maximum(parts_needed(each, self._rough), least), max(MOST, 2 * len(GAUSS) * len(layout.panels))
         return parts if len(GAUSS) * np.sum(parts) <= most else np.ones_like(parts)
 
     def _kinks(self, run: Run, track: Track, signals: Mapping[str, Signal], item: Quantity) -> Array:
