@@ -63,7 +63,7 @@ TOO_LARGE: dict[str, tuple[Callable[[Model], object], str]] = {
     ),
     "segments": (
         lambda model: model.simulate(MANY_TURNS, times=[0.0, MANY_TURNS * model.period()], outputs=[]),
-        r"Up to 9\d{8} segments, .* of 10 numbers would not fit into memory\. Take a shorter run, .*Model\.reduce",
+        r"Up to 9\d{8} segments, .* of 11 numbers would not fit into memory\. Take a shorter run, .*Model\.reduce",
     ),
     "segments of a method without a stepper": (
         lambda model: model.simulate(MANY_TURNS, times=[0.0, MANY_TURNS * model.period()], outputs=[], method="cvodes"),

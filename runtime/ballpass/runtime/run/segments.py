@@ -30,7 +30,7 @@ TURNS_A_SEARCH = 64
 SEGMENTS_A_CALL = 600
 
 #: Numbers that a segment takes besides its inputs while segments are made: ends, middles, jumps, samples.
-WORK = 6
+WORK = 7
 
 
 def time_resolution(begin: float, end: float, turn: float) -> float:
