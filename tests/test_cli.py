@@ -448,7 +448,10 @@ def started(site: Site, folder: Path, *words: str) -> subprocess.Popen[str]:
     raise AssertionError(f"ended with {process.wait()}")
 
 
-@pytest.mark.parametrize(("method", "length"), [("stepper", ("800", "1e-7")), ("cvodes", ("500", "1e-12"))])
+@pytest.mark.parametrize(
+    ("method", "length"),
+    [("stepper", ("800", "1e-7")), pytest.param("cvodes", ("500", "1e-12"), marks=pytest.mark.long)],
+)
 def test_interrupted_run_leaves_no_results_and_says_so(
     site: Site, tmp_path: Path, method: str, length: tuple[str, str]
 ) -> None:

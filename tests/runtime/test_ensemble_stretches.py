@@ -95,7 +95,7 @@ def test_a_run_cut_at_its_segments_is_the_run_in_one_call(make_model: ModelMaker
 @pytest.mark.parametrize(
     ("law", "rtol"),
     [
-        ("stiff", 1e-6),
+        pytest.param("stiff", 1e-6, marks=pytest.mark.long),
         *(pytest.param(law, rtol, marks=SECOND) for law, rtol in (("one-sided", 1e-6), ("tangent", 1e-2))),
     ],
 )
