@@ -10,7 +10,7 @@ hold are searched between such nodes; a moment is a node of its own.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -114,7 +114,7 @@ class NodeLayer:
 
     def is_still(self, quantity: Quantity) -> bool:
         """Whether a quantity follows from time alone."""
-        names = [quantity.channel, *(quantity.channel.removesuffix("ball.force") + n for n in kind_of(quantity).beside)]
+        names = channels_of([quantity])
         return all(name not in self.model.states and not depends(self.model, name, "x") for name in names)
 
     def lay(self, run: Run, ends: Array, row: Array, noded: Sequence[Quantity]) -> list[Layout]:
@@ -160,7 +160,7 @@ class NodeLayer:
         """The run along the nodes of panels."""
         plan = plan_of(panels, layout.edges)
         track = follow(run, layout.segments, layout.edges, place(plan, layout.edges), still=layout.still)
-        signals = self._channels.along(track, run.numbers)
+        signals = self._channels.only(channels_of(layout.items)).along(track, run.numbers)
         return replace(layout, panels=panels, plan=plan, track=track, signals=signals)
 
     def _refined(
@@ -251,7 +251,7 @@ class NodeLayer:
 
         def look(nodes: Nodes) -> Mapping[str, Signal]:
             seen = follow(run, layout.segments, layout.edges, nodes, still=layout.still)
-            return self._channels.along(seen, run.numbers)
+            return self._channels.only(channels_of(layout.items)).along(seen, run.numbers)
 
         each = [wanted(item, kind) for item, kind in asked]
         distinct = list(dict.fromkeys(each))
@@ -277,6 +277,15 @@ class NodeLayer:
 def kind_of(quantity: Quantity) -> Kind:
     """The kind of a quantity."""
     return KINDS[quantity.kind]
+
+
+def channels_of(quantities: Iterable[Quantity]) -> list[str]:
+    """Channels that quantities are evaluated from."""
+    names: dict[str, None] = {}
+    for item in quantities:
+        beside = (item.channel.removesuffix("ball.force") + name for name in kind_of(item).beside)
+        names |= dict.fromkeys((item.channel, *beside))
+    return list(names)
 
 
 def needs(quantity: Quantity) -> tuple[str, ...]:

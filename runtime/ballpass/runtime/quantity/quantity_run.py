@@ -21,7 +21,7 @@ from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.reduction_rows import reduction_rows
 from ballpass.runtime.quantity.between_nodes import Extreme
-from ballpass.runtime.quantity.layout import Layout, NodeLayer, around, is_reduced, kind_of, needs
+from ballpass.runtime.quantity.layout import Layout, NodeLayer, around, channels_of, is_reduced, kind_of, needs
 from ballpass.runtime.quantity.location import Moment, place_of, place_slope
 from ballpass.runtime.quantity.nodes import (
     Edges,
@@ -116,11 +116,7 @@ class QuantityRun:
         self._moving = [item for item in quantities if kind_of(item).at_rest is None]
         self._reduced = [] if along_nodes else [item for item in self._moving if is_reduced(model, item)]
         self._noded = [item for item in self._moving if item not in self._reduced]
-        channels = [item.channel for item in self._moving]
-        channels += [
-            item.channel.removesuffix("ball.force") + name for item in self._moving for name in kind_of(item).beside
-        ]
-        self._channels = ChannelValues(model, channels)
+        self._channels = ChannelValues(model, channels_of(self._moving))
         self._layer = NodeLayer(model, self._channels, rough=rough, along_nodes=along_nodes)
         # outputs that follow from time alone need no integration
         self._runs = motion or not all(self._layer.is_still(item) for item in self._moving)
@@ -162,7 +158,10 @@ class QuantityRun:
                 )
         chain = Chain(self.model, run.numbers, names)
         found, layouts = self._measure(run, self._moving, len(names))
-        laid = [_Differentiated(run, layout, chain, sensitivity_rtol) for layout in layouts]
+        laid = []
+        for layout in layouts:
+            edges = _moving_edges(run, layout, chain, sensitivity_rtol)
+            laid += [_Differentiated(run, part, edges, chain) for part in _by_nodes(layout)]
         slopes: dict[str, Estimate] = {}
         for still in (False, True):
             some = [one for one in laid if one.layout.still is still]
@@ -174,7 +173,8 @@ class QuantityRun:
             first = 0
             for one in some:
                 count = len(one.nodes)
-                signals = self._channels.along(part_of_track(track, first, first + count), run.numbers, chain)
+                channels = self._channels.only(channels_of(one.layout.items))
+                signals = channels.along(part_of_track(track, first, first + count), run.numbers, chain)
                 first += count
                 view = View(
                     run=run,
@@ -246,7 +246,7 @@ class QuantityRun:
         signals = layout.signals
         if layout.track is None:
             track = follow(run, layout.segments, layout.edges, nodes, still=layout.still)
-            signals = self._channels.along(track, run.numbers)
+            signals = self._channels.only(channels_of(layout.items)).along(track, run.numbers)
         marks |= {key: _plain_mark(some[0]) for key, some in layout.extremes.items()}
         return View(run=run, nodes=nodes, signals=signals, marks=marks, slopes=lambda _: np.zeros(0), names=())
 
@@ -276,13 +276,8 @@ class QuantityRun:
 class _Differentiated:
     """Nodes of a layout that move with the parameters, and the moments among them."""
 
-    def __init__(self, run: Run, layout: Layout, chain: Chain, sensitivity_rtol: float) -> None:
-        self.layout = layout
-        self.edges = make_edges(run, layout.segments, chain)
-        if layout.passages.edges:
-            assert layout.track is not None
-            slopes = passage_slopes(run, layout.track, layout.passages, chain, sensitivity_rtol)
-            self.edges = with_passages(self.edges, layout.passages.times, slopes)
+    def __init__(self, run: Run, layout: Layout, edges: Edges, chain: Chain) -> None:
+        self.layout, self.edges = layout, edges
         beside = {
             (item.name, kind): around(layout, layout.extremes[item.name, kind][0])
             for item in layout.items
@@ -291,13 +286,39 @@ class _Differentiated:
         }
         points = [(one.segment, one.fraction) for some in layout.extremes.values() for one in some]
         points += [point for some in beside.values() for point in some]
-        integrated = any(not (kind_of(item).extremes or kind_of(item).at_moment) for item in layout.items)
+        integrated = any(_is_integrated(item) for item in layout.items)
         plan = with_points(layout.plan if integrated else no_nodes(), list(dict.fromkeys(points)))
         self.nodes, self.marks = _with_moments(run, layout, self.edges, place(plan, self.edges), chain)
         for key, some in layout.extremes.items():
             best, *others = (_mark(one, plan) for one in some)
             nodes = tuple(_node(plan, point) for point in beside.get(key, ()))
             self.marks[key] = replace(best, competing=tuple(others), around=nodes)
+
+
+def _moving_edges(run: Run, layout: Layout, chain: Chain, sensitivity_rtol: float) -> Edges:
+    """Edges of a layout that move with the parameters."""
+    edges = make_edges(run, layout.segments, chain)
+    if not layout.passages.edges:
+        return edges
+    assert layout.track is not None
+    slopes = passage_slopes(run, layout.track, layout.passages, chain, sensitivity_rtol)
+    return with_passages(edges, layout.passages.times, slopes)
+
+
+def _by_nodes(layout: Layout) -> list[Layout]:
+    """What is integrated over the run, and what is taken at some points, which costs nothing between them."""
+    parts = []
+    for integrated in (True, False):
+        items = tuple(item for item in layout.items if _is_integrated(item) is integrated)
+        names = {item.name for item in items}
+        extremes = {key: some for key, some in layout.extremes.items() if key[0] in names}
+        if items:
+            parts.append(replace(layout, items=items, extremes=extremes))
+    return parts
+
+
+def _is_integrated(quantity: Quantity) -> bool:
+    return not (kind_of(quantity).extremes or kind_of(quantity).at_moment)
 
 
 def _evaluated(view: View, quantity: Quantity) -> Estimate:

@@ -10,7 +10,7 @@ not: it is one number for both sides of the edge.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
@@ -177,6 +177,12 @@ class ChannelValues:
         self._columns += [(name.partition("[")[0], len(rows.labels)) for rows in self._more for name in rows.labels[:1]]
         self._own = threading.local()  # a loop is not for several threads, and differences run in several
         self._derivatives: Loop | None = None
+        self._parts: dict[tuple[str, ...], ChannelValues] = {}
+
+    def only(self, channels: Collection[str]) -> ChannelValues:
+        """The same for some of the channels: what nobody asked for at a node costs nothing there."""
+        names = tuple(name for name in self.channels if name in channels)
+        return self if names == self.channels else self._parts.setdefault(names, ChannelValues(self._model, names))
 
     def along(self, track: Track, numbers: Numbers, chain: Chain | None = None) -> Mapping[str, Signal]:
         """Every channel along a track."""
