@@ -81,6 +81,24 @@ def test_drawn_values_are_distributed_as_scipy_says(name: str, arguments: dict[s
         assert not np.any(draw(seed, kind, 10, {"x": Distribution(name=name, arguments=arguments)})["x"] == few["x"])
 
 
+def test_quantities_of_members_are_those_of_their_runs(rotor: Model, tmp_path: Path) -> None:
+    names = ("peak_ball_force", "rms:inner.y", "value:inner.x@0.03s", "mean:ball.force")
+    signals = replace(SIGNALS, quantities=names)
+    found = read(make_data_set(tmp_path / "a.nc", classes(rotor, 3), signals, seed=2).path)
+    assert list(found["quantity"].values) == list(names)
+    assert list(found["quantity_unit"].values) == ["N", "m", "m", "N"]
+    turn = 2.0 * np.pi / rotor.parameters["shaft.speed"]
+    for member in range(len(found["member"])):
+        row = dict(zip(found["parameter"].values.tolist(), found["parameters"].values[member].tolist(), strict=True))
+        changed = {CLEARANCE: row[CLEARANCE]}
+        own = rotor.quantities(
+            names, parameters=changed, rtol=SIGNALS.rtol, duration=found["time"].values[-1], transient=0.01 / turn
+        )
+        assert found["quantities"].values[member].tolist() == [own[name].value for name in names]
+    with pytest.raises(RequestError, match=r"class tight: .*peak_bal_force.*peak_ball_force"):
+        make_data_set(tmp_path / "b.nc", classes(rotor), replace(SIGNALS, quantities=("peak_bal_force",)), seed=1)
+
+
 def test_wrong_distributions_are_refused_with_what_is_allowed() -> None:
     with pytest.raises(RequestError, match="Did you mean 'uniform'"):
         Distribution(name="unifrom")
@@ -200,7 +218,7 @@ def test_wrong_classes_are_refused(rotor: Model, tmp_path: Path) -> None:
 
     with pytest.raises(RequestError, match=r"class tight: There is no parameter .*bearing\.clearance"):
         make(parameters={"bearing.clearence": 1e-6})
-    with pytest.raises(RequestError, match="class tight: 0 members"):
+    with pytest.raises(RequestError, match=r"class tight: 0 members"):
         make(members=0)
     with pytest.raises(RequestError, match="a value for each ball"):
         make(replace(SIGNALS, outputs=("ball.force",)))

@@ -48,6 +48,7 @@ from ballpass.runtime.many.distributions import Distribution, draw
 from ballpass.runtime.many.signals import Made, Member, Signals, check_outputs, make_signals
 from ballpass.runtime.many.spall_entries import entry_times
 from ballpass.runtime.native.loaded_model import LoadedModel
+from ballpass.runtime.quantity.grammar import quantities_of, quantity_words
 from ballpass.runtime.show.progress import Progress, shown
 from ballpass.runtime.show.short import ShortRepr
 
@@ -313,11 +314,14 @@ def _axes(
     for kind, columns in enumerate(table.columns):
         if _SNR in columns:
             snr[table.kinds == kind] = columns[_SNR][table.places[table.kinds == kind]]
+    model = classes[0].model
+    wanted = quantities_of(model, signals.quantities) if signals.quantities else ()
     return SignalAxes(
         spec=spec,
         times=signals.times,
         precision=signals.precision,
         outputs=[(name, outputs[name].unit, outputs[name].description) for name in signals.outputs],
+        quantities=[(item.name, item.unit, quantity_words(model.manifest, item)) for item in wanted],
         labels=np.array([one.label for one in classes])[table.kinds],
         names=[(info.name, info.unit, info.description) for info in infos.values()],
         parameters=_truth(classes, table, list(infos)),

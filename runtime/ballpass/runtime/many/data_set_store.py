@@ -78,6 +78,7 @@ class SignalAxes:
     times : of the samples, shape (samples,) [s]
     precision : of the samples
     outputs : name, unit and meaning of each
+    quantities : the same of each quantity
     labels : shape (members,)
     names : name, unit and meaning of each parameter
     parameters : shape (members, parameters) [SI]
@@ -90,6 +91,7 @@ class SignalAxes:
     times: np.ndarray
     precision: str
     outputs: Sequence[tuple[str, str, str]]
+    quantities: Sequence[tuple[str, str, str]]
     labels: np.ndarray
     names: Sequence[tuple[str, str, str]]
     parameters: np.ndarray
@@ -129,7 +131,13 @@ def create_store(path: Path, axes: SignalAxes) -> Any:
     array("member", "member", np.arange(count), "number of the member", "1")
     array("time", "time", axes.times, "time from the start of the run", "s")
     array("label", "member", axes.labels, "class of the member")
-    for name, dimension, rows in (("parameter", "parameter", axes.names), ("output", "output", axes.outputs)):
+    for name, dimension, rows in (
+        ("parameter", "parameter", axes.names),
+        ("output", "output", axes.outputs),
+        ("quantity", "quantity", axes.quantities),
+    ):
+        if not rows:
+            continue
         names, units, meanings = (np.array(column) for column in zip(*rows, strict=True))
         array(name, dimension, names, f"name of the {name}")
         array(f"{name}_unit", dimension, units, f"SI unit of the {name}")
@@ -141,6 +149,9 @@ def create_store(path: Path, axes: SignalAxes) -> Any:
         array(f"entry_time.{name}", f"member entry.{name}", times, meaning, "s")
     noise = np.full((count, len(axes.outputs)), np.nan)
     array("noise_rms", "member output", noise, "rms of the noise, in the unit of the output", chunk=size)
+    if axes.quantities:
+        unknown = np.full((count, len(axes.quantities)), np.nan)
+        array("quantities", "member quantity", unknown, "quantities of the recorded part of the run", chunk=size)
     for name, unit, meaning in axes.outputs:
         group.create_array(
             name,
@@ -169,6 +180,8 @@ def write_status(group: Any, first: int, made: Made) -> None:
     count = len(made.noise_rms)
     which = slice(first, first + count)
     group["noise_rms"][which] = made.noise_rms
+    if made.quantities.shape[1]:
+        group["quantities"][which] = made.quantities
     status = np.full(count, MADE, dtype=np.int8)
     if made.failures:
         words = np.full(count, "", dtype=f"<U{MESSAGE}")

@@ -9,17 +9,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ballpass.runtime.contract.errors import BallpassError, RequestError
+from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.many.chunks import MemberFailure
 from ballpass.runtime.many.distributions import NOISE, Distribution, stream
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
+from ballpass.runtime.quantity.grammar import quantities_of
+from ballpass.runtime.quantity.quantity_run import QuantityRun
+from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.integration_error import IntegrationError
 from ballpass.runtime.run.request import TOLERANCES, Request
+from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.simulate import simulate
 
 #: Ways to store samples.
@@ -40,6 +45,8 @@ class Signals:
         distribution gives each member its own; None adds no noise [dB]
     rtol : tolerance of the runs; None takes the scene's [1]
     precision : of stored samples, "float32" or "float64"
+    quantities : names of quantities of the recorded part of each run, which are stored as labels ("peak_ball_force");
+        see `Model.quantities`
 
     Raises
     ------
@@ -60,6 +67,7 @@ class Signals:
     snr: Distribution | float | None = None
     rtol: float | None = None
     precision: str = "float32"
+    quantities: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         least, most = TOLERANCES
@@ -118,11 +126,13 @@ class Made:
     ----------
     samples : by output, each of shape (members, samples); NaN for a member without results
     noise_rms : root mean square of the noise that was added, shape (members, outputs) [units of the outputs]
+    quantities : shape (members, quantities); NaN for a member without results
     failures : members without results, by their place here
     """
 
     samples: Mapping[str, np.ndarray]
     noise_rms: np.ndarray
+    quantities: np.ndarray
     failures: tuple[MemberFailure, ...]
 
 
@@ -136,6 +146,7 @@ def make_signals(models: Mapping[int, LoadedModel], signals: Signals, seed: int,
     shape = (len(members), signals.samples)
     samples = {name: np.full(shape, np.nan, signals.precision) for name in signals.outputs}
     noise_rms = np.zeros((len(members), len(signals.outputs)))
+    quantities = np.full((len(members), len(signals.quantities)), np.nan)
     failures = []
     times = signals.times
     for row, member in enumerate(members):
@@ -144,6 +155,8 @@ def make_signals(models: Mapping[int, LoadedModel], signals: Signals, seed: int,
             numbers = model.numbers(member.parameters)
             check_assembly(model, numbers)
             found = simulate(model, numbers, Request(times=times, outputs=signals.outputs, rtol=signals.rtol)).outputs
+            if signals.quantities:
+                quantities[row] = _quantities(model, numbers, signals)
         except BallpassError as fault:
             status, time = (fault.status.name, fault.time) if isinstance(fault, IntegrationError) else ("REFUSED", 0.0)
             failures.append(MemberFailure(member=row, status=status, time=time, message=str(fault)))
@@ -155,11 +168,21 @@ def make_signals(models: Mapping[int, LoadedModel], signals: Signals, seed: int,
                 noise_rms[row, k] = np.std(signal) * 10.0 ** (-member.snr / 20.0)
                 signal = signal + noise_rms[row, k] * random.standard_normal(len(signal))
             samples[name][row] = signal
-    return Made(samples=samples, noise_rms=noise_rms, failures=tuple(failures))
+    return Made(samples=samples, noise_rms=noise_rms, quantities=quantities, failures=tuple(failures))
+
+
+def _quantities(model: LoadedModel, numbers: Numbers, signals: Signals) -> np.ndarray:
+    """Quantities of the recorded part of a run, which takes the steps of the one with samples."""
+    turn = driver_angle.period(model.manifest, numbers.values)
+    request = Request(rtol=signals.rtol, transient_cycles=signals.transient / turn)
+    run = resolve(model, numbers, request, duration=float(signals.times[-1]))
+    if not math.isfinite(turn):
+        run = replace(run, start=signals.transient)
+    return QuantityRun(model, quantities_of(model, signals.quantities)).measure(run).values
 
 
 def check_outputs(model: LoadedModel, signals: Signals, label: str) -> None:
-    """Refuse outputs that the model of a class does not have, or that have a value for each ball.
+    """Refuse outputs that the model of a class does not have, or that have a value for each ball; and quantities.
 
     Raises
     ------
@@ -178,5 +201,10 @@ def check_outputs(model: LoadedModel, signals: Signals, label: str) -> None:
                 f"class {label}: {name} has a value for each ball, and a signal has one. Allowed: outputs with one "
                 "value, such as inner.ax or reaction.A.x."
             )
+    if signals.quantities:
+        try:
+            quantities_of(model, signals.quantities)
+        except RequestError as fault:
+            faults += [f"class {label}: {line}" for line in str(fault).splitlines()]
     if faults:
         raise RequestError("\n".join(faults))

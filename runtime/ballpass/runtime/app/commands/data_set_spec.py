@@ -114,12 +114,8 @@ def _read_signals(root: Table) -> tuple[Signals | None, list[str]]:
     from ballpass.derive.scene.keys import ChoiceKey, QuantityKey
 
     before = len(root.collector.faults)
-    outputs = root.take("outputs", '["inner.ax"]')
-    if outputs is not None and not (
-        isinstance(outputs, list) and outputs and all(isinstance(name, str) for name in outputs)
-    ):
-        allowed = 'a list of names such as ["inner.ax"]'
-        root.fault("outputs", "this is no list of names", given=repr(outputs), allowed=allowed, remedy="write names")
+    outputs = _names(root, "outputs", '["inner.ax"]')
+    quantities = _names(root, "quantities", '["peak_ball_force"]') if root.has("quantities") else []
     sample_rate = QuantityKey(unit="Hz", example="25.6 kHz", setting=True).read(root, "sample_rate")
     duration = QuantityKey(unit="s", example="1 s", setting=True).read(root, "duration")
     transient = QuantityKey(unit="s", example="0.2 s", default="0 s", setting=True).read(root, "transient")
@@ -137,6 +133,7 @@ def _read_signals(root: Table) -> tuple[Signals | None, list[str]]:
             snr=snr,
             rtol=rtol,
             precision=precision,
+            quantities=tuple(dict.fromkeys(quantities)),
         )
     except RequestError as fault:
         for line in str(fault).splitlines():
@@ -145,6 +142,15 @@ def _read_signals(root: Table) -> tuple[Signals | None, list[str]]:
             root.fault(name, problem, allowed=allowed, remedy="correct the value")
         return None, []
     return signals, list(signals.outputs)
+
+
+def _names(root: Table, key: str, example: str) -> Any:
+    """A list of names; what is none is reported."""
+    given = root.take(key, example)
+    if given is not None and not (isinstance(given, list) and given and all(isinstance(name, str) for name in given)):
+        allowed = f"a list of names such as {example}"
+        root.fault(key, "this is no list of names", given=repr(given), allowed=allowed, remedy="write names")
+    return given
 
 
 def _read_class(
