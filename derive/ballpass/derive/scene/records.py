@@ -22,6 +22,7 @@ from ballpass.derive.scene.quantity import NOT_NEGATIVE, POSITIVE, Bounds, Limit
 from ballpass.derive.scene.read_keys import Either, column, declared, not_negative, positive, quantity
 from ballpass.derive.scene.table import FRAME as FRAME
 from ballpass.derive.scene.toml_lines import LineIndex
+from ballpass.runtime.contract.defaults import TOLERANCES
 from ballpass.runtime.show import html
 
 #: Of a length in polar form.
@@ -412,7 +413,7 @@ class RunSettings:
         example=1e-6,
         default=1e-6,
         setting=True,
-        bounds=Bounds(least=1e-13, most=0.1),
+        bounds=Bounds(least=TOLERANCES[0], most=TOLERANCES[1]),
         remedy="write rtol = 1e-6 where nothing speaks for another value",
         note="see {doc}`../theory/integration`",
     )

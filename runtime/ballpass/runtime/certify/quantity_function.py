@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from ballpass.runtime.certify.derivative_runs import derivative_run, differentiate, refuse_chaos
 from ballpass.runtime.certify.sensitivity_query import Query, answer, length_request
 from ballpass.runtime.certify.sensitivity_report import SensitivityReport
-from ballpass.runtime.contract.defaults import FUNCTION_RTOL, FUNCTION_SLOPES, SENSITIVITY
+from ballpass.runtime.contract.defaults import FUNCTION_RTOL, FUNCTION_SLOPES, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import BallpassWarning, RequestError, SimulationError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.many.ensemble import simulate_many
@@ -35,7 +35,7 @@ from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.quantity.records import Estimate
 from ballpass.runtime.quantity.registry import KINDS
 from ballpass.runtime.run.locating import STEPPED_OVER, Kinks, refuse_jumps
-from ballpass.runtime.run.request import TOLERANCES, tolerance
+from ballpass.runtime.run.request import tolerance
 from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.show.progress import shown, shown_steps
 

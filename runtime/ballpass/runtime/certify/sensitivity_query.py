@@ -36,7 +36,7 @@ from ballpass.runtime.certify.sensitivity_report import (
     ratio_unit,
 )
 from ballpass.runtime.contract import Manifest
-from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY
+from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -50,7 +50,7 @@ from ballpass.runtime.quantity.values import value_of
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.direction_scales import ANGLE
 from ballpass.runtime.run.locating import check_kinks, refuse_jumps
-from ballpass.runtime.run.request import TOLERANCES, Request, asked_length
+from ballpass.runtime.run.request import Request, asked_length
 from ballpass.runtime.run.resolve import Run, check_transient
 
 Array = NDArray[np.float64]

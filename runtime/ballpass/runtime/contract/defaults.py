@@ -1,9 +1,12 @@
-"""Default tolerances of everything that runs a model, each with what it is for.
+"""Bounds and defaults of the tolerances of everything that runs a model, each with what it is for.
 
 A plain run (`Model.simulate`, `reduce`, `quantities`, `simulate_many`, `ballpass run`) has that of the scene.
 """
 
 from __future__ import annotations
+
+#: Smallest and largest relative tolerance that can be asked for: below, rounding decides [1].
+TOLERANCES = (1e-13, 1e-1)
 
 #: Values of functions of parameters, which optimizers take differences of: their noise is below a search's steps [1].
 FUNCTION_RTOL = 1e-9

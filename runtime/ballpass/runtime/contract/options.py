@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, get_args, get_origin
 
+from ballpass.runtime.contract.defaults import TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
 
 #: What a number with a unit is.
@@ -141,7 +142,7 @@ Transient = Annotated[float | None, Option(words="Turns at the start that do not
 
 
 def _tolerance(words: str) -> Option:
-    return Option(words=words, shown="R", least=1e-13, most=1e-1)
+    return Option(words=words, shown="R", least=TOLERANCES[0], most=TOLERANCES[1])
 
 
 Rtol = Annotated[float | None, _tolerance("Relative tolerance of the integrator.")]

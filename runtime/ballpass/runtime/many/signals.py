@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ballpass.runtime.contract.defaults import TOLERANCES
 from ballpass.runtime.contract.errors import BallpassError, RequestError
 from ballpass.runtime.contract.parameters import Numbers
 from ballpass.runtime.many.chunks import MemberFailure
@@ -23,7 +24,7 @@ from ballpass.runtime.quantity.grammar import quantities_of
 from ballpass.runtime.quantity.quantity_run import QuantityRun
 from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.integration_error import IntegrationError
-from ballpass.runtime.run.request import TOLERANCES, Request
+from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.simulate import simulate
 

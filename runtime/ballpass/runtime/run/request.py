@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ballpass.runtime.contract.defaults import TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import real, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
@@ -20,9 +21,6 @@ from ballpass.runtime.run.start import Start
 
 if TYPE_CHECKING:
     from ballpass.runtime.contract import Manifest, RunInfo
-
-#: Smallest and largest relative tolerance [1].
-TOLERANCES = (1e-13, 1e-1)
 
 #: Longest run, in turns and in time [s].  A press takes days for so many turns, and an edge of a window within the last
 #: of them is known to a thousandth of a turn.

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY
+from ballpass.runtime.contract.defaults import DERIVATIVE_RTOL, SENSITIVITY, TOLERANCES
 from ballpass.runtime.contract.errors import RequestError
 from ballpass.runtime.contract.parameters import Numbers, unknown_name
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.native.stepper import METHODS
 from ballpass.runtime.run.directions import Directions
 from ballpass.runtime.run.locating import kinks_with_derivatives, refuse_jumps
-from ballpass.runtime.run.request import TOLERANCES, Request
+from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.simulate import simulate
 from ballpass.runtime.run.solution import Solution
 from ballpass.runtime.show.short import ShortRepr
