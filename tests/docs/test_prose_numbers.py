@@ -58,6 +58,7 @@ NAMED: dict[str, dict[str, str]] = {
     },
     "docs/tutorial.md": {
         "more than 200 MB are written": "a limit of the code",
+        "stands out follows: 4200 MPa is": "STATIC_PRESSURE",
         "of 100 turns": "a number of docs/make_figures.py",
         "of 101 turns": "likewise",
         "ball pass, 25.44 Hz, from the third harmonic, 25 Hz": "test_frequencies_of_the_tutorial_are_those_of_its_cage",

@@ -165,7 +165,7 @@ def test_the_summary_tells_how_well_the_reactions_can_be_solved(make_model: Mode
     assert told["unscaled"] == pytest.approx(37.0458, rel=1e-5)  # of the printed 8 by 8 matrix at 180 degrees
     assert told["unscaled"] > told["scaled"] > 1.0
     assert set(told["crank_angle"]) == {"unscaled", "scaled", "unit"}
-    assert render_summary(summary).rows
+    assert render_summary(summary, model.manifest)[0].rows
 
 
 def test_a_linkage_that_nearly_locks_is_warned_about(make_model: ModelMaker) -> None:

@@ -485,7 +485,7 @@ def test_runs_say_what_they_did_at_kinks(gated: Model, tmp_path: Path) -> None:
     assert read.statistics == located.statistics
     summary = summarize(gated, located)
     assert summary["located_kinks"] == {"value": located.statistics.located, "unit": "1"}
-    assert f"{located.statistics.located} kinks located" in str(render_summary(summary).caption)
+    assert f"{located.statistics.located} kinks located" in str(render_summary(summary, gated.manifest)[0].caption)
     assert "located_kinks" not in summarize(gated, over)
     assert gated.simulate(**given, method="cvodes").statistics.kinks is None  # type: ignore[arg-type]
 

@@ -14,6 +14,7 @@ import pytest
 from ballpass.runtime import Model, Solution
 from ballpass.runtime.app.summary import add_turns, summarize
 from ballpass.runtime.app.summary_table import render_summary
+from ballpass.runtime.app.summary_words import stands_out
 from ballpass.runtime.contract.errors import SimulationError
 from ballpass.runtime.report.html import table_html
 from ballpass.runtime.report.report import Report, ReportTable
@@ -113,8 +114,9 @@ def test_extremes_of_samples_alone_are_marked_where_they_stand(make_model: Calla
     model = make_model("varying_compliance")
     for method, mark in (("cvodes", "*"), ("stepper", "")):
         summary = summarize(model, model.simulate(cycles=2, transient=1, method=method))
-        table = render_summary(summary)
-        names, peaks, _, highest, *_ = (list(column) for column in zip(*table.rows, strict=True))
+        table, _ = render_summary(summary, model.manifest, every=True)
+        words, peaks, _, highest, *_ = (list(column) for column in zip(*table.rows, strict=True))
+        names = [str(word).split()[-1] for word in words]
         for name, unit in (("inner.y", 1e6), ("inner.vy", 1e3)):
             assert highest[names.index(name)] == f"{unit * summary[name]['max']:z.4g}{mark}"
         assert str(peaks[names.index("peak_ball_force.total")]).endswith("*") == bool(mark)
@@ -139,14 +141,37 @@ def test_values_that_are_not_finite_are_refused(press: tuple[Model, Solution]) -
         summarize(model, sampled)
 
 
-def test_table_fits_a_terminal_and_shows_micrometres(summary: dict[str, Any]) -> None:
-    text = table_text(render_summary(summary))
+def test_table_fits_a_terminal_and_shows_micrometres(press: tuple[Model, Solution], summary: dict[str, Any]) -> None:
+    table, left_out = render_summary(summary, press[0].manifest)
+    text = table_text(table)
     assert "…" not in text
-    row = next(line for line in text.splitlines() if line.split()[:1] == ["inner.y"])
-    assert float(row.split()[2]) == pytest.approx(1e6 * summary["inner.y"]["max"], rel=1e-3)
+    assert max(map(len, text.splitlines())) <= 80
+    # words, no symbols, and the highest ball force first
+    assert not any(symbol in text for symbol in ("k_b", "m_ei", "c_b", "reaction.", "_"))
+    assert str(table.rows[0][0]) == "Highest ball force"
+    every, none = render_summary(summary, press[0].manifest, every=True)
+    assert none == 0
+    assert len(every.rows) == len(table.rows) + left_out
+    row = next(line for line in text.splitlines() if line.split()[:3] == ["Inner", "ring,", "y"])
+    assert float(row.split()[4]) == pytest.approx(1e6 * summary["inner.y"]["max"], rel=1e-3)
     assert row.split()[-1] == "µm"
     assert "2 transient cycles" in " ".join(text.split())
     assert "one-sided" in text
+
+
+def test_sentences_on_top_name_the_peak_and_its_pressure(
+    make_model: Callable[..., Model], summary: dict[str, Any], press: tuple[Model, Solution]
+) -> None:
+    model, solution = press
+    first, dent = stands_out(model.manifest, {**solution.parameters, **solution.constants}, summary)
+    assert first.startswith("Highest ball force: 4391 N (ball 3 at 0.3194 s, crank at 238.2 deg), ")
+    # the derived output is the pressure under the elastic force alone; Hertz's grows with its cube root
+    pressed = make_model("punching_press", ("outputs = [", 'outputs = ["ball.inner_pressure", '))
+    peak = summary["peak_ball_force"]
+    derived = pressed.quantities("max:ball.inner_pressure")["max:ball.inner_pressure"].value
+    expected = derived * (peak["total"] / peak["elastic"]) ** (1.0 / 3.0) / 1e6
+    assert float(first.split()[-6]) == pytest.approx(expected, rel=2e-3)
+    assert "4200 MPa (ISO 76)" in dent
 
 
 def test_names_and_numbers_of_tables_are_whole_at_any_width(
@@ -203,4 +228,4 @@ def test_a_run_with_some_outputs_has_the_summary_of_these(
     longer = look_further(model, model.numbers(), run)
     assert longer is not None
     assert "peak_ball_force.total" in add_turns(found, longer, instead=False)
-    render_summary(found)
+    render_summary(found, model.manifest)

@@ -39,7 +39,6 @@ from ballpass.runtime.app.commands.shared import (
     note,
     read_own,
     results_folder,
-    show,
     show_json,
     show_parts,
     size_words,
@@ -155,6 +154,9 @@ def run(
             help="Quantity to give, and that --error is about: peak_ball_force, drive_work. May be repeated.",
         ),
     ] = None,
+    all_: Annotated[
+        bool, typer.Option("--all", help="All rows of the summary, with the names of the numbers.")
+    ] = False,
     out: options.ResultsFolder = None,
     json_: options.Json = False,
     figures: options.Figures = True,
@@ -168,6 +170,9 @@ def run(
         # within: an interrupt while they are imported is one of the command
         from ballpass.runtime.app.summary import add_turns, summarize
         from ballpass.runtime.app.summary_table import render_accuracy, render_quantities, render_summary
+        from ballpass.runtime.app.summary_words import stands_out
+        from ballpass.runtime.report.report import Report
+        from ballpass.runtime.report.text import show as show_report
         from ballpass.runtime.run.settle import look_further
 
         stages("read")
@@ -253,18 +258,21 @@ def run(
     if json_:
         show_json(summary)
         return
-    table = render_summary(summary)
-    show_parts(table)
+    table, left_out = render_summary(summary, model.manifest, every=all_)
+    values = {**solution.parameters, **solution.constants}
+    show_report(Report(title=summary["title"], parts=(*stands_out(model.manifest, values, summary), table)))
+    if left_out:
+        show_parts(f"{left_out} more rows with --all; every number with its name in summary.json.")
     if asked_for and solution.accuracy is None:
         show_parts(render_quantities(asked_for))
     if turned:
-        show(turned)
+        show_parts(turned)
     if solution.accuracy is not None:
         told = render_accuracy(model, solution.accuracy)
         show_parts(told)
-        show(solution.accuracy.words)
+        show_parts(solution.accuracy.words)
     size = size_words((folder / "solution.nc").stat().st_size)
-    show(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")
+    show_parts(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")
 
 
 app.command(rich_help_panel=SIMULATE)(as_command(run))

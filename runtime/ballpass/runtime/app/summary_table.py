@@ -10,10 +10,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ballpass.runtime.app.summary import TABLE_UNITS
+from ballpass.runtime.app.summary_words import row_place, row_words
 from ballpass.runtime.quantity.grammar import parse_quantity
 from ballpass.runtime.report.report import ReportTable
 
 if TYPE_CHECKING:
+    from ballpass.runtime.contract import Manifest
     from ballpass.runtime.model import Model
     from ballpass.runtime.quantity.values import QuantityValue
     from ballpass.runtime.run.accuracy import Accuracy
@@ -35,33 +37,49 @@ _RUN = {
 }
 
 
-def render_summary(summary: Mapping[str, Any]) -> ReportTable:
-    """The summary as a table; mean and standard deviation are in the file only.
+def render_summary(summary: Mapping[str, Any], manifest: Manifest, *, every: bool = False) -> tuple[ReportTable, int]:
+    """The summary as a table in words, what a reader wants first on top; mean and standard deviation are in the file.
 
     Parameters
     ----------
     summary : what `summarize` gave
+    every : all rows, with the names by which files and options call them
+
+    Returns
+    -------
+    the table, and how many rows it leaves out
     """
     columns = ("value", "min", "max", "rms")
-    rows: list[tuple[str, ...]] = []
+    rows: list[tuple[float, tuple[str, ...]]] = []
+    left_out = 0
     for name, item in summary.items():
         if name in _RUN or not isinstance(item, Mapping) or "unit" not in item:
             continue
         factor, unit = TABLE_UNITS.get(item["unit"], (1.0, item["unit"]))
-        cells = [_cell(item, key, factor) for key in columns]
-        if any(cells):
-            rows.append((name, *cells, unit))
+        found = {name: tuple(_cell(item, key, factor) for key in columns)}
         for key, value in item.items():
             if key not in _COLUMNS and key != "unit" and not isinstance(value, Mapping):
                 # a named part of a quantity, as the peak's elastic one; what is said of it is in the file
-                rows.append((f"{name}.{key}", _cell(item, key, factor), "", "", "", unit))
-    return ReportTable(
-        title=f"{summary['title']}: {summary['method']}",
-        heads=("quantity", *columns, "unit"),
-        rows=rows,
+                found[f"{name}.{key}"] = (_cell(item, key, factor), "", "", "")
+        for row, cells in found.items():
+            if not any(cells):
+                continue
+            place = row_place(manifest, row)
+            if place is None and not every:
+                left_out += 1
+                continue
+            order = math.inf if place is None else float(place)
+            words = row_words(manifest, row)
+            rows.append((order, (f"{words}\n  {row}" if every else words, *cells, unit)))
+    rows.sort(key=lambda row: row[0])
+    table = ReportTable(
+        heads=("", *columns, "unit"),
+        rows=[row for _, row in rows],
         right=columns,
-        caption=_caption(summary),
+        wrapped=() if every else ("",),
+        caption=_caption(summary, every=every),
     )
+    return table, left_out
 
 
 def _cell(item: Mapping[str, Any], key: str, factor: float) -> str:
@@ -103,7 +121,7 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
     )
 
 
-def _caption(summary: Mapping[str, Any]) -> str:
+def _caption(summary: Mapping[str, Any], *, every: bool) -> str:
     run = [
         words.format(f"{summary[key]['value']:.4g}")
         for key, words in _RUN.items()
@@ -120,4 +138,5 @@ def _caption(summary: Mapping[str, Any]) -> str:
     tools = [f"{name} {number}" for name, number in summary["versions"]["run_with"].items()]
     searched = [item.get("searched", {}) for item in summary.values() if isinstance(item, Mapping)]
     sampled = ["* of the samples alone"] if any("samples" in found.values() for found in searched) else []
-    return f"{', '.join(run + sampled + law)}.\n{', '.join(tools)}."
+    method = f"{summary['method']}, "
+    return f"{method}{', '.join(run + sampled + law)}." + (f"\n{', '.join(tools)}." if every else "")

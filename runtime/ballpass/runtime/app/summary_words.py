@@ -1,0 +1,117 @@
+"""What the rows of the summary's table are called, their order, and what stands out.
+
+In: a manifest, what `summarize` gave.  Out: words for each number, and sentences.
+
+Names of numbers are those of files and options; people read words.  Words of states, outputs and constants are the
+manifest's own descriptions, shortened.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from ballpass.runtime.contract import Manifest
+from ballpass.runtime.ratings.load_ratings import STATIC_PRESSURE
+from ballpass.runtime.ratings.of_bearing import contacts_of
+from ballpass.runtime.run.driver_angle import crank_angle
+
+#: What shortens a description, in this order.
+_SHORTER = (
+    (r"^(Force|Moment) of the \S+ on the ", r"\1 on the "),
+    (r"^Position of the centre of the ", ""),
+    (r"^Velocity of the centre of the ", "Velocity of the "),
+    (r"^Torque of the drive.*", "Torque of the drive"),
+    (r"^External load on", "Load on"),
+    (r"(, r_b/.*)?, Eq\. .*", ""),
+    (r", counter-clockwise$", ""),
+    (r" along (x|y)$", r", \1"),
+)
+
+#: Words of what the summary adds to states, outputs and constants; those of one bearing of several name it.
+_ADDED = {
+    "peak_ball_force.total": "Highest ball force",
+    "peak_ball_force.elastic": "Highest ball force, elastic part",
+    "drive_work": "Work of the drive in a turn",
+    "reaction_condition.unscaled": "Condition number of Eq. (1)",
+    "reaction_condition.scaled": "Condition number of Eq. (1), scaled",
+    "frequencies.shaft": "Shaft frequency",
+    "frequencies.cage": "Cage frequency (FTF)",
+    "frequencies.ball_pass_outer": "Ball pass, outer (BPFO)",
+    "frequencies.ball_pass_inner": "Ball pass, inner (BPFI)",
+    "frequencies.ball_spin": "Ball spin (BSF)",
+}
+
+#: What a reader wants first, by the beginnings of names behind that of a bearing; other rows are shown on request.
+_FIRST = (
+    ("peak_ball_force.total",),
+    ("reaction.", "load."),
+    ("drive_torque", "drive_work", "drive_power"),
+    ("driver.",),
+    ("inner.x", "inner.y", "outer.x", "outer.y"),
+    ("frequencies.",),
+)
+
+
+def row_words(manifest: Manifest, name: str) -> str:
+    """What a number of the summary is."""
+    prefix, own = _of_bearing(manifest, name)
+    whose = f" of {prefix.removesuffix('.')}" if prefix else ""
+    if own in _ADDED:
+        return f"{_ADDED[own]}{',' + whose.removeprefix(' of') if whose else ''}"
+    infos = (*manifest.states, *manifest.outputs)
+    found = next((info.description for info in infos if info.name == name), "")
+    paths = {f"{bearing.prefix}{key}": f"{bearing.path}.{key}" for bearing in manifest.bearings for key in (own,)}
+    found = found or next((info.description for info in manifest.constants if info.name == paths.get(name)), name)
+    for pattern, short in _SHORTER:
+        found = re.sub(pattern, short, found)
+    found = found[:1].upper() + found[1:]
+    return found if not whose or prefix.removesuffix(".") in found else f"{found}{whose}"
+
+
+def row_place(manifest: Manifest, name: str) -> int | None:
+    """Place of a number among those a reader wants first; None for the others."""
+    own = _of_bearing(manifest, name)[1]
+    return next((place for place, begins in enumerate(_FIRST) if own.startswith(begins)), None)
+
+
+def stands_out(manifest: Manifest, values: Mapping[str, float], summary: Mapping[str, Any]) -> list[str]:
+    """Sentences on top: the highest ball force of each bearing with its moment, and what its pressure leaves behind.
+
+    Parameters
+    ----------
+    values : parameters and derived constants of the run by name
+    """
+    said, highest = [], 0.0
+    for bearing in manifest.bearings:
+        peak = summary.get(f"{bearing.prefix}peak_ball_force")
+        if peak is None or "total" not in peak:
+            continue
+        force, time = peak["total"], peak["time"]["total"]
+        place = f"ball {peak['ball']['total']} at {time:.5g} s"
+        if manifest.mechanism is None or not manifest.mechanism.angle:
+            turning = "crank" if manifest.mechanism is not None else "shaft"
+            place += f", {turning} at {math.degrees(crank_angle(manifest, values, time)):.1f} deg"
+        pressure, ring = max(
+            (float(contact.peak_pressure(force)), ring)
+            for contact, ring in zip(contacts_of(bearing, values), ("inner", "outer"), strict=True)
+        )
+        highest = max(highest, pressure)
+        whose = f" of {bearing.name}" if bearing.name else ""
+        said.append(
+            f"Highest ball force{whose}: {force:.4g} N ({place}), {pressure / 1e6:.0f} MPa on the {ring} raceway."
+        )
+    if highest > STATIC_PRESSURE:
+        said.append(
+            f"Above {STATIC_PRESSURE / 1e6:.0f} MPa (ISO 76) a dent of about a ten-thousandth of the ball's diameter "
+            "remains: see ballpass life."
+        )
+    return said
+
+
+def _of_bearing(manifest: Manifest, name: str) -> tuple[str, str]:
+    """Prefix of the bearing that a number belongs to, and the rest of the name."""
+    prefix = next((b.prefix for b in manifest.bearings if b.prefix and name.startswith(b.prefix)), "")
+    return prefix, name.removeprefix(prefix)
