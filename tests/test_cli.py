@@ -185,7 +185,7 @@ def test_without_json_a_table_and_the_place_of_the_results_are_printed(
     before = contents(site.folder)
     result = ballpass(site.folder, *words, "--transient", "1")
     assert result.exit_code == 0, result.stderr
-    assert "peak_ball_force" in result.stdout
+    assert "Highest ball force: " in result.stdout
     assert f"results in {out}: solution.nc, summary.json" in result.stdout
     assert sorted(path.name for path in out.glob("[!.]*")) == ["solution.nc", "summary.json"]
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))

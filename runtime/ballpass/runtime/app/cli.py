@@ -39,6 +39,7 @@ from ballpass.runtime.app.commands.shared import (
     note,
     read_own,
     results_folder,
+    show,
     show_json,
     show_parts,
     size_words,
@@ -272,7 +273,7 @@ def run(
         show_parts(told)
         show_parts(solution.accuracy.words)
     size = size_words((folder / "solution.nc").stat().st_size)
-    show_parts(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")
+    show(f"results in {folder}: {', '.join(files)} (solution.nc: {size})")
 
 
 app.command(rich_help_panel=SIMULATE)(as_command(run))
