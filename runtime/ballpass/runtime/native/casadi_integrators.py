@@ -98,7 +98,7 @@ def make_integrator(rhs: casadi.Function, sizes: Mapping[str, int], intervals: i
         "ode": step * rate / scale,
     }
     # the relative part is there only because it may not be zero
-    options: dict[str, Any] = {"abstol": 1.0, "reltol": 1e-14, "max_num_steps": 1_000_000, "show_eval_warnings": False}
+    options: dict[str, Any] = {"abstol": 1.0, "reltol": 1e-14, "max_num_steps": 100_000, "show_eval_warnings": False}
     grid = [k / intervals for k in range(1, intervals + 1)]
     return casadi.integrator(f"cvodes_{intervals}", "cvodes", equations, 0.0, grid, options)
 
