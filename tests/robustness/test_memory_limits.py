@@ -93,7 +93,11 @@ TOO_LARGE: dict[str, tuple[Callable[[Model], object], str]] = {
 }
 
 
-@pytest.mark.parametrize("name", TOO_LARGE)
+@pytest.mark.parametrize(
+    "name",
+    # a hundred turns in debug code
+    [pytest.param(name, marks=pytest.mark.long) if name == "nodes of a quantity" else name for name in TOO_LARGE],
+)
 def test_what_does_not_fit_into_memory_is_refused_before_it_is_asked_for(press: Model, name: str) -> None:
     call, words = TOO_LARGE[name]
     # what is compiled once
