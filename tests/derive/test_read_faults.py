@@ -308,11 +308,11 @@ REFUSED_ROTOR = [
     (
         "bearing without load",
         '[load]\ntype = "constant"',
-        '[loaded]\ntype = "constant"',
+        '[weight]\ntype = "constant"',
         "load",
         "add the table [load]",
     ),
-    ("bearing without shaft", "[shaft]", "[shafts]", "shaft", "add the table [shaft]"),
+    ("bearing without shaft", "[shaft]", "[motor]", "shaft", "add the table [shaft]"),
     ("unknown load", 'type = "constant"', 'type = "constnt"', "load.type", 'did you mean "constant"?'),
     ("harmonic without frequency", 'type = "constant"', 'type = "harmonic"', "load.frequency", "50 Hz"),
     (
@@ -534,10 +534,8 @@ def test_faults_of_reading_of_values_and_of_topology_are_told_together_with_thei
     text = edited(text, 'branch = "ahead"', "")  # assembly
     lines = {fault.key: fault.line for fault in faults(text).faults}
     given = text.split("\n")
-    assert set(lines) == {
-        *("mechanism.bodies.rod.mass", "mechanism.bodies.rod.mas"),
-        *("mechanism.joints.C.branch", "bearing.share"),
-    }
+    # a key that is misspelt is not missing as well
+    assert set(lines) == {"mechanism.bodies.rod.mas", "mechanism.joints.C.branch", "bearing.share"}
     for key, words in (
         ("mechanism.bodies.rod.mas", "mas ="),
         ("mechanism.joints.C.branch", "[mechanism.joints.C]"),

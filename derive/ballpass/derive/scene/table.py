@@ -110,6 +110,13 @@ def upright(name: str) -> str:
     return rf"\mathrm{{{escaped}}}"
 
 
+#: Likeness from which an unknown key is a missing one, misspelt: one fault, not two [1].
+MISSPELT = 0.75
+
+#: What is said of keys and tables that have to be there.
+NO_KEY, NO_TABLE = "this key is missing", "this table is missing"
+
+
 class Table:
     """A table of the file; as a context it reports the keys nobody asked for.
 
@@ -145,6 +152,13 @@ class Table:
                     allowed=listing(self._known),
                     remedy=suggest(key, absent, "delete it, or move it to the table it belongs to"),
                 )
+                self._forget_missing(get_close_matches(key, absent, n=1, cutoff=MISSPELT))
+
+    def _forget_missing(self, keys: Sequence[str]) -> None:
+        """Take back that keys are missing: they are there, misspelt."""
+        places = {".".join((*self.path, key)) for key in keys}
+        faults = self.collector.faults
+        faults[:] = [one for one in faults if not (one.key in places and one.problem in (NO_KEY, NO_TABLE))]
 
     def fault(self, key: str, problem: str, *, given: str = "", allowed: str = "", remedy: str) -> None:
         """Note a fault at `key`; the empty key means the table itself."""
@@ -180,7 +194,7 @@ class Table:
         if self.has(key):
             return self.data[key]
         if not self.missing:
-            self.fault(key, "this key is missing", allowed=f"{key} = {example}", remedy=f"add {key} = {example}")
+            self.fault(key, NO_KEY, allowed=f"{key} = {example}", remedy=f"add {key} = {example}")
         return None
 
     def table(self, key: str, example: str = "", *, required: bool = True) -> Table:
@@ -191,7 +205,7 @@ class Table:
                 name = ".".join(path)
                 self.fault(
                     key,
-                    "this table is missing",
+                    NO_TABLE,
                     allowed=f"[{name}] with {example}" if example else f"[{name}]",
                     remedy=f"add the table [{name}]",
                 )
