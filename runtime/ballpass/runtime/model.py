@@ -1,4 +1,4 @@
-"""A generated model at work: load, look, evaluate, simulate, differentiate."""
+"""A generated model: load, inspect, evaluate, simulate, differentiate."""
 
 from __future__ import annotations
 

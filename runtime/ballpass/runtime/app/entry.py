@@ -1,7 +1,7 @@
 """Entry point of the ``ballpass`` command.
 
 An interrupt (Ctrl-C) ends it with exit code 130, also while modules are imported or objects destroyed, where Python
-turns an interrupt into other faults or into a remark.  One that comes when all is done changes nothing.
+turns an interrupt into other errors or only prints it.  An interrupt after the last output changes nothing.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an interrupted command says; it imports nothing heavy, so that it can be said while modules are imported."""
+"""The message of an interrupted command.  Nothing heavy is imported here: an interrupt may come during imports."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The results of a run as a folder: solution, summary and figures.
 
 In: a folder, and a function that writes the files of a run.  Out: the folder holds them, and whatever else was in it.
-The summary is put in place last and carries the digests of the other files, so that `load_results` takes a whole run or
-refuses: a process that is killed meanwhile leaves the old run, the new one, or files that are refused.
+The summary is put in place last and carries the digests of the other files, so that `load_results` reads a complete run
+or refuses: a process that is killed during the writing leaves the old run, the new one, or files that are refused.
 """
 
 from __future__ import annotations

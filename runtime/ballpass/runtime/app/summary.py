@@ -1,8 +1,8 @@
-"""The numbers people read first, as one JSON-ready mapping.
+"""The main results of a run, as one mapping ready for JSON.
 
 In: a `Model` and its `Solution`.  Out: a dict; every number stands in an object with its ``unit``.
 
-Only steady cycles count, transient ones are dropped.  Extremes are looked for between the samples as well, and means
+Only steady cycles count, transient ones are dropped.  Extremes are searched between the samples as well, and means
 are taken over every step, where the project's own stepper ran.  ``rms`` is the plain root mean square; ``std`` that of
 the deviation from the mean.
 """

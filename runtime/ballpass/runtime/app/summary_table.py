@@ -1,4 +1,4 @@
-"""The numbers people read first as a table for the terminal.
+"""The main results of a run as a table for the terminal.
 
 In: what `summarize` gave.  Out: tables of a report.
 """

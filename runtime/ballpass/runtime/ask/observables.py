@@ -1,4 +1,4 @@
-"""What people ask of a run: turns, statistics, stroboscopic points, orbit.
+"""Observables of a run: turns, statistics, stroboscopic points, orbit.
 
 In: plain numpy arrays in SI.  Out: numbers, arrays and small frozen records in SI.  Spectra are in `spectrum`.
 """

@@ -1,9 +1,9 @@
 """The true peak of an output, which may lie between the samples of a run.
 
-Ball forces have spikes narrower than a sample interval; samples alone read them low, or show nothing of them.
+Ball forces have spikes narrower than a sample interval; samples alone give too low a peak, or miss it.
 
 - States, and the largest ball forces, are reduced in every step of a run of the project's own stepper
-  (`Solution.reductions`): their extremes are there.
+  (`Solution.reductions`): their extremes are taken from there.
 - All other outputs are evaluated along nodes within those steps, as any quantity is (`ballpass.runtime.quantity`);
   those that follow from time alone without a run.
 - Of the rest, the smallest force of any ball or what depends on a run of CasADi's integrators, the samples are given.

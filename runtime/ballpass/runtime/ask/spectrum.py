@@ -1,9 +1,10 @@
-"""How much of a signal is at which frequency.
+"""Spectra of a signal: amplitude or power by frequency.
 
 In: samples at equal steps.  Out: an `AmplitudeSpectrum`, single-sided, in the unit of the signal; or a `PowerSpectrum`.
 
 For amplitudes the record is cut to a whole number of cycles of the machine, its mean taken off, and weighted with a
-window whose coherent gain is divided out: a sine of amplitude a that falls on a line of the spectrum reads a.
+window whose coherent gain is divided out: a sine of amplitude a whose frequency is a line of the spectrum has the
+height a there.
 
 Choice of window
 ----------------

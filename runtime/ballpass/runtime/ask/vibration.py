@@ -1,4 +1,4 @@
-"""What diagnosis of bearings asks of a vibration signal: envelope, orders of a shaft, spectrogram, statistics.
+"""Vibration signals for the diagnosis of bearings: envelope, orders of a shaft, spectrogram, statistics.
 
 In: samples at equal steps.  Out: arrays and small frozen records.  SciPy does the signal processing.
 """

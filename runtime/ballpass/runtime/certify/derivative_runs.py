@@ -1,4 +1,4 @@
-"""How runs with derivatives of quantities step: method and tolerances; and which motion has no derivatives.
+"""Method and tolerances of runs with derivatives of quantities, and motion that has no derivatives.
 
 In: a model, numbers, a request.  Out: a `Run`, and `Values` made by it.
 """

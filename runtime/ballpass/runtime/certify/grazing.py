@@ -1,4 +1,4 @@
-"""Where a trajectory touches a kink of a law instead of crossing it: there a derivative says least.
+"""Moments at which a trajectory touches a kink of a law instead of crossing it: derivatives are unreliable there.
 
 In: deflections of the balls along a run.  Out: `Grazing` records.
 

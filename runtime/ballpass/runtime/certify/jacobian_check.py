@@ -1,9 +1,10 @@
-"""A Jacobian with a second opinion: generated derivatives beside extrapolated differences of the function itself.
+"""Check a Jacobian: generated derivatives beside extrapolated differences of the function itself.
 
-In: a model, numbers, what by what, an instant and a state.  Out: a `CheckedJacobian` with a verdict for each entry.
+In: a model, numbers, outputs and variables to differentiate by, an instant and a state.  Out: a `CheckedJacobian` with
+a verdict for each entry.
 
-The second route shares nothing with the first but the values of the function: parameters are moved and everything is
-computed anew, the derived constants, phases and tables included.
+The differences share only the values of the function with the derivatives: parameters are changed and everything is
+computed anew, including the derived constants, phases and tables.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Values of quantities for many changed parameter sets at once: what difference quotients are made of.
+"""Values of quantities for many changed parameter sets at once, for difference quotients.
 
-In: changes of parameters.  Out: values, shape (runs, quantities).  What steps reduce comes from an ensemble.  All else,
-as values at an angle, amplitudes and outputs that are no channels of the steps, is taken along nodes, one run at a time
-in each thread.
+In: changes of parameters.  Out: values, shape (runs, quantities).  Quantities that the steps reduce come from
+an ensemble.  All others (values at an angle, amplitudes, outputs that are no channels of the steps) are taken along
+nodes, one run at a time in each thread.
 
-Steps end on the kinks of the laws: stepped over, they leave a thousand times the noise in the values.
+Steps end on the kinks of the laws: stepping over them makes the noise in the values a thousand times larger.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A way to integrate that the tool chooses or measures: method, tolerance, kinks."""
+"""A choice of method, tolerance and treatment of kinks, which the tool makes or measures."""
 
 from __future__ import annotations
 

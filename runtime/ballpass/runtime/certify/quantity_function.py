@@ -4,7 +4,7 @@ In: a model, names of quantities and parameters, how long to run.  Out: a `Quant
 `ballpass.jax` and `ballpass.torch` wrap it.
 
 Values come from ensembles in lanes, which step over the kinks of the laws, derivatives from steps that end on them.
-Kinks that a run with derivatives shows are warned of; `QuantityFunction.certify` compares with differences.
+A warning names kinks that a run with derivatives meets; `QuantityFunction.certify` compares with differences.
 """
 
 from __future__ import annotations

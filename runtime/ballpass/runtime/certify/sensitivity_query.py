@@ -2,8 +2,9 @@
 
 In: a model, names of quantities and parameters.  Out: a `SensitivityReport`.
 
-Derivatives are those of the stepper's own steps, with their error in the choice of step sizes; a looser run beside it
-says how well they are known.  The certificate compares each with a second route (`certificate.py`).
+Derivatives are those of the stepper's own steps, whose sizes are chosen by the error of the derivatives too.  A second
+run with a looser tolerance gives their uncertainty.  The certificate compares each with a second route
+(`certificate.py`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a query of sensitivities answers: values, derivatives with their certificates, warnings.
+"""The report of a query of sensitivities: values, derivatives with their certificates, warnings.
 
 In: nothing but numbers.  Out: `SensitivityReport`, which gives JSON and tables.
 """

@@ -1,10 +1,10 @@
-"""What a simpler model of the same machine costs and gains: its error in quantities, and its time, measured.
+"""A simpler model of the same machine: its error in quantities and its time, measured.
 
 In: a model, a simpler one, quantities of interest.  Out: a `Simplification`.
 
-Both are integrated with the same parameter sets around the user's, for contact makes single runs a lottery.  Values are
-those of a tight tolerance, so that only the models differ; a second method says how uncertain they are.  Times are
-those of the scene's own tolerance, taken in turns.
+Both are integrated with the same parameter sets around the user's, because contact makes the error of a single run
+random.  Values are those of a tight tolerance, so that only the models differ; a second method says how uncertain they
+are.  Times are those of the scene's own tolerance, taken in turns.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a trade holds, for people and for files: a table of what no other way beats, sentences, plain data.
+"""The report of a trade: a table of the choices that no other one beats, sentences, plain data.
 
 In: nothing but numbers.  Out: `Trade`, its report, its rows.
 """

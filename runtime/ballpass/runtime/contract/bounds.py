@@ -1,7 +1,7 @@
-"""Which values a model's parameters may have: signs, bounds, and what they must be to each other.
+"""Allowed values of a model's parameters: signs, bounds, and rules between several parameters.
 
 In: the manifest and values, single ones or a column for each parameter.  Out: a mask or messages.  A scene file is
-checked by whoever reads it; these are the same bounds, for numbers given in Python.
+checked when it is read; these are the same bounds, for numbers given in Python.
 """
 
 from __future__ import annotations

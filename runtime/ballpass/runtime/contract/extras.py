@@ -1,4 +1,4 @@
-"""Packages that not every installation has: the extra that brings each, said where it is missing."""
+"""Optional packages: where one is missing, the error names the extra that installs it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Put files in the place of others: whole files, one process at a time.
 
 A file is written beside its place and moved there, so that it is the old one or the new one.  A folder's files are
-moved one by one, the one with the digests of all others last: where a process is ended in between, the digests do not
+moved one by one, the one with the digests of all others last: where a process ends in between, the digests do not
 fit, and readers refuse the folder.  Files of others are not touched.
 """
 

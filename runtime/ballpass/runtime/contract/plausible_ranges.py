@@ -1,4 +1,4 @@
-"""Numbers that are allowed and unusual: said, never refused.
+"""Numbers that are allowed but unusual: a warning names them, none is refused.
 
 In: the manifest and values, single ones or a column for each parameter.  Out: sentences, and warnings.
 """

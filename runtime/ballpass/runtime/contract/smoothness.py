@@ -1,4 +1,4 @@
-"""What the words of `Manifest.smoothness` mean, said so that nobody takes Hertz's law for smooth in every sense."""
+"""Meaning of the words of `Manifest.smoothness`: which derivatives of a law are continuous, which are bounded."""
 
 from __future__ import annotations
 

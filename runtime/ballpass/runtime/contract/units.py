@@ -1,10 +1,10 @@
 """Text with a unit to a number in SI.
 
-In: what stands in a scene file ("611.7 kg*mm^2", 0.5).  Out: one float in the SI unit the key asks for.
+In: a value of a scene file ("611.7 kg*mm^2", 0.5).  Out: one float in the SI unit the key asks for.
 
 A scene is data, so nothing in it is evaluated: the grammar below is read by a small parser of its own.  Sizes of the
-names most scenes are written with stand here, equal to pint's; whoever has more names, as `ballpass.derive` has pint's,
-gives a function that looks them up.
+usual units are here, equal to pint's.  A caller with more units, as `ballpass.derive` with pint's, gives a function
+that looks them up.
 
 ::
 
@@ -14,8 +14,8 @@ gives a function that looks them up.
     factor   = ( name | "1" | "(" unit ")" ) [ ("^" | "**") exponent | "²" | "³" ]
     exponent = [sign] decimal | "(" [sign] decimal ["/" decimal] ")"
 
-Two things differ from pint.  The radian counts as a dimension: "Hz" and "rad/s" are different things here, where pint
-would silently lose a factor of 2 pi.  Arithmetic is rational: "0.3567 kg" and "356.7 g" are the same float, and
+Two things differ from pint.  The radian counts as a dimension: "Hz" and "rad/s" are different things here, while pint
+silently loses a factor of 2 pi.  Arithmetic is rational: "0.3567 kg" and "356.7 g" are the same float, and
 1 rpm is 2 pi/60 rad/s rounded once.
 """
 

@@ -1,4 +1,4 @@
-/* Family of methods and first step size.  Single runs and ensembles decide alike, where a segment begins and within it
+/* Family of methods and first step size.  Single runs and ensembles decide alike, at the start of a segment and within it
    (family.h). */
 #ifndef BALLPASS_CONTROL_H
 #define BALLPASS_CONTROL_H

@@ -1,16 +1,16 @@
-/* Events, located: which side of each switching function the state is on, where a step changes it, and when to leave one alone.
+/* Events, located: which side of each switching function the state is on, where a step changes it, and when a kink is no longer located.
 
    switches.h is generated with the scene from the conditions of its laws: switching functions g of a ball's deflection and rate, zero at
    the kinks, and the law with its sides held.  A step is tried with the sides that its start has; where the law can be continued, it is
-   smooth within the step whatever the step does.  The step is looked at in BP_LOOKS places: a side changes where g is beyond zero by more
+   smooth within the step whatever the step does.  The step is checked at BP_LOOKS places: a side changes where g is beyond zero by more
    than a band, which is a part BP_BAND of the error allowed in a step.  Below that a kink does not matter, and a ring that rests on one
-   does not count as crossing it by rounding; between looks the parabola through three of them tells who has been on the other side.  The
+   does not count as crossing it by rounding; between these places the parabola through three of them shows a ball that has been on the other side.  The
    step is then repeated so that it ends where g is zero on its dense output, and the sides are turned there.
 
    Work is bounded.  A step is repeated BP_REPEATS times at most for one kink.  A ball may turn its side back at the very place where it
-   turned; the BP_TURNS-th time it is let go.  A crossing that follows the last one of the same ball by less than BP_BRIEF times the step
+   turned; the BP_TURNS-th time it is released.  A crossing that follows the last one of the same ball by less than BP_BRIEF times the step
    tried is brief: such steps do not resolve what crosses (an explicit method at the limit of its stability zigzags about rest), and
-   BP_CHATTER brief ones in a row let go as well.  A ball let go obeys the law as it is, stepped over, for BP_REST steps. */
+   BP_CHATTER brief ones in a row release it as well.  Steps go over the kinks of a released ball for BP_REST steps. */
 #ifndef BALLPASS_KINKS_H
 #define BALLPASS_KINKS_H
 

@@ -1,5 +1,5 @@
-/* Steps that end on kinks of the law, and steps about contacts, which have a clock of their own: what kinks.h and sqrt_time.h describe, done in a
-   run.  Without BALLPASS_LOCATED nothing of it is there. */
+/* Steps that end on kinks of the law, and steps near a contact, taken over the square root of time: the use of kinks.h and sqrt_time.h in a
+   run.  Compiled in only where BALLPASS_LOCATED is defined. */
 #ifndef BALLPASS_LOCATE_H
 #define BALLPASS_LOCATE_H
 

@@ -1,4 +1,4 @@
-/* What a run gives while it goes on: states at output times, ends of steps, and reductions (reductions.h). */
+/* Results that a run gives while it integrates: states at output times, ends of steps, and reductions (reductions.h). */
 #ifndef BALLPASS_OBSERVE_H
 #define BALLPASS_OBSERVE_H
 

@@ -1,4 +1,4 @@
-/* When loads switch and which inputs hold in between: the run's segments. */
+/* Segments of a run: the times at which loads switch, and the inputs between them. */
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
 

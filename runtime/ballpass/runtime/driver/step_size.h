@@ -1,7 +1,7 @@
 /* Step sizes by the PI controller (Hairer & Wanner, Solving Ordinary Differential Equations II, section IV.2).
 
-   A body as explicit.h, for one run and for a member in each lane.  Of BP_W numbers are BP_NAME(log) and BP_NAME(exp), which is also given
-   what it is of for rejected steps: the error to the power -1/order. */
+   A body as explicit.h, for one run and for a member in each lane.  BP_NAME(log) and BP_NAME(exp) take BP_W numbers;
+   for rejected steps BP_NAME(exp) also gets the error and the order, because the result there is the error to the power -1/order. */
 
 /* By how much the next step is longer than the one tried, which had this scaled error and was accepted or not.
 

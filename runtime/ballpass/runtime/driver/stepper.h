@@ -1,7 +1,7 @@
 /* The stepper's interface: one call integrates a run over any number of segments.
 
    A segment is a stretch of time within which the inputs u are constant; its clock starts at zero.  The driver lands on every
-   segment's end exactly, so that a load that switches there never hides inside a step.
+   segment's end exactly, so that a load never switches within a step.
 
    Compiled with BALLPASS_LOCATED, no step straddles a kink of the law (kinks.h); without, error control steps over them.
 

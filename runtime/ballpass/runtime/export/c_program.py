@@ -2,7 +2,7 @@
 
 In: a generated folder.  Out: the model's kernels, the driver with its methods, the scene's numbers, an interface for
 other programs, a main that prints a CSV, a Makefile and a README.  `make` needs gcc, clang or another compiler of C99
-that knows their vector types, and nothing else.
+that supports their vector types, and nothing else.
 
 The program finds the segments of a run in C (``schedule.c``, as ensembles do), the magnitudes
 that tolerances are relative to (``scales.h``, as the stepper does), and evaluates the derived constants there, so that

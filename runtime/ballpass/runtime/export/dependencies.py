@@ -1,7 +1,8 @@
-"""What states, their rates and the outputs of a model depend on, as importers of an FMU ask.
+"""Dependencies of a model's states, their rates and its outputs, for importers of an FMU.
 
 In: a model.  Out: for each of them the names of time, parameters and states that move it: at any moment, and where a
-run starts.  From the sparsity of the generated functions, so that what is not named has no influence at all.
+run starts.  From the sparsity of the generated functions, so that a quantity that is not listed has no influence at
+all.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an FMU says of itself: ``modelDescription.xml`` and ``buildDescription.xml`` of FMI 3.0.
+"""The description of an FMU: ``modelDescription.xml`` and ``buildDescription.xml`` of FMI 3.0.
 
 In: a manifest, the names of its inputs.  Out: trees of XML.  Value references are those of ``driver/fmi/fmi.c``: 0 is
 the time; then parameters, states, derivatives of states, outputs that are no states, in the scene's order; then the

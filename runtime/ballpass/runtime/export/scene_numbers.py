@@ -1,4 +1,4 @@
-"""The C that a scene brings to its stand-alone program: its numbers, constants, outputs, margins of its linkage.
+"""C code of a scene for its stand-alone program: its numbers, constants, outputs, margins of its linkage.
 
 In: a manifest, or a model whose functions CasADi can write.  Out: texts of ``scene.h``, ``scene.c``, ``constants.c``,
 ``outputs.c`` and ``margins.c``.

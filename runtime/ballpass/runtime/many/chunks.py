@@ -1,6 +1,6 @@
-"""An ensemble under way: chunks of members in threads, each a stretch of its runs after the other.
+"""Run an ensemble: chunks of members in threads, one stretch of their runs after the other.
 
-In: `Work`.  Out: its rows of reductions and states at the end, filled; who has no results, and why.
+In: `Work`.  Out: its rows of reductions and states at the end, filled; members without results, and why.
 
 A stretch is some turns of all members of a chunk, so that memory does not grow with the runs.  What members carry from
 one stretch to the next is in the driver's `Carried`: steps and bits are those of runs in one go.

@@ -1,7 +1,7 @@
 """Random numbers of members: distributions by SciPy's names, and a stream of numbers for each member.
 
 In: a seed, the place of a class and of its members, distributions.  Out: columns of values.  A member's numbers depend
-on the seed, its class and its place in the class alone: not on other members, nor on who computes them.
+on the seed, its class and its place in the class alone: not on other members, nor on the worker that computes them.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Quantities that steps do not reduce, member by member of an ensemble.
 
-In: an ensemble under way, quantities.  Out: their values; members for which some are not known, and why.
+In: an ensemble under way, quantities.  Out: their values; members with unknown values, and why.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which figures exist, what each needs, and writing them.
+"""List of all figures with their conditions; write them.
 
 In: a model and its `Solution`.  Out: files, the same bytes for the same run.
 """

@@ -1,7 +1,7 @@
 """A moving picture as one HTML file that needs nothing else: no network, no server, no library.
 
-In: the plain numbers of `animation.to_plain`.  Out: the text of a page.  ``animation.html`` says what it looks like,
-``animation.js`` what it does.
+In: the plain numbers of `animation.to_plain`.  Out: the text of a page.  ``animation.html`` is its layout,
+``animation.js`` its code.
 """
 
 from __future__ import annotations

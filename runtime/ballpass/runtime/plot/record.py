@@ -1,6 +1,6 @@
-"""What every figure needs of a run, gathered once.
+"""Data of a run for all figures, gathered once.
 
-In: a model and its `Solution`.  Out: a frozen `Record`: the steady part, its turns, angles, and what a caption says.
+In: a model and its `Solution`.  Out: a frozen `Record`: the steady part, its turns, angles, and text for captions.
 """
 
 from __future__ import annotations

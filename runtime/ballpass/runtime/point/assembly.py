@@ -1,4 +1,4 @@
-"""Whether a linkage can be assembled: at every angle of a turn, and at one instant."""
+"""Check whether a linkage can be assembled: at every angle of a turn, and at one instant."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""How well Eq. (1), A r = b, can be solved over a turn: condition numbers of the reaction matrix A(q).
+"""Condition numbers of the reaction matrix A(q) of Eq. (1), A r = b, over a turn.
 
 In: a model with a mechanism and its numbers.  Out: `Conditioning`: the largest condition number in a turn, of the
 matrix as it stands (SI, with forces beside moments) and of the matrix with rows and columns scaled to like size, with
-the crank angles where they are met.  The second one tells how near the linkage is to a position where it locks: there
-reactions grow like the condition number, and so do errors of lengths and masses in them.
+the crank angles where they are met.  The second one grows near a position where the linkage locks: reactions grow like
+it there, and so does the effect of errors of lengths and masses on them.
 
 Scaling: rows and columns are divided by the roots of their largest entries, in turns (D. Ruiz, A scaling algorithm to
 equilibrate both rows and columns norms in matrices, RAL-TR-2001-034).

@@ -1,4 +1,4 @@
-"""Static equilibrium: where the rings stand under the load of one instant, and how that place moves with parameters.
+"""Static equilibrium: positions of the rings under the load of one instant, and their derivatives by parameters.
 
 In: a model, numbers, an instant.  Out: a `StaticEquilibrium`.
 

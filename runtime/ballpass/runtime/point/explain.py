@@ -1,8 +1,8 @@
-"""What a model's numbers mean for its integration: breakpoints, smoothness, time scales, and the method they speak for.
+"""Effects of a model's numbers on its integration: breakpoints, smoothness, time scales, and a suitable method.
 
 In: a model and numbers.  Out: `Explanation`.  Time scales are eigenvalues of the derivative of the right-hand side by
 the states, at the equilibria that the ring would rest in under the lightest and the heaviest load of a turn, at rest
-and moving each way (a law that damps approach only shows its damping only then).
+and moving each way (only the motion shows the damping of a law that damps the approach alone).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Derivatives of generated functions at a point: of what, along what, and the chain between them.
+"""Derivatives of generated functions at a point, along states, time, angle and parameters, by the chain rule.
 
 In: a model, numbers, a point.  Out: dense arrays.
 
-A generated function depends on (t, x, u, p, c).  A *direction* says how these move when one thing does: a state, the
+A generated function depends on (t, x, u, p, c).  A *direction* holds their derivatives by one variable: a state, the
 time, the crank's angle, or a parameter, which moves the derived constants (groove radius -> elliptic integrals ->
 stiffness), the phases and the tables as well.  Gates are flat: they jump at the edges of their windows, where no
 derivative exists.  Derivatives along parameters are taken at fixed states.

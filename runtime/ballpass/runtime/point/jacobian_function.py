@@ -1,7 +1,7 @@
 """A Jacobian prepared for many calls: one generated function on fixed memory, with its sparsity pattern.
 
-In: a model, numbers, what to differentiate by what.  Out: a `JacobianFunction`, called with a state in about a
-microsecond: the pattern is found once, and a call copies the state, runs compiled code and picks the entries.
+In: a model, numbers, outputs and variables to differentiate by.  Out: a `JacobianFunction`, called with a state in
+about a microsecond: the pattern is found once, and a call copies the state, runs compiled code and picks the entries.
 """
 
 from __future__ import annotations

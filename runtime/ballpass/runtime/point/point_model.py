@@ -1,4 +1,4 @@
-"""A loaded model and what is asked of it at one instant: numbers, outputs, derivatives, positions at rest."""
+"""A loaded model evaluated at one instant: numbers, outputs, derivatives, positions at rest."""
 
 from __future__ import annotations
 

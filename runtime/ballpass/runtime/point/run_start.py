@@ -1,4 +1,4 @@
-"""What a run of a model begins with: numbers with which the linkage can be assembled, and a state."""
+"""The start of a run of a model: numbers with which the linkage can be assembled, and a state."""
 
 from __future__ import annotations
 

@@ -1,10 +1,11 @@
-"""Second derivatives at a point, where the laws have them.
+"""Second derivatives at a point, for laws that are smooth enough.
 
-In: a model, numbers, what to differentiate by which pair.  Out: a dense array.
+In: a model, numbers, an output and the pair to differentiate by.  Out: a dense array.
 
 The graph of the function is put together with those of the derived constants and of the inputs, so that second
 derivatives along parameters are total, and differentiated twice by CasADi.  Hertz's law has no bounded second
-derivative at contact onset, d2F/d(delta)2 ~ delta^(-1/2): such a query is refused and the smoothed law offered.
+derivative at contact onset, d2F/d(delta)2 ~ delta^(-1/2): such a query is refused, and the message names the smoothed
+law.
 """
 
 from __future__ import annotations

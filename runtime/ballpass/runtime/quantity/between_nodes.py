@@ -1,10 +1,10 @@
 """Extremes of channels along a run, found between its nodes.
 
-In: a track, channels along it, and where the driver's reductions saw the extreme.  Out: an `Extreme` for each.
+In: a track, channels along it, and the times of the extremes in the driver's reductions.  Out: an `Extreme` for each.
 
-Around the best nodes, and around the moment that the reductions tell, the run is looked at again on grids that get
-finer until a parabola through three points is exact to rounding.  Where two balls change rank, which is where the most
-loaded ball carries least, the two straight lines through the points are intersected instead.
+Around the best nodes, and around the moment of the reductions, the run is evaluated again on finer and finer grids,
+until a parabola through three points is exact to rounding.  Where two balls carry the same load, the largest ball force
+has its minimum in a corner: there the two straight lines through the points are intersected instead.
 """
 
 from __future__ import annotations

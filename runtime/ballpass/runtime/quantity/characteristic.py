@@ -1,4 +1,4 @@
-"""Characteristic frequencies of the bearings of a model, and which of them a line of a spectrum is.
+"""Characteristic frequencies of the bearings of a model, and the one that a line of a spectrum belongs to.
 
 In: a manifest and numbers.  Out: frequencies, or orders of the driver's or shaft's speed, with names.
 

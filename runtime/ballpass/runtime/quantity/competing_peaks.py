@@ -1,9 +1,9 @@
-"""Other peaks that take a largest value's place after a small change of a parameter: there its derivative jumps.
+"""Other peaks that become the largest after a small change of a parameter: there the derivative of the maximum jumps.
 
 In: an extreme of a run with derivatives; the next ones, and where no ball is named the other balls at its moment.
 Out: a sentence, empty where none is near.
 
-One of about the same derivative does not count, as the same peak in another turn.
+A peak of about the same derivative does not count, for example the same peak in another turn.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Names of quantities: numbers that a run is asked for, in every command and call.
+"""Names of quantities (numbers computed from a run), alike in every command and call.
 
 In: a name, `parse_quantity`.  Out: a `Quantity`, which `ballpass.runtime.quantity.quantity_run` evaluates along a run.
 

@@ -2,10 +2,11 @@
 
 In: deflections of the balls and other signals along a run.  Out: times.
 
-Where a ball comes into contact, its force starts like a power of time, under the tangent law with infinite slope; where
-a law damps one way only, it has a corner; where two balls change rank, the force of the most loaded one has.  At such a
+Where a ball comes into contact, its force starts like a power of time, under the tangent law with infinite slope.
+Where a law damps one way only, the force has a corner.  Where another ball becomes the most loaded one, the largest
+force has a corner.  At such a
 moment the derivative of the force by a parameter jumps or is unbounded.  A quadrature that runs across it converges
-slowly; one whose panels end there, and get finer towards it, does not notice.  What is integrated does not jump, so
+slowly; one whose panels end there, and get finer towards it, converges fast.  The integrand does not jump there, so
 that the panels need not move with the kink.
 """
 

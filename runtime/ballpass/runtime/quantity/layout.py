@@ -1,8 +1,8 @@
-"""Where in the steps of a run each quantity is evaluated.
+"""The nodes within the steps of a run at which each quantity is evaluated.
 
 In: a run, the ends of its steps, quantities.  Out: `Layout` of all that share their nodes.
 
-A quantity's nodes depend on nothing but itself and the run, so that its value is the same bits whatever else is asked.
+A quantity's nodes depend only on itself and the run, so that its value is the same to the bit beside any others.
 Integrals have Gauss's nodes in every step, and finer ones where their channel needs it; extremes that the steps do not
 hold are searched between such nodes; a moment is a node of its own.
 """

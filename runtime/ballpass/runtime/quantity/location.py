@@ -1,4 +1,4 @@
-"""What stands behind ``@`` in the name of a quantity: an angle, a time, a frequency, and how it moves with parameters.
+"""The part after ``@`` in the name of a quantity: an angle, a time or a frequency, and its derivative by parameters.
 
 In: a `Quantity` and the numbers of a run.  Out: a time [s] or a frequency [Hz], each with its derivative.
 """

@@ -1,9 +1,9 @@
-"""Where a run is evaluated: points at fixed fractions of its segments, which move with the parameters.
+"""Nodes at which a run is evaluated: at fixed fractions of its segments, which move with the parameters.
 
 In: a run.  Out: `Edges` with their derivatives, a `NodePlan`, and `Nodes`, the plan put onto the edges.
 
 A load switches at an edge, and outputs may jump there; speed and windows move the edges.  Nodes that keep their
-fraction of a segment never cross one, so that whatever is summed over nodes is a smooth function of the parameters:
+fraction of a segment never cross one, so that sums over nodes are smooth functions of the parameters:
 integrals by Gauss's rule on panels within the segments (`panels.py`), values at both sides of each edge for extremes.
 """
 

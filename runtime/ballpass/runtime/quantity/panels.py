@@ -1,11 +1,11 @@
-"""Into which panels a run is cut for quadratures: its own steps, and finer where its signals need it.
+"""Panels of a run for quadratures: its own steps, cut finer where its signals need it.
 
 In: ends of the steps of a run, and signals along the nodes of coarser panels.  Out: `Panels`, and the `NodePlan` of
 their nodes.
 
 The integrator chooses its steps so that the motion is smooth within each; where it ends them on the kinks of the laws,
 so do the panels.  Outputs may be rougher than states: Gauss's rule of four nodes is exact for polynomials of degree
-seven, and how large the part of third degree is that its nodes see tells how many times finer a panel has to be.
+seven, and the size of the part of third degree at its nodes gives how many times finer a panel has to be.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a quantity is, what its kind declares, what it sees of a run, and what it gives: records alone."""
+"""Records: a quantity, the declaration of its kind, the data of a run that it gets, its result."""
 
 from __future__ import annotations
 

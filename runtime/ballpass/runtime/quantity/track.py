@@ -4,7 +4,7 @@ In: a run, edges and nodes.  Out: a `Track`, and `Signal` for each channel asked
 
 Derivatives are taken along the moving nodes: with x' at fixed time and the node's own t', that of the state is
 ``x' + f t'``.  Across an edge where a load switches x' jumps by ``(f_before - f_behind) t_edge'``, and the sum does
-not: it is one number for both sides of the edge.
+not: it has one value for both sides of the edge.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Quantities of one run by their names, for people.
+"""Quantities of one run by their names, for tables and notebooks.
 
 In: a model, numbers, a request, names.  Out: a `QuantityValue` of each.
 """

@@ -1,4 +1,4 @@
-"""Derivatives at one instant, each with a second opinion."""
+"""Derivatives at one instant, each checked by differences."""
 
 from __future__ import annotations
 

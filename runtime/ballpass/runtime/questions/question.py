@@ -1,8 +1,8 @@
-"""What makes a function a question: its options, its report, how the command line shows it.
+"""The declaration of a question: its function, options, report, and how the command line shows it.
 
 A question is a function of a model.  Parameters with a type of `contract.options` are its options; ``parameters`` are
-overrides of the numbers; ``progress`` is told how far it is.  Its module imports inside functions what computes:
-the command line reads all modules before it knows which question is asked.
+overrides of the numbers; ``progress`` gets the part that is done.  Modules with heavy work are imported inside
+functions: the command line imports all questions before it knows which one is asked.
 """
 
 from __future__ import annotations

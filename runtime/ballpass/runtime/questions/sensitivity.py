@@ -1,4 +1,4 @@
-"""Which parameters move what, with a certificate for each number."""
+"""Derivatives of quantities by parameters, with a certificate for each number."""
 
 from __future__ import annotations
 

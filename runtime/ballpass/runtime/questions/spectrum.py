@@ -1,4 +1,4 @@
-"""The lines of a signal, and which characteristic frequency of which bearing each is."""
+"""The spectral lines of a signal, and the characteristic frequency of a bearing that each belongs to."""
 
 from __future__ import annotations
 

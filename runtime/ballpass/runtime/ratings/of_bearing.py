@@ -1,4 +1,4 @@
-"""The ratings of a model's bearing: those its scene gives, else what follows from its geometry; and its contacts.
+"""The ratings of a model's bearing: those that its scene gives, else those of its geometry; and its contacts.
 
 In: the manifest's record of a bearing, and values of parameters by name (floats, or CasADi's symbols).  Out: `Ratings`,
 `Contact`.

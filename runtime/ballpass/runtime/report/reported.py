@@ -1,4 +1,4 @@
-"""What answers have in common: text, HTML, plain data and a table of pandas, written from their report."""
+"""Base class of answers: text, HTML, plain data and a table of pandas, written from their report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run to a named error asked, chose and found; `ballpass.runtime.certify.error_target` makes it."""
+"""Record of a run to a named error: request, choice and result; `ballpass.runtime.certify.error_target` makes it."""
 
 from __future__ import annotations
 

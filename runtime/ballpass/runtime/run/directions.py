@@ -1,8 +1,8 @@
-"""Directions of a run: what the stepper needs to differentiate its steps along parameters.
+"""Directions of a run: input of the stepper to differentiate its steps along parameters.
 
 The chain from a parameter goes through the derived constants (groove radius, elliptic integrals, stiffness), through
 the phases, and through the times at which loads switch: where such a time moves, the derivative at fixed time jumps by
-the difference of the rates before and behind.
+the difference of the rates before and after it.
 """
 
 from __future__ import annotations

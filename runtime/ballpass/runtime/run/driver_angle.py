@@ -1,4 +1,4 @@
-"""Which inputs hold at a time, and when they change: phases, gates, tables.
+"""Values of the inputs at a time, and the times at which they change: phases, gates, tables.
 
 In: the manifest's inputs and a look-up of values by name.  Out: numbers for ``u``, times of breakpoints.
 

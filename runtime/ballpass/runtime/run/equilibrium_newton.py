@@ -1,9 +1,9 @@
-"""Newton's method for positions at rest, from a start where nothing may touch.
+"""Newton's method for positions at rest, also from a start without any contact.
 
-In: forces on the coordinates and their stiffness.  Out: positions where the forces vanish, or how far they got.
+In: forces on the coordinates and their stiffness.  Out: positions where the forces vanish, or the last positions.
 
-Pseudo-transient continuation: ``q += (h I + K)^-1 f(q)`` with h falling as the residual falls.  Where nothing
-touches (K = 0) this is a walk along the force, and where something does it is Newton's method.  (Kelley and Keyes, SIAM
+Pseudo-transient continuation: ``q += (h I + K)^-1 f(q)`` with h falling as the residual falls.  Without
+contact (K = 0) this moves along the force; with contact it is Newton's method.  (Kelley and Keyes, SIAM
 J. Numer. Anal. 35 (1998) 508, doi:10.1137/S0036142996304796.)
 """
 

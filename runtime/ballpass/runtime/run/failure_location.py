@@ -1,4 +1,4 @@
-"""Where a machine stood when a run ended early: crank angle and the ball that was pressed most, for messages."""
+"""State of a machine when a run ended early: crank angle and the most loaded ball, for messages."""
 
 from __future__ import annotations
 

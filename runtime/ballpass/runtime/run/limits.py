@@ -1,10 +1,10 @@
-"""How much work a run may take before it is given up, so that no request runs for hours unseen.
+"""Limits of the work of a run: it is stopped beyond them, so that no request runs for hours unnoticed.
 
 A step takes some 0.2 to 0.5 microseconds, with reductions up to one, so a run of some turns that reaches its limit has
 taken seconds.  The limits are far above what any method needs that fits its model: a turn of a press takes a thousand
-steps.  What meets them is an explicit method on an overdamped contact, whose steps are bounded by 3.3 / decay, and
-motion that grows without bound.  They are the same for runs with samples, runs with reductions, and each member of an
-ensemble.
+steps.  They are reached by an explicit method on an overdamped contact, whose steps are bounded by 3.3 / decay, and
+by motion that grows without bound.  They are the same for runs with samples, runs with reductions, and each member of
+an ensemble.
 """
 
 from __future__ import annotations

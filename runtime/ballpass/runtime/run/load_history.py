@@ -1,8 +1,8 @@
 """Loads of the balls along a run, added up until the lives that follow from them settle.
 
-In: a model, numbers, a request.  Out: `LoadHistory`.  The balls meet the load's peak in other places each turn, so the
-life of two turns depends on the balls' first angle: the press of the paper repeats after 134 turns.  The turns are
-doubled, and the run goes on, until that changes no life by more than `LIVES` and no highest ball force by more than
+In: a model, numbers, a request.  Out: `LoadHistory`.  The balls are at other places at the load's peak in each turn, so
+the life of two turns depends on the balls' first angle: the press of the paper repeats after 134 turns.  The turns are
+doubled, and the run continues, until that changes no life by more than `LIVES` and no highest ball force by more than
 `PEAKS` of settle.
 """
 

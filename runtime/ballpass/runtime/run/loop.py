@@ -1,10 +1,10 @@
-"""The loop around the project's own stepper, for all that runs a model by it.
+"""The loop around the project's own stepper, for everything that runs a model with it.
 
 In: a `Run`, and sinks that take what it passes: samples, reductions, ends of steps.  Out: the sinks, filled.
 
 A run is cut into windows of so many segments (`segments.run_windows`), each one run of the driver, made in calls
-of so many steps: between calls progress is shown, and an interrupt or the wish of an ensemble to stop is heard.  What
-sinks there are, and how many steps a call takes, changes no bit of the motion.
+of so many steps: between calls progress is shown, and an interrupt or a stop of the ensemble takes effect.  The
+sinks, and the number of steps in a call, change no bit of the motion.
 """
 
 from __future__ import annotations

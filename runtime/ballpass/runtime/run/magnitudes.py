@@ -1,7 +1,8 @@
 """Magnitudes of the states of a run, from its most loaded moments (see `ballpass.runtime.run.scales`).
 
 In: a model, numbers, the length of a run.  Out: one magnitude for each state, which tolerances are relative to.  Where
-the stepper runs, its own C finds them; elsewhere Python does, and the rates with them that tell a stiff model.
+the stepper runs, its own C finds them; elsewhere Python does, and with them the rates that show whether a model is
+stiff.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""NetCDF-4 files in memory: a disk that is full then fails in one plain write, not somewhere within HDF5; their seal.
+"""Write NetCDF-4 files in memory, so that a full disk fails in one plain write, not within HDF5; add their seal.
 
 In: variables with dimensions, units and descriptions.  Out: the bytes of a file that xarray and `h5netcdf` read.
 """

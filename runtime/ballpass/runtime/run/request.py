@@ -1,4 +1,4 @@
-"""What a run is asked for, and the bounds of what may be asked: length, tolerance, memory, names of outputs.
+"""The request of a run, and its bounds: length, tolerance, memory, names of outputs.
 
 `ballpass.runtime.run.resolve` makes a `Run` of a request; `ballpass.runtime.run.sampling` the times of its samples.
 """

@@ -1,4 +1,4 @@
-"""The run that a request means: every open question answered once, for all that runs a model.
+"""The run that a request means: every open choice made once, for everything that runs a model.
 
 In: a model, numbers, a `Request`.  Out: a `Run`.
 """

@@ -1,7 +1,7 @@
-"""How large the states get and how stiff the model is, asked of the model itself.
+"""Magnitudes of the states and stiffness of a model, from the model's own right-hand side.
 
-Tolerances are relative to magnitudes.  With magnitudes taken from the momentary state, an error control asks for
-nonsense when a coordinate passes zero; so they are found once a run, from the model's own right-hand side, at the
+Tolerances are relative to magnitudes.  With magnitudes taken from the current state, the allowed error would
+vanish when a coordinate passes zero; so they are found once a run, from the model's own right-hand side, at the
 moments that load it most:
 
 Coordinates that share a magnitude make a group, as the rings of a bearing do; some have a partner, as the other ring's
@@ -9,14 +9,14 @@ coordinate along the same axis.  An angle, which grows as the driver turns, has 
 spread over a turn of it, it keeps its initial velocity, and stays where it is while an equilibrium is sought.
 
 1. For each group the moments with its largest acceleration at the initial positions, at rest, are picked from the run.
-2. At each, the positions of static equilibrium are found (`equilibrium_newton`).  What has to fall is the residual of
-   the accelerations; where that gets stuck, that of the forces: a ring of a milligramme has enormous accelerations on
-   the way.  The walk ends where both rings have gone too far for the distance between them to be told: nothing holds
-   them, but the balls between them have found their deflection.
+2. At each, the positions of static equilibrium are found (`equilibrium_newton`).  The residual of the accelerations
+   has to fall; where it does not, that of the forces: a ring of a milligramme has enormous accelerations on the way.
+   The search ends where both rings have moved so far that rounding hides the distance between them: nothing holds
+   them, but the balls between them have reached their deflection.
 3. Position magnitude: the group's largest coordinate among these equilibria and the initial state; for a bearing, half
    the clearance and the deflection.  At most `SOFT` times the largest difference between partners: in a soft housing
    both rings move far, and the balls feel the small difference.  Velocity magnitude: ``sqrt(acceleration x
-   position)``, the speed gained on falling through that distance; for a linear oscillator, amplitude times natural
+   position)``, the speed after that acceleration over that distance; for a linear oscillator, amplitude times natural
    frequency.
 4. Stiffness: eigenvalues of the Jacobian at those equilibria, at rest and moving in each direction (laws that damp
    one way only show their damping only then).

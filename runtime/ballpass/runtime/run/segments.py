@@ -1,4 +1,4 @@
-"""Into which segments a run falls: split where a load switches and at every whole turn.
+"""Segments of a run: it is split where a load switches and at every whole turn.
 
 In: a model, numbers, an interval of time.  Out: edges, and the inputs that hold between them.  Within a segment gates
 and slopes are constant and the phases are taken anew at its start, so that angles stay small in the thousandth turn as

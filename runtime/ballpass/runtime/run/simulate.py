@@ -2,8 +2,8 @@
 
 In: a model, numbers, a request.  Out: a `Solution`.
 
-1. The request is checked, and what it leaves open taken from the scene (`resolve`, `sampling`).
-2. The method fills the samples (`loop`: the project's own stepper; `pieces`: CasADi's).
+1. The request is checked, and what it leaves open is taken from the scene (`resolve`, `sampling`).
+2. The method fills the samples (`loop`: the project's own stepper; `casadi_run`: CasADi's).
 3. The outputs asked for are evaluated at all samples at once (`trajectory`).
 """
 

@@ -1,4 +1,4 @@
-"""What a simulation gives: samples of states and outputs, with all that is needed to read them later; its file."""
+"""The solution of a simulation: samples of states and outputs with their names and units; its file."""
 
 from __future__ import annotations
 

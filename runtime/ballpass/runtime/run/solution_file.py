@@ -1,6 +1,6 @@
 """Read a solution that was saved: by `Solution.save`, `Model.stream`, or ``ballpass run``.
 
-In: a file.  Out: its `Solution`, or a refusal of a file that is none of ours, cut short or edited.
+In: a file.  Out: its `Solution`, or an error where the file has another format, is cut short or was edited.
 """
 
 from __future__ import annotations

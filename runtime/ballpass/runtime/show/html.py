@@ -1,6 +1,6 @@
-"""HTML of objects in notebooks: one look, no script but that of framed pages, everything escaped.
+"""HTML of objects in notebooks: one style, no script except in framed pages, everything escaped.
 
-In: heads and rows of text.  Out: HTML that stands alone, light on dark as dark on light.
+In: heads and rows of text.  Out: HTML that needs nothing else, for light and dark pages.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Progress of long calls: a bar on a terminal or in a notebook, nothing in pipes, logs and other processes.
 
 A bar appears when a call has taken `PATIENCE`.  One shows at a time: calls within calls, and in other threads, are
-silent, and so are those of a program that says itself what goes on (`silent`).
+silent, and so are those of a program that shows its own progress (`silent`).
 """
 
 from __future__ import annotations

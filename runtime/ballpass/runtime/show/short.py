@@ -1,4 +1,4 @@
-"""Short reprs of records: a line or a few, whatever arrays and tables they hold."""
+"""Short reprs of records: a few lines for any size of arrays and tables."""
 
 from __future__ import annotations
 

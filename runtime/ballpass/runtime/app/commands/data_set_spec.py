@@ -1,4 +1,4 @@
-"""A file that says what a data set is made of, as ``ballpass dataset`` reads it.
+"""Read the specification of a data set, for ``ballpass dataset``.
 
 In: the path of a TOML file.  Out: a `DataSetSpec`: scenes, distributions and what is recorded, in SI, all checked.  The
 schema is in `docs/reference/data_sets.md`.  `ballpass.derive` is imported inside functions.

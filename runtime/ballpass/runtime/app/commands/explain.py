@@ -1,4 +1,4 @@
-"""``ballpass explain``: what a scene models and why, what it does not, what that costs, and what it means for a run."""
+"""``ballpass explain``: what a scene models and what it leaves out, the reasons, the cost, and the effects on a run."""
 
 from __future__ import annotations
 

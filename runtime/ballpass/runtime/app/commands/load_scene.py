@@ -1,4 +1,4 @@
-"""What a command was asked for: numbers of ``--set`` and other options, checked before anything is derived.
+"""Read a scene with the numbers of ``--set`` and other options, all checked before anything is derived.
 
 In: a scene file and texts.  Out: values in SI.  `ballpass.derive` is imported inside functions, where it is needed.
 """

@@ -1,4 +1,4 @@
-"""What the commands of ``ballpass`` share: errors as messages, stages on stderr, folders, loading a model.
+"""Functions that the commands of ``ballpass`` share: errors as messages, stages on stderr, folders, loading a model.
 
 Like every module here it serves both halves and imports `ballpass.derive` inside functions.  Messages and
 progress go to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 the request was wrong, 130

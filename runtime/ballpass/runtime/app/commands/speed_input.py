@@ -1,7 +1,7 @@
 """`ballpass export --fmu --input mechanism.driver.speed` where the scene's driver turns at constant speed.
 
-In: a scene file.  Out: a generated folder of the same scene with the driver's speed as a table over time, which has the
-driver's angle and speed as states, and an acceleration for a speed that changes.  The table's rows are equal.
+In: a scene file.  Out: a generated folder of the same scene with the driver's speed as a table over time, whose rows
+are equal.  There the driver's angle and speed are states, so that the speed may change.
 """
 
 from __future__ import annotations

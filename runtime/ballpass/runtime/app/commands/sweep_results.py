@@ -1,4 +1,4 @@
-"""What a sweep gives: the grid as a dataset, the table, the report, figures, and tables for the terminal."""
+"""Results of a sweep: the grid as a dataset, the table, the report, figures, and tables for the terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``ballpass trade``: what accuracy costs on a user's own scene."""
+"""``ballpass trade``: error and time of methods and tolerances on a user's scene."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 /* See ballpass.h.  A run is cut into segments (schedule.h), these are integrated some hundred to a call of the stepper, and a call is paused
-   with the step that passes the time asked for: what is read has no influence on the steps. */
+   with the step that passes the time asked for: reading has no influence on the steps. */
 #include "ballpass.h"
 
 #include <math.h>

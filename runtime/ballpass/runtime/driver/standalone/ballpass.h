@@ -11,7 +11,7 @@
        ballpass_free(press);
 
    Any number of instances, each of them for one thread at a time; there is no static state.  How often a run is read does not change it:
-   it has the bits of a run of the same length in one go.  For C99 and C++. */
+   its results equal those of an uninterrupted run to the bit.  For C99 and C++. */
 #ifndef BALLPASS_H
 #define BALLPASS_H
 

@@ -1,5 +1,5 @@
-/* Runs the scene and prints its states and outputs as CSV.  --help tells the options, --list the parameters.  Of an instance it asks what
-   ballpass.h offers, but for the check of values that are only listed. */
+/* Runs the scene and prints its states and outputs as CSV.  --help tells the options, --list the parameters.  It uses an instance only
+   through ballpass.h, except for the check of values that are only listed. */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,4 @@
-/* What main.c and the interface of FMI ask of an instance besides ballpass.h. */
+/* Functions of an instance for main.c and the interface of FMI, besides ballpass.h. */
 #ifndef BALLPASS_SIMULATION_H
 #define BALLPASS_SIMULATION_H
 

@@ -1,4 +1,4 @@
-"""Quantities of the rings at rest under the load of one instant: nothing is run for them."""
+"""Quantities of the rings at rest under the load of one instant: they need no run."""
 
 from __future__ import annotations
 

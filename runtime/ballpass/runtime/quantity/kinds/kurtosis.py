@@ -1,4 +1,4 @@
-"""Kurtosis: how much of a signal is in its peaks, which a damaged raceway raises before its rms does."""
+"""Kurtosis: the weight of the peaks in a signal.  A damaged raceway raises it before the rms."""
 
 from __future__ import annotations
 
