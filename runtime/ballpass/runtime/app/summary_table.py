@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 #: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
 _COLUMNS = ("value", "min", "max", "mean", "rms", "std")
 
-#: What the table's caption tells of the run, and with which words.
+#: Parts of the table's caption about the run, with their words.
 _RUN = {
     "rtol": "rtol {}",
     "steps": "{} steps",
@@ -53,7 +53,7 @@ def render_summary(summary: Mapping[str, Any]) -> ReportTable:
             rows.append((name, *cells, unit))
         for key, value in item.items():
             if key not in _COLUMNS and key != "unit" and not isinstance(value, Mapping):
-                # a named part of a quantity, as the peak's elastic one; what is said of it is in the file
+                # a named part of a quantity, as the peak's elastic one; its other numbers are in the file
                 rows.append((f"{name}.{key}", _cell(item, key, factor), "", "", "", unit))
     return ReportTable(
         title=f"{summary['title']}: {summary['method']}",
@@ -94,7 +94,7 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
         unit = parse_quantity(model.manifest, name).unit
         factor, unit = TABLE_UNITS.get(unit, (1.0, unit))
         value, error = accuracy.values[name], accuracy.estimates[name]
-        # no more digits than the error leaves
+        # no more digits than the error allows
         digits = min(max(math.ceil(-math.log10(max(error, 1e-16))), 1), 9) if math.isfinite(error) else 1
         rows.append((name, f"{factor * value:z.{digits}g}", f"{100 * error:.2g} %", unit))
     right = ("value", "estimated error")

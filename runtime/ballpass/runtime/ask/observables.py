@@ -91,7 +91,7 @@ def statistics(t: ArrayLike, signal: ArrayLike) -> SignalStatistics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StroboscopicPoints:
-    """State seen once per turn: times [s], positions [m] and velocities [m/s], each (k,)."""
+    """State once per turn: times [s], positions [m] and velocities [m/s], each (k,)."""
 
     time: Array
     position: Array

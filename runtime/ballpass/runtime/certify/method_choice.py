@@ -31,7 +31,7 @@ class MethodChoice:
 
     @property
     def words(self) -> str:
-        """For people: method, tolerance, and kinks where they are located."""
+        """As text: method, tolerance, and kinks where they are located."""
         return f"{self.method}, rtol {self.rtol:g}" + (", kinks located" if self.kinks == LOCATED else "")
 
     def measure(self, quantities: QuantityRun, run: Run, moved: float | np.ndarray = 0.0) -> EvaluatedQuantities:

@@ -59,13 +59,13 @@ Array = NDArray[np.float64]
 #: How much rougher panels of quadratures may be in the looser run beside.
 COARSER = 4.0
 
-#: A change of the start by this share of the motion is a large one: it stays near, so that its effect is linear.
+#: Natural change of a state at the start, as a share of the motion: small, so that its effect is linear.
 START_SHARE = 1e-2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Query:
-    """What is asked for; None takes the scene's run settings, or this module's defaults.
+    """The request; None takes the scene's run settings, or this module's defaults.
 
     Attributes
     ----------
@@ -198,7 +198,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
             slopes=slopes,
         )
         with np.errstate(invalid="ignore", divide="ignore"):
-            # what the routes differ in tells how well quadratures and extremes are known
+            # the difference of the routes gives the uncertainty of quadratures and extremes
             apart = np.nan_to_num(np.abs(values - second.quantities) / np.abs(values))
         own = own + apart[:, None] * np.abs(slopes)
     pairs = []
@@ -219,7 +219,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
                     sides=second.sides(row, column),
                 )
             known = float(own[row, column])
-            # of two numbers that nobody vouches for, the one that is known better
+            # neither is verified: take the smaller uncertainty
             better = (
                 check.verdict is Verdict.NOT_CHECKED
                 and check.value is not None

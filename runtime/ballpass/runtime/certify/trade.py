@@ -28,7 +28,7 @@ from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.show.progress import Progress, shown
 
-#: The reference and the second opinion on it.
+#: The reference and the method that checks it.
 REFERENCE = MethodChoice(method="stepper-rodas5p", rtol=1e-12, kinks=LOCATED)
 SECOND = MethodChoice(method="stepper-dp54", rtol=1e-12, kinks=LOCATED)
 
@@ -64,7 +64,7 @@ def perturbed(
     """Parameter sets around some numbers: every one that is not zero, drawn evenly from its neighbourhood.
 
     The times of a load's table stay: drawn one by one they would change places where the load is steep.  A number that
-    is not allowed is mirrored at the user's, for that one may lie on its bound.
+    is not allowed is mirrored at the user's, which may lie on its bound.
     """
     random = np.random.default_rng(seed)
     manifest = model.manifest

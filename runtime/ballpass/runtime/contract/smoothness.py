@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-#: Word of the manifest -> what people read.
+#: Word of the manifest -> description.
 WORDS = {
     "twice smooth": "twice continuously differentiable",
     "smooth": "once continuously differentiable (second derivative unbounded at contact onset)",
