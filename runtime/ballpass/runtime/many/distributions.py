@@ -49,7 +49,7 @@ class Distribution:
             support = self._frozen().support()
         except TypeError as fault:
             raise RequestError(f"{self.name}: {self._shown()}. {self._allowed()}.") from fault
-        if not support[0] <= support[1]:  # SciPy answers NaN
+        if not support[0] <= support[1]:  # SciPy gives NaN
             raise RequestError(
                 f"{self.name}: {self._shown()} lie outside the domain of this distribution of scipy.stats. scale is "
                 "above 0; for shape parameters see SciPy's page of it."

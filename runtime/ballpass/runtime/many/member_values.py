@@ -44,7 +44,7 @@ def measure_members(
             return dict(zip(which, values, strict=True)), None
         except (RequestError, SimulationError) as fault:
             known: dict[int, float] = {}
-            if len(which) > 1:  # each that is known by itself
+            if len(which) > 1:  # one by one
                 for k in which:
                     known |= measure(member, (k,))[0]
             return known, fault

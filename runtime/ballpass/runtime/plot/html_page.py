@@ -19,7 +19,7 @@ def page(numbers: Mapping[str, Any]) -> str:
     parts = {
         "/*TITLE*/": html.escape(str(numbers["title"])),
         "/*SCRIPT*/": _template("animation.js"),
-        "/*DATA*/": text.replace("<", "\\u003c"),  # no word of a scene ends the element
+        "/*DATA*/": text.replace("<", "\\u003c"),  # so that no text of a scene ends the element
     }
     found = _template("animation.html")
     for mark, content in parts.items():

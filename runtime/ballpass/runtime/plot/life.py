@@ -20,7 +20,7 @@ from ballpass.runtime.ratings.life import MILLION
 
 Array = NDArray[np.float64]
 
-#: Names and lines of the readings.
+#: Labels and lines of the readings.
 _LOOKS = {
     "mean": FIRST | {"label": "means over time"},
     "miner": SECOND | {"label": "damage added up (Miner)"},

@@ -15,7 +15,7 @@ from ballpass.runtime.run import driver_angle
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
 
-#: Angles looked at in a turn; between them minima are refined.
+#: Angles checked in a turn; between them minima are refined.
 ANGLES = 720
 
 #: Sweeps around the smallest sample, each so many times finer than the one before.
@@ -23,7 +23,7 @@ SWEEPS, FINE = 3, 128
 
 
 def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
-    """Look at every margin of the linkage over a turn.
+    """Check every margin of the linkage over a turn.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
 
 
 def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mapping[str, Any]) -> None:
-    """Look at every margin of the linkage at one instant alone; others of the turn are not looked at.
+    """Check every margin of the linkage at one instant alone, not over the turn.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mappi
     kernel.run(there)
     (margins,) = kernel.outputs.values()
     heights = margins.tolist()
-    if all(height > 0.0 for height in heights):  # no number is no assembly
+    if all(height > 0.0 for height in heights):  # NaN: it cannot be assembled
         return
     angle = math.degrees(driver_angle.crank_angle(model.manifest, numbers.values, t))
     faults = [
@@ -100,7 +100,7 @@ def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mappi
 
 
 def _margins(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> np.ndarray:
-    """Margins at times counted from t = 0, shape (times, margins); no number is no assembly.
+    """Margins at times counted from t = 0, shape (times, margins); NaN: it cannot be assembled.
 
     Where the driver's angle is a state, in place of times angles past the start [rad].
     """

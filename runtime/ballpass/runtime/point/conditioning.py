@@ -28,16 +28,16 @@ if TYPE_CHECKING:
 #: Name of the generated function with A.
 FUNCTION = "reaction_system"
 
-#: Angles looked at in a turn; around the largest value the maximum is refined.
+#: Angles evaluated in a turn; around the largest value the maximum is refined.
 ANGLES = 360
 
 #: Sweeps around the largest sample, each so many times finer than the one before.
 SWEEPS, FINE = 3, 16
 
-#: Scaled condition number above which reactions are warned about [1].
+#: Scaled condition number above which a warning is given [1].
 BOUND = 1e4
 
-#: Passes of the scaling; each halves the logarithm of what is left to do.
+#: Passes of the scaling; each halves the logarithm of the remaining imbalance.
 PASSES = 12
 
 
@@ -67,7 +67,7 @@ def has_reactions(model: LoadedModel) -> bool:
 
 
 def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
-    """Look at a turn; where nothing turns, at the position that stands.
+    """Condition numbers over a turn; where nothing turns, at the given position.
 
     Warns
     -----
@@ -81,7 +81,7 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
     span = turn if math.isfinite(turn) else 0.0
 
     def matrix(t: float) -> np.ndarray:
-        """At a time, or so far past the start angle."""
+        """At a time, or at an angle past the start angle."""
         if by_angle:
             (x,) = driver_angle.turned_states(model.manifest, numbers.values, np.array([t]))
             u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, 0.0)

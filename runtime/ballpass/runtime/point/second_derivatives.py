@@ -45,7 +45,7 @@ def hessian(
     Raises
     ------
     RequestError
-        `wrt` is no pair, unknown names, or a law without a bounded second derivative.
+        `wrt` is not a pair, unknown names, or a law without a bounded second derivative.
     SimulationError
         The derivatives are not finite there.
     """
@@ -118,7 +118,7 @@ def _input(item: InputInfo, known: dict[str, ca.SX], numbers: Numbers, t: float)
     """An input at the time `t` as a function of parameters: its value there, and what moves it."""
     if item.kind == "phase":
         now = float(driver_angle.inputs_at([item], numbers.values, t)[0])
-        # the angle within the turn, for rounding; what is subtracted and added has the same value
+        # the angle within the turn, for rounding; the subtracted and the added term have the same value
         whole = numbers.values[item.offset] + numbers.values[item.rate] * t
         return known[item.offset] + known[item.rate] * t + (now - whole)
     if item.kind == "border":
@@ -129,7 +129,7 @@ def _input(item: InputInfo, known: dict[str, ca.SX], numbers: Numbers, t: float)
     if piece.rows[0] == piece.rows[1]:
         return ca.SX(0.0) if item.kind == "table_rate" else known[item.values[piece.rows[0]]]
     (t0, t1), (y0, y1) = ([known[names[row]] for row in piece.rows] for names in (item.times, item.values))
-    # angles are counted on beyond a turn; what is added has no derivative
+    # angles are counted beyond a turn; the added whole turns have no derivative
     t0, t1 = (
         k + (v - numbers.values[item.times[r]]) for k, v, r in zip((t0, t1), piece.knots, piece.rows, strict=True)
     )

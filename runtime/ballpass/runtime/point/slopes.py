@@ -44,7 +44,7 @@ STEP = 1e-6
 
 
 class KinkWarning(BallpassWarning):
-    """There is no derivative, as where a law has a corner or two peaks are as high; the warning says what is given."""
+    """There is no derivative, as where a law has a corner or two peaks are equal; the warning names the value given."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,7 +65,7 @@ class Slopes:
 
     @property
     def differ(self) -> NDArray[np.bool_]:
-        """Where the sides are not one: there is no derivative there."""
+        """Where the sides differ: there is no derivative there."""
         size = np.maximum(np.abs(self.below), np.abs(self.above))
         beside = np.max(size, axis=0, initial=0.0)
         found: NDArray[np.bool_] = np.abs(self.above - self.below) > ALIKE * size + ALIKE_BESIDE * beside
@@ -164,7 +164,7 @@ class Deflections:
         return np.flatnonzero(resting & (self.value > 0.0) if self._jumps else resting).tolist()
 
     def reach(self, direction: JacobianDirections, balls: Sequence[int]) -> float:
-        """How far to go along a direction so that these balls are clear of rest; 0 where it leaves them there."""
+        """Step along a direction that moves these balls away from rest; 0 where it does not move them."""
         sizes = [
             float(np.max(np.abs(np.asarray(self._there[name])[moved]) / np.abs(along[moved])))
             for name, along in _arguments(direction)
@@ -192,7 +192,7 @@ class Deflections:
 
 
 def named(balls: Sequence[int]) -> str:
-    """Balls for people, who count from 1."""
+    """Names of balls, counted from 1."""
     return "ball " + ", ".join(str(k + 1) for k in balls)
 
 

@@ -49,6 +49,6 @@ def competing_peak(view: View, quantity: Quantity, mark: Mark) -> str:
 
 
 def _scale(view: View, name: str) -> float:
-    """What a change of a parameter is measured in: its value; of an angle a radian."""
+    """Scale of a change of a parameter: its value; of an angle a radian."""
     unit = next(info.unit for info in view.manifest.parameters if info.name == name)
     return 1.0 if unit == "rad" else abs(view.numbers.parameters[name])

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 #: The output that shows where contacts begin and end.
 DEFLECTION = "ball.deflection"
 
-#: Kinks nearer to each other, or to an edge, than this share of the time that counts are one [1].
+#: Kinks nearer to each other, or to an edge, than this share of the time that counts are taken as one [1].
 APART = 1e-9
 
 #: Halvings that locate a kink on the cubic through four nodes.
@@ -114,7 +114,7 @@ def find_kinks(
         pairs = {
             (int(best[k]), int(best[k + 1])) for k in np.flatnonzero((np.diff(best) != 0) & (np.diff(segment) == 0))
         }
-        # a crossing of two balls that carry less is a kink of nothing, and does no harm
+        # a crossing of two less loaded balls is no kink; the extra cut does no harm
         signals += [table[:, a] - table[:, b] for a, b in sorted({(min(pair), max(pair)) for pair in pairs})]
     kept: list[float] = []
     for time in np.sort(crossings(t, segment, *signals)).tolist():

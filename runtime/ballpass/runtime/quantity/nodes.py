@@ -101,7 +101,7 @@ def make_edges(run: Run, segments: Segments, chain: Chain | None) -> Edges:
     Raises
     ------
     RequestError
-        Several loads switch at one time, each of which could move on its own.
+        Several loads switch at one time, and each could move separately.
     """
     times, near = segments.times, 1e-9 * min(run.turn, run.duration)
     first = int(np.argmin(np.abs(times - run.start)))
@@ -186,7 +186,7 @@ def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
 
 
 def find(edges: Edges, time: float) -> tuple[int, float]:
-    """Interval and fraction of a time; an edge belongs to what follows."""
+    """Interval and fraction of a time; an edge belongs to the interval after it."""
     last = len(edges.times) - 2
     k = min(max(int(np.searchsorted(edges.times, time, side="right")) - 1, 0), last)
     left, right = float(edges.times[k]), float(edges.times[k + 1])

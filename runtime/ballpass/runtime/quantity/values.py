@@ -19,7 +19,7 @@ from ballpass.runtime.run.resolve import resolve
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuantityValue:
-    """A quantity's value: name, number, unit; time and ball of an extreme; what to mind."""
+    """A quantity's value: name, number, unit; time and ball of an extreme; remarks."""
 
     name: str
     value: float

@@ -70,8 +70,8 @@ def sensitivity(
 ) -> SensitivityReport:
     """Differentiate quantities of interest by parameters, and check every derivative by a second route.
 
-    Where the two routes disagree the command reports both numbers, and its exit code is 1. Charts rank what moves a
-    quantity most.
+    Where the two routes disagree the command reports both numbers, and its exit code is 1. Charts rank the parameters
+    by their effect.
 
     Parameters
     ----------

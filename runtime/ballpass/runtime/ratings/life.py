@@ -53,7 +53,7 @@ def static_safety(static_rating: Any, load: Any) -> Any:
 
 
 def reference_viscosity(speed: float, pitch_diameter: float) -> float:
-    """Viscosity ν_1 that just parts the surfaces [m²/s]; ISO 281:2007.
+    """Viscosity ν_1 that just separates the surfaces [m²/s]; ISO 281:2007.
 
     The two branches of the standard do not meet: at 1000 rpm the upper one is 2 % lower.
 
@@ -92,7 +92,7 @@ def life_factor(viscosity_ratio: Any, contaminated_limit: Any) -> Any:
             f"thin a film. Allowed: {least} and above. Take a thicker lubricant, or judge by the basic life alone."
         )
     kappa = smaller(viscosity_ratio, most)
-    # three branches that meet at 0.4 and 1; each is the one wanted where it is between the two others
+    # three branches that meet at 0.4 and 1; everywhere the middle one of the three values holds
     fall = smaller(2.2649 * kappa**-0.054381, larger(1.9987 * kappa**-0.19087, 1.9987 * kappa**-0.071739))
     bracket = 1.0 - (2.5671 - fall) ** 0.83 * contaminated_limit ** (1.0 / 3.0)
     return 0.1 * larger(bracket, (MOST_MODIFIED / 0.1) ** (-1.0 / 9.3)) ** -9.3
@@ -120,7 +120,7 @@ def modified_life(life: Any, factor: Any, reliability: float = 0.90) -> Any:
 def ball_ratings(
     dynamic_rating: Any, balls: Any, gamma: Any, grooves: tuple[Any, Any] = REFERENCE_GROOVES
 ) -> tuple[Any, Any]:
-    """Q_ci and Q_ce, loads of a ball that inner and outer ring bear for a million turns [N]; ISO 16281:2008.
+    """Q_ci and Q_ce, loads of a ball for a life of a million turns of inner and outer ring [N]; ISO 16281:2008.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ def ratings_of(bearing: BearingInfo, values: Mapping[str, Any]) -> Ratings:
     )
 
 
-#: Slower than this part of the driver, rings do not turn against each other [1].
+#: Rings turn against each other above this part of the speed of the driver [1].
 TURNS = 1e-9
 
 

@@ -21,7 +21,7 @@ class Reported:
         raise NotImplementedError
 
     def report(self) -> Report:
-        """What the answer says: sentences, tables, plain data.
+        """The report of the answer: sentences, tables, plain data.
 
         Examples
         --------

@@ -17,10 +17,10 @@ from rich.text import Text
 
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 
-#: Columns of text where no terminal says how many.
+#: Columns of text without a terminal.
 WIDTH = 80
 
-#: Measures what cells take.
+#: Measures the width of cells.
 _WIDE = Console(width=10_000, emoji=False)
 
 #: Styles of the terminal, by what marked text means.

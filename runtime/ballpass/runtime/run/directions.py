@@ -102,7 +102,7 @@ class Chain:
         Raises
         ------
         RequestError
-            Several loads switch at that time, each of which could move on its own.
+            Several loads switch at that time, and each could move separately.
         """
         shift = np.zeros(len(self.names))
         for name, slope in driver_angle.breakpoint_derivative(self._inputs, self._values, time):
@@ -118,7 +118,7 @@ class Directions:
     model, numbers : the model and the run's numbers
     names : parameters
     samples : number of samples of the run
-    kinks : what the run does at the kinks of the laws
+    kinks : treatment of the kinks of the laws
 
     Raises
     ------

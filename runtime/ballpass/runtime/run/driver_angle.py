@@ -78,7 +78,7 @@ def driver_at(manifest: Manifest, values: Values, t: float) -> tuple[float, floa
 
 
 def turned_states(manifest: Manifest, values: Values, angles: np.ndarray) -> np.ndarray:
-    """States with the driver so far past its start [rad], all else zero, shape (angles, states)."""
+    """States with the driver at these angles past its start [rad], all else zero, shape (angles, states)."""
     assert manifest.mechanism is not None  # it has the driver
     found = np.zeros((len(angles), len(manifest.states)))
     at = [info.name for info in manifest.states].index(manifest.mechanism.angle)
@@ -95,7 +95,7 @@ def inputs_at(inputs: Sequence[InputInfo], values: Values, t: float, inside: flo
     values : parameters and derived constants by name
     t : reference time of phases and table values [s]
     inside : a time within the open interval for which gates and slopes hold [s].  Default: `t`, where an edge belongs
-        to what follows in angle (gates) and in time (tables).
+        to the interval that follows in angle (gates) and in time (tables).
 
     Returns
     -------
@@ -227,7 +227,7 @@ def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float)
     Raises
     ------
     RequestError
-        Several loads switch at that time, each of which could move on its own.
+        Several loads switch at that time, and each could move separately.
     """
     found: dict[tuple[tuple[str, float], ...], None] = {}
     for item in inputs:

@@ -24,7 +24,7 @@ FREE = 1e-10
 
 
 class SearchEnd(Enum):
-    """How a search for rest ended."""
+    """How a search for equilibrium ended."""
 
     FOUND = "found"
     UNHELD = "nothing holds the body"
@@ -59,10 +59,10 @@ def settle(
     force, stiffness : force on each coordinate, and -d(force)/d(position)
     start : positions, shape (coordinates,)
     weights : of the coordinates in the residual that has to fall
-    done : whether the forces count as none, from positions, force and stiffness there
+    done : whether the forces count as zero, from positions, force and stiffness there
     gone : whether these positions are so far away that nothing holds the body
     iterations : most of them
-    free : least stiffness that is put in place of none, relative to the largest
+    free : smallest stiffness, also in place of zero, relative to the largest
     """
     q, net = start.copy(), force(start)
     size = float(np.linalg.norm(weights * net))

@@ -27,7 +27,7 @@ from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.settle import LEAST, MOST, PEAKS
 
-#: Change of a life, relative to itself, that counts as none [1].
+#: Relative change of a life that counts as zero [1].
 LIVES = 1e-2
 
 
@@ -37,11 +37,11 @@ class LoadHistory:
 
     Attributes
     ----------
-    turns : how long that was; None where nothing turns
+    turns : number of turns; None where nothing turns
     duration : [s]
     shaft_speed : mean of driver or shaft [rad/s]
     change : by the second half of the turns: of the life, or of the peak, that moved most, relative to itself [1]
-    settled : whether that counts as none
+    settled : whether that counts as zero
     powers : of the loads of each bearing, by its prefix
     peaks : the highest force of any ball of each bearing, likewise
     """
@@ -131,7 +131,7 @@ def _history(going: ReducedRun) -> LoadHistory:
 
 
 def _compared(going: ReducedRun, before: LoadHistory) -> LoadHistory:
-    """Loads so far, with what has changed since."""
+    """Loads so far, with the change since the last ones."""
     found = _history(going)
     values = going.run.numbers.values
     life, peak = 0.0, 0.0

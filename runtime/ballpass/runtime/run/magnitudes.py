@@ -94,7 +94,7 @@ def _moments(
     begin: float,
     edges: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
-    """Inputs at the moments that are looked at, shape (moments, inputs), and the time that bounds travel [s]."""
+    """Inputs at the moments, shape (moments, inputs), and the time that bounds travel [s]."""
     horizon = min(duration, turn)
     if edges is None:
         edges = segment_edges(model, numbers, begin, begin + duration, turn)

@@ -19,7 +19,7 @@ SEAL_LENGTH = 82
 
 
 def seal(digest: str) -> bytes:
-    """What stands behind the data of a saved file, which HDF5 does not look at: the SHA-256 digest of all bytes before.
+    """Last bytes of a saved file, which HDF5 ignores: the SHA-256 digest of all bytes before.
 
     The HDF5 library may end the process, or give other numbers, where bytes of a file have changed; so they are checked
     first.

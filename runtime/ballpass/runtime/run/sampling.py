@@ -44,7 +44,7 @@ class Sampling:
 
 
 def sampling_of(model: LoadedModel, request: Request, turn: float) -> Sampling:
-    """Check what a request says of samples and outputs.
+    """Check samples and outputs of a request.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def sampling_of(model: LoadedModel, request: Request, turn: float) -> Sampling:
     Raises
     ------
     RequestError
-        What was asked for is wrong, with what is allowed.
+        The request is wrong; the message says what is allowed.
     """
     outputs = output_names(model, request.outputs)
     duration, times = _sample_times(model, request, turn, outputs)

@@ -38,7 +38,7 @@ LOADED_MOMENTS = 3
 #: Most iterations of the continuation for one equilibrium.
 ITERATIONS = 80
 
-#: Residual left over, relative to that at the start [1].
+#: Allowed residual, relative to that at the start [1].
 SETTLED = 1e-6
 
 #: Largest coordinate over the difference to its partner at which that difference still has digits [1].
@@ -96,7 +96,7 @@ class Groups:
         return float(np.max(np.abs(x[own] - other)))
 
     def gone(self, x: np.ndarray) -> bool:
-        """Whether a group has gone too far for the differences in it to be told."""
+        """Whether a group has moved so far that rounding hides the differences in it."""
         return any(np.max(np.abs(x[own])) > FAR * self.apart(name, x) for name, own in self.members.items())
 
 
@@ -104,7 +104,7 @@ class Groups:
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-# numbers that overflow end a search or a run further down, with words
+# numbers that overflow end a search or a run later, with a message
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def find_scales(
     rhs: Field,
@@ -122,7 +122,7 @@ def find_scales(
     rhs, jacobian : right-hand side and its derivative along the states
     inputs : inputs at moments spread over the run
     initial : state at the start, shape (states,)
-    horizon : a turn, or the run [s]; bounds the travel of a body that nothing holds
+    horizon : a turn, or the run [s]; bounds the travel of an unsupported body
     groups : which coordinates share a magnitude
     masses : of the coordinates [kg].  Default: equal ones
     """
@@ -180,9 +180,9 @@ def find_scales(
 def _equilibrium(
     rhs: Field, jacobian: Field, groups: Groups, u: np.ndarray, start: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, bool] | None:
-    """State at rest with vanishing acceleration, True; or where it got to as nothing holds a group, False.
+    """State at rest with vanishing acceleration, True; or the last one where nothing holds a group, False.
 
-    None when the continuation gets nowhere.
+    None when the continuation fails.
     """
     half = len(start) // 2
     free = ~groups.angles

@@ -26,7 +26,7 @@ def load_solution(path: str | Path) -> Solution:
     Raises
     ------
     RequestError
-        There is no such file, it is none of ours, or it was cut short or edited.
+        There is no such file, it has another format, or it was cut short or edited.
 
     Examples
     --------
@@ -60,7 +60,7 @@ def read_bytes(path: str | Path, content: bytes) -> Solution:
 
 
 def _read(path: str | Path, content: bytes) -> Solution:
-    """Solution from the bytes of a file that nobody has touched."""
+    """Solution from the bytes of an unchanged file."""
     import h5netcdf
 
     with h5netcdf.File(io.BytesIO(content), "r") as stored:

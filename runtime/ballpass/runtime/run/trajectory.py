@@ -37,7 +37,7 @@ class Trajectory:
     finished : samples filled
     passed : segments integrated, at least in part
     calls : calls of the integrator
-    steps, rejected : it took
+    steps, rejected : of the integration
     """
 
     begin: float

@@ -49,7 +49,7 @@ def framed_page(page: str, height: int = 720) -> str:
 
 
 def title(words: str, note: str = "") -> str:
-    """A line that says what this is, and a fainter one about it."""
+    """A title line, and a fainter line below it."""
     return f'<p><span class="title">{escape(words)}</span></p>' + (paragraph(note) if note else "")
 
 
