@@ -8,14 +8,14 @@
 #include "single.h"
 
 enum {
-    BP_STIFF_STEPS = 12, /* steps at the stability limit before an explicit method gives up */
-    BP_STIFF_LOOK = 8,   /* every so many steps it looks whether it is there */
-    BP_FAMILY_LOOKS = 3, /* looks that a change of family is decided on */
+    BP_STIFF_STEPS = 12, /* steps at the stability limit before an explicit method stops */
+    BP_STIFF_LOOK = 8,   /* steps between two checks whether it is at the limit */
+    BP_FAMILY_LOOKS = 3, /* checks before a change of family is decided */
     BP_FAMILY_REST = 3,  /* decisions without asking for the largest stable step where steps are far below it */
-    BP_PATIENCE = 4      /* decisions that a linearly implicit method gets to show what it is worth */
+    BP_PATIENCE = 4      /* decisions before a linearly implicit method is judged */
 };
 
-/* Step size, in the mean over the looks, by the largest stable step of an explicit method.  Above the first an explicit method is held
+/* Step size, in the mean over the checks, by the largest stable step of an explicit method.  Above the first an explicit method is held
    down by stability and not by accuracy, below the second it is far from it.  Below the third a linearly implicit step, which costs more
    than two explicit ones, is not worth it. */
 static const double BP_LIMITED = 0.9, BP_FAR_FROM_LIMIT = 0.3, BP_WORTH_SOLVING = 1.25;
@@ -27,8 +27,8 @@ static const double BP_WORTH_TRYING = 1.7, BP_WORTH_KEEPING = 3.0;
 /* Limits of stability of the explicit methods, step size times rate: for decay, and for DOP853 as well for oscillation without damping. */
 static const double BP_DP54_DECAY = 3.3, BP_DOP853_DECAY = 6.3, BP_DOP853_OSCILLATION = 5.9;
 
-/* Where accuracy asks for steps far below the stability limit the higher order pays, although its step costs twice as much.  Below the
-   last the ring flies free. */
+/* Where accuracy asks for steps far below the stability limit the higher order pays, although its step costs twice as much.  Below
+   BP_FREE no ball is in contact. */
 static const double BP_HIGH_ORDER = 0.35, BP_LOW_ORDER = 1.2, BP_FREE = 1e-3;
 
 /* Whether limits of the step size [s] are numbers that can be kept to. */
@@ -115,7 +115,7 @@ static inline double bp_fastest_mode(const double *restrict A, const double *res
     return frequency;
 }
 
-/* Largest step of Dormand-Prince 5(4) or DOP853 that is stable for q'' = A q + B q' [s]; infinite where nothing touches. */
+/* Largest step of Dormand-Prince 5(4) or DOP853 that is stable for q'' = A q + B q' [s]; infinite without contact. */
 static inline double bp_stable_step(const double *restrict A, const double *restrict B, int dp54)
 {
     double decay, squared, ratio;
@@ -131,8 +131,8 @@ static inline double bp_stable_step(const double *restrict A, const double *rest
 }
 
 /* Whether the linearly implicit family fits from the start: where damping is faster than the oscillation it damps, for then an explicit
-   method's step is held down by stability and not by accuracy.  What oscillates fast may have to be followed, and steps must show that it
-   has not (family.h).  A = da/dq, B = da/dv. */
+   method's step is held down by stability and not by accuracy.  A fast oscillation may have to be resolved; only the steps show
+   whether (family.h).  A = da/dq, B = da/dv. */
 static inline int bp_is_stiff(const double *restrict A, const double *restrict B)
 {
     double decay, squared;

@@ -23,7 +23,7 @@ static void write_outputs(bp_run *run, double start, double t, double h, double 
             prepared = 1;
             state_at(run, theta > 0.0 ? theta : 0.0, y);
         }
-        /* behind the state: the derivatives use its slopes */
+        /* after the state: the derivatives use its slopes */
         tangent_output(run, t, h, theta > 0.0 ? theta : 0.0, y, tangents_prepared);
         tangents_prepared = tangents_prepared || theta < 1.0;
         result->written++;
@@ -41,7 +41,7 @@ static void note_end(const bp_run *run, double time, int on_kink)
 }
 
 #ifdef BALLPASS_REDUCTIONS
-/* An accepted step, for the reductions: its dense output is ready.  They look at its part from `from` over `span` of it. */
+/* An accepted step, for the reductions: its dense output is ready.  They use its part from `from` over `span` of it. */
 typedef struct {
     const bp_run *run;
     double t, h, from, span;
@@ -68,7 +68,7 @@ static void reduce_step(bp_run *run, double start, double t, double h)
 {
     if (run->reduction == NULL) return;
     prepare_dense(run, t, h);
-    /* the output of DOP853 is of degree seven, more than five points tell: its steps are taken in halves */
+    /* the output of DOP853 is of degree seven, too high for five points: its steps are taken in halves */
     const int parts = run->method == BALLPASS_DOP853 ? 2 : 1;
     const int of_balls = bp_balls_wanted(run->reduction), powers = bp_powers_wanted(run->reduction);
     for (int part = 0; part < parts; part++) {
