@@ -55,7 +55,7 @@ class Kept:
 
 
 def stepped(cycle: Cycle, name: str, tolerance: float) -> np.ndarray:
-    """States at the output points by one raw call of the stepper on prepared arrays; NaN behind a failure."""
+    """States at the output points by one raw call of the stepper on prepared arrays; NaN after a failure."""
     stepper = stepper_for(cycle.model, choose_kinks(None, name, cycle.model.manifest, tolerance))
     states = np.empty((POINTS, len(cycle.start)))
     outcome = stepper.run(

@@ -110,7 +110,7 @@ class Cycle:
         self.model, self.parameters, self.start, self.magnitude = model, parameters, start, magnitude
         self.numbers: Numbers = model.numbers(parameters)
         self.period = model.period(parameters)
-        # the quotient may lie a last digit behind the end
+        # by rounding the quotient may lie after the end
         self.times = np.minimum(self.period * np.arange(1, POINTS + 1) / POINTS, self.period)
         self.edges = segment_edges(model, self.numbers, 0.0, self.period, self.period)
 

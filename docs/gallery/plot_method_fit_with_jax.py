@@ -8,7 +8,7 @@ derivatives of the simulation.
 """
 
 # %%
-# JAX has to compute in 64 bits, which it is told before its first array.
+# JAX has to compute in 64 bits, which is set before its first array.
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt

@@ -395,7 +395,7 @@ class Model(PointModel, Questions):
         kinks: Kinks | None = None,
         progress: Progress = None,
     ) -> Reductions:
-        """Extremes with their times, mean and rms of a run behind its transient, without a stored trajectory.
+        """Extremes with their times, mean and rms of a run after its transient, without a stored trajectory.
 
         Parameters are those of `simulate`; the transient's turns do not count.  The memory does not grow with the run.
         Several times a second `progress` is called and an interrupt (Ctrl-C) takes effect; that changes no bit of the

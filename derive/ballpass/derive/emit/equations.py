@@ -1,4 +1,4 @@
-"""Derived equations for people: a `System` as Markdown with LaTeX.
+"""Derived equations as a readable text: a `System` as Markdown with LaTeX.
 
 In: a `System`.  Out: text; the same system gives the same bytes.
 """

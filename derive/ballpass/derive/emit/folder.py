@@ -12,7 +12,7 @@ switches.h         where the laws have kinks, for runs whose steps end there; no
 model.casadi, equations.casadi    the same functions serialised, for machines without a compiler
 jacobians.c, .h    all quantities, their derivatives and those of the right-hand side, compiled when first asked for
 jacobians.casadi   the quantities serialised
-EQUATIONS.md       the derivation for people
+EQUATIONS.md       the derivation as a readable text
 manifest.json      the contract with the runtime, written last
 
 The same scene gives the same bytes on every run.

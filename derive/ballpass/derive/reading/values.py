@@ -122,7 +122,7 @@ def parse_override(scene: Scene, text: str) -> tuple[str, float]:
                     problem="an override without a value",
                     given=show(text),
                     allowed="PATH=VALUE",
-                    remedy='write the value with its unit behind "=", as in "bearing.clearance=20 um"',
+                    remedy='write the value with its unit after "=", as in "bearing.clearance=20 um"',
                 )
             ]
         )
@@ -225,7 +225,7 @@ def _check_windows(checker: Checker, load: Load) -> None:
             window.end.path,
             "the load ends before it begins",
             f"start {checker.show(window.start)}, end {checker.show(window.end)}",
-            "an end behind the start",
+            "an end after the start",
             "give a later end, or none for a load that does not end",
         )
 

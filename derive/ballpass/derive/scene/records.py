@@ -163,7 +163,7 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedOverTime:
-    """Rows of a driver's speed: times [s], increasing, and the speeds behind the first, which is `Driver.speed`."""
+    """Rows of a driver's speed: times [s], increasing, and the speeds after the first, which is `Driver.speed`."""
 
     time: tuple[SceneNumber, ...] = column(
         "s", "Time in row ROW of the driver's table", "t_{1,ROW}", bounds=NOT_NEGATIVE, note="increasing"
@@ -291,7 +291,7 @@ class HarmonicLoad:
 class TableLoad:
     """Force on the inner ring, linear between rows.
 
-    Rows are over the `time` [s], constant before the first and behind the last, or the `angle` of the shaft [rad],
+    Rows are over the `time` [s], constant before the first and after the last, or the `angle` of the shaft [rad],
     periodic over a turn; the other one is empty.  Rows strictly increasing, `x` and `y` [N]; all of one length of at
     least two.
     """

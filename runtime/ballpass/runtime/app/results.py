@@ -1,6 +1,6 @@
 """The results of a run as a folder: solution, summary and figures.
 
-In: a folder, and a function that writes the files of a run.  Out: the folder holds them, and whatever else was in it.
+In: a folder, and a function that writes the files of a run.  Out: the folder holds them beside its other files.
 The summary is put in place last and carries the digests of the other files, so that `load_results` reads a complete run
 or refuses: a process that is killed during the writing leaves the old run, the new one, or files that are refused.
 """

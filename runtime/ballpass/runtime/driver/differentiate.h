@@ -124,7 +124,7 @@ static void tangent_accept(bp_run *run)
     }
 }
 
-/* Derivatives at fixed time of the state y behind a part of the step. */
+/* Derivatives at fixed time of the state y after a part of the step. */
 static void tangent_output(bp_run *run, double t, double h, double part, const double *y, int prepared)
 {
     const ballpass_tangents *tangents = run->tangents;

@@ -2,7 +2,7 @@
 
    switches.h is generated with the scene from the conditions of its laws: switching functions g of a ball's deflection and rate, zero at
    the kinks, and the law with its sides held.  A step is tried with the sides that its start has; where the law can be continued, it is
-   smooth within the step whatever the step does.  The step is checked at BP_LOOKS places: a side changes where g is beyond zero by more
+   smooth within any step.  The step is checked at BP_LOOKS places: a side changes where g is beyond zero by more
    than a band, which is a part BP_BAND of the error allowed in a step.  Below that a kink does not matter, and a ring that rests on one
    does not count as crossing it by rounding; between these places the parabola through three of them shows a ball that has been on the
    other side.  The step is then repeated so that it ends where g is zero on its dense output, and the sides are turned there.

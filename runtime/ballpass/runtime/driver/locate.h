@@ -253,7 +253,7 @@ static int locate(bp_run *run, double start, double t, double *h, double *error,
     for (int e = 0; e < BP_EVENTS; e++)
         if (bp_of_rate[e] == bp_of_rate[which]) scale = fabs(s->seen[0][e]) > scale ? fabs(s->seen[0][e]) : scale;
     const double band = s->band[which], least = 1e-6 * band, rounding = 4.0 * DBL_EPSILON * scale;
-    /* behind a branch point of the law its slope is unbounded: a linearly implicit step stays on the other side */
+    /* after a branch point of the law its slope is unbounded: a linearly implicit step stays on the other side */
     const double clear = is_explicit(run->method) ? 0.0 : bp_ends(which, 1.0) ? -1.0 : bp_ends(which, -1.0) ? 1.0 : 0.0;
     const double goal = clear * (least > rounding ? least : rounding);
     double length = tried; /* of the step at hand */

@@ -19,7 +19,7 @@ from ballpass.runtime.plot.style import (
     styled,
 )
 
-#: Part of the turns that the closer look at ball loads shows, and part of the time below which high loads are rare.
+#: Part of the turns in the enlarged panel of ball loads, and part of the time below which high loads are rare.
 CLOSER, RARE = 1.0 / 16.0, 0.2
 
 

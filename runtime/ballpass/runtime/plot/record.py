@@ -107,7 +107,7 @@ class Record:
         return np.zeros_like(time)
 
     def load_windows(self) -> tuple[tuple[float, float], ...]:
-        """Windows of the crank angle in which some load acts, start in [0, 2 pi), end behind it [rad].
+        """Windows of the crank angle in which some load acts, start in [0, 2 pi), end after it [rad].
 
         A load that acts all the turn has none.
         """

@@ -59,7 +59,7 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
             body = constant.name.removeprefix("body.").removesuffix(".turns")
             raise RequestError(
                 f"The {body} turns by more than three eighths of a turn while the driver turns by 7.5 degrees: which "
-                "way its bearings' balls went cannot be told. Change lengths so that no joint passes another so near."
+                "way its bearings' balls went is unknown. Change lengths so that no joint passes another so near."
             )
 
 

@@ -98,7 +98,7 @@ def _refuse_unbounded(model: LoadedModel, labels: Sequence[str], functions: Sequ
     if rough and asked:
         raise RequestError(
             f"hessian: {asked[0]} depends on laws without a bounded second derivative ({', '.join(rough)}): that of "
-            "Hertz's law grows as deflection^(-1/2) at contact onset, so a number would tell nothing of its "
+            "Hertz's law grows as deflection^(-1/2) at contact onset, so a number would say nothing about its "
             'surroundings. Take the smoothed law: smoothing = "0.05 um" in [bearing.contact], for a one-sided damping '
             'law also smoothing = "1 mm/s" in [bearing.damping].'
         )

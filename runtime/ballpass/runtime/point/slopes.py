@@ -2,14 +2,14 @@
 
 In: a model, numbers, a point.  Out: dense arrays.
 
-A one-sided law damps a ball's approach and not its release: its force has a corner where the deflection's rate is
-zero.  The generated code takes the side of release for every ball there.  A sum over balls may have a derivative all
-the same: with an even number of balls one of two opposite balls approaches in either direction of motion, and both
-together are a linear dashpot.  So the sum is differentiated, not one ball after the other: where a direction moves the
-rate of a ball at rest, the derivative along it is taken at a small distance on either side, where each ball is on one
-side of its law. The law is piecewise linear in the rate, so that both are the one-sided slopes.  Where they agree there
-is a derivative; where they do not, their mean is given, which is what a harmonic motion about the point loses energy
-by, and both are told.
+A one-sided law damps a ball's approach and not its release: its force has a corner where the deflection's rate is zero.
+The generated code takes the side of release for every ball there.  A sum over balls may have a derivative all the same:
+with an even number of balls one of two opposite balls approaches in either direction of motion, and both together are a
+linear dashpot.  So the sum is differentiated, not one ball after the other: where a direction moves the rate of a ball
+at rest, the derivative along it is taken at a small distance on either side, where each ball is on one side of its law.
+The law is piecewise linear in the rate, so that both are the one-sided slopes.  Where they agree there is a derivative;
+where they do not, their mean is given, which is the damping of a harmonic motion about the point, and both are
+reported.
 """
 
 from __future__ import annotations

@@ -304,7 +304,7 @@ def is_reduced(model: LoadedModel, quantity: Quantity) -> bool:
 
 
 def around(layout: Layout, extreme: Extreme) -> tuple[tuple[int, float], ...]:
-    """Points before and behind an extreme, within its panel; none where that ends beside it."""
+    """Points before and after an extreme, within its panel; none where that ends beside it."""
     panels = layout.panels
     if panels is None:
         return ()

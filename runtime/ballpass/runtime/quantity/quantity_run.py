@@ -241,7 +241,7 @@ class QuantityRun:
         return values, layouts
 
     def _plain_view(self, run: Run, layout: Layout) -> View:
-        """What kinds see of a run without derivatives."""
+        """Data for kinds, of a run without derivatives."""
         nodes, marks = _with_moments(run, layout, layout.edges, place(layout.plan, layout.edges), None)
         signals = layout.signals
         if layout.track is None:
@@ -358,7 +358,7 @@ def _of_reductions(runs: ReducedRuns, quantity: Quantity) -> Estimate:
 
 
 def _appended(nodes: Nodes, edges: Edges, time: float, slope: Array, moment: Moment) -> Nodes:
-    """Nodes with one more at a time of its own; at an edge the loads behind it hold, at the end those before."""
+    """Nodes with one more at a time of its own; at an edge the loads after it hold, at the end those before."""
     segment, _ = find(edges, time)
     return Nodes(
         t=np.append(nodes.t, edges.times[-1] if moment.kind == "end" else time),

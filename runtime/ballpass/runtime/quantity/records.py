@@ -121,7 +121,7 @@ class Mark:
     other : column that the channel's most loaded ball changes to or from at this very moment; None elsewhere
     rate, other_rate : time derivatives of both columns there, where there is another
     at_edge : whether the extreme lies at an edge of a load or of the window
-    around : nodes at equal distances before and behind it, the same number of both
+    around : nodes at equal distances before and after it, the same number of both
     competing : the next extremes elsewhere in the run
     """
 

@@ -310,7 +310,7 @@ def _table(item: InputInfo, values: Values, t: np.ndarray, inside: np.ndarray) -
         knots, heights = np.append(knots, knots[0] + TURN), np.append(heights, heights[0])
     k = np.searchsorted(knots, begin, side="right")
     within = (k > 0) & (k < len(knots))
-    # pieces before the first knot and behind the last are flat; a table over the angle has none
+    # pieces before the first knot and after the last are flat; a table over the angle has none
     slopes = np.concatenate([[0.0], np.diff(heights) / np.diff(knots), [0.0]])[k]
     if item.kind == "table_rate":
         return np.asarray(slopes)

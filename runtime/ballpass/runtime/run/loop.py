@@ -195,7 +195,7 @@ class RunUnderWay:
     families: list[str] = field(default_factory=list)
 
     def go_on(self, until: float | None = None) -> None:
-        """Integrate to the end of the run, or to a time, which may lie behind it [s].
+        """Integrate to the end of the run, or to a time, which may lie after it [s].
 
         Raises
         ------

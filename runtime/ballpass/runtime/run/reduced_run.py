@@ -80,7 +80,7 @@ def start_reducing(run: Run, channels: Collection[str]) -> ReducedRun:
     Raises
     ------
     RequestError
-        Nothing is left of the run behind its transient.
+        The run ends within its transient.
     """
     row = reduction_rows(run.model.manifest).empty(1, run.check_steady().start, channels)[0]
     return ReducedRun(going=start_run(run, [ReductionRow(row=row)]), row=row, channels=tuple(channels))

@@ -114,7 +114,7 @@ def _sample_times(
         duration = run_length(model, request, turn)
         if times[-1] > (begin + duration) * (1.0 + driver_angle.TIME_RESOLUTION):
             raise RequestError(
-                f"times: the run ends at {begin + duration!r} s, and {float(times[-1])!r} s lies behind it. Run "
+                f"times: the run ends at {begin + duration!r} s, and {float(times[-1])!r} s lies after it. Run "
                 "longer, or leave cycles and duration out: the run then ends at the last time."
             )
     check_length(begin + duration, turn)

@@ -52,7 +52,7 @@ class Statistics:
     located : kinks located, None where they are stepped over
     initial : state at its start; None where an earlier version wrote the solution
     begin : time at its start, above 0 where it continues another run [s]
-    duration : length of the run, which may end behind the last sample [s]; None as for `initial`
+    duration : length of the run, which may end after the last sample [s]; None as for `initial`
 
     Examples
     --------
@@ -96,7 +96,7 @@ class Solution:
     statistics : how the solution came about
     status : how the simulation ended
     accuracy : target, choice and estimate, where an error was named instead of a method
-    reductions : extremes, means and rms found in every step of the run, whatever its samples: of the states, and of
+    reductions : extremes, means and rms found in every step of the run, for any samples: of the states, and of
         the most loaded ball for those outputs that are kept.  None for other methods than the project's own stepper,
         beside derivatives, and where no output is kept
     steady_reductions : the same from the end of the transient on
@@ -198,7 +198,7 @@ class Solution:
         return tuple(state.name for state in self.manifest.states)
 
     def steady(self) -> Solution:
-        """The samples behind the transient cycles; times are kept.
+        """The samples after the transient cycles; times are kept.
 
         Raises
         ------

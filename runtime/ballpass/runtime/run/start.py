@@ -97,7 +97,7 @@ def _check_driver(model: LoadedModel, numbers: Numbers, time: float, x: np.ndarr
     if abs(given - speed) > SAME_ANGLE * max(abs(speed), 1.0):
         raise RequestError(
             f"initial: the driver's speed {given:.9g} rad/s was given, and its table has {speed:.9g} rad/s at "
-            f"t = {time:g} s. Give that speed; to go on with a run give its end, initial=solution.end."
+            f"t = {time:g} s. Give that speed; to continue a run give its end, initial=solution.end."
         )
 
 
@@ -122,7 +122,7 @@ def _refuse_jump(model: LoadedModel, numbers: Numbers, end: RunEnd) -> None:
         what = "the driver" if moved[0] == np.max(moved) else "balls"
         raise RequestError(
             f"initial: with {', '.join(changed)} changed, {what} would jump by "
-            f"{math.degrees(float(np.max(moved))):.4g} deg at t = {end.time:.6g} s, where the run goes on. Allowed: "
+            f"{math.degrees(float(np.max(moved))):.4g} deg at t = {end.time:.6g} s, where the run continues. Allowed: "
             "parameters that leave driver and balls where they are. Give them as they were, or start anew from the "
             "state alone: initial=solution.end.x."
         )

@@ -210,7 +210,7 @@ def _read_range(numbers: _SceneNumbers | _ModelNumbers, text: str) -> Range:
     require(whole, "this is not a range", "PATH=A:B:N or PATH=A:B:N:log", f"write it as in {_EXAMPLE}")
     ends = tuple(numbers.value(path, end) for end in parts[:2])
     count = int(parts[2]) if re.fullmatch(r"[0-9]{1,18}", parts[2]) else 0
-    remedy = f"write a count behind the ends, as in {_EXAMPLE}"
+    remedy = f"write a count after the ends, as in {_EXAMPLE}"
     require(count >= 2, "the count of values is wrong", "a whole number from 2 on", remedy)
     remedy = f'for one value write --set {path}="{parts[0]}"'
     require(ends[0] != ends[1], "both ends are the same", "two ends that differ", remedy)

@@ -181,7 +181,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     if (!at) return fmi3Error;
     if (!(isfinite(startTime) && startTime >= 0.0) || (FMU_STARTS_AT_ZERO && startTime != 0.0) || (stopTimeDefined && !(stopTime > startTime && isfinite(stopTime))))
         return fail(at, "fmi3EnterInitializationMode: a run from %g s to %g s was asked for. Allowed: %s.", startTime, stopTimeDefined ? stopTime : INFINITY,
-                    FMU_STARTS_AT_ZERO ? "a start at 0, a stop behind it" : "a start from 0 on, a stop behind it");
+                    FMU_STARTS_AT_ZERO ? "a start at 0, a stop after it" : "a start from 0 on, a stop after it");
     if (toleranceDefined && !(tolerance >= 1e-13 && tolerance <= 0.1))
         return fail(at, "fmi3EnterInitializationMode: the tolerance %g was given. Allowed: a number from 1e-13 to 0.1.", tolerance);
     at->own.asked = ballpass_default(at->simulation);

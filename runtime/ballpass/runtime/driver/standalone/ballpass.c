@@ -310,7 +310,7 @@ static void check_request(ballpass *s, const ballpass_request *asked)
     if (!(isfinite(asked->begin) && isfinite(asked->end) && asked->begin >= 0.0 && asked->end > asked->begin)) {
         const int still = !isfinite(asked->end) && !isfinite(time_of_turn(s->run.values));
         add_fault(&s->faults, "a run from %g s to %g s was asked for. Allowed: %s.", asked->begin, asked->end,
-                  still ? "a time, for nothing turns in this model (its speed is zero)" : "finite times, from 0 on, the end behind the begin");
+                  still ? "a time, for nothing turns in this model (its speed is zero)" : "finite times, from 0 on, the end after the begin");
     }
     if (!(asked->rtol >= SMALLEST_RTOL && asked->rtol <= LARGEST_RTOL))
         add_fault(&s->faults, "tolerance: %g was given. Allowed: a number from 1e-13 to 0.1.", asked->rtol);

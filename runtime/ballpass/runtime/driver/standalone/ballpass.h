@@ -75,7 +75,7 @@ int ballpass_columns(void);
 const char *ballpass_column(int column, const char **unit);
 int ballpass_read(ballpass *simulation, double *columns);
 
-/* The next time at which a load switches, behind the time reached [s]; infinite where none does before the run's end. */
+/* The next time at which a load switches, after the time reached [s]; infinite where none does before the run's end. */
 double ballpass_next_switch(ballpass *simulation);
 
 /* A copy of all data of an instance, in so many bytes, for instances of the same program on machines of the same kind.  A run that
