@@ -121,8 +121,7 @@ def _of_netcdf(file: Path, name: str, wanted: str) -> tuple[list[float], str]:
         variable = stored.variables[wanted]
         if variable.ndim != 1 or variable.dtype.kind not in "fiu":
             given = f"{variable.ndim} dimensions of {variable.dtype}"
-            problem = f"{wanted} of {name} is not a column"
-            _refuse(problem, given, "numbers along one dimension", "name another variable")
+            _refuse(f"{wanted} of {name} is no column", given, "numbers along one dimension", "name another variable")
         _few(name, variable.shape[0])
         unit = variable.attrs.get("units", "")
         return [float(value) for value in variable[...]], unit if isinstance(unit, str) else ""
