@@ -116,7 +116,7 @@ class Model(PointModel, Questions):
         self, folder: Path, manifest: Manifest, library: CompiledLibrary | None, *, compiler: str | None = None
     ) -> None:
         super().__init__(folder, manifest, library, compiler=compiler)
-        self._assembled = b""  # parameters whose linkage was checked last
+        self._assembled = b""  # parameters whose linkage was looked at last
 
     def __reduce__(self) -> tuple[Callable[[str, str, str | None], Model], tuple[str, str, str | None]]:
         return _load_same, (str(self.folder), self.manifest.signature, self._compiler)

@@ -62,7 +62,7 @@ def _rosenbrock(name: str, t: RosenbrockTableau) -> str:
 
 
 def _inner_stages(t: RosenbrockTableau) -> int:
-    """Stages after the first whose time is not the end of the step; the rest must all be there."""
+    """Stages behind the first whose time is not the end of the step; the rest must all be there."""
     inner = [i for i, node in enumerate(t.nodes) if i > 0 and node != 1]
     if inner != list(range(1, len(inner) + 1)):
         raise TypeError(f"{t.name}: the stages at the end of the step are expected to be the last ones")

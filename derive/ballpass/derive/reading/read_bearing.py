@@ -35,9 +35,9 @@ from ballpass.derive.scene.units import show
 
 #: Keys that every bearing has.
 _NUMBERS = ("balls", "ball_diameter", "pitch_diameter", "clearance", "ball_angle")
-#: Values of the placeholders in the keys of materials.
+#: What placeholders in the keys of materials stand for.
 RINGS, BALLS = {"PART": "rings", "_OF": ""}, {"PART": "balls", "_OF": "_w"}
-#: Keys that give the stiffness of a contact.
+#: What gives the stiffness of a contact.
 _GEOMETRY = ("inner_groove_radius", "outer_groove_radius", *keys_of(Material))
 CONTACT = Either(what="the contact stiffness", groups=(("stiffness",), _GEOMETRY), at="stiffness")
 MASS = Either(what="the moved mass", groups=(("mass",), ("equivalent_mass",)))

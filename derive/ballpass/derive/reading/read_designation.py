@@ -106,6 +106,6 @@ def _fill_contact(table: Table) -> None:
             continue
         try:
             filled[f"{ring}_groove_radius"] = f"{parse_quantity(ball, 'm') * float(ratio)!r} m"
-        except QuantityError:  # reported where the ball diameter is read
+        except QuantityError:  # told where the ball diameter is read
             filled[f"{ring}_groove_radius"] = "1 m"
     table.data = {**table.data, "contact": filled | contact}

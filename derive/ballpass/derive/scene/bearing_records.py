@@ -286,8 +286,8 @@ class Bearing:
     `coupling` two-way: its play moves the bodies of the joint; `inner_body` carries the inner ring, `count` bearings
     stand side by side (None: one).
     `balls` is structure.  `clearance` is diametral (ISO 5753) [m].  `ball_angle` is theta_0 [rad].
-    `outer` is None for a fixed outer ring.  `catalogue`, `cage` and `lubrication` are None where the scene
-    does not give them.
+    `outer` is None for a fixed outer ring.  `catalogue`, `cage` and `lubrication` are None where the scene says
+    nothing of that kind.
     """
 
     name: str

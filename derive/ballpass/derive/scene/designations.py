@@ -1,7 +1,7 @@
 """Deep groove ball bearings by designation, and groups of clearance.
 
-In: a designation ("6204"), a bore.  Out: dimensions, balls and ratings of catalogues; the clearance of a group.  The
-head of ``deep_groove.csv`` names the sources of the numbers, and those that no standard fixes.
+In: a designation ("6204"), a bore.  Out: dimensions, balls and ratings of catalogues; the clearance of a group.  Where
+the numbers are from, and which of them no standard fixes, is said at the head of ``deep_groove.csv``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from importlib.resources import files
 #: Groove radius over ball diameter, inner and outer: reference values of ISO 16281.
 GROOVES = (Decimal("0.52"), Decimal("0.53"))
 #: Radial clearance of deep groove ball bearings with cylindrical bore, lowest and highest [µm], by the bore up to which
-#: [mm] it holds; ISO 5753-1.  It is the diametral clearance P_d: the travel of one ring from one side to the other.
+#: [mm] it holds; ISO 5753-1.  It is the diametral clearance P_d: the way of one ring from one side to the other.
 GROUPS = ("C2", "CN", "C3", "C4", "C5")
 _CLEARANCES: tuple[tuple[int, tuple[tuple[int, int] | None, ...]], ...] = (
     (6, ((0, 7), (2, 13), (8, 23), None, None)),
@@ -43,7 +43,7 @@ class CatalogueRating:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BearingType:
-    """A bearing of the table; lengths as decimals in mm, so that results from them are exact."""
+    """A bearing of the table; lengths as decimals in mm, so that what follows from them is exact."""
 
     designation: str
     bore: Decimal

@@ -309,7 +309,7 @@ class ChoiceKey(Key):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextKey(Key):
-    """A text; empty, with a fault, where there is none.  With `longest`, one line of at most `longest` characters."""
+    """A text; empty, with a fault, where there is none.  With `longest`, one line of at most as many characters."""
 
     longest: int = 0
 

@@ -165,7 +165,7 @@ def run(
     Derives and compiles what is stale in generated/<scene>. Options not given are those of the scene's run table.
     """
     with command(scene) as stages:
-        # inside the function, so that an interrupt during the import ends the command cleanly
+        # within: an interrupt while they are imported is one of the command
         from ballpass.runtime.app.summary import add_turns, summarize
         from ballpass.runtime.app.summary_table import render_accuracy, render_quantities, render_summary
         from ballpass.runtime.run.settle import look_further

@@ -53,7 +53,7 @@ def render_summary(summary: Mapping[str, Any]) -> ReportTable:
             rows.append((name, *cells, unit))
         for key, value in item.items():
             if key not in _COLUMNS and key != "unit" and not isinstance(value, Mapping):
-                # a named part of a quantity, as the peak's elastic one; its other numbers are in the file
+                # a named part of a quantity, as the peak's elastic one; what is said of it is in the file
                 rows.append((f"{name}.{key}", _cell(item, key, factor), "", "", "", unit))
     return ReportTable(
         title=f"{summary['title']}: {summary['method']}",

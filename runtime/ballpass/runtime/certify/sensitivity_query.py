@@ -59,7 +59,7 @@ Array = NDArray[np.float64]
 #: How much rougher panels of quadratures may be in the looser run beside.
 COARSER = 4.0
 
-#: Natural change of a state at the start, as a share of the motion: small, so that its effect is linear.
+#: A change of the start by this share of the motion is a large one: it stays near, so that its effect is linear.
 START_SHARE = 1e-2
 
 
@@ -219,7 +219,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
                     sides=second.sides(row, column),
                 )
             known = float(own[row, column])
-            # neither is verified: take the smaller uncertainty
+            # of two numbers that nobody vouches for, the one that is known better
             better = (
                 check.verdict is Verdict.NOT_CHECKED
                 and check.value is not None

@@ -43,8 +43,8 @@ class Sensitivity:
     ----------
     quantity, parameter : names
     value, parameter_value : numbers
-    derivative, unit : dQ/dp; where neither route is verified, the number with the smaller uncertainty
-    dimensionless : (p/Q) dQ/dp; NaN where p or Q is zero
+    derivative, unit : dQ/dp; where nothing vouches for either route's number, the one that is known better
+    dimensionless : (p/Q) dQ/dp; NaN where p or Q is zero: there it says nothing of the parameter's effect
     scale : change of the parameter that is a large one, in its unit: its value; for an angle a radian; where it is
         zero, what positions move by in the run, or the largest value of its unit
     uncertainty : of the derivative, same unit: that of the steps from a run at a looser tolerance, and from the

@@ -27,8 +27,8 @@ static const double BP_WORTH_TRYING = 1.7, BP_WORTH_KEEPING = 3.0;
 /* Limits of stability of the explicit methods, step size times rate: for decay, and for DOP853 as well for oscillation without damping. */
 static const double BP_DP54_DECAY = 3.3, BP_DOP853_DECAY = 6.3, BP_DOP853_OSCILLATION = 5.9;
 
-/* Where accuracy asks for steps far below the stability limit the higher order pays, although its step costs twice as much.  Below
-   BP_FREE no ball is in contact. */
+/* Where accuracy asks for steps far below the stability limit the higher order pays, although its step costs twice as much.  Below the
+   last the ring flies free. */
 static const double BP_HIGH_ORDER = 0.35, BP_LOW_ORDER = 1.2, BP_FREE = 1e-3;
 
 /* Whether limits of the step size [s] are numbers that can be kept to. */
@@ -115,7 +115,7 @@ static inline double bp_fastest_mode(const double *restrict A, const double *res
     return frequency;
 }
 
-/* Largest step of Dormand-Prince 5(4) or DOP853 that is stable for q'' = A q + B q' [s]; infinite without contact. */
+/* Largest step of Dormand-Prince 5(4) or DOP853 that is stable for q'' = A q + B q' [s]; infinite where nothing touches. */
 static inline double bp_stable_step(const double *restrict A, const double *restrict B, int dp54)
 {
     double decay, squared, ratio;

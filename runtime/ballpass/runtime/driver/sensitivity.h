@@ -195,8 +195,8 @@ static inline void bp_explicit_tangent_start(const ballpass_tangents *tangents, 
     }
 }
 
-/* Differentiate an explicit step that was tried; `plain` still holds its slopes.  Block after block, so that one block's numbers stay in
-   the cache; data common to the blocks are computed before. */
+/* Differentiate an explicit step that was tried; `plain` still holds its slopes.  Block after block, so that one block's numbers stay near
+   the processor; what the blocks share is made beforehand. */
 static inline void bp_explicit_tangent_step(const bp_explicit_method *restrict method, const int stages, const ballpass_tangents *tangents,
                                             bp_tangent_block *restrict work, const bp_explicit *restrict plain, const bp_numbers *n,
                                             long segment, double t, const double *restrict x, double h, const double *lead,

@@ -1,7 +1,7 @@
 """A moving picture as one HTML file that needs nothing else: no network, no server, no library.
 
-In: the plain numbers of `animation.to_plain`.  Out: the text of a page.  ``animation.html`` is its layout,
-``animation.js`` its code.
+In: the plain numbers of `animation.to_plain`.  Out: the text of a page.  ``animation.html`` says what it looks like,
+``animation.js`` what it does.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def page(numbers: Mapping[str, Any]) -> str:
     parts = {
         "/*TITLE*/": html.escape(str(numbers["title"])),
         "/*SCRIPT*/": _template("animation.js"),
-        "/*DATA*/": text.replace("<", "\\u003c"),  # so that no text of a scene ends the element
+        "/*DATA*/": text.replace("<", "\\u003c"),  # no word of a scene ends the element
     }
     found = _template("animation.html")
     for mark, content in parts.items():

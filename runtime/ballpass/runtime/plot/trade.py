@@ -13,7 +13,7 @@ from ballpass.runtime.certify.trade_report import Measured, Trade
 from ballpass.runtime.plot.style import GREY, INK, PALE, SAND, SIGNAL, caption, log_ticks, new_figure, styled
 from ballpass.runtime.run.locating import LOCATED
 
-#: Marker and colour of each method; shapes distinguish them in grey as well; open markers have located kinks.
+#: Marker and colour of each method; shapes tell them apart in grey as well, and open ones locate kinks.
 _METHODS: dict[str, tuple[str, str]] = {
     "stepper": ("o", INK),
     "stepper-rodas4": ("s", SAND),

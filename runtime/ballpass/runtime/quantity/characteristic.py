@@ -14,10 +14,10 @@ from ballpass.runtime.contract import BearingInfo, Manifest
 from ballpass.runtime.ratings.kinematic_frequencies import KinematicFrequencies
 from ballpass.runtime.run import driver_angle
 
-#: Multiples that are searched: of the shaft, of ball passes, of the cage (more are ball passes); and most shafts or
-#: cages as sidebands.  With more of them every line would get a name.
+#: Multiples that are looked for: of the shaft, of ball passes, of the cage (more are ball passes); and the most shafts
+#: or cages to their sides.  With more of them everything would be something.
 MOST_OF_SHAFT, MOST_MULTIPLES, MOST_OF_CAGE, MOST_SIDEBANDS = 30, 10, 3, 5
-#: A second name is given where it is hardly less simple.
+#: A second name is told where it is hardly less simple.
 NEARLY_AS_SIMPLE = 2
 
 
@@ -106,7 +106,7 @@ def characteristic_lines(
 
 
 def identify(frequency: float, lines: Sequence[CharacteristicLine], resolution: float) -> str:
-    """Name of a line of a spectrum: "3 BPFO", "BPFI - shaft"; the simplest that fits, "" where none does.
+    """What a line of a spectrum is: "3 BPFO", "BPFI - shaft"; the simplest that fits, "" where nothing does.
 
     Parameters
     ----------

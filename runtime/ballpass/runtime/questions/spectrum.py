@@ -96,7 +96,7 @@ class SignalSpectrum(ShortRepr, Reported):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the highest lines: "BPFO", "2 shaft"; empty where none fits."""
+        """What the highest lines are: "BPFO", "2 shaft"; empty for what is none."""
         from ballpass.runtime.quantity.characteristic import identify
 
         return tuple(identify(float(self.position[k]), self.marks, self.resolution) for k in self.highest)

@@ -92,7 +92,7 @@ def life_factor(viscosity_ratio: Any, contaminated_limit: Any) -> Any:
             f"thin a film. Allowed: {least} and above. Take a thicker lubricant, or judge by the basic life alone."
         )
     kappa = smaller(viscosity_ratio, most)
-    # three branches that meet at 0.4 and 1; everywhere the middle one of the three values holds
+    # three branches that meet at 0.4 and 1; each is the one wanted where it is between the two others
     fall = smaller(2.2649 * kappa**-0.054381, larger(1.9987 * kappa**-0.19087, 1.9987 * kappa**-0.071739))
     bracket = 1.0 - (2.5671 - fall) ** 0.83 * contaminated_limit ** (1.0 / 3.0)
     return 0.1 * larger(bracket, (MOST_MODIFIED / 0.1) ** (-1.0 / 9.3)) ** -9.3

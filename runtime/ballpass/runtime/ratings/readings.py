@@ -2,10 +2,10 @@
 
 In: mean powers of the loads over time.  Out: equivalent loads of both rings [N], lives [turns].
 
-There are three ways.  `mean` takes ISO 16281's means over the balls, one ring turning against the load
+A history has more than one reading.  `mean` takes ISO 16281's means over the balls, one ring turning against the load
 and the other standing, over time as well.  `miner` takes the damage of the standing ring at every instant and adds it
-up.  `sectors` needs no ring to stand or to turn: it adds up the damage at every place of each raceway, in the ring's
-own coordinates, and equals either mean where the load stands or turns.  Where a load turns with the shaft, as a
+up.  `sectors` asks no ring to stand or to turn: it adds up what every place of each raceway has met, in the ring's own
+coordinates, and reduces to either mean where the load stands or turns.  Where a load turns with the shaft, as a
 punch's, one place of the inner raceway meets it in every turn, and `mean` is on the unsafe side.
 
 Means are over time, which is over turns where the speed is constant.

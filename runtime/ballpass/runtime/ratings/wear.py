@@ -21,7 +21,7 @@ COEFFICIENTS = (1e-17, 1e-13)
 def depth_of_pass(place: Any, load: Any, contact: RacewayContact) -> Any:
     """Depth that a pass of a ball wears off at a place across the groove, over the wear coefficient [N/m].
 
-    The pressure integrated along the path of the ball, times the ratio of slip:
+    The pressure along the way of the ball, integrated, times the share of the way that slips:
     (π/2) p_0 b (1 - x²/a²) abs(s(x)).  It holds within the contact; beyond it there is no wear.
 
     Parameters

@@ -37,11 +37,11 @@ class LoadHistory:
 
     Attributes
     ----------
-    turns : number of turns; None where nothing turns
+    turns : how long that was; None where nothing turns
     duration : [s]
     shaft_speed : mean of driver or shaft [rad/s]
     change : by the second half of the turns: of the life, or of the peak, that moved most, relative to itself [1]
-    settled : whether that counts as zero
+    settled : whether that counts as none
     powers : of the loads of each bearing, by its prefix
     peaks : the highest force of any ball of each bearing, likewise
     """

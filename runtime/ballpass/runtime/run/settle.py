@@ -1,9 +1,9 @@
 """Find the number of turns for a peak: a run continues until its extremes and means settle.
 
-In: a model, numbers, a request.  Out: `Settled`.  The balls are at other places at the load's peak in each turn, so the
-peak of two turns depends on the balls' first angle.  The turns are doubled until that changes no extreme of any channel
-by more than `PEAKS` of its range, and no rms by more than `MEANS`.  Fewer than `LEAST` turns are not trusted: two and
-four of them may share a peak by luck.
+In: a model, numbers, a request.  Out: `Settled`.  The balls meet the load's peak in other places each turn, so the peak
+of two turns depends on the balls' first angle.  The turns are doubled until that changes no extreme of any channel by
+more than `PEAKS` of its range, and no rms by more than `MEANS`.  Fewer than `LEAST` turns are not trusted: two and four
+of them may share a peak by luck.
 """
 
 from __future__ import annotations

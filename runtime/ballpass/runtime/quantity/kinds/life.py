@@ -29,8 +29,8 @@ Dual = tuple[float | Array, Array]
 #: Angle of ball 1 as the rings see it, outer and inner, behind the bearing's prefix.
 PLACES = ("cage.in_outer", "cage.in_inner")
 
-#: Step along the imaginary axis that gives the derivatives of powers of means: without a difference nothing
-#: cancels, for any small step (Squire and Trapp 1998) [1].
+#: Step along the imaginary axis that gives the derivatives of powers of means: no difference is taken, so that none
+#: cancels, however small it is (Squire and Trapp 1998) [1].
 IMAGINARY = 1e-100
 
 
@@ -143,7 +143,7 @@ def _reduced(runs: ReducedRuns, quantity: Quantity, readings: Sequence[str]) -> 
 
 
 def _needs(channel: str, readings: Sequence[str]) -> tuple[str, ...]:
-    # the loads at each place of the raceways need no root of a load
+    # what every place of the raceways has met needs no root of a load
     powers = LOAD_POWERS[:1] if tuple(readings) == ("sectors",) else LOAD_POWERS
     return tuple(channel.removesuffix("ball.force") + name for name in powers)
 
