@@ -146,7 +146,8 @@ def test_files_of_two_runs_are_refused_by_name(tmp_path: Path, runs: tuple[Path,
     target = tmp_path / "rotor"
     put(target, runs[0], 0)
     (target / name).write_bytes((runs[1] / SOLUTION).read_bytes())
-    with pytest.raises(RequestError, match=rf"{name}: does not belong to the run of summary\.json.*Run the scene again"):
+    refusal = rf"{name}: does not belong to the run of summary\.json.*Run the scene again"
+    with pytest.raises(RequestError, match=refusal):
         load_results(target)
 
 

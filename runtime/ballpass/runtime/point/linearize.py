@@ -83,7 +83,7 @@ class Linearization(Reported):
     time : the instant [s]
     at_equilibrium : whether the state is the static equilibrium of that instant
     unbalanced : accelerations left at the state, largest [m/s^2]
-    notes : limits of the result, in words
+    notes : what does not hold without reserve, for people
 
     Examples
     --------
