@@ -1,7 +1,7 @@
 """Entry point of the ``ballpass`` command.
 
 An interrupt (Ctrl-C) ends it with exit code 130, also while modules are imported or objects destroyed, where Python
-turns an interrupt into other errors or only prints it.  An interrupt after the last output changes nothing.
+turns an interrupt into other faults or into a remark.  One that comes when all is done changes nothing.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def main() -> None:
     """Import the command line and run it."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # ASCII has no µ, and pipes of Windows cannot show lines of tables
+            stream.reconfigure(errors="replace")  # ASCII has no µ, and pipes of Windows no rules of tables
     interrupted = False
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:

@@ -58,8 +58,8 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
 
     Parameters
     ----------
-    table : mapping from name to one number for each member; or one mapping for each member, where parameters that a
-        member does not name keep their defaults; or a structured array
+    table : mapping from name to one number for each member; or one mapping for each member, where what a member does
+        not name keeps its default; or a structured array
 
     Raises
     ------

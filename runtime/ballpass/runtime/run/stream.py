@@ -71,7 +71,7 @@ def stream_run(model: LoadedModel, numbers: Numbers, request: Request, path: Pat
 
 
 def _edges(model: LoadedModel, request: Request, rate: float, begin: float, end: float, piece: int) -> list[int]:
-    """Numbers of the first samples of the pieces, and the one after the last."""
+    """Numbers of the samples with which pieces begin, and the one behind the last."""
     first, behind = int(np.ceil(begin * rate - 1e-6)), int(np.floor(end * rate + 1e-6)) + 1
     if behind - first < 2:
         raise RequestError(f"sample_rate: {rate:g} Hz has fewer than two samples within the run. Give a higher rate.")
