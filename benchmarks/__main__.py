@@ -72,17 +72,17 @@ def _version(name: str) -> str:
 def main(arguments: list[str] | None = None) -> int:
     """Measure the parts that are asked for; the page holds them and those measured before at the same commit."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="a look at every part; numbers mean nothing")
-    parser.add_argument("--draw", action="store_true", help="measure nothing: write the page of the results there are")
+    parser.add_argument("--quick", action="store_true", help="run every part briefly; the numbers mean nothing")
+    parser.add_argument("--draw", action="store_true", help="measure nothing: write the page from existing results")
     parser.add_argument("--out", type=Path, help="folder of page and results; default: docs and benchmarks/results")
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(parts(False))}")
     options = parser.parse_args(arguments)
     known = parts(options.quick)
     unknown = sorted(set(options.parts) - set(known))
     if unknown:
-        parser.error(f"no such part: {', '.join(unknown)}. There are {', '.join(known)}.")
+        parser.error(f"unknown part: {', '.join(unknown)}. There are {', '.join(known)}.")
     if options.draw and options.parts:
-        parser.error("--draw measures nothing: name no part, or leave --draw out.")
+        parser.error("--draw measures nothing: omit the parts or --draw.")
     out = options.out or (ROOT / "build" / "benchmarks" / "quick" if options.quick else None)
     folder = out / "results" if out else ROOT / "benchmarks" / "results"
     folder.mkdir(parents=True, exist_ok=True)

@@ -28,9 +28,9 @@ class Contender:
 
     Attributes
     ----------
-    label, group : names for people, of itself and of the curve of the figure that it belongs to
-    solve : member and tolerance to states at the output points, shape (POINTS, 8)
-    tolerances : that are swept
+    label, group : its name in tables, and the name of its curve in the figure
+    solve : function of member and tolerance; returns the states at the output points, shape (POINTS, 8)
+    tolerances : all that are measured
     ready : raises `UnavailableError` where it cannot run
     """
 
@@ -55,7 +55,7 @@ class Kept:
 
 
 def stepped(cycle: Cycle, name: str, tolerance: float) -> np.ndarray:
-    """States at the output points by one raw call of the stepper on prepared arrays; NaN behind a failure."""
+    """States at the output points by one raw call of the stepper on prepared arrays; NaN after a failure."""
     stepper = stepper_for(cycle.model, choose_kinks(None, name, cycle.model.manifest, tolerance))
     states = np.empty((POINTS, len(cycle.start)))
     outcome = stepper.run(
@@ -91,7 +91,7 @@ def _simulated(method: str, outputs: list[str] | None) -> Solve:
 
 
 def own_contenders() -> list[Contender]:
-    """All of them, in the order of tables; plain `stepper`, to which ratios are, first."""
+    """All of them, in the order of tables; first the plain `stepper`, to which ratios refer."""
     return [
         *(_stepper(name) for name in METHODS),
         Contender(label="model.simulate, outputs included", group="model.simulate", solve=_simulated("stepper", None),

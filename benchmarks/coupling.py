@@ -18,7 +18,7 @@ from benchmarks.problem import BUILD, ROOT, Cycle
 from benchmarks.timing import interleave, spread
 from benchmarks.work_precision import time_at
 
-#: Scenes and words; ratios are to the first.
+#: Scenes and their names; ratios refer to the first.
 SCENES = {
     "punching_press": "one-way at A, the paper's model",
     "punching_press_two_way": "two-way at A",

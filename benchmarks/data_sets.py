@@ -1,6 +1,6 @@
 """Throughput of data sets: this process alone, and the workers of a Dask cluster on this machine.
 
-``python -m benchmarks.data_sets [--members N] [--rounds N] [--page FILE]``; two minutes with what is not given.
+``python -m benchmarks.data_sets [--members N] [--rounds N] [--page FILE]``; takes two minutes with the defaults.
 """
 
 from __future__ import annotations

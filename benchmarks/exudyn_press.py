@@ -52,7 +52,7 @@ class ExudynPress:
         self.symbolic_function = importlib.import_module("exudyn.utilities").CreateSymbolicUserFunction
         self.n, self.balls = numbers, balls
         self.speed = numbers["mechanism.driver.speed"]
-        self.functions: list[Any] = []  # Exudyn holds no reference to them
+        self.functions: list[Any] = []  # Exudyn keeps no reference to them
 
     def solve(self, step: float, integrator: str, times: np.ndarray) -> np.ndarray:
         """Displacements of the inner and the outer ring at times of one turn.

@@ -1,4 +1,7 @@
-"""The page of the benchmarks: results in, Markdown and a figure for each damping out, with its caption on the page."""
+"""The page of the benchmarks.
+
+In: results.  Out: Markdown, and a figure with its caption for each damping.
+"""
 
 from __future__ import annotations
 

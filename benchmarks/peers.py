@@ -2,7 +2,8 @@
 
 All integrate the scaled states ``z = x / magnitude`` with the same relative and absolute tolerance, from edge to
 edge of the
-load, with the right-hand side of `press`.  None is given a Jacobian.  What is not installed says so.
+load, with the right-hand side of `press`.  None is given a Jacobian.  A contender that is not installed is reported as
+missing.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ TRANSIENT = 3
 #: Tolerance of the two references [1].
 REFERENCE_TOLERANCE = 1e-13
 
-#: What an ensemble changes, by up to `SPREAD` either way.
+#: Parameters that an ensemble changes, by up to `SPREAD` in both directions.
 VARIED = (
     "mechanism.driver.speed",
     "mechanism.bodies.crank.mass",
@@ -99,7 +99,7 @@ class Cycle:
     ----------
     model : that is run
     parameters : overrides of the model's defaults, SI
-    numbers : all parameters and constants as the runtime has them
+    numbers : all parameters and constants of the runtime
     start : state at the start, shape (states,)
     magnitude : of the states, shape (states,): tolerances are relative to it
     times : output points [s], shape (POINTS,)
@@ -110,7 +110,7 @@ class Cycle:
         self.model, self.parameters, self.start, self.magnitude = model, parameters, start, magnitude
         self.numbers: Numbers = model.numbers(parameters)
         self.period = model.period(parameters)
-        # the quotient may lie a last digit behind the end
+        # by rounding the quotient may lie after the end
         self.times = np.minimum(self.period * np.arange(1, POINTS + 1) / POINTS, self.period)
         self.edges = segment_edges(model, self.numbers, 0.0, self.period, self.period)
 
@@ -163,7 +163,7 @@ class Member(Cycle):
         )
 
     def refer(self, independent: Callable[[Member, float], np.ndarray] | None) -> None:
-        """Make the reference from Rodas5P with kinks located and a method of somebody else (without one: DOP853)."""
+        """Make the reference from Rodas5P with located kinks and a method of another library (else DOP853)."""
         own = self._located("stepper-rodas5p")
         other = self._located("stepper-dop853") if independent is None else independent(self, REFERENCE_TOLERANCE)
         self.reference = 0.5 * (own + other)

@@ -1,4 +1,4 @@
-"""How time is taken: in rounds, A B C A B C ..., so that whatever else the machine does meets all alike."""
+"""Time contenders in rounds, A B C A B C ..., so that other load on the machine slows all of them alike."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ REPEATS = 3
 
 
 def timed(call: Callable[[], object]) -> float:
-    """Time of a call [s]: what passes, less the time in which the system ran other programs instead."""
+    """Time of a call [s]: elapsed time without the time in which the system ran other programs."""
     processor, begun = time.process_time(), time.perf_counter()
     call()
     return min(time.perf_counter() - begun, time.process_time() - processor)

@@ -84,7 +84,7 @@ def _call(contender: Contender, member: Member, tolerance: float) -> Callable[[]
 
 
 def _errors(contender: Contender, members: Sequence[Member], effort: Effort) -> list[dict[str, Any]]:
-    """Errors of the members at each tolerance, behind a call that does not count, for it may compile."""
+    """Errors of the members at each tolerance, after a first call that is not timed, because it may compile."""
     runs: list[dict[str, Any]] = []
     contender.solve(members[0], contender.tolerances[0])
     for tolerance in contender.tolerances[:: effort.every]:

@@ -74,7 +74,7 @@ def test_new_copies_each_shipped_scene_byte_for_byte_and_no_file_twice(tmp_path:
     mine.write_text("mine", encoding="utf-8")
     for name in names:
         refused = call("new", name, tmp_path / "a b")
-        assert (refused.exit_code, "left as it is" in refused.stderr) == (2, True)
+        assert (refused.exit_code, "not overwritten" in refused.stderr) == (2, True)
     assert mine.read_text(encoding="utf-8") == "mine"
 
 

@@ -104,7 +104,7 @@ def test_waves_of_the_inner_raceway_are_heard_at_bpfi_and_a_shaft(site: Path, ba
         (("--of", "inner.ay", "--envelope", "2kHz"), "is no band"),
         (("--of", "inner.ay", "--envelope", "2kHz:20kHz"), "half the sampling"),
         (("--of", "inner.ay", "--window", "loud"), "get_window"),
-        (("--of", "inner.ay", "--cycles", "3"), "a run that is done"),
+        (("--of", "inner.ay", "--cycles", "3"), "a finished run"),
         (("--of", "inner.ay", "--top", "0"), "from 1 on"),
         (("--of", "inner.ay", "--orders", "--spectrogram"), "one of the two"),
     ],

@@ -119,8 +119,8 @@ def test_a_named_error_tells_choice_estimate_and_cost(place: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--error", "soon"], "is no relative error"),
-        (["--error", "-1%"], "is no relative error"),
+        (["--error", "soon"], "is not a relative error"),
+        (["--error", "-1%"], "is not a relative error"),
         (["--error", "1%", "--rtol", "1e-6"], "Give one or the"),
         (["--error", "1%", "--of", "peak_ball_farce"], "peak_ball_force"),
     ],

@@ -74,7 +74,7 @@ def page(trades: list[Trade], minutes: float, captions: Mapping[str, str]) -> st
         "What an error of the result costs, on the shipped scenes. `ballpass trade SCENE` makes the same table for "
         "your own; [how to use it](howto/accuracy.md).",
         f"Errors are relative, the 95 % point over {first.members} parameter sets within {percent(first.spread)} of "
-        "the scene's (contact makes single runs a lottery). The reference is Rodas5P at rtol 1e-12, checked by "
+        "the scene's (contact makes single errors random). The reference is Rodas5P at rtol 1e-12, checked by "
         "Dormand–Prince 5(4); the difference of the two is its uncertainty, and no error is claimed below that. Times "
         "are those of the integration alone on one processor, all measured in one run, interleaved.",
         f"`make trade` wrote this page in {minutes:.0f} minutes.",

@@ -23,7 +23,7 @@ from benchmarks.trade.promise import ROOT
 PAGE = ROOT / "docs" / "howto" / "two_way_numbers.md"
 SCENES = ("punching_press", "punching_press_two_way")
 
-#: Words for law and housing, and changes of the scenes' text that make them.
+#: Names of law and housing, and the changes of the scenes' text for them.
 LAWS = {
     "`one-sided`, 683 N·s/m": (),
     "`tangent`, 2.5e-5 s": (

@@ -1,9 +1,9 @@
-"""Are named errors kept?  `--error` asked on random parameter sets near the shipped scenes and far from them.
+"""Check that `--error` is kept, on random parameter sets near the shipped scenes and far from them.
 
     python -m benchmarks.trade.promise [--scenes NAME ...] [--sets N] [--seed N]
 
-Writes docs/howto/accuracy_numbers.md.  The true error is that against another method at rtol 1e-12, located kinks and
-all; a third run from a start moved by a picometre tells what has a value at all.
+Writes docs/howto/accuracy_numbers.md.  The true error is the distance to another method at rtol 1e-12 with located
+kinks.  A third run starts a picometre aside: quantities that it changes much have no value to compare (chaos).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ PAGE = ROOT / "docs" / "howto" / "accuracy_numbers.md"
 SCENES = ("punching_press", "punching_press_tangent", "offset_slider", "four_bar", "varying_compliance")
 TARGETS = (0.1, 0.03, 0.01, 0.003, 1e-3, 1e-4, 1e-5, 1e-6)
 
-#: An estimate is near the true error when it is within this factor of it, and has failed beyond the second one.
+#: An estimate is near the true error within the first factor of it, and wrong beyond the second.
 NEAR, WRONG = 10.0, 100.0
 
 #: What a named error may add: so many times the chosen run, and so long [s].
@@ -49,7 +49,7 @@ TURNS = (3, 12)
 
 @dataclass(slots=True, kw_only=True)
 class Counts:
-    """What came of the requests.
+    """Outcome of the requests.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ def count(
     wanted: int,
     progress: Callable[[float], None],
 ) -> Counts:
-    """Ask for every target, of the peak ball force alone and of all default quantities, on so many sets."""
+    """Request every target, of the peak ball force alone and of all default quantities, on `sets` parameter sets."""
     compared = compared_quantities(model, None)
     quantities = QuantityRun(model, compared)
     found = Counts()
@@ -112,7 +112,7 @@ def count(
             values, doubt = reference(run, quantities)
             moved = REFERENCE.measure(quantities, run, MOVED).values
         except BallpassError:
-            continue  # a linkage that cannot be assembled, a ring without hold: no run to ask about
+            continue  # a linkage that cannot be assembled, a ring without support: there is no run
         with np.errstate(divide="ignore", invalid="ignore"):
             doubt = np.fmax(doubt, np.abs(moved / values - 1.0))
         if np.all(np.isfinite(doubt)):

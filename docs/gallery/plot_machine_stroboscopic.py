@@ -8,7 +8,7 @@ wander along a curve.
 """
 
 # %%
-# Two hundred turns behind the transient, and one more with fine steps.
+# Two hundred turns after the transient, and one more with fine steps.
 import matplotlib.pyplot as plt
 
 from ballpass.derive import generate, shipped_scenes

@@ -94,7 +94,7 @@ def features(seed):
 (seen, labels), (unseen, truth) = features(1), features(2)
 forest = RandomForestClassifier(random_state=0).fit(seen, labels)
 print(
-    f"{forest.score(unseen, truth):.0%} of {len(truth)} unseen signals are told right"
+    f"{forest.score(unseen, truth):.0%} of {len(truth)} unseen signals are named right"
 )
 
 figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")

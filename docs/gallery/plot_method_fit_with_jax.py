@@ -3,12 +3,12 @@ Fit parameters with JAX
 =======================
 
 How large are the clearance of the press's bearing and the damping of its balls, if only
-the motion of the inner ring was measured? The derivatives of the simulation tell an
-optimiser of JAX which way to go.
+the motion of the inner ring was measured? An optimiser of JAX finds them with the
+derivatives of the simulation.
 """
 
 # %%
-# JAX has to compute in 64 bits, which it is told before its first array.
+# JAX has to compute in 64 bits, which is set before its first array.
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt

@@ -506,7 +506,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         (tmp_path / "none.toml", "none.toml"),
         (tmp_path, tmp_path.name),
         (latin, "UTF-8"),
-        ("a\0b", "no path"),
+        ("a\0b", "not a path"),
     ]:
         with pytest.raises(SceneError, match=word) as caught:
             read_scene(path)

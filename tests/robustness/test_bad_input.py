@@ -361,7 +361,7 @@ def test_a_message_lists_the_first_hundred_faults_and_counts_the_others() -> Non
     assert len(error.faults) == 250
     assert "250 faults" in str(error)
     assert str(error).count("unknown key") == 100
-    assert "... and 150 more; mend these first" in str(error)
+    assert "... and 150 more; correct these first" in str(error)
 
 
 # ------------------------------------------------------------------------------------------------- a scene file is data

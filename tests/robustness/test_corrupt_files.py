@@ -176,7 +176,7 @@ def test_deriving_into_a_folder_with_other_files_deletes_nothing(
     before = kept(home)
     result = CliRunner().invoke(app, ["derive", str(SCENES / "varying_compliance.toml"), "--out", str(home)])
     assert result.exit_code == 2
-    assert "holds other files (photos, thesis.tex), and none that ballpass derive wrote" in result.stderr
+    assert "holds other files (photos, thesis.tex), and none written by ballpass derive" in result.stderr
     assert "Allowed: a folder that is empty, new, or was written by ballpass derive" in result.stderr
     assert kept(home) == before
 

@@ -341,7 +341,7 @@ def test_an_interrupt_at_any_moment_ends_with_130_and_whole_files(
         assert process.returncode in (0, 130), errors
         assert "Traceback" not in errors
         if process.returncode == 130:
-            assert "interrupted. Whatever files are there are whole." in errors
+            assert "interrupted. Files written so far are complete." in errors
             assert out == ""
         found = kept(tmp_path / "results")
         assert set(found) == set(old)
@@ -389,7 +389,7 @@ main()
 def test_an_interrupt_that_python_turns_into_something_else_is_one(where: str, code: int) -> None:
     found = subprocess.run([sys.executable, "-c", ELSEWHERE, where], capture_output=True, text=True, timeout=PATIENCE)
     assert found.returncode == code, found.stderr
-    assert found.stderr == ("error: interrupted. Whatever files are there are whole.\n" if code else "")
+    assert found.stderr == ("error: interrupted. Files written so far are complete.\n" if code else "")
 
 
 def test_an_interrupt_while_compiling_ends_the_compiler_and_its_children(

@@ -146,7 +146,8 @@ def test_files_of_two_runs_are_refused_by_name(tmp_path: Path, runs: tuple[Path,
     target = tmp_path / "rotor"
     put(target, runs[0], 0)
     (target / name).write_bytes((runs[1] / SOLUTION).read_bytes())
-    with pytest.raises(RequestError, match=rf"{name}: not of the run that summary\.json tells of.*Run the scene again"):
+    refusal = rf"{name}: does not belong to the run of summary\.json.*Run the scene again"
+    with pytest.raises(RequestError, match=refusal):
         load_results(target)
 
 
@@ -156,7 +157,7 @@ def test_results_without_summary_or_of_another_version_are_refused(tmp_path: Pat
     put(tmp_path / "rotor", runs[0], 0)
     for text in ("", "[]", "{}", '{"files": 3}', "[" * 100_000):
         (tmp_path / "rotor" / SUMMARY).write_text(text, encoding="utf-8")
-        with pytest.raises(RequestError, match="does not tell the digests"):
+        with pytest.raises(RequestError, match="has no digests"):
             load_results(tmp_path / "rotor")
 
 

@@ -257,7 +257,7 @@ def test_a_failing_ffmpeg_is_told_and_an_interrupt_stays_one(
 def test_what_cannot_be_shown_is_refused(
     press: tuple[Model, Solution], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(RequestError, match=r"'.avi' is no kind of animation. Allowed: .html, .mp4, .gif"):
+    with pytest.raises(RequestError, match=r"'.avi' is not a kind of animation. Allowed: .html, .mp4, .gif"):
         write_animation(*press, tmp_path / "a.avi")
     with pytest.raises(RequestError, match="2 turns long, and 3 were asked for"):
         write_animation(*press, tmp_path / "a.html", turns=3)

@@ -336,7 +336,7 @@ def test_wrong_tables_are_refused_before_anything_runs(
     ("changes", "message"),
     [
         ({"observables": ["max:ball.forces"]}, "Did you mean 'ball.force'"),
-        ({"observables": ["value:ball.force"]}, "behind @ a crank angle"),
+        ({"observables": ["value:ball.force"]}, "after @ a crank angle"),
         ({"observables": []}, "one name or more"),
         ({"threads": 0}, "threads"),
         ({"transient": 1}, "nothing is left"),

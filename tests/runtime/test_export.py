@@ -612,7 +612,7 @@ def test_wrong_requests_name_what_was_given_and_what_is_allowed(exported: Callab
         "--samples=-3": "above 0",
         "--method=euler": "rodas5p",
         "--steps=3": "--help",
-        "--rtol": "a value behind it",
+        "--rtol": "a value after it",
         "bearing.clearence=1e-5": "--list",
         "bearing.clearance": "SI units",
         "bearing.clearance=": "SI units",

@@ -220,7 +220,7 @@ def test_spectrum_lines_equal_fourier_integrals_of_the_run(press: Run) -> None:
     assert "8.333 Hz" in text
     assert "25.44 Hz" in text
     # 3.0522 - 3 ball passes a turn: two turns cannot tell them apart, and the caption says so
-    assert "within one line; telling them apart takes 20 turns" in text
+    assert "within one line; separating them takes 20 turns" in text
 
 
 def test_a_run_of_many_turns_separates_ball_pass_from_the_third_harmonic(press: Run) -> None:

@@ -195,7 +195,7 @@ def test_a_sum_rule_of_amplitudes_holds(make_model: Callable[..., Model]) -> Non
         ("value:inner.y", "240deg"),
         ("value:inner.y@bpfo", "240deg"),
         ("amplitude:inner.y@9", "bpfo"),
-        ("max:inner.y@2x", "nothing behind"),
+        ("max:inner.y@2x", "nothing after"),
         ("drive_wrok", "drive_work"),
         ("static_deflection@1000deg", "1000deg is more than two turns.* -720deg to 720deg"),
         ("static_peak_ball_force@-17.5rad", "-17.5rad is more than two turns.* -4 pi to 4 pi rad"),

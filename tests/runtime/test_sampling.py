@@ -80,7 +80,7 @@ def test_the_run_ends_at_the_last_time_unless_its_length_is_given(rotor: Model) 
         ({"times": [0.0, 0.2, 0.1]}, r"0\.1 s follows 0\.2 s \(places 1 and 2\)"),
         ({"times": [0.1, 0.1]}, "must increase"),
         ({"times": [-0.1, 0.1]}, "lies before it"),
-        ({"times": [0.0, 0.2], "duration": 0.1}, r"0\.2 s lies behind it"),
+        ({"times": [0.0, 0.2], "duration": 0.1}, r"0\.2 s lies after it"),
         ({"times": []}, "one or more finite times"),
         ({"times": [[0.1, 0.2]]}, r"shape \(1, 2\)"),
         ({"times": [0.0, np.nan]}, "with NaN or inf"),

@@ -1,8 +1,8 @@
 """Events of a model: where its equations change, each a switching function with its rate.
 
-In: the inputs of a model and its bearings.  Out: `Event` after `Event`.  Steps end on all of them alike: on zeros of a
-function of time or of an angle that turns at constant speed, which are known before a run, its segments end; zeros of a
-function of the state are located in the step that meets them.
+In: the inputs of a model and its bearings.  Out: `Event` after `Event`.  Steps end on all of them.  Zeros of a function
+of time, or of an angle that turns at constant speed, are known before a run: its segments end there.  Zeros of a
+function of the state are located in the step in which they occur.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class Event:
 
     Attributes
     ----------
-    name : for people; of ``ball.`` events there is one for each ball
+    name : for texts; of ``ball.`` events there is one for each ball
     kind : what the switching function depends on; one of an angle counts modulo a turn
-    function : zero at the event, positive behind it
+    function : zero at the event, positive after it
     rate : its time derivative; None where that takes accelerations
     changes : what changes there
     """

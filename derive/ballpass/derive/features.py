@@ -1,4 +1,4 @@
-"""What of a scene costs what: the parts a scene names, and the operations that each adds to the generated functions.
+"""Cost of the parts of a scene: the operations that each part adds to the generated functions.
 
 In: a scene.  Out: its features, each with the path of the lines that ask for it and the same scene without it; and
 operation counts of every function.  The share of a feature is measured, not estimated: the scene is derived and
@@ -26,10 +26,10 @@ class Feature:
 
     Attributes
     ----------
-    name : short name for people, "outer ring"
-    path : where the scene asks for it, "bearing.outer_ring"
+    name : short, as in "outer ring"
+    path : its place in the scene, "bearing.outer_ring"
     modelled : what it adds to the model
-    without : the scene without it, None where no scene can do without
+    without : the scene without it; None where every scene needs it
     """
 
     name: str

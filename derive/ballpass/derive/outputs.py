@@ -1,4 +1,4 @@
-"""Outputs: everything a scene's model can report, and which of it the scene asks for.
+"""Outputs of a model: all that it can report, and those that its scene asks for.
 
 In: the derived parts of a model.  Out: `Output` after `Output`, each an expression in the model's symbols.
 """
@@ -22,7 +22,7 @@ OUTPUTS = "run.outputs"
 
 
 def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None) -> list[Output]:
-    """What a bearing reports, in the order it is listed: rings, balls, sums over the balls, load on the inner ring."""
+    """Outputs of a bearing, in the order of listing: rings, balls, sums over the balls, load on the inner ring."""
     prefix = bearing.names.prefix
     of = f" of {prefix[:-1]}" if prefix else ""
     out: list[Output] = []
@@ -58,7 +58,7 @@ def bearing_outputs(bearing: BearingModel, load: tuple[sp.Expr, sp.Expr] | None)
 
 
 def mechanism_outputs(mechanism: Mechanism, linkage: Linkage, reactions: Reactions) -> list[Output]:
-    """What a mechanism reports, in the order it is listed: reactions, drive, angles of the bodies."""
+    """Outputs of a mechanism, in the order of listing: reactions, drive, angles of the bodies."""
     out: list[Output] = []
     for joint in mechanism.joints:
         first, second = joint.bodies
@@ -119,7 +119,7 @@ def select_outputs(
 ) -> tuple[Output, ...]:
     """Outputs that the patterns name, in the order of `available`, then of `requested`.
 
-    A pattern means those of `available` that it matches; only where there are none, those of `requested`.
+    A pattern selects the outputs of `available` that it matches; where there are none, those of `requested`.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def select_outputs(
 
 
 def _grouped(names: Sequence[str]) -> str:
-    """Names with what stands before the last dot once: point.rod.B.{x,y,vx,vy}."""
+    """Names grouped by the part before the last dot: point.rod.B.{x,y,vx,vy}."""
     ends: dict[str, list[str]] = {}
     for name in names:
         stem, dot, end = name.rpartition(".")

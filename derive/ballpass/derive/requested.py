@@ -72,7 +72,7 @@ def power_outputs(
     Parameters
     ----------
     loads : of each force, by its label
-    inertias : all that moves
+    inertias : of all moving parts
     weights : work of gravity
     """
     out: list[Words] = [
@@ -85,7 +85,7 @@ def power_outputs(
         power = reactions.drive_torque * linkage.drive.speed
         out.append(("drive_power", power, "W", "Power of the drive"))
     energy = sp.Add(*(inertia.amount * inertia.rate**2 for inertia in inertias)) / 2
-    out.append(("kinetic_energy", energy, "J", "Kinetic energy of all that moves, without rings loaded one-way"))
+    out.append(("kinetic_energy", energy, "J", "Kinetic energy of all moving parts, without rings loaded one-way"))
     return _made(out)
 
 
@@ -164,7 +164,7 @@ def _count(bearing: Bearing) -> sp.Expr:
 def bearing_power_outputs(
     bearing: Bearing, model: BearingModel, load: Pair | None, turning: sp.Expr = sp.S.Zero
 ) -> list[Output]:
-    """Power of the balls and of the housing's spring and damper on the rings, and what the dampers take of it.
+    """Power of the balls and of the housing's spring and damper on the rings, and power loss of the dampers.
 
     Parameters
     ----------
@@ -186,10 +186,10 @@ def bearing_power_outputs(
         spring = -count * stiffness * dot(out, moving)
         rows = [
             ("housing.power", spring - loss, "W", f"Power of the housing's spring and damper{of}"),
-            ("housing.loss", loss, "W", f"What the housing's damper{of} takes"),
+            ("housing.loss", loss, "W", f"Power loss of the housing's damper{of}"),
         ]
     force = (ball.sums[0].symbol, ball.sums[1].symbol)  # of the inner ring on the balls
-    # where rings are loaded one-way nothing feels the cage's moments
+    # where rings are loaded one-way the cage's moments have no effect
     moment = cross(apart, force) if load is None else sp.S.Zero
     power = count * (moment * ball.cage_speed - dot(force, parting))
     rows.append(("contact.power", power, "W", f"Power of all ball forces{of}"))
@@ -202,7 +202,7 @@ def bearing_power_outputs(
         rows.append(("rings.kinetic_energy", energy, "J", f"Kinetic energy of the rings{of}"))
         if bearing.inner is not None and bearing.inner.damping is not None:
             loss = symbol_of(bearing.inner.damping) * dot(speed, speed)
-            rows.append(("inner.loss", loss, "W", f"What the damper of the inner ring{of} takes"))
+            rows.append(("inner.loss", loss, "W", f"Power loss of the damper of the inner ring{of}"))
     made = _made((f"{names.prefix}{n}", e, u, d) for n, e, u, d in rows)
     if ball.damping_force is not None:
         taken = ball.damping_force * ball.deflection_rate
@@ -211,7 +211,7 @@ def bearing_power_outputs(
                 name=f"{names.prefix}ball.loss",
                 expression=taken,
                 unit="W",
-                description=f"What the damping force of each ball{of} takes",
+                description=f"Power loss by the damping force of each ball{of}",
                 per_ball=True,
                 balls_of=names.prefix,
             )
@@ -221,7 +221,7 @@ def bearing_power_outputs(
                 name=f"{names.prefix}contact.loss",
                 expression=count * taken,
                 unit="W",
-                description=f"What the damping forces of all balls{of} take",
+                description=f"Power loss by the damping forces of all balls{of}",
                 balls_of=names.prefix,
                 over_balls=True,
             )

@@ -55,8 +55,8 @@ class System:
 
     `constants` are the derived constants (functions of the parameters only).  `definitions` is the ordered rest.
     `mass * d(velocities)/dt = forcing`; both empty without a bearing.  `linear_forms` are the definitions of their
-    entries, where bearings and linkage move each other.  `quantities` is all that the model can report
-    without request, and what the scene names beyond; `outputs` is what the scene asks for.
+    entries, where bearings and linkage are coupled two-way.  `quantities` are all outputs that the model has
+    without request, and those on request that the scene names; `outputs` are those that the scene names.
 
     Examples
     --------
@@ -138,7 +138,7 @@ def derive(scene: Scene) -> System:
     ------
     SceneError
         Where the linkage's topology is wrong, its numbers lock it within a turn, or an output is unknown: all faults
-        that can be told together, with their lines; `LinkageError` where all are of the linkage.
+        that can be reported together, with their lines; `LinkageError` where all are of the linkage.
 
     Examples
     --------
@@ -162,7 +162,7 @@ def derive(scene: Scene) -> System:
 
 @contextmanager
 def _noted(errors: list[SceneError]) -> Iterator[None]:
-    """Note an error and go on: what does not depend on the failed stage is looked at as well."""
+    """Note an error and continue: stages that do not depend on the failed one are checked as well."""
     try:
         yield
     except SceneError as error:
@@ -183,7 +183,7 @@ def _on_shaft(scene: Scene, errors: list[SceneError]) -> System:
 def _linked(
     scene: Scene, mechanism: Mechanism, drive: Drive, play: Play, errors: list[SceneError]
 ) -> tuple[Linkage, Forces] | None:
-    """The linkage and what acts on it; None, with what is wrong noted."""
+    """The linkage and its loads; None, with the faults noted."""
     linkage, forces = None, None
     with _noted(errors):
         linkage = derive_linkage(mechanism, drive, play)
@@ -343,7 +343,7 @@ def _requested(
     inertias: Sequence[Inertia],
     weights: Sequence[Effort],
 ) -> tuple[Output, ...]:
-    """What a mechanism reports on request."""
+    """Outputs of a mechanism on request."""
     powers = power_outputs(linkage, reactions, loads=forces.of_each, inertias=inertias, weights=weights)
     return (*motion_outputs(mechanism, linkage, reactions), *powers, *forces.requested)
 

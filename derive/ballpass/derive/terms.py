@@ -1,4 +1,4 @@
-"""The words all derivations share: symbols of parameters, named definitions, smoothness.
+"""Records that all derivations share: symbols of parameters, named definitions, smoothness.
 
 A derivation is an ordered tuple of `Definition`: symbol := expression, each using parameters, inputs, states and
 earlier
@@ -29,7 +29,7 @@ class Smoothness(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Definition:
-    """``symbol := expression``, with unit, words and the symbol people read."""
+    """``symbol := expression``, with unit, description and the LaTeX symbol."""
 
     symbol: sp.Symbol
     expression: sp.Expr
@@ -57,7 +57,7 @@ class Names:
         return sp.Symbol(f"{self.path}.{name}", real=True)
 
     def latex(self, text: str) -> str:
-        """What people read, marked with the part's name where there are several."""
+        """A description, marked with the part's name where there are several."""
         return text if not self.prefix else rf"{{{text}}}^{{(\mathrm{{{self.prefix[:-1]}}})}}"
 
     def define(self, symbol: sp.Symbol, expression: sp.Expr, unit: str, description: str, latex: str) -> Definition:

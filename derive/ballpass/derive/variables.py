@@ -1,4 +1,4 @@
-"""What a model's numbers and signals are: parameters, inputs, states, outputs, each with its symbol, unit and words."""
+"""Records of parameters, inputs, states and outputs, each with its symbol, unit and description."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Input:
-    """Held constant between breakpoints by whoever integrates; `kind` and fields as in `manifest.InputInfo`."""
+    """Held constant between breakpoints by the integrator; `kind` and fields as in `manifest.InputInfo`."""
 
     name: str
     symbol: sp.Symbol
@@ -44,7 +44,7 @@ class Input:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StateSwitch:
-    """A place of the motion at which a load switches: what it switches on acts where `function` is above `border`.
+    """A place of the motion at which a load switches: the load acts where `function` is above `border`.
 
     `function` is zero there, and `rate` its time derivative; the input `border` is zero, or infinite while a step holds
     the side on which it started.  That of a window of the driver's angle names the edges, [rad]; others are sizes, in
@@ -82,7 +82,7 @@ class Coordinate:
     unit : of the position; that of the velocity is the same per second
     position, velocity : symbols
     group : coordinates of one group share a magnitude, which tolerances are relative to
-    partner : coordinate of the other end of the contact, "" where that end is fixed: what counts is the difference
+    partner : coordinate of the other end of the contact, "" where that end is fixed: the difference of both matters
     """
 
     name: str
@@ -117,8 +117,8 @@ class Output:
     """Something a run can report.
 
     `per_ball` outputs have one value for each ball of the bearing with the prefix `balls_of` and use the symbols of its
-    generic ball; with `over_balls` the output is the sum of these.  `constants` are derived constants that nothing
-    else needs.
+    generic ball; with `over_balls` the output is the sum of these.  `constants` are derived constants that only this
+    output needs.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""A generated model at work: load, look, evaluate, simulate, differentiate."""
+"""A generated model: load, inspect, evaluate, simulate, differentiate."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
     Parameters
     ----------
     folder : what `ballpass derive` wrote
-    compiler : command of a C compiler.  Default: $CC, cc, gcc, clang, ziglang, whichever is there first
+    compiler : command of a C compiler.  Default: the first found of $CC, cc, gcc, clang, ziglang
     verify : refuse files that differ from the manifest's digests
 
     Warns
@@ -83,7 +83,7 @@ def load(folder: str | Path, *, compiler: str | None = None, verify: bool = True
 
 
 def _load_same(folder: str, signature: str, compiler: str | None) -> Model:
-    """The model that another process has sent: loaded anew, if its folder is still the same."""
+    """A model from another process: loaded anew, if its folder is unchanged."""
     model = load(folder, compiler=compiler)
     if model.manifest.signature != signature:
         raise ArtefactError(
@@ -96,8 +96,8 @@ def _load_same(folder: str, signature: str, compiler: str | None) -> Model:
 class Model(PointModel, Questions):
     """Functions of one scene with their names, units and defaults.  All numbers are SI.
 
-    For any number of threads at once, with the bits of calls one after the other.  What `kernel` and `loop` give
-    belongs to the thread that asked for it, and so does what `jacobian_function` gives.
+    For any number of threads at once, with the same bits as calls one after the other.  Results of `kernel`, `loop` and
+    `jacobian_function` belong to the thread that called them.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class Model(PointModel, Questions):
         return method_names(self)
 
     def _runnable(self, parameters: Mapping[str, float] | None) -> Numbers:
-        """Numbers of a run whose linkage can be assembled; what was looked at last is not looked at again."""
+        """Numbers of a run whose linkage can be assembled; the last ones are not checked again."""
         numbers = self.numbers(parameters)
         looked_at = numbers.p.tobytes()
         if looked_at != self._assembled:
@@ -136,7 +136,7 @@ class Model(PointModel, Questions):
         return numbers
 
     def _start(self, numbers: Numbers, initial: Initial) -> Start:
-        """What a run begins with; RequestError for words that are none."""
+        """Start of a run; RequestError for an unknown word."""
         return start_of(self, numbers, initial)
 
     def simulate(
@@ -158,7 +158,7 @@ class Model(PointModel, Questions):
         error: float | None = None,
         of: str | Sequence[str] | None = None,
     ) -> Solution:
-        """Simulate, from t = 0 or from where another run ended.  What is not given is as the scene's run settings say.
+        """Simulate, from t = 0 or from where another run ended.  Defaults are the scene's run settings.
 
         Parameters
         ----------
@@ -169,22 +169,22 @@ class Model(PointModel, Questions):
         rtol : error allowed per step, relative to the magnitudes of the states (`ballpass.runtime.run.scales`)
         samples_per_cycle : samples in a turn; in the whole run where nothing turns
         times : times of the samples instead, increasing, within the run; where neither cycles nor duration is given,
-            the run ends at the last one.  The stepper takes the same steps however a run of one length is sampled;
-            ``cvodes`` goes from sample to sample [s]
+            the run ends at the last one.  The stepper takes the same steps for any samples of a run of one length;
+            ``cvodes`` steps from sample to sample [s]
         sample_rate : samples at whole multiples of one over this, instead [Hz]
         outputs : names of the outputs to keep, none of them for ``[]``, where none is evaluated.  Default: all of the
             scene
         initial : state at the start, shape (states,); ``"equilibrium"`` for rings at rest under the load of t = 0, with
             the driver at its speed (`static_equilibrium`); or `Solution.end` of a run of this scene, whose time and
-            motion go on.  Default: the scene's
-        transient : turns from t = 0 on that `Solution.steady` leaves out, also where the run goes on from another one
+            motion continue.  Default: the scene's
+        transient : turns from t = 0 on that `Solution.steady` leaves out, also where the run continues another one
         kinks : ``stepped-over`` leaves kinks of the laws to error control; with ``located`` steps of the project's own
             stepper end on them (see `docs/theory/integration.md`).  Default: located by ``stepper`` at rtol up to 3e-7
             (1e-6 where a law jumps), else stepped over
         progress : called with the finished fraction.  Default: a bar on a terminal or in a notebook, from the first
             second on; False for none.  With BALLPASS_PROGRESS=0 in the environment there is one only for True
         error : relative error wanted instead of `method` and `rtol`: the tool chooses them, estimates the error of
-            this run and tightens until the estimate is within it; ``Solution.accuracy`` tells (see
+            this run and tightens until the estimate is within it; ``Solution.accuracy`` has the result (see
             `ballpass.runtime.certify.error_target`)
         of : quantities that `error` is about.  Default: peak ball force, rms and range of the inner ring's motion
 
@@ -195,7 +195,7 @@ class Model(PointModel, Questions):
         IntegrationError
             The computation failed; ``.partial`` holds what was computed.
         TargetMissed
-            No way keeps the error that was asked for.
+            No method and tolerance keep the requested error.
 
         Examples
         --------
@@ -300,7 +300,7 @@ class Model(PointModel, Questions):
         Parameters
         ----------
         wrt : names of parameters; any number in one pass
-        rtol : error allowed per step in the states.  Default: 1e-11, for derivatives lose digits
+        rtol : error allowed per step in the states.  Default: 1e-11, because derivatives lose digits
         sensitivity_rtol : the same in the derivatives, which take part in the choice of step sizes, relative to the
             states' magnitudes over the parameters' scales (`run/direction_scales.py`) or to the derivative itself where
             it is larger.  Default: ten times `rtol`
@@ -395,11 +395,11 @@ class Model(PointModel, Questions):
         kinks: Kinks | None = None,
         progress: Progress = None,
     ) -> Reductions:
-        """Extremes with their times, mean and rms of a run behind its transient, without a stored trajectory.
+        """Extremes with their times, mean and rms of a run after its transient, without a stored trajectory.
 
         Parameters are those of `simulate`; the transient's turns do not count.  The memory does not grow with the run.
-        However long it takes, `progress` is told and an interrupt (Ctrl-C) heard every so many steps, a fraction of a
-        second; that changes no bit of the results.  It is given up where `simulate` gives up.
+        Several times a second `progress` is called and an interrupt (Ctrl-C) takes effect; that changes no bit of the
+        results.  The limits of a run are those of `simulate`.
 
         Raises
         ------
@@ -445,7 +445,7 @@ class Model(PointModel, Questions):
 
         Parameters
         ----------
-        most : steady turns; ``settled`` of the result is False where they are not enough
+        most : largest number of steady turns; ``settled`` of the result is False where they are not enough
 
         Raises
         ------
@@ -508,13 +508,13 @@ class Model(PointModel, Questions):
         rtol : error allowed per step, relative to each member's own magnitudes
         method : ``auto``, or one of the project's own stepper
         kinks : as in `simulate`: with ``located``, the default at tight tolerances of ``auto`` and ``stepper``, steps
-            end on the kinks of the laws and members run one at a time, for lanes cannot; with ``stepped-over`` lanes
-            serve at any tolerance, but what a step loses at a kink is above a tight one, and members agree with single
-            runs no closer than that.  ``statistics.kinks`` says which it was
+            end on the kinks of the laws and members run one at a time, because lanes cannot locate kinks; with
+            ``stepped-over`` they run in lanes at any tolerance, but the error of a step at a kink exceeds a tight one,
+            and members agree with single runs only within that error.  ``statistics.kinks`` has the choice
         threads : default: as many as processors
         lanes : False advances one member at a time
         growth : run each member a second time from a start moved by the tolerance; ``uncertain`` of the result then
-            says which numbers have no digits (see `growth`)
+            names the numbers without digits (see `growth`)
         client : of `dask.distributed`; its workers simulate parts of the table, in lanes, with the same bits where they
             have the same processor and compiler.  ``threads`` are then those of the cluster
         progress : as for `simulate`
@@ -522,7 +522,7 @@ class Model(PointModel, Questions):
         Raises
         ------
         RequestError
-            A wrong request: unknown names, columns of unequal length, values that are no finite numbers.
+            A wrong request: unknown names, columns of unequal length, values that are not finite numbers.
 
         Examples
         --------
@@ -569,7 +569,7 @@ class Model(PointModel, Questions):
         initial: Initial = None,
         progress: Progress = None,
     ) -> Growth:
-        """What a start moved by the tolerance changes in the extremes of a run (see `ballpass.runtime.certify.growth`).
+        """Change of the extremes of a run when its start moves by the tolerance; see `ballpass.runtime.certify.growth`.
 
         Takes two runs of the stepper, without samples.  Parameters are those of `simulate`.
 
@@ -625,7 +625,7 @@ class Model(PointModel, Questions):
         return refine_peak(self, numbers, solution, name, kind=kind)
 
     def explain(self, parameters: Mapping[str, float] | None = None) -> Explanation:
-        """Breakpoints, smoothness and time scales, and the method they speak for.
+        """Breakpoints, smoothness and time scales, and the method that suits them.
 
         Examples
         --------

@@ -1,4 +1,4 @@
-"""A drive whose angle is a coordinate: what changes with the angle is a function of the state."""
+"""A drive whose angle is a coordinate: loads that change with the angle are functions of the state."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class AngleState(Drive):
         )
 
     def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str]) -> OverAngle:
-        """Value over the angle behind the first knot, whole turns taken off."""
+        """Value over the angle after the first knot, without whole turns."""
         knots, heights = ([sp.Symbol(path, real=True) for path in column] for column in (angles, values))
         turn, past = 2 * sp.pi, DRIVER_ANGLE - knots[0]
         behind = Definition(
@@ -91,7 +91,7 @@ def inside_window(start: str, end: str) -> sp.Expr:
     span = last - first
     half = sp.Min(sp.Abs(span) / 2, sp.pi, evaluate=False)
     middle = (first + last) / 2
-    # cosine and sine of the angle are there already: the driven body's
+    # cosine and sine of the angle are defined already: the driven body's
     along = sp.cos(DRIVER_ANGLE) * sp.cos(middle) + sp.sin(DRIVER_ANGLE) * sp.sin(middle)
     slope = sp.Max(sp.sin(half), LEAST_SLOPE, evaluate=False)
     return sp.sign(span, evaluate=False) * (along - sp.cos(half)) / slope

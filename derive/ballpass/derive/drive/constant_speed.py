@@ -1,6 +1,6 @@
-"""The drive at constant speed: the angle is that at the reference time and speed times what has passed since.
+"""The drive at constant speed: angle = angle at the reference time + speed times the time since then.
 
-What changes with the angle is an input, which changes at times that are known before a run.
+Loads that change with the angle are inputs; they change at times that are known before a run.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class ConstantSpeed(Drive):
         return OverAngle(value=gate.symbol, inputs=(gate,))
 
     def table(self, name: str, unit: str, angles: Sequence[str], values: Sequence[str]) -> OverAngle:
-        """Value at the reference time, and slope over the angle times what has passed since."""
+        """Value at the reference time, plus slope over the angle times the angle turned since then."""
 
         def entry(kind: Literal["table", "table_rate"], ending: str, unit: str, words: str, latex: str) -> Input:
             return Input(

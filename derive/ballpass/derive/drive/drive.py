@@ -1,6 +1,6 @@
-"""What the rest of the derivation knows of a drive: the driver's angle, speed and acceleration, and its own symbols.
+"""A drive as the rest of the derivation uses it: the driver's angle, speed and acceleration, and its symbols.
 
-Nobody else multiplies a speed by time, or asks whether the angle is known before a run.
+Only drives multiply a speed by time, and decide whether the angle is known before a run.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ballpass.derive.variables import DRIVER_ANGLE, Coordinate, Input, StateSwit
 class OverAngle:
     """Something that changes with the driver's angle: its value, and the inputs and definitions that this needs.
 
-    `smoothness` is that of what is a function of the state, by name, and `switches` are where it jumps.
+    `smoothness` is by name, of functions of the state; `switches` are the places where they jump.
     """
 
     value: sp.Expr
@@ -37,11 +37,11 @@ class Drive(ABC):
     ----------
     angle : of the driven body's x axis from +x [rad]
     speed, acceleration : of the same [rad/s], [rad/s^2]
-    description : of the acceleration, for people
+    description : of the acceleration, as text
     definitions : of the symbols in these, ordered
     inputs : that these need
     coordinate : the angle, where it is a state; without a `torque` its acceleration is known
-    torque : on the driven body [N*m]; None where it is what the motion takes
+    torque : on the driven body [N*m]; None where it follows from a given motion
     flywheel : moment of inertia that turns with the driven body [kg*m^2]
     smoothness : of the torque
     """

@@ -9,9 +9,9 @@ import sympy as sp
 
 
 def piecewise_linear(argument: sp.Expr, knots: Sequence[sp.Expr], values: Sequence[sp.Expr]) -> sp.Expr:
-    """Value over `argument`, constant before the first knot and behind the last.
+    """Value over `argument`, constant before the first knot and after the last.
 
-    The first value, and of every piece its slope times how far the argument has come in it.
+    The sum of the first value and, for every piece, its slope times the part of the piece below the argument.
     """
     total = values[0]
     for (left, right), (low, high) in zip(pairwise(knots), pairwise(values), strict=True):

@@ -2,7 +2,8 @@
 
 In: an SX function.  Out: a ``static inline`` function whose body is straight-line code over local scalars.
 CasADi's own
-code generator passes everything through pointer tables, which no compiler turns into SIMD lanes; this text it does.
+code generator passes everything through pointer tables, which no compiler turns into SIMD lanes; compilers do so with
+this text.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ _BINARY = {
     ca.OP_NE: "(double)({0} != {1})",
     ca.OP_AND: "(double)({0} != 0.0 && {1} != 0.0)",
     ca.OP_OR: "(double)({0} != 0.0 || {1} != 0.0)",
-    # a selection, not a product: what is not selected may be NaN
+    # a selection, not a product: the value that is not selected may be NaN
     ca.OP_IF_ELSE_ZERO: "({0} != 0.0 ? {1} : 0.0)",
 }
 
@@ -149,7 +150,7 @@ def _argument(name: str, by_value: frozenset[str]) -> str:
 
 
 def print_array(name: str, values: list[float]) -> str:
-    """``static const double`` array; never of length zero, which C does not know."""
+    """``static const double`` array; at least of length one, since C has no arrays of length zero."""
     body = ", ".join(_literal(v) for v in values) or "0.0"
     return f"static const double {name}[{max(len(values), 1)}] = {{{body}}};"
 

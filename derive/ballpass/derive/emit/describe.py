@@ -1,4 +1,4 @@
-"""What the runtime is told of a model: its manifest.
+"""The manifest of a model, which the runtime reads.
 
 In: a `System` and its `Functions`.  Out: the `Manifest`; the same scene gives the same text.
 """

@@ -1,4 +1,4 @@
-"""Derived equations for notebooks: the sections of `equations` as HTML with MathML, which browsers show by themselves.
+"""Derived equations for notebooks: the sections of `equations` as HTML with MathML, which browsers show themselves.
 
 In: a `System`.  Out: HTML without script and network.
 """
@@ -19,7 +19,7 @@ _FORMULA, _PLACE = re.compile(r"\$\$\n(.*?)\n\$\$|\$([^$\n]+)\$", re.DOTALL), re
 
 
 def equations_html(system: System) -> str:
-    """Every derived equation of a scene, a section each that opens and closes."""
+    """All derived equations of a scene, in sections that open and close."""
     formulas: list[str] = []
 
     def keep(found: re.Match[str]) -> str:

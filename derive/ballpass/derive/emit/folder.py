@@ -12,7 +12,7 @@ switches.h         where the laws have kinks, for runs whose steps end there; no
 model.casadi, equations.casadi    the same functions serialised, for machines without a compiler
 jacobians.c, .h    all quantities, their derivatives and those of the right-hand side, compiled when first asked for
 jacobians.casadi   the quantities serialised
-EQUATIONS.md       the derivation for people
+EQUATIONS.md       the derivation as a readable text
 manifest.json      the contract with the runtime, written last
 
 The same scene gives the same bytes on every run.
@@ -47,7 +47,7 @@ def write_folder(folder: Path, system: System, functions: LoweredFunctions, sour
         (folder / name).write_text(text, encoding="utf-8", newline="\n")
     _pack(folder / "model.casadi", functions.functions)
     _pack(folder / "equations.casadi", functions.equations)
-    # values only: where there is no compiler, the runtime makes their derivatives when they are asked for
+    # values only: without a compiler the runtime makes their derivatives when they are needed
     values = [entry for entry in functions.jacobians if not entry[0].name().endswith(DERIVATIVES)]
     _pack(folder / "jacobians.casadi", values)
     (folder / "EQUATIONS.md").write_text(equations(system), encoding="utf-8", newline="\n")
@@ -82,7 +82,7 @@ def _write_c(folder: Path, name: str, functions: Sequence[Described]) -> None:
     generator = ca.CodeGenerator(f"{name}.c", {"with_header": True})
     for function, _ in functions:
         generator.add(function)
-    with tempfile.TemporaryDirectory() as place:  # CasADi writes nothing, in silence, where a path is not UTF-8
+    with tempfile.TemporaryDirectory() as place:  # CasADi writes nothing, without an error, where a path is not UTF-8
         generator.generate(f"{place}{os.sep}")
         for ending in ("c", "h"):
             shutil.copyfile(Path(place) / f"{name}.{ending}", folder / f"{name}.{ending}")

@@ -57,7 +57,7 @@ GENERATED = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FolderCheck:
-    """Result of comparing a folder with what its scene derives today; `stale` names the files that differ."""
+    """Result of comparing a folder with a new derivation of its scene; `stale` names the files that differ."""
 
     folder: Path
     stale: tuple[str, ...]
@@ -88,7 +88,7 @@ def generate(
     SceneError
         The scene is wrong.  Nothing is written then.
     RequestError
-        The folder holds files, but none that this function wrote.  Nothing is written then.
+        The folder holds only files that this function did not write.  Nothing is written then.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def generate(
 def check(scene: str | Path | Scene, out: str | Path | None = None) -> FolderCheck:
     """Derive a scene afresh and compare with the folder, byte for byte; writes nothing to it.
 
-    A file that is not there, as in a clean checkout, is compared by the digest that the folder's manifest gives it.
+    A missing file, as in a clean checkout, is compared by its digest in the folder's manifest.
 
     Examples
     --------
@@ -199,7 +199,7 @@ def _refresh(folder: Path, present: mf.Manifest, scene: Scene, source: str) -> N
 
 
 def _refuse_foreign(folder: Path) -> None:
-    """Refuse what is no folder, or holds files but none that a derivation wrote: somebody gave the wrong path."""
+    """Refuse a path that is no folder, or a folder with other files only: probably the path is wrong."""
     if not folder.is_dir():
         if os.path.lexists(folder):
             raise RequestError(
@@ -211,7 +211,7 @@ def _refuse_foreign(folder: Path) -> None:
     if names and not any(name in GENERATED for name in names):
         raise RequestError(
             f"The folder {folder} holds other files ({', '.join(names[:5])}{', ...' if len(names) > 5 else ''}), and "
-            "none that ballpass derive wrote. Allowed: a folder that is empty, new, or was written by ballpass derive. "
+            "none written by ballpass derive. Allowed: a folder that is empty, new, or was written by ballpass derive. "
             "Nothing was changed. Give another folder, for example one inside it."
         )
 

@@ -1,4 +1,4 @@
-"""What a generated folder was made from: the key that tells whether it is fresh.
+"""The signature of a generated folder: what it was made from, to find whether it is up to date.
 
 Nothing here needs SymPy or CasADi, so that a fresh folder is found without waiting for them.  Numbers are not in the
 signature: a changed number rewrites the manifest's defaults and nothing else.
@@ -46,9 +46,9 @@ def source_key(path: Path) -> str:
     text = path.read_bytes().replace(b"\r\n", b"\n")
     digest.update(text)
     if b"file" in text:
-        with contextlib.suppress(ValueError):  # a file that is no TOML has no digest to compare with
+        with contextlib.suppress(ValueError):  # a file that is not TOML has no digest
             for name in named_files(tomllib.loads(text.decode("utf-8-sig"))):
-                with contextlib.suppress(OSError, ValueError):  # reading the scene says what is wrong with it
+                with contextlib.suppress(OSError, ValueError):  # reading the scene reports the fault
                     digest.update((path.parent / name).read_bytes().replace(b"\r\n", b"\n"))
     return digest.hexdigest()
 
@@ -66,18 +66,18 @@ def folder_of(scene: str | Path | Scene, out: str | Path | None = None) -> Path:
 
 
 def fresh_manifest(scene: str | Path | Scene, out: str | Path | None = None) -> mf.Manifest | None:
-    """Manifest of a scene file's folder where both are what they were when it was written, else None."""
+    """Manifest of a scene file's folder where both are unchanged since it was written, else None."""
     if not isinstance(scene, str | Path):
         return None
     present = intact_manifest(folder_of(scene, out))
     try:
         return present if present is not None and present.source == source_key(Path(scene)) else None
-    except (OSError, ValueError):  # no such file, no path: whoever reads it says so
+    except (OSError, ValueError):  # no such file, no path: the reader reports it
         return None
 
 
 def intact_manifest(folder: Path) -> mf.Manifest | None:
-    """The folder's manifest where its files have the digests it gives them."""
+    """The folder's manifest where its digests fit the files."""
     try:
         present = mf.read_manifest(folder)
         mf.check_files(folder, present)
@@ -102,7 +102,7 @@ def catalogue_info(bearing: Bearing) -> mf.CatalogueInfo | None:
 
 
 def lubrication_info(bearing: Bearing) -> mf.LubricationInfo | None:
-    """Film and dirt of a bearing."""
+    """Lubricant film and contamination of a bearing."""
     return None if bearing.lubrication is None else info_of(mf.LubricationInfo, bearing.lubrication)
 
 

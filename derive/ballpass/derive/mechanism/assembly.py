@@ -1,4 +1,4 @@
-"""In which order a linkage is put together: the driven body first, then Assur dyads until every body has its place.
+"""The order in which a linkage is assembled: the driven body first, then Assur dyads until every body is placed.
 
 In: a `Mechanism`.  Out: an `Assembly`, or a `LinkageError` that names joints, bodies and the count of unknowns and
 equations.  Which dyads there are is `dyads.DYADS`.

@@ -1,7 +1,7 @@
 """Newton–Euler balances of the bodies of a linkage: the equations A r = b, and the steps of their solution.
 
-A `Balance` knows what every joint may do to its bodies and what acts on them besides.  Whoever solves (a dyad, the
-driver) asks for the force or moment of all that is known on a body and defines one unknown after the other.
+A `Balance` holds the forces that every joint transmits to its bodies, and the other loads on them.  A dyad or the
+driver takes the known force or moment on a body from it and defines one unknown after the other.
 
 Signs: the reaction of a joint is the force of ``bodies[1]`` on ``bodies[0]``; the reaction of a guide is a force along
 its normal, to the left of its direction, at ``points[1]``, and a moment.
@@ -72,7 +72,7 @@ class AppliedLoad:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointAction:
-    """What one joint does to the bodies it joins.
+    """Forces and moment of one joint on its two bodies.
 
     `along` holds the unknown force components with their directions.  The force acts on each body at `point` of that
     body plus `shift` (a vector in the frame's axes).

@@ -1,4 +1,4 @@
-"""Plane motion of a rigid body in symbols, and the ledger that keeps every expression small.
+"""Plane motion of a rigid body in symbols, and the ledger of named definitions, which keeps expressions small.
 
 A `Ledger` turns an expression into a named symbol and remembers the definition; a `Pose` says where a body is and how
 it moves, and gives the motion of any of its points.  Vectors are pairs (x, y) of SymPy expressions.
@@ -71,7 +71,7 @@ Play = Mapping[str, Motion]
 
 
 def displaced(motion: Motion, by: Motion | None, sign: int) -> Motion:
-    """The motion of a point that is `by` away, in the direction that `sign` says; the motion itself for None."""
+    """The motion of a point at the distance `by` times `sign`; the motion itself for None."""
     if by is None:
         return motion
     one, two = (motion.position, motion.velocity, motion.acceleration), (by.position, by.velocity, by.acceleration)
@@ -143,7 +143,7 @@ class Ledger:
         return tuple(self._definitions)
 
     def define(self, name: str, expression: sp.Expr, unit: str, description: str, latex: str) -> sp.Symbol:
-        """Give the expression a name and return its symbol."""
+        """Define a symbol for the expression and return it."""
         symbol = sp.Symbol(name, real=True)
         sentence = description[0].upper() + description[1:]
         self._definitions.append(
@@ -152,7 +152,7 @@ class Ledger:
         return symbol
 
     def name(self, name: str, expression: sp.Expr, unit: str, description: str, latex: str) -> sp.Expr:
-        """As `define`, but numbers and symbols, which need no name, stay themselves."""
+        """As `define`, but numbers and symbols, which need no name, are returned unchanged."""
         expression = sp.sympify(expression)
         if expression.is_number or expression.is_Symbol:
             return expression

@@ -1,6 +1,6 @@
 """Velocities as linear forms in the generalized velocities, and the equations of motion they give (Kane's form).
 
-In: the definitions of a derivation with free coordinates, what has inertia, and what does work.  Out: M, h and Q of
+In: the definitions of a derivation with free coordinates, its inertias, and its loads.  Out: M, h and Q of
 M(q) q'' + h(q, q') = Q, entry by entry, and the definitions they use.
 
 Every velocity of a linkage is linear in the generalized velocities, every acceleration in the generalized
@@ -126,7 +126,7 @@ class LinearForms:
         return self._biases[symbol]
 
     def motion(self, inertias: Sequence[Inertia], efforts: Sequence[Effort]) -> EquationsOfMotion:
-        """M and Q - h of what has inertia and what does work: the sums of J^T m J and of J^T (F - m a0)."""
+        """M and Q - h of inertias and efforts: the sums of J^T m J and of J^T (F - m a0)."""
         size = len(self._coordinates)
         mass = [[sp.S.Zero] * size for _ in range(size)]
         forcing = [sp.S.Zero] * size

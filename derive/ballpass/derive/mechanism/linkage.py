@@ -135,13 +135,13 @@ def derive_linkage(mechanism: Mechanism, drive: Drive, play: Play = NO_PLAY) -> 
 def check_assembly(
     linkage: Linkage, values: Mapping[str, float], reach: Mapping[str, float] = MappingProxyType({})
 ) -> None:
-    """Refuse numbers with which the linkage locks somewhere in a turn of the driver, or where its play lets it lock.
+    """Refuse numbers with which the linkage, or the linkage with play, locks at some angle of the driver.
 
     Parameters
     ----------
     linkage : from `derive_linkage`
     values : SI value of every parameter, by its path
-    reach : of joints with play, how far the two points of each come apart without load [m]
+    reach : of joints with play, largest distance of the two points of each without load [m]
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""Inertia of a linkage's bodies and the work of its loads: what its equations of motion are made of.
+"""Inertia of a linkage's bodies and the work of its loads, for its equations of motion.
 
-In: the poses of the bodies, and loads on them.  Out: `Inertia` and `Effort`, each with the rate it goes with.
+In: the poses of the bodies, and loads on them.  Out: `Inertia` and `Effort`, each with the velocity that belongs to it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def work_of_drive(linkage: Linkage) -> tuple[tuple[Effort, ...], tuple[Inertia, 
 
 
 def loads_of_drive(linkage: Linkage) -> tuple[AppliedLoad, ...]:
-    """What a flywheel does to the driven body, besides the torque of the drive."""
+    """Torque of a flywheel on the driven body, besides the torque of the drive."""
     drive = linkage.drive
     return (
         (AppliedLoad(body=linkage.driven, torque=-drive.flywheel * drive.acceleration),) if drive.flywheel != 0 else ()

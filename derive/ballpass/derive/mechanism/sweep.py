@@ -40,8 +40,8 @@ def locked_positions(
     definitions, placements : of a `Linkage`
     driven : pose of the driven body, whose cosine and sine are swept
     values : SI value of every parameter, by its path
-    plays : by joint, the displacements of its play, and how far they reach together [m].  A margin is then what is left
-        of it where all plays lie as they are worst for it, to first order
+    plays : by joint, the displacements of its play, and their largest resultant [m].  A margin is then its smallest
+        value over all positions of the plays, to first order
 
     Raises
     ------
@@ -53,7 +53,7 @@ def locked_positions(
 
     def sweep(degrees: Array) -> Array:
         radians = np.deg2rad(degrees)
-        # Beyond the limit of one dyad the next one has no numbers: not a warning, but what is looked for.
+        # Beyond the limit of one dyad the next one is NaN: no warning, because this is what the sweep searches for.
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             turned = {**parameters, driven.cos: np.cos(radians), driven.sin: np.sin(radians)}
 
@@ -71,7 +71,7 @@ def locked_positions(
     swept = sweep(grid)
     faults = []
     for row, placement in enumerate(placements):
-        # Where an earlier dyad has failed, this one has no place to start from.
+        # Where an earlier dyad has failed, this one cannot be placed.
         reachable = np.all(swept[:row] > DEAD_CENTER, axis=0)
         here = np.where(np.isnan(swept[row]), -np.inf, swept[row])
         here = np.where(reachable, here, np.inf)

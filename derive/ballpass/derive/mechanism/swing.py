@@ -18,10 +18,10 @@ from ballpass.derive.mechanism.kinematics import Pose, subscript
 from ballpass.derive.terms import Definition
 from ballpass.derive.variables import DRIVER_ANGLE
 
-#: Angles of the driver at which the ideal linkage is looked at.
+#: Angles of the driver at which the ideal linkage is evaluated.
 POINTS = 48
 
-#: How far a body may turn from one to the next: by more, and nobody could tell which way it went [rad].
+#: Most that a body may turn from one to the next: beyond it the sense of rotation is ambiguous [rad].
 FARTHEST = 0.75 * math.pi
 
 
@@ -41,7 +41,7 @@ class Mean(sp.Function):  # type: ignore[misc]
     """``Mean(cos, sin, turns, *positions)``: mean direction over a turn, less the whole turns, rounded [rad]."""
 
 
-#: Functions of the linkage without play: constants of a run, whatever stands in them.
+#: Functions of the linkage without play: constants of a run.
 OF_IDEAL_LINKAGE = (Ideal, Turns, Mean)
 
 

@@ -1,4 +1,4 @@
-"""The same scene with its bearings coupled otherwise: what a trade compares.
+"""The same scene with its bearings coupled the other way (one-way or two-way), for a trade to compare.
 
 In: the data of a scene file.  Out: data of a scene whose bearings are all coupled one-way, as in the paper, or two-way.
 """

@@ -1,6 +1,6 @@
-"""Groups of clearance where numbers are written: ``--set bearing.clearance=C3``, ``--vary bearing.clearance=CN:9``.
+"""Groups of clearance in place of numbers: ``--set bearing.clearance=C3``, ``--vary bearing.clearance=CN:9``.
 
-In: a scene, the path of a number, what was written for it.  Out: the range of the group in operation.
+In: a scene, the path of a number, the text given for it.  Out: the range of the group in operation.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from ballpass.derive.scene.units import show
 
 
 def clearance_of_group(scene: Scene, path: str, written: str) -> tuple[float, float, float] | None:
-    """Lowest, middle and highest clearance of a group [m], less what `bearing.fit` takes.
+    """Lowest, middle and highest clearance of a group [m], reduced by `bearing.fit`.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """A JSON Schema of the scene file, by which editors complete and check it.
 
-In: the declared keys.  Out: a schema (draft 2020-12) of the tables, their keys and what may stand there.  It knows no
-rule across keys: a file that it accepts may have faults that only reading it shows.
+In: the declared keys.  Out: a schema (draft 2020-12) of the tables, their keys and the allowed values.  It has no
+rules across keys: a file that it accepts may have faults that are found only when the file is read.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ballpass.derive.scene.keys import Key, QuantityKey, VectorKey
 from ballpass.derive.scene.table import MAX_NAME
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
-#: What fits nothing.  Editors mark the key that holds it, where false would make Taplo mark the whole table.
+#: A schema that no value fits.  Editors then mark the key; with false Taplo would mark the whole table.
 _UNKNOWN: dict[str, Any] = {"not": {}}
 #: Keys that stand for a name or a number, as patterns.
 _PATTERNS = {"*": rf"^[A-Za-z][A-Za-z0-9_]{{0,{MAX_NAME - 1}}}$", "#": "^[1-9][0-9]*$"}
@@ -40,14 +40,14 @@ def json_schema() -> dict[str, Any]:
 
 
 def meaning(key: Key) -> str:
-    """What a key is, and what bounds it."""
+    """Schema of a key: its description and its bounds."""
     told = key.told({"row ROW": "each row", ", AXIS": "", "AXIS": "each"}).words
     words = f"{told[:1].upper()}{told[1:]}"
     return words if not isinstance(key, QuantityKey) or key.bounds is None else f"{words}, {key.bounds}"
 
 
 def describe(key: Key) -> str:
-    """What an editor shows of a key: meaning, unit, example, note."""
+    """Text that an editor shows for a key: meaning, unit, example, note."""
     unit = f" [{key.unit}]" if isinstance(key, QuantityKey | VectorKey) and key.unit != "1" else ""
     example = f", as in {key.sample}" if key.example != "" else ""
     return f"{meaning(key)}{unit}{example}. {key.note[:1].upper()}{key.note[1:]}".rstrip(". ") + "."
@@ -81,7 +81,7 @@ def _table(known: Sequence[Section], path: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _required(section: Section) -> list[str]:
-    """Keys that are needed whatever else the scene says."""
+    """Keys that are always needed."""
     some = {key for group in section.either.groups for key in group} if section.either is not None else set()
     needed = (name for name, key in section.keys.items() if not (key.optional or key.when or key.default is not None))
     return [name for name in needed if name not in some and name not in _PATTERNS]
@@ -94,7 +94,7 @@ def _rules(section: Section) -> dict[str, Any]:
 
 
 def _of_variant(own: Sequence[Section], variant: tuple[str, str]) -> dict[str, Any]:
-    """Where a key has this value: which others there must be, and which there may not be."""
+    """Required and refused keys where a key has this value."""
     tag, value = variant
     chosen = [section for section in own if section.variant == variant]
     kept = {key for section in chosen for key in section.keys}

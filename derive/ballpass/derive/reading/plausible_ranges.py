@@ -1,7 +1,7 @@
-"""Ranges in which the numbers of a scene usually lie: beyond them a number is allowed, and probably a slip.
+"""Ranges in which the numbers of a scene usually lie: a number outside is allowed, but probably a mistake.
 
 In: a `Scene`.  Out: ranges for its manifest, by which the runtime warns, wherever a number comes from.  The range of a
-number is declared with its key; what several numbers usually are to each other stands here and with their laws.
+number is declared with its key; ranges for ratios of several numbers are here and with their laws.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ In: the path of a TOML file, or its text.  Out: the frozen record in SI, every v
 in it is evaluated.  All faults of a file are raised together, as one `SceneError`.
 
 Keys are declared at the records that they fill (`ballpass.derive.scene.keys`).  Rules across them are here and in
-`read_*.py`; those that need nothing but numbers, which `--set` repeats, in `values.py`.
+`read_*.py`; those that need nothing but numbers are in `values.py`, since `--set` repeats them.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def read_scene(
 
     Parameters
     ----------
-    changes : tables and values that take the place of those of the file, or come beside them; None takes one away
+    changes : tables and values that replace those of the file or are added; None removes one
     name : of the scene; the file's stem by default
 
     Raises
@@ -83,7 +83,7 @@ def read_scene(
             file, error.strerror or type(error).__name__, "give the path of a scene file (TOML)"
         ) from None
     except ValueError:  # a NUL in the path
-        raise _unreadable(file, "this is no path", "give the path of a scene file (TOML)") from None
+        raise _unreadable(file, "this is not a path", "give the path of a scene file (TOML)") from None
     if len(data) > MAX_FILE_SIZE:
         raise _unreadable(file, f"the file is larger than {MAX_FILE_SIZE} bytes", "give a scene file (TOML)")
     try:
@@ -118,7 +118,7 @@ def _unreadable(file: Path, problem: str, remedy: str, line: int | None = None) 
 
 
 def _merged(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables with changes put in, at any depth."""
+    """Tables with changes applied, at any depth."""
     found = dict(data)
     for key, value in changes.items():
         both = isinstance(value, Mapping) and isinstance(found.get(key), Mapping)
@@ -155,8 +155,8 @@ def _scene(
         return replace(scene, lines=collector.lines)
     topology = ("mechanism.joints", "mechanism.driver")
     if scene.mechanism is not None and not any(fault.key.startswith(topology) for fault in collector.faults):
-        # what deriving would find next is told together with the rest
-        from ballpass.derive.mechanism.assembly import assemble  # SymPy takes longer to read than most scenes
+        # faults that the derivation would find next are reported with the rest
+        from ballpass.derive.mechanism.assembly import assemble  # importing SymPy takes longer than reading most scenes
 
         try:
             assemble(scene.mechanism)
@@ -276,7 +276,7 @@ def _one_or_several(root: Table, one: str, example: str) -> Iterator[tuple[Table
             allowed=f"[{one}] for one, or [{several}.<name>] for several",
             remedy=f"move [{one}] to [{several}.<name>], with a name of its own",
         )
-        return  # what a half-moved table lacks would only hide this
+        return  # faults of a half-moved table would only hide this one
     if not root.has(several):
         yield root.table(one, example), ""
         return

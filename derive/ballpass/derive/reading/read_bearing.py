@@ -41,7 +41,7 @@ RINGS, BALLS = {"PART": "rings", "_OF": ""}, {"PART": "balls", "_OF": "_w"}
 _GEOMETRY = ("inner_groove_radius", "outer_groove_radius", *keys_of(Material))
 CONTACT = Either(what="the contact stiffness", groups=(("stiffness",), _GEOMETRY), at="stiffness")
 MASS = Either(what="the moved mass", groups=(("mass",), ("equivalent_mass",)))
-SUPPORT = ChoiceKey(words="What the outer ring is on", choices=("elastic", "fixed"), note="fixed: nothing else")
+SUPPORT = ChoiceKey(words="Support of the outer ring", choices=("elastic", "fixed"), note="fixed: nothing else")
 LAW = ChoiceKey(words="Law of the damping at a ball", choices=tuple(LAWS))
 #: Keys of the start, in this order.
 INITIAL = {
@@ -192,7 +192,7 @@ def _read_damping(table: Table) -> Damping:
                 ("smoothing",),
                 f'the law "{name}" has no kink at rest',
                 allowed=f"smoothing with the laws {listing(kinked)}",
-                remedy="delete the key; smoothing in [bearing.contact] smooths what happens at contact",
+                remedy="delete the key; smoothing in [bearing.contact] smooths the contact onset",
             )
         return read_record(Damping, damping, **known | {"numbers": law.read(damping)})
 

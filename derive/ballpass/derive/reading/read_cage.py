@@ -1,4 +1,4 @@
-"""What a scene says of a bearing's cage: ratio, and slip as a number, over time or at random."""
+"""Keys of a bearing's cage: ratio, and slip as a number, over time or at random."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SLIPS = {
         symbol="s_{c,ROW}",
         bounds=Bounds(above=-1.0, below=1.0),
         usual=UsualRange(
-            least=-0.3, most=0.3, hint="A cage lags by some hundredths: check whether percents were given."
+            least=-0.3, most=0.3, hint="A cage lags by some hundredths: check whether a percentage was given."
         ),
     ),
 }
@@ -65,7 +65,7 @@ def read_cage(table: Table, uneven: str) -> CageMotion | None:
 
 
 def _jitter(cage: Table) -> object:
-    """Rows of a slip that is drawn anew after each interval, normally about its mean, which holds afterwards."""
+    """Rows of a slip that is drawn anew after each interval, normally distributed about its mean; then the mean."""
     mean = 0.0
     given = cage.data.get("slip", 0.0)
     if isinstance(given, int | float) and not isinstance(given, bool):

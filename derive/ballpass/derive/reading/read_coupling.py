@@ -1,4 +1,4 @@
-"""Keys of a bearing that say how it and its linkage move each other.
+"""Keys of the coupling between a bearing and its linkage.
 
 In: the table of a bearing.  Out: coupling, bearings side by side, body of the inner ring; faults where keys of one
 coupling stand beside the other.
@@ -26,7 +26,7 @@ BODY = TextKey(
 
 
 def read_coupling(table: Table, mechanism: Mechanism | None) -> Literal["one-way", "two-way"]:
-    """How a bearing and its linkage move each other; faults where the scene has no room for it."""
+    """Coupling of a bearing and its linkage; faults where the scene does not allow it."""
     coupling = keys_of(Bearing)["coupling"].read(table, "coupling")
     if coupling == "one-way" and mechanism is not None and mechanism.driver.torque is not None:
         table.fault(

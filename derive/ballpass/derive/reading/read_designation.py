@@ -1,7 +1,7 @@
-"""A bearing by its designation: what the table of bearings knows is put where the scene says nothing.
+"""A bearing by its designation: keys that the scene leaves out are filled in from the table of bearings.
 
-In: the table of a bearing.  Out: the same with balls, diameters, clearance and grooves filled in, as text that the
-reading rules of these keys take like the scene's own; and the record of what a catalogue says.
+In: the table of a bearing.  Out: the same with balls, diameters, clearance and grooves filled in, as text in the
+form of the scene file; and the record of the catalogue's values.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def _bearing_type(table: Table) -> BearingType:
         allowed="6000 to 6016, 6200 to 6216, 6300 to 6316, 618/3 to 61805, 619/3 to 61905, without suffixes",
         remedy=suggest(name, list(types), "see `ballpass bearings`, or give balls and diameters as numbers"),
     )
-    return types["6204"]  # so that no fault follows from this one; what is read never leaves
+    return types["6204"]  # so that this fault causes no others; the record is never used
 
 
 def _clearance_group(table: Table, kind: BearingType | None) -> str:
@@ -82,12 +82,12 @@ def _clearance_group(table: Table, kind: BearingType | None) -> str:
         allowed = listing([group for group in GROUPS if kind.clearance(group) is not None])
         remedy = f"name one of them, or {remedy}"
     elif kind is not None and isinstance(given, str) and given[:1].isalpha():
-        problem = "this is no group of clearance"
+        problem = "this is not a clearance group"
         remedy = suggest(given, GROUPS, 'write clearance = "CN" for the normal group')
     else:
         return ""
     table.fault("clearance", problem, given=show(given), allowed=allowed, remedy=remedy)
-    table.data = {**table.data, "clearance": "0 um"}  # the fault is told; no second one
+    table.data = {**table.data, "clearance": "0 um"}  # the fault is reported; no second one
     return ""
 
 

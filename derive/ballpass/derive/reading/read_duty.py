@@ -1,4 +1,4 @@
-"""The tables [duty.<state>] and [bearing.lubrication] of a scene file: what lives depend on beside the model.
+"""The tables [duty.<state>] and [bearing.lubrication] of a scene file: inputs of the rating life beside the model.
 
 In: the tables.  Out: records, possibly with placeholders where faults were noted.
 """
@@ -39,13 +39,13 @@ def read_duty(table: Table, scene: Scene) -> tuple[DutyState, ...]:
 
 
 def duty_faults(scene: Scene) -> list[Fault]:
-    """What is wrong with the numbers of the states of a scene that is right itself."""
+    """Faults of the numbers of the states, for a scene without other faults."""
     found = []
     for state in scene.duty:
         try:
             with_values(scene, dict(state.parameters))
         except SceneError as error:
-            # a state that stands still has no turns, and needs none
+            # a state at rest has no turns, and needs none
             faults = (fault for fault in error.faults if not fault.key.startswith("run."))
             found += [replace(fault, key=f"duty.{state.name}.set.{fault.key}") for fault in faults]
     return found
@@ -70,7 +70,7 @@ def _read_state(table: Table, name: str, scene: Scene) -> DutyState:
 def _no_value(path: str, value: Any) -> Fault:
     return Fault(
         key=path,
-        problem="this is no value of a number",
+        problem="this is not a value of a number",
         given=show(value),
         allowed='text with a unit, as in "20 um"',
         remedy="write one number for one path",
@@ -87,7 +87,7 @@ def _leaves(data: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]
 
 
 def read_lubrication(table: Table) -> Lubrication | None:
-    """Film and dirt of a bearing; None where the scene does not say."""
+    """Lubricant film and contamination of a bearing; None where the scene does not give them."""
     if not table.has("lubrication"):
         return None
     with table.table("lubrication") as film:

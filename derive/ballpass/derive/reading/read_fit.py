@@ -1,6 +1,6 @@
-"""What fits and temperatures take from the clearance of a bearing: the table ``[bearing.fit]``.
+"""Reduction of the clearance of a bearing by fits and temperatures: the table ``[bearing.fit]``.
 
-In: the table of a bearing, its clearance before mounting.  Out: the clearance in operation, which the model has.
+In: the table of a bearing, its clearance before mounting.  Out: the clearance in operation, which the model uses.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ballpass.derive.scene.read_keys import keys_of, not_negative, quantity, rea
 from ballpass.derive.scene.table import Table
 from ballpass.runtime.ratings.mounted_clearance import inner_growth, outer_shrinkage, thermal_reduction
 
-#: What an interference takes, over itself, the diameter of the seat and that of the raceway.
+#: Reduction of clearance, as a function of interference, diameter of the seat and of the raceway.
 Change = Callable[[float, float, float], float]
 
 
@@ -43,7 +43,7 @@ def _warming(ring: str) -> Any:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """What stands in the table."""
+    """The values of the table."""
 
     inner_interference: float | None = _interference("shaft and bore")
     outer_interference: float | None = _interference("outer ring and housing")

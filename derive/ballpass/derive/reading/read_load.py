@@ -12,10 +12,10 @@ from ballpass.derive.scene.read_keys import keys_of, read_record
 from ballpass.derive.scene.records import ConstantLoad, HarmonicLoad, Load, LoadWindow, TableLoad, UnbalanceLoad
 from ballpass.derive.scene.table import Table
 
-#: Laws of a load by what its type says.
+#: Laws of a load by its type.
 LOADS = {"constant": ConstantLoad, "harmonic": HarmonicLoad, "table": TableLoad, "unbalance": UnbalanceLoad}
 TYPE = ChoiceKey(words="How the load changes", choices=tuple(LOADS))
-#: What placeholders in the keys of its windows stand for.
+#: Values of the placeholders in the keys of its windows.
 WINDOWS = {
     "window": {"UNIT": "rad", "WHAT": "Angle of the shaft", "SYMBOL": r"\theta", "FIRST": "30 deg", "LAST": "60 deg"},
     "time_window": {"UNIT": "s", "WHAT": "Time", "SYMBOL": "t", "FIRST": "0.1 s", "LAST": "0.2 s"},

@@ -1,7 +1,7 @@
 """The table [mechanism] of a scene file to a `Mechanism`.
 
 In: the table.  Out: the record, possibly with placeholders where faults were noted (see `schema.py`).  Whether the
-linkage can be assembled is no question of reading: `derive` answers it.
+linkage can be assembled is checked later, by `derive`.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ FLYWHEEL = number(
     when="optional; only with `[mechanism.driver.torque]` or `driver.table`",
     bounds=NOT_NEGATIVE,
 )
-#: What placeholders in the words of the driver's speed stand for, with a torque and without.
+#: Values of the placeholders in the words of the driver's speed, with a torque and without.
 START, CONSTANT = {"START": " at the start", "ZERO": "_0"}, {"START": "", "ZERO": ""}
 LAW = ChoiceKey(words="Law of the torque", choices=tuple(LAWS))
 
@@ -88,7 +88,7 @@ def _read_driver(table: Table) -> Driver:
 
 
 def _read_table(driver: Table) -> tuple[SceneNumber | None, SpeedOverTime | None]:
-    """The speed at t = 0, and the table it begins; faults where another key gives the speed."""
+    """The speed at t = 0, and the table that starts with it; faults where another key gives the speed."""
     driver.refuse(
         ("speed", "torque"),
         "the table gives the driver's speed",

@@ -1,7 +1,7 @@
-"""All tables of the scene file with their keys: what the reference page and the JSON Schema are made of.
+"""All tables of the scene file with their keys, for the reference page and the JSON Schema.
 
-The keys are those of the records that the reader fills.  Where one key decides which others there are (a law, a type),
-each of its values is a section.
+The keys are those of the records that the reader fills.  Where the value of one key (a law, a type) decides which other
+keys are allowed, each of its values is a section.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ballpass.derive.scene import bearing_records, records
 from ballpass.derive.scene.keys import Fill, Key
 from ballpass.derive.scene.read_keys import Either, keys_of
 
-#: What stands for a name in words.
+#: Text in place of a name in descriptions.
 NAME: Fill = {"NAME": "<name>", "POINT": "<name>", "OWNER": "body or frame", "INDEX": ""}
 
 

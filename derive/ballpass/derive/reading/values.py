@@ -1,7 +1,7 @@
 """The numbers of a scene: list them, check them, replace them.
 
-In: a `Scene`.  Out: its quantities; the faults of their values; a scene with other values.  The checks here are all
-that need nothing but numbers, so that a value from ``--set`` meets the same ones as a value from the file.
+In: a `Scene`.  Out: its quantities; the faults of their values; a scene with other values.  All checks
+that need nothing but numbers are here, so that values from ``--set`` and from the file are checked alike.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from ballpass.derive.scene.quantity import Bounds, SceneNumber
 from ballpass.derive.scene.records import Driver, Load, Mechanism, Scene, TableLoad
 from ballpass.derive.scene.units import QuantityError, parse_quantity, show
 
-#: Ends of keys that stand in the file beside quantities, for the message where somebody asks to override one.
+#: Last parts of keys of the file that are no quantities, for the message about an override of one.
 _STRUCTURE = ("balls", "designation", "joint", "law", "support")
 
 
 def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
-    """Faults of the values: signs, bounds, and what they must be to each other.
+    """Faults of the values: signs, bounds, and rules between several values.
 
     Parameters
     ----------
@@ -47,16 +47,16 @@ def value_faults(scene: Scene, given: Mapping[str, str]) -> list[Fault]:
 
 
 def value_bounds(scene: Scene) -> dict[str, Bounds]:
-    """What each quantity alone must satisfy, by path; quantities that may have any value are not in it."""
+    """Bounds of each quantity by path; quantities without bounds are left out."""
     return {q.path: q.limits.bounds for q in scene.quantities if q.limits.bounds is not None}
 
 
 def value_relations(scene: Scene) -> tuple[tuple[str, float, str], ...]:
-    """What quantities must be to each other: (path, factor, other path) for ``value > factor * other value``."""
+    """Rules between quantities: (path, factor, other path) for ``value > factor * other value``."""
     relations: list[tuple[str, float, str]] = []
     for bearing in scene.bearings:
         ball, pitch = bearing.ball_diameter.path, bearing.pitch_diameter.path
-        # the balls fit side by side on the pitch circle, a hair's breadth apart
+        # the balls fit side by side on the pitch circle, with a small gap
         relations.append((pitch, (1.0 - 1e-12) / math.sin(math.pi / bearing.balls) if bearing.balls > 1 else 1.0, ball))
         relations.append((bearing.clearance.path, -1.0, ball))  # see `_check_preload`
         relations += [r for effect in bearing.effects for r in EFFECTS[effect.kind].relations(effect, bearing)]
@@ -122,7 +122,7 @@ def parse_override(scene: Scene, text: str) -> tuple[str, float]:
                     problem="an override without a value",
                     given=show(text),
                     allowed="PATH=VALUE",
-                    remedy='write the value with its unit behind "=", as in "bearing.clearance=20 um"',
+                    remedy='write the value with its unit after "=", as in "bearing.clearance=20 um"',
                 )
             ]
         )
@@ -144,7 +144,7 @@ def check_path(scene: Scene, path: str) -> None:
     Raises
     ------
     SceneError
-        The nearest paths are named; what decides the structure of the model is told from what does not exist.
+        The nearest paths are named; keys that decide the structure of the model get another message than unknown ones.
     """
     known = [quantity.path for quantity in scene.quantities]
     if path not in known:
@@ -155,7 +155,7 @@ def _unknown_path(path: str, known: Sequence[str]) -> Fault:
     if path.rpartition(".")[2] in _STRUCTURE or path.startswith("run."):
         return Fault(
             key=path,
-            problem="this is no number of the model"
+            problem="this is not a number of the model"
             + ("" if path.startswith("run.") else ": it decides which equations are derived"),
             given=show(path),
             allowed="paths of quantities",
@@ -225,7 +225,7 @@ def _check_windows(checker: Checker, load: Load) -> None:
             window.end.path,
             "the load ends before it begins",
             f"start {checker.show(window.start)}, end {checker.show(window.end)}",
-            "an end behind the start",
+            "an end after the start",
             "give a later end, or none for a load that does not end",
         )
 
@@ -282,7 +282,7 @@ def _check_balls(checker: Checker, bearing: Bearing) -> None:
 
 
 def _check_preload(checker: Checker, bearing: Bearing) -> None:
-    """A preload as large as a ball leaves no room for one.  A clearance may be of any width: it is a free ring then."""
+    """Refuse a preload as large as a ball.  A clearance may have any size: the ring is free then."""
     ball, clearance = bearing.ball_diameter, bearing.clearance
     if ball.value <= 0.0 or not -clearance.value >= ball.value:
         return

@@ -1,1 +1,1 @@
-"""Scene files: records, units, words of faults, and what reading rules are made of."""
+"""Scene files: records, units, messages of faults, and the helpers of the reading rules."""

@@ -1,4 +1,4 @@
-"""What the user asked for of a bearing, as frozen records in SI units; see `records`."""
+"""The bearing of a scene as frozen records in SI units; see `records`."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _CLEARANCE = UsualRange(
 )
 #: Young's modulus from magnesium to silicon carbide.
 _MODULUS = UsualRange(least=50e9, most=400e9, hint="Steel has 207 GPa: check the unit.")
-#: Over ball diameter: ISO 16281 takes 0.52 and 0.53; the bounds are those of made bearings, wide.
+#: Over ball diameter: ISO 16281 takes 0.52 and 0.53; the bounds are wider than those of real bearings.
 _GROOVE = UsualRange(
     least=0.505, most=0.56, of="ball_diameter", hint="Check that the ball's diameter was given, not its radius."
 )
 _WIDTH = "give a small width, or delete the key for the law itself"
-#: Slip of a cage: beyond, balls skid, and the model of a cage that turns evenly is none.
-_PERCENTS = "A cage lags by some hundredths: check whether percents were given."
+#: Slip of a cage: beyond this, balls skid, and the model of an evenly turning cage does not hold.
+_PERCENTS = "A cage lags by some hundredths: check whether a percentage was given."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,7 +94,7 @@ class GivenContact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Damping:
-    """Damping law at the ball, by name, and its numbers; the law itself says what they are.
+    """Damping law at the ball, by name, and its numbers, which the law defines.
 
     `smoothing` is the half width [m/s] of the smoothed kink of one-sided laws at rest, or None.
     """
@@ -114,7 +114,7 @@ class Damping:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BallEffect:
-    """An effect on the balls: its kind, and records of its own, which this layer only carries."""
+    """An effect on the balls: its kind, and its own records, which this layer only stores."""
 
     kind: str
     parts: tuple[Any, ...]
@@ -122,7 +122,7 @@ class BallEffect:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CageMotion:
-    """What a scene says of the cage: its ratio to the inner ring's speed instead of that of rolling, and its slip.
+    """The cage of a scene: its ratio to the inner ring's speed instead of that of rolling, and its slip.
 
     `slip` is the part by which it turns slower [1].  None: rolling, or the slip of each row of a table holds from its
     `time` [s] until the next; the first is zero.
@@ -223,7 +223,7 @@ def _rating(symbol: str) -> Any:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Catalogue:
-    """What a catalogue says of a bearing, for its ratings; nothing that is derived depends on it.
+    """Catalogue data of a bearing, for its ratings; the derived equations do not depend on them.
 
     `designation` and `clearance_group` are empty where the scene names none; `clearance_range` is that of the group
     [m] in operation, after `mounting_loss` [m].  Ratings and fatigue load limit [N] are None where the scene does not
@@ -241,7 +241,7 @@ class Catalogue:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lubrication:
-    """Film and dirt, for the life factor of ISO 281; nothing that is derived depends on it.
+    """Lubricant film and contamination, for the life factor of ISO 281; the derived equations do not depend on it.
 
     Of `viscosity_ratio` [1] and kinematic `viscosity` at the bearing's temperature [m^2/s] one is given;
     `contamination` is e_C [1].
@@ -360,10 +360,10 @@ class Bearing:
 
     @property
     def prefix(self) -> str:
-        """What the names of its states and outputs begin with."""
+        """Prefix of the names of its states and outputs."""
         return f"{self.name}." if self.name else ""
 
     @property
     def path(self) -> str:
-        """Its place in the scene file, which the names of its parameters and constants begin with."""
+        """Its place in the scene file: the prefix of the names of its parameters and constants."""
         return f"bearings.{self.name}" if self.name else "bearing"

@@ -11,7 +11,7 @@ from ballpass.derive.scene.quantity import SceneNumber
 
 
 class Checker:
-    """Notes faults; a comparison with NaN is false, so every check asks for what is wrong."""
+    """Notes faults.  Every check compares for the wrong case, because comparisons with NaN are false."""
 
     def __init__(self, given: Mapping[str, str]) -> None:
         self.given = given

@@ -1,6 +1,6 @@
-"""What can be wrong with a scene: all faults collected, raised once.
+"""Faults of a scene: all are collected and raised once.
 
-A `Fault` says in which key, what is wrong, what was given, what is allowed and what to do.  A `SceneError` carries one
+A `Fault` holds the key, what is wrong, what was given, what is allowed and what to do.  A `SceneError` carries one
 or more of them; its message lists them all.
 """
 
@@ -28,8 +28,8 @@ class Fault:
     ----------
     key : dotted place in the scene file ("mechanism.joints.C"); empty when the whole file is meant
     problem : what is wrong, in one clause
-    given : what the file says (or what was computed from it); may be empty
-    allowed : what may stand there; may be empty
+    given : the value in the file (or computed from it); may be empty
+    allowed : the allowed values; may be empty
     remedy : what to do
     line : line of the file, counted from 1, where it is known
     """
@@ -52,7 +52,7 @@ class Fault:
 
 
 def _shown(text: str, most: int) -> str:
-    """A text for a terminal: names of the file may be of any length, with escape sequences in them."""
+    """A text that is safe for a terminal: names in a file may be very long or hold escape sequences."""
     text = "".join(letter if letter.isprintable() else "?" for letter in text)
     return text if len(text) <= most else f"{text[:most]}..."
 
@@ -75,7 +75,7 @@ class SceneError(BallpassError, ValueError):
         head = f"{self.source or 'the scene'}: {count}"
         listed = [fault.render() for fault in self.faults[:MOST_FAULTS]]
         if len(self.faults) > MOST_FAULTS:
-            listed.append(f"... and {len(self.faults) - MOST_FAULTS} more; mend these first")
+            listed.append(f"... and {len(self.faults) - MOST_FAULTS} more; correct these first")
         super().__init__("\n".join([head, *listed]))
 
 

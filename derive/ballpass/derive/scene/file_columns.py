@@ -47,7 +47,7 @@ def with_columns(data: dict[str, Any], folder: Path | None, faults: list[Fault],
 
 
 class _Unfit(Exception):
-    """What is wrong with a column, as the words of a `Fault`."""
+    """A fault of a column, as the parts of a `Fault`."""
 
 
 def _refuse(problem: str, given: object, allowed: str, remedy: str) -> NoReturn:
@@ -86,7 +86,7 @@ def _of_csv(file: Path, name: str, wanted: str) -> list[float]:
     try:
         text = file.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or "it is no text in UTF-8"
+        why = getattr(error, "strerror", None) or "it is not text in UTF-8"
         _refuse(f"the file cannot be read: {why}", name, "a CSV file", "give its path from the scene file's folder")
     lines = [
         (k, line) for k, line in enumerate(text.splitlines(), start=1) if line.strip() and not line.startswith("#")
@@ -106,13 +106,13 @@ def _of_csv(file: Path, name: str, wanted: str) -> list[float]:
 
 
 def _of_netcdf(file: Path, name: str, wanted: str) -> tuple[list[float], str]:
-    """Numbers, and their unit, "" where the file tells none."""
-    import h5netcdf  # takes longer to import than most scenes to read
+    """Numbers, and their unit; "" where the file has none."""
+    import h5netcdf  # importing it takes longer than reading most scenes
 
     try:
         stored = h5netcdf.File(file, "r")
     except (OSError, ValueError) as error:
-        why = "there is no such file" if isinstance(error, FileNotFoundError) else "it is no NetCDF-4 file"
+        why = "there is no such file" if isinstance(error, FileNotFoundError) else "it is not a NetCDF-4 file"
         _refuse(
             f"the file cannot be read: {why}", name, "a NetCDF-4 file", "give its path from the scene file's folder"
         )

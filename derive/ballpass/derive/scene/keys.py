@@ -1,8 +1,8 @@
 """Keys of the scene file.  Each is declared once, at the field of the record that it fills.
 
-A declaration says what the key is, in words, and for a number its unit, symbol, bounds and the range it usually lies
-in.  The reader, the checks of values, the warnings of unusual numbers, the reference page and the JSON Schema take it
-from there.  Only rules across keys are code.
+A declaration holds a description of the key, and for a number its unit, symbol, bounds and plausible range.  The
+reader, the checks of values, the warnings of unusual numbers, the reference page and the JSON Schema take it from
+there.  Only rules across keys are code.
 
 Text of a declaration may hold placeholders in capitals ("Mass of the NAME"), which the owner of a table fills in.
 """
@@ -20,7 +20,7 @@ from ballpass.derive.scene.quantity import NO_LIMITS, Bounds, Limits, SceneNumbe
 from ballpass.derive.scene.table import Table, listing, suggest
 from ballpass.derive.scene.units import show
 
-#: What placeholders stand for.
+#: Values of placeholders.
 Fill = Mapping[str, str]
 
 
@@ -29,7 +29,7 @@ NUMBER = r"^\s*[-+]?(\d|\.\d)"
 
 
 def filled(text: str, fill: Fill) -> str:
-    """A text with its placeholders replaced, in one pass: names of the scene may be like placeholders."""
+    """A text with its placeholders replaced, in one pass, because names of the scene may look like placeholders."""
     longest_first = sorted(fill, key=len, reverse=True)
     return re.sub("|".join(longest_first), lambda match: fill[match[0]], text) if fill else text
 
@@ -40,12 +40,12 @@ class Key(ABC):
 
     Attributes
     ----------
-    words : what it is, one line without its unit; the description of its parameter
-    name : in the file, where it is not that of its field
+    words : description in one line without unit; also that of its parameter
+    name : in the file, where it differs from that of its field
     example : as the file has it; a text without its quotes
-    default : what stands for a key that is not given, likewise
+    default : value of a key that is not given, in the same form
     optional : it may be left out, and is None then
-    when : for people, where other keys decide whether it is needed: "required if elastic"
+    when : text on when it is needed, where other keys decide this: "required if elastic"
     note : more for the reference page, in Markdown
     """
 
@@ -68,22 +68,22 @@ class Key(ABC):
 
     @property
     def sample(self) -> str:
-        """What may stand in the file."""
+        """The allowed values in the file."""
         return f'"{self.example}"' if self.quoted else str(self.example)
 
     def read(self, table: Table, name: str) -> Any:
-        """What a table holds at this key; a placeholder, with a fault, where it holds nothing that fits."""
+        """The value in a table at this key; a placeholder, with a fault, where none fits."""
         if not table.has(name) and (self.optional or self.default is not None):
             return self.absent(table, name)
         given = table.take(name, self.sample)
         return self.placeholder(table, name) if given is None else self.value(table, name, given)
 
     def absent(self, table: Table, name: str) -> Any:
-        """What stands for a key that is not given."""
+        """Value of a key that is not given."""
         return self.default
 
     def placeholder(self, table: Table, name: str) -> Any:
-        """What stands for a value that is missing or wrong; such a record never leaves the reader."""
+        """Value in place of a missing or wrong one; such a record never leaves the reader."""
         return None
 
     @abstractmethod
@@ -92,10 +92,10 @@ class Key(ABC):
 
     @abstractmethod
     def schema(self) -> dict[str, Any]:
-        """What may stand there, as JSON Schema."""
+        """The allowed values, as JSON Schema."""
 
     def refuse(self, table: Table, name: str, problem: str, given: Any, allowed: str = "", remedy: str = "") -> Any:
-        """Note a fault; the placeholder."""
+        """Note a fault; return the placeholder."""
         remedy = remedy or f"write {name} = {self.sample}"
         table.fault(name, problem, given=show(given), allowed=allowed or self.sample, remedy=remedy)
         return self.placeholder(table, name)
@@ -244,7 +244,7 @@ class ColumnKey(QuantityKey):
         if not isinstance(values, list) or not values:
             allowed = f'{self.sample}, or {{ values = [0, 1], unit = "{self.unit}" }}'
             remedy = "write a list with one value for each row"
-            return self.refuse(table, name, "this is no column of numbers", given, allowed, remedy)
+            return self.refuse(table, name, "this is not a column of numbers", given, allowed, remedy)
         return tuple(
             self.told({"ROW": str(row)}).at(
                 (*table.path, name, str(row)),
@@ -327,7 +327,7 @@ class TextKey(Key):
             return self.refuse(table, name, "this is not a text", given, "a text")
         if self.longest and (not given.isprintable() or len(given) > self.longest):
             allowed, remedy = f"at most {self.longest} printable characters", "shorten it; put the rest into a comment"
-            return self.refuse(table, name, "this is no single line", given, allowed, remedy)
+            return self.refuse(table, name, "this is not a single line", given, allowed, remedy)
         return given
 
 
@@ -355,14 +355,14 @@ class NamesKey(Key):
             return self.refuse(table, name, "this is not a list of two names", given)
         allowed = f"a list of names and patterns, as in {self.sample}"
         if not isinstance(given, list) or not given:
-            return self.refuse(table, name, "this is no list of names", given, allowed)
+            return self.refuse(table, name, "this is not a list of names", given, allowed)
         names = []
         for number, item in enumerate(given, start=1):
             if isinstance(item, str) and item.strip() and len(item) <= 200:
                 names.append(item.strip())
             else:
                 remedy = "delete the entry, or write a name"
-                self.refuse(table, name, f"entry {number} is no name", item, allowed, remedy)
+                self.refuse(table, name, f"entry {number} is not a name", item, allowed, remedy)
         return tuple(names)
 
 

@@ -1,4 +1,4 @@
-"""Numbers of a scene: a quantity with its path, what bounds it, and plane vectors of quantities."""
+"""Numbers of a scene: a quantity with its path and bounds, and plane vectors of quantities."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """What a value must satisfy: > above, >= least, <= most, < below; None bounds nothing."""
+    """Bounds of a value: > above, >= least, <= most, < below; None bounds nothing."""
 
     above: float | None = None
     least: float | None = None
@@ -24,11 +24,11 @@ class Bounds:
 
     @property
     def allowed(self) -> str:
-        """What may stand there."""
+        """The allowed values."""
         return "zero or a value above it" if self == NOT_NEGATIVE else f"a value {self}"
 
     def problem(self, value: float) -> str:
-        """What is wrong with a value; empty where nothing is, and for NaN."""
+        """Fault of a value; empty where there is none, and for NaN."""
         checks = (
             (self.above, operator.le),
             (self.least, operator.lt),
@@ -57,7 +57,7 @@ class UsualRange:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What the declaration of a key says of its values: bounds, what to do beyond them, where values usually lie."""
+    """Limits of the values of a key: bounds, remedy beyond them, usual range."""
 
     bounds: Bounds | None = None
     remedy: str = ""
@@ -65,7 +65,7 @@ class Limits:
 
     @property
     def advice(self) -> str:
-        """What to do where a value is out of its bounds."""
+        """Remedy where a value is out of its bounds."""
         words = {POSITIVE: "give a positive value", NOT_NEGATIVE: "give zero or a positive value"}
         return self.remedy or words.get(self.bounds or POSITIVE, "correct the value")
 
@@ -82,7 +82,7 @@ class SceneNumber:
     path : dotted place in the scene file; the parameter's name
     value : magnitude in SI [unit]
     unit : SI unit as text, "kg*m^2"; "1" when dimensionless
-    description : one line for people, without the unit
+    description : one line, without the unit
     latex : symbol in the derived equations
     limits : of its value, by the declaration of its key
     """

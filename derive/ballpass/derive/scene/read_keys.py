@@ -24,7 +24,7 @@ class Either:
 
     Attributes
     ----------
-    what : they give, "the coefficient"
+    what : name of what they give, "the coefficient"
     groups : of keys, the usual one first; the keys of the other groups are None
     at : key that a second group is reported at; the table itself by default
     """

@@ -1,4 +1,4 @@
-"""What the user asked for: the scene as frozen records in SI units.
+"""The scene as frozen records in SI units.
 
 In: nothing but values that `read.py` has checked.  Out: one `Scene`.
 
@@ -39,7 +39,7 @@ METHODS = (
 
 
 def force_key(words: str, symbol: str, index: str = "", **more: Any) -> VectorKey:
-    """A force: no single number, because nothing says along which axis it would act."""
+    """A force: a single number is not enough, because its axis would be unknown."""
     x, y = (f"{symbol}_{{{index}{',' * bool(index)}{axis}}}" for axis in "xy")
     length, angle = f"{symbol}_{{{index}}}" if index else symbol, rf"\alpha_{{{index or symbol}}}"
     return VectorKey(unit="N", words=words, symbols=("", x, y, length, angle), polar=("magnitude", "direction"), **more)
@@ -70,7 +70,7 @@ class Body:
     """A moving rigid body.
 
     `inertia` is about the centre of mass [kg*m^2]; None for a body that does not rotate and whose moment balance
-    nobody asked for.
+    is not needed.
     """
 
     name: str
@@ -163,7 +163,7 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedOverTime:
-    """Rows of a driver's speed: times [s], increasing, and the speeds behind the first, which is `Driver.speed`."""
+    """Rows of a driver's speed: times [s], increasing, and the speeds after the first, which is `Driver.speed`."""
 
     time: tuple[SceneNumber, ...] = column(
         "s", "Time in row ROW of the driver's table", "t_{1,ROW}", bounds=NOT_NEGATIVE, note="increasing"
@@ -180,7 +180,7 @@ class Driver:
     The driver's angle is that of the driven body's x axis from +x.
 
     Without `table` and `torque` the `speed` [rad/s] is constant, else it is that at t = 0.  A `table` gives it over
-    time.  A `torque` is a record of `ballpass.derive.drive` that this layer only carries.  With either a `flywheel`
+    time.  A `torque` is a record of `ballpass.derive.drive` that this layer only stores.  With either a `flywheel`
     [kg*m^2] (None: none) turns with the driven body.
     """
 
@@ -213,7 +213,7 @@ class Force:
     """A force or torque on the linkage, from ``[mechanism.<table>.<name>]``.
 
     `pathway` says which bodies it acts on and along what, `law` how large it is: records of
-    `ballpass.derive.mechanism.forces`, which this layer only carries.
+    `ballpass.derive.mechanism.forces`, which this layer only stores.
     """
 
     name: str
@@ -291,7 +291,7 @@ class HarmonicLoad:
 class TableLoad:
     """Force on the inner ring, linear between rows.
 
-    Rows are over the `time` [s], constant before the first and behind the last, or the `angle` of the shaft [rad],
+    Rows are over the `time` [s], constant before the first and after the last, or the `angle` of the shaft [rad],
     periodic over a turn; the other one is empty.  Rows strictly increasing, `x` and `y` [N]; all of one length of at
     least two.
     """
@@ -362,17 +362,17 @@ class Load:
 
     @property
     def path(self) -> str:
-        """Its place in the scene file, which the names of its constants begin with."""
+        """Its place in the scene file: the prefix of the names of its constants."""
         return f"loads.{self.name}" if self.name else "load"
 
     @property
     def label(self) -> str:
-        """What the names of its inputs and variables begin with."""
+        """Prefix of the names of its inputs and variables."""
         return f"load.{self.name}" if self.name else "load"
 
     @property
     def turns(self) -> bool:
-        """Whether it follows the angle of the shaft."""
+        """Whether it depends on the angle of the shaft."""
         over_angle = isinstance(self.law, TableLoad) and self.law.over == "angle"
         return over_angle or isinstance(self.law, UnbalanceLoad) or self.angle_window is not None
 
@@ -414,7 +414,7 @@ class RunSettings:
         default=1e-6,
         setting=True,
         bounds=Bounds(least=TOLERANCES[0], most=TOLERANCES[1]),
-        remedy="write rtol = 1e-6 where nothing speaks for another value",
+        remedy="write rtol = 1e-6 unless another value is needed",
         note="see {doc}`../theory/integration`",
     )
 
@@ -461,7 +461,7 @@ class Scene:
     """A checked scene.
 
     `outputs` are the patterns of the file (``"inner.*"``); `derive` resolves them.  `duty` is for lives alone.  `lines`
-    says where its keys stand, for messages.
+    are the lines of its keys, for messages.
 
     Examples
     --------

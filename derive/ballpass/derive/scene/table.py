@@ -1,8 +1,8 @@
-"""Reading tables of a scene file: every fault is noted, reading goes on.
+"""Read tables of a scene file: every fault is noted, and reading continues.
 
-A `Table` hands out what its keys hold and knows at its end which keys nobody asked for.  Where a value is missing or
-wrong, a `Fault` is noted and a placeholder is handed out (NaN for a quantity), so that one pass over the file finds all
-faults.  The records made of placeholders never leave `read.py`.
+A `Table` returns the values of its keys, and at its end reports the keys that were never read.  Where a value is
+missing or wrong, a `Fault` is noted and a placeholder is handed out (NaN for a quantity), so that one pass over the
+file finds all faults.  The records made of placeholders never leave `read.py`.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Collector:
         limits: Limits = NO_LIMITS,
         wrong_dimension: str = "",
     ) -> SceneNumber:
-        """Quantity from what stands at `path`; its value is NaN where that is none.
+        """Quantity from the value at `path`; NaN where that is not a quantity.
 
         `wrong_dimension` replaces the remedy where number and unit can be read, but measure something else.
         """
@@ -100,7 +100,7 @@ def suggest(given: object, known: Sequence[str], otherwise: str) -> str:
 
 
 def listing(names: Sequence[str]) -> str:
-    """Names as people read them: "a", "b"."""
+    """Names as a text: "a", "b"."""
     return ", ".join(show(name) for name in names) if names else "none"
 
 
@@ -118,7 +118,7 @@ NO_KEY, NO_TABLE = "this key is missing", "this table is missing"
 
 
 class Table:
-    """A table of the file; as a context it reports the keys nobody asked for.
+    """A table of the file; as a context it reports the keys that were not read.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ class Table:
         self.collector.fault(path, problem, given=given, allowed=allowed, remedy=remedy)
 
     def refuse(self, keys: Iterable[str], problem: str, *, allowed: str = "", remedy: str) -> None:
-        """Note a fault at each of some keys that is there, where they have no place beside others."""
+        """Note a fault at each of some keys that is given although others exclude it."""
         for key in keys:
             if self.has(key):
                 self.fault(key, problem, given=show(self.data[key]), allowed=allowed, remedy=remedy)
@@ -181,7 +181,7 @@ class Table:
         return key in self.data
 
     def names(self, what: str, example: str = "") -> list[str]:
-        """All keys, where they are names the user chooses; with an example there must be one."""
+        """All keys, where they are names that the user chooses; with an example at least one is required."""
         for key in self.data:
             self.know(key)
             self.collector.check_name((*self.path, key), key, what)
@@ -190,7 +190,7 @@ class Table:
         return list(self.data)
 
     def take(self, key: str, example: str) -> Any:
-        """What stands at a required key; None, with a fault, where nothing does."""
+        """The value of a required key; None, with a fault, where it is missing."""
         if self.has(key):
             return self.data[key]
         if not self.missing:

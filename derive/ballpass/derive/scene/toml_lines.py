@@ -1,4 +1,4 @@
-"""Where each key of a TOML text stands.
+"""The line of each key in a TOML text.
 
 In: text that `tomllib` has read.  Out: line numbers by path, for the messages.  Because the text is known to be valid,
 it is enough to follow strings, comments and brackets; nothing is read a second time.
@@ -49,7 +49,7 @@ class LineIndex:
 def deep_key(text: str) -> int | None:
     """Line of the first key with more than 64 dots, None where there is none.
 
-    The time `tomllib` takes for a key grows with the square of its parts: a file of one key would keep it for hours.
+    The time `tomllib` takes for a key grows with the square of its parts: a file of one key could take hours.
     """
     found = _TOO_DEEP.search(text)
     return None if found is None else text.count("\n", 0, found.start()) + 1
@@ -98,7 +98,7 @@ def _element(path: tuple[str, ...], elements: dict[tuple[str, ...], int]) -> tup
 
 @dataclass(slots=True)
 class _LineState:
-    """What is open at the end of a line: brackets of arrays and inline tables, or a multi-line string."""
+    """Open elements at the end of a line: brackets of arrays and inline tables, or a multi-line string."""
 
     depth: int = 0
     quote: str = ""

@@ -1,7 +1,7 @@
 """Text with a unit to a number in SI, with all units that pint knows.
 
-The grammar, and sizes of the names most scenes are written with, are in `ballpass.runtime.contract.units`.  pint is
-asked for one thing only, the size of a unit of another name: it and its definitions take a third of a second to load.
+The grammar, and the sizes of the usual units, are in `ballpass.runtime.contract.units`.  pint is used only for the
+size of any other unit: pint and its definitions take a third of a second to load.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ __all__ = ["COMMON", "KINDS", "QuantityError", "looked_up_size", "parse_quantity
 
 
 def parse_quantity(given: object, unit: str) -> float:
-    """Value in SI of what stands in a scene file; see `ballpass.runtime.contract.units.parse_quantity`."""
+    """Value in SI of a text or number of a scene file; see `ballpass.runtime.contract.units.parse_quantity`."""
     return units.parse_quantity(given, unit, looked_up_size)
 
 

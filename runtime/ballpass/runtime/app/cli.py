@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.run.solution import Solution
     from ballpass.runtime.run.start import RunEnd
 
-#: Bytes of samples that are written without a word.
+#: Bytes of samples that are written without a remark.
 LARGE = 200_000_000
 
 #: Groups of commands in ``ballpass --help``, in this order.
@@ -119,7 +119,7 @@ def run(
         typer.Option(
             metavar="START",
             help="Where the run starts: equilibrium, the rings at rest under the load of t = 0, or the solution.nc of "
-            "another run, which goes on. Default: as the scene says.",
+            "another run, which continues. Default: as in the scene.",
         ),
     ] = None,
     set_: options.Settings = None,
@@ -152,7 +152,7 @@ def run(
         typer.Option(
             "--of",
             metavar="Q",
-            help="Quantity to give, and that --error is about: peak_ball_force, drive_work. May be repeated.",
+            help="Quantity to report, and to which --error applies: peak_ball_force, drive_work. May be repeated.",
         ),
     ] = None,
     all_: Annotated[
@@ -165,7 +165,7 @@ def run(
 ) -> None:
     """Simulate a scene; write solution, summary and figures.
 
-    Derives and compiles what is stale in generated/<scene>. What is not given here is as the scene's run table says.
+    Derives and compiles what is stale in generated/<scene>. Options not given are those of the scene's run table.
     """
     with command(scene) as stages:
         # within: an interrupt while they are imported is one of the command
@@ -286,7 +286,7 @@ def derive(
         Path | None, typer.Option(metavar="DIR", help="Folder to write; generated/<scene> if not given.")
     ] = None,
     check: Annotated[
-        bool, typer.Option("--check", help="Write nothing; exit 1 where the folder differs from what is derived today.")
+        bool, typer.Option("--check", help="Write nothing; exit code 1 if the folder differs from a new derivation.")
     ] = False,
 ) -> None:
     """Derive the equations of a scene and generate its C, functions, manifest and EQUATIONS.md."""
@@ -356,7 +356,7 @@ def export(
             )
         manifest = read_own(scene, stages, read_artefact, lambda manifest: manifest)
         stages("export the FMU" if fmu else "export")
-        # here, for they bring CasADi
+        # here, because they import CasADi
         if fmu:
             from ballpass.runtime.app.commands.speed_input import speed_becomes_input, with_speed_over_time
             from ballpass.runtime.export.fmu import export_fmu
@@ -382,7 +382,7 @@ for _question in (*QUESTIONS, trade):
 
 
 def _read_start(text: str | None) -> RunEnd | Literal["equilibrium"] | None:
-    """Where a run starts, as people write it: equilibrium, or a file of a run that goes on."""
+    """Where a run starts, as an option: equilibrium, or a file of a run that continues."""
     if text is None:
         return None
     if text == "equilibrium":
@@ -400,7 +400,7 @@ def _check_request(
     *,
     goes_on: bool = False,
 ) -> None:
-    """Refuse options that no model can follow, before anything is derived or written; `goes_on` from another run."""
+    """Refuse options that no model allows, before anything is derived or written; `goes_on`: from another run."""
     from ballpass.runtime.contract.parameters import unknown_name
     from ballpass.runtime.native.casadi_integrators import METHODS
     from ballpass.runtime.native.stepper import METHODS as STEPPERS

@@ -28,12 +28,12 @@ def main() -> None:
         raise KeyboardInterrupt
 
     def ignored(fault: sys.UnraisableHookArgs) -> None:
-        if issubclass(fault.exc_type, KeyboardInterrupt):  # in a destructor or callback: again when that is over
+        if issubclass(fault.exc_type, KeyboardInterrupt):  # in a destructor or callback: raise it again after that
             threading.Timer(0.01, signal.pthread_kill, (threading.get_ident(), signal.SIGINT)).start()
         else:
             sys.__unraisablehook__(fault)
 
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have it ignored
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have set it to be ignored
         signal.signal(signal.SIGINT, interrupt)
         sys.unraisablehook = ignored
     try:
@@ -48,5 +48,5 @@ def main() -> None:
             say_interrupted()
         sys.exit(130)
     finally:
-        # Python gives the signal back to the system while it ends, and that would kill a command that has succeeded
+        # at its end Python restores the default handler, by which a late signal would kill a command that has succeeded
         signal.signal(signal.SIGINT, signal.SIG_IGN)

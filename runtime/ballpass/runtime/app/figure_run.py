@@ -1,7 +1,7 @@
-"""A run of many turns for figures that need them: stroboscopic points, and spectra that tell near lines apart.
+"""A run of many turns for figures that need them: stroboscopic points, and spectra that resolve near lines.
 
-In: a model and a run of it.  Out: the run that goes on behind it, or None where it is long enough or
-costs too much.
+In: a model and a run of it.  Out: a run that continues it, or None where it is long enough or a longer
+one takes too much time.
 """
 
 from __future__ import annotations

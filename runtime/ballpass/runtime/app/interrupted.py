@@ -1,21 +1,21 @@
-"""What an interrupted command says; it imports nothing heavy, so that it can be said while modules are imported."""
+"""The message of an interrupted command.  Nothing heavy is imported here: an interrupt may come during imports."""
 
 from __future__ import annotations
 
 import sys
 
-INTERRUPTED = "interrupted. Whatever files are there are whole."
+INTERRUPTED = "interrupted. Files written so far are complete."
 
-#: Commands of this process that have said so.
+#: Commands of this process that have printed it.
 _said: list[str] = []
 
 
 def say_interrupted() -> None:
-    """Say it on stderr."""
+    """Print it on stderr."""
     _said.append(INTERRUPTED)
     print(f"error: {INTERRUPTED}", file=sys.stderr)
 
 
 def has_said() -> bool:
-    """Whether it was said: typer takes an interrupt between our own commands without a word."""
+    """Whether it was printed: between our own commands typer handles an interrupt without a message."""
     return bool(_said)

@@ -1,8 +1,8 @@
 """The results of a run as a folder: solution, summary and figures.
 
-In: a folder, and a function that writes the files of a run.  Out: the folder holds them, and whatever else was in it.
-The summary is put in place last and carries the digests of the other files, so that `load_results` takes a whole run or
-refuses: a process that is killed meanwhile leaves the old run, the new one, or files that are refused.
+In: a folder, and a function that writes the files of a run.  Out: the folder holds them beside its other files.
+The summary is put in place last and carries the digests of the other files, so that `load_results` reads a complete run
+or refuses: a process that is killed during the writing leaves the old run, the new one, or files that are refused.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def write_results(
     ----------
     folder : to be written, made where it is missing
     write : writes solution and figures into the folder it is called with; gives the summary
-    figures : names of all figures there are: those that the new run does not bring go, for they would pass for its own
+    figures : names of all figures there are: those that the new run does not write are deleted, as they are outdated
 
     Returns
     -------
@@ -107,7 +107,7 @@ def _load(home: Path) -> Results:
         digests = {str(name): str(digest) for name, digest in summary[FILES].items()}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise RequestError(
-            f"{home / SUMMARY}: it does not tell the digests of the run's files: not written by `ballpass run` of this "
+            f"{home / SUMMARY}: it has no digests of the run's files: not written by `ballpass run` of this "
             "version, or edited. Run the scene again."
         ) from None
     solution = b""
@@ -122,7 +122,7 @@ def _load(home: Path) -> Results:
             raise RequestError(f"{home / name}: cannot be read ({fault.strerror}). Run the scene again.") from None
         if hashlib.sha256(content).hexdigest() != digests.get(name):
             raise RequestError(
-                f"{home}: {name}: not of the run that {SUMMARY} tells of: edited, or of another run. Run the "
+                f"{home}: {name}: does not belong to the run of {SUMMARY}: edited, or of another run. Run the "
                 "scene again, or read the solution alone with load_solution."
             )
         if name == SOLUTION:

@@ -1,8 +1,8 @@
-"""The numbers people read first, as one JSON-ready mapping.
+"""The main results of a run, as one mapping ready for JSON.
 
 In: a `Model` and its `Solution`.  Out: a dict; every number stands in an object with its ``unit``.
 
-Only steady cycles count, transient ones are dropped.  Extremes are looked for between the samples as well, and means
+Only steady cycles count, transient ones are dropped.  Extremes are searched between the samples as well, and means
 are taken over every step, where the project's own stepper ran.  ``rms`` is the plain root mean square; ``std`` that of
 the deviation from the mean.
 """
@@ -45,11 +45,11 @@ if TYPE_CHECKING:
 #: Packages whose version may change a number.
 _TOOLS = ("casadi", "numpy", "scipy")
 
-#: The ball forces of a bearing whose peaks are told, by the key they stand under.
+#: The ball forces of a bearing whose peaks are reported, by their key.
 _BALL_FORCES = {"elastic": "ball.elastic_force", "total": "ball.force"}
 
-#: Largest usual deflection of a ball over its diameter [1]; work of the drive below zero that is none, over the work of
-#: the torque's amount [1].
+#: Largest usual deflection of a ball over its diameter [1]; negative work of the drive that counts as zero, over the
+#: work of the torque's amount [1].
 MOST_DEFLECTION, LEAST_WORK = 0.01, 1e-3
 
 #: Numbers that `add_turns` names; the file has all.
@@ -64,7 +64,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
 
     Parameters
     ----------
-    growth : of perturbations, where it was looked for; numbers whose digits the tolerance does not bear then get the
+    growth : of perturbations, where it was computed; numbers that the tolerance does not determine then get the
         mean and the standard deviation over moved starts (``over_starts``)
 
     Returns
@@ -121,7 +121,7 @@ def summarize(model: Model, sol: Solution, growth: Growth | None = None) -> dict
 
 
 def _unusual(model: Model, sol: Solution) -> list[str]:
-    """What of a run's results is unlike bearings and machines."""
+    """Results outside what real bearings and machines show."""
     said = []
     for bearing in sol.manifest.bearings:
         ball, clearance = (sol.parameters[f"{bearing.path}.{key}"] for key in ("ball_diameter", "clearance"))
@@ -145,16 +145,16 @@ def _unusual(model: Model, sol: Solution) -> list[str]:
 
 
 def add_turns(summary: dict[str, Any], longer: Settled, *, instead: bool) -> str:
-    """Add what more turns give to a summary (``longer``).
+    """Add the results of more turns to a summary (``longer``).
 
     Parameters
     ----------
     longer : extremes and rms over more turns than the run's
-    instead : put them in the place of those of the run
+    instead : replace those of the run by them
 
     Returns
     -------
-    Words for people: what changes, over how many turns.
+    A sentence: which results change, over how many turns.
     """
     told: dict[str, Any] = {"turns": _numbers("turns", "1", value=longer.turns), "settled": longer.settled}
     lines: list[tuple[float, str]] = []
@@ -225,7 +225,7 @@ def _add_spread(summary: dict[str, Any], growth: Growth, name: str) -> None:
 
 
 def _peaks(model: Model, sol: Solution) -> dict[tuple[str, Kind], Peak]:
-    """Peaks of forces and torques: samples miss what a load's step and a contact's spike do between them."""
+    """Peaks of forces and torques, also between samples, which miss a load's step and a contact's spike."""
     prefixes = [bearing.prefix for bearing in sol.manifest.bearings]
     of_balls = [prefix + name for prefix in prefixes for name in _BALL_FORCES.values()]
     wanted: list[tuple[str, Kind]] = [(name, "max") for name in of_balls if name in sol.outputs]
@@ -279,7 +279,7 @@ def _conditioning(model: Model, sol: Solution) -> dict[str, Any]:
 
 
 def _balls(manifest: Manifest, found_peaks: Mapping[tuple[str, Kind], Peak]) -> dict[str, Any]:
-    """The highest force of any ball of each bearing, and how it was looked for."""
+    """The highest force of any ball of each bearing, and how it was found."""
     told = {}
     for bearing in manifest.bearings:
         names: dict[str, tuple[str, Kind]] = {key: (bearing.prefix + name, "max") for key, name in _BALL_FORCES.items()}
@@ -338,7 +338,7 @@ def _versions(sol: Solution) -> dict[str, Any]:
 
 
 def _numbers(name: str, unit: str, **values: float | np.floating[Any]) -> dict[str, Any]:
-    """Numbers with their unit; `name` is told where one is not finite."""
+    """Numbers with their unit; the error names `name` where one is not finite."""
     for value in values.values():
         if not isfinite(value):
             raise SimulationError(

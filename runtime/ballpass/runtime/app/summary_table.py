@@ -1,4 +1,4 @@
-"""The numbers people read first as a table for the terminal.
+"""The main results of a run as a table for the terminal.
 
 In: what `summarize` gave.  Out: tables of a report.
 """
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 #: Keys that are columns of the table or left out of it; other keys name parts of a quantity and get rows.
 _COLUMNS = ("value", "min", "max", "mean", "rms", "std")
 
-#: What the table's caption tells of the run, and with which words.
+#: Parts of the table's caption about the run, with their words.
 _RUN = {
     "rtol": "rtol {}",
     "steps": "{} steps",
@@ -112,7 +112,7 @@ def render_accuracy(model: Model, accuracy: Accuracy) -> ReportTable:
         unit = parse_quantity(model.manifest, name).unit
         factor, unit = TABLE_UNITS.get(unit, (1.0, unit))
         value, error = accuracy.values[name], accuracy.estimates[name]
-        # no more digits than the error leaves
+        # no more digits than the error allows
         digits = min(max(math.ceil(-math.log10(max(error, 1e-16))), 1), 9) if math.isfinite(error) else 1
         rows.append((name, f"{factor * value:z.{digits}g}", f"{100 * error:.2g} %", unit))
     right = ("value", "estimated error")

@@ -1,4 +1,4 @@
-"""What people ask of a run: turns, statistics, stroboscopic points, orbit.
+"""Observables of a run: turns, statistics, stroboscopic points, orbit.
 
 In: plain numpy arrays in SI.  Out: numbers, arrays and small frozen records in SI.  Spectra are in `spectrum`.
 """
@@ -91,7 +91,7 @@ def statistics(t: ArrayLike, signal: ArrayLike) -> SignalStatistics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StroboscopicPoints:
-    """State seen once per turn: times [s], positions [m] and velocities [m/s], each (k,)."""
+    """State once per turn: times [s], positions [m] and velocities [m/s], each (k,)."""
 
     time: Array
     position: Array

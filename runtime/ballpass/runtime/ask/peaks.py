@@ -1,9 +1,9 @@
 """The true peak of an output, which may lie between the samples of a run.
 
-Ball forces have spikes narrower than a sample interval; samples alone read them low, or show nothing of them.
+Ball forces have spikes narrower than a sample interval; samples alone give too low a peak, or miss it.
 
 - States, and the largest ball forces, are reduced in every step of a run of the project's own stepper
-  (`Solution.reductions`): their extremes are there.
+  (`Solution.reductions`): their extremes are taken from there.
 - All other outputs are evaluated along nodes within those steps, as any quantity is (`ballpass.runtime.quantity`);
   those that follow from time alone without a run.
 - Of the rest, the smallest force of any ball or what depends on a run of CasADi's integrators, the samples are given.
@@ -32,10 +32,10 @@ from ballpass.runtime.run.solution import Solution
 
 Kind = Literal["max", "min"]
 
-#: What makes either extreme a largest value.
+#: Sign that makes either extreme a largest value.
 SIGNS: Mapping[Kind, float] = {"max": 1.0, "min": -1.0}
 
-#: How a peak was looked for between the samples.
+#: How a peak was searched between the samples.
 Searched = Literal["every step", "dense samples", "samples"]
 
 
@@ -48,11 +48,11 @@ class Peak:
     value : in the output's unit
     time : when [s]
     ball : which ball, counted from 1; None for outputs without balls
-    sampled : the value that the samples alone show
+    sampled : the value of the samples alone
     searched : where it was searched.  ``every step``: in each step of the run, evaluated in its quarters (those of
-        ``stepper-dop853`` in eighths) or at Gauss's nodes; what begins and ends between two of them, as a brief
-        contact, is not seen.  ``dense samples``: on a grid of its own, for the output follows from time alone.
-        ``samples``: nowhere else; more samples may show more
+        ``stepper-dop853`` in eighths) or at Gauss's nodes; an event between two of them, as a brief
+        contact, is missed.  ``dense samples``: on a separate grid, because the output follows from time alone.
+        ``samples``: only there; more samples may give a higher peak
 
     Examples
     --------
@@ -111,7 +111,7 @@ def refine_peaks(
 
 
 def has_quantities(solution: Solution, name: str, model: LoadedModel) -> bool:
-    """Whether quantities of an output are those of the very run: it follows from time, or the stepper ran."""
+    """Whether quantities of an output are of this same run: it follows from time, or the stepper ran."""
     return name not in model.states and (solution.statistics.method in STEPPERS or _is_of_time(model, name))
 
 
@@ -165,7 +165,7 @@ def _of_steps(solution: Solution, name: str, kind: Kind, peak: Peak) -> Peak:
         return peak
     of_balls = name in reduction_rows(solution.manifest).balls
     if of_balls and kind == "min":
-        return peak  # what is reduced is the most loaded ball's smallest, not that of any ball
+        return peak  # the reductions hold the minimum of the most loaded ball, not that of any ball
     entry = reductions[name]
     value, time, ball = (
         (entry.maximum, entry.maximum_time, entry.maximum_ball)

@@ -1,9 +1,10 @@
-"""How much of a signal is at which frequency.
+"""Spectra of a signal: amplitude or power by frequency.
 
 In: samples at equal steps.  Out: an `AmplitudeSpectrum`, single-sided, in the unit of the signal; or a `PowerSpectrum`.
 
 For amplitudes the record is cut to a whole number of cycles of the machine, its mean taken off, and weighted with a
-window whose coherent gain is divided out: a sine of amplitude a that falls on a line of the spectrum reads a.
+window whose coherent gain is divided out: a sine of amplitude a whose frequency is a line of the spectrum has the
+height a there.
 
 Choice of window
 ----------------
@@ -209,7 +210,7 @@ def amplitude_spectrum(
     Notes
     -----
     Amplitude of line k: ``2 |X_k| / sum(w)``, at half the sampling rate ``|X_k| / sum(w)``; X the discrete Fourier
-    transform of w (signal - mean), the mean being weighted with w so that nothing of it is left at zero frequency.
+    transform of w (signal - mean), the mean being weighted with w so that the line at zero frequency vanishes.
     """
     cycles: int | None = None
     if cycle_length is None:
@@ -222,7 +223,7 @@ def amplitude_spectrum(
     centred = values - np.sum(weight * values) / np.sum(weight)
     amplitude = np.abs(np.fft.rfft(weight * centred)) * (2.0 / np.sum(weight))
     if count % 2 == 0:
-        amplitude[-1] /= 2.0  # this line has no mirror image
+        amplitude[-1] /= 2.0  # this line has no counterpart at negative frequencies
     return AmplitudeSpectrum(
         frequency=np.arange(amplitude.size) / length,
         amplitude=np.asarray(amplitude, dtype=float),

@@ -1,4 +1,4 @@
-"""What diagnosis of bearings asks of a vibration signal: envelope, orders of a shaft, spectrogram, statistics.
+"""Vibration signals for the diagnosis of bearings: envelope, orders of a shaft, spectrogram, statistics.
 
 In: samples at equal steps.  Out: arrays and small frozen records.  SciPy does the signal processing.
 """
@@ -25,7 +25,7 @@ from ballpass.runtime.show.short import ShortRepr
 
 Array = NDArray[np.float64]
 
-#: Order of the Butterworth band-pass of envelopes; it runs forth and back, which doubles it and keeps the phase.
+#: Order of the Butterworth band-pass of envelopes; it runs forward and backward: order doubled, phase kept.
 BAND_ORDER = 4
 #: Samples of a turn where orders are asked for, at most so many times those of a mean turn.
 MOST_FINER = 8
@@ -33,7 +33,7 @@ MOST_FINER = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnosisStatistics:
-    """What a signal is judged by at a glance, its mean removed.
+    """Basic statistics of a signal, its mean removed.
 
     Attributes
     ----------
@@ -78,10 +78,10 @@ def diagnosis(signal: ArrayLike) -> DiagnosisStatistics:
 
 
 def envelope(t: ArrayLike, signal: ArrayLike, band: tuple[float, float]) -> Array:
-    """Envelope of a signal within a band: amount of the analytic signal of what a band-pass lets through.
+    """Envelope of a signal within a band: amount of the analytic signal after a band-pass.
 
-    The band-pass is a Butterworth filter that runs forth and back; its transients reach some periods of the lower edge
-    into both ends.
+    The band-pass is a Butterworth filter that runs forward and backward; its transients last some periods of the lower
+    edge at both ends.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def over_angle(angle: ArrayLike, signal: ArrayLike, per_turn: int | None = None)
     ----------
     angle : (n,) angles of the shaft, all increasing or all decreasing, counted on beyond a turn [rad]
     signal : (n,) samples [any unit]
-    per_turn : samples in a turn.  Default: as many as the slowest turn has, so that nothing is folded, at most eight
+    per_turn : samples in a turn.  Default: as many as the slowest turn has, to avoid aliasing, at most eight
         times those of a mean turn
 
     Returns

@@ -35,7 +35,7 @@ class LoadSamples:
     ----------
     time : shape (samples,) [s]
     crank : angle of driver or shaft since t = 0, with that at the start, shape (samples,) [rad]
-    force : of each ball, nothing where it pulls, shape (samples, balls) [N]
+    force : of each ball, zero where it pulls, shape (samples, balls) [N]
     resultant : force on the inner ring, shape (samples,) [N]
     in_outer, in_inner : angle of ball 1 as the rings see it, shape (samples,) [rad]
     """

@@ -1,1 +1,1 @@
-"""How far a number can be trusted: differences, certificates, ``--error``, trade."""
+"""Uncertainty of results: differences, certificates, ``--error``, trade."""

@@ -1,4 +1,4 @@
-"""How runs with derivatives of quantities step: method and tolerances; and which motion has no derivatives.
+"""Method and tolerances of runs with derivatives of quantities, and motion that has no derivatives.
 
 In: a model, numbers, a request.  Out: a `Run`, and `Values` made by it.
 """
@@ -52,7 +52,7 @@ def derivative_run(model: LoadedModel, numbers: Numbers, request: Request) -> tu
         fine = "stepper-rodas5p" if scales.stiffness > STIFF_RATIO else fine
     method = fine if asked in ("auto", "stepper") else asked
     run = resolve(model, numbers, replace(request, method=method, kinks=None))
-    check_count(model.manifest.inputs, numbers, run.duration, run.turn)  # before anything that takes long
+    check_count(model.manifest.inputs, numbers, run.duration, run.turn)  # before any long computation
     return replace(run, kinks=kinks_with_derivatives(request.kinks, model.manifest)).check_steady(), fine
 
 
@@ -71,7 +71,7 @@ def differentiate(
 
 
 def refuse_chaos(model: LoadedModel, numbers: Numbers, quantities: Sequence[Quantity], request: Request) -> None:
-    """Refuse derivatives of quantities whose motion amplifies a tiny change beyond meaning; see `refuse_growth`.
+    """Refuse derivatives where the motion amplifies a tiny change too much (chaos); see `refuse_growth`.
 
     Raises
     ------

@@ -60,9 +60,9 @@ def richardson(
 
     Parameters
     ----------
-    function : number to number or array of one shape; it should be as exact as can be: its noise is divided by the step
-    at : where
-    scale : largest step; a length over which the function changes smoothly, a tenth of it is as good
+    function : number to number or array of one shape; it should be as exact as possible: the step divides its noise
+    at : the point
+    scale : largest step; a length over which the function changes smoothly; a tenth of it gives the same accuracy
     steps : number of steps, each half the one before
     resolution : error of the function's values besides rounding (an integrator's tolerance, say), in its unit
 

@@ -1,4 +1,4 @@
-"""Where a trajectory touches a kink of a law instead of crossing it: there a derivative says least.
+"""Moments at which a trajectory touches a kink of a law instead of crossing it: derivatives are unreliable there.
 
 In: deflections of the balls along a run.  Out: `Grazing` records.
 
@@ -119,7 +119,7 @@ def _near_zero(t: Array, signal: Array, angles: Array, kink: str, width: float, 
     before, here, behind = signal[:-2], signal[1:-1], signal[2:]
     top = (here > before) & (here >= behind) & (here <= 2.0 * width)
     bottom = (here < before) & (here <= behind) & (here >= -2.0 * width)
-    # a signal that stands still wiggles by rounding
+    # a constant signal varies by rounding
     moving = np.maximum(np.abs(here - before), np.abs(here - behind)) > 1e-6 * width
     rows, balls = np.nonzero((top | bottom) & moving)
     # Newton's form of the parabola about the middle point

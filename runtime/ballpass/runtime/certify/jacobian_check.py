@@ -1,9 +1,10 @@
-"""A Jacobian with a second opinion: generated derivatives beside extrapolated differences of the function itself.
+"""Check a Jacobian: generated derivatives beside extrapolated differences of the function itself.
 
-In: a model, numbers, what by what, an instant and a state.  Out: a `CheckedJacobian` with a verdict for each entry.
+In: a model, numbers, outputs and variables to differentiate by, an instant and a state.  Out: a `CheckedJacobian` with
+a verdict for each entry.
 
-The second route shares nothing with the first but the values of the function: parameters are moved and everything is
-computed anew, the derived constants, phases and tables included.
+The differences share only the values of the function with the derivatives: parameters are changed and everything is
+computed anew, including the derived constants, phases and tables.
 """
 
 from __future__ import annotations
@@ -43,19 +44,19 @@ Array = NDArray[np.float64]
 #: Relative disagreement that is allowed [1]: both routes are exact but for rounding.
 AGREEMENT = 1e-6
 
-#: Derivatives that count as nothing, relative to the largest of the row times its step [1].
+#: Derivatives that count as zero, relative to the largest of the row times its step [1].
 NOTHING = 1e-9
 
-#: Largest step, relative to what is moved.
+#: Largest step, relative to the value that is moved.
 STEP = 1e-3
 
-#: The same for what is zero, by unit.
+#: The same for values of zero, by unit.
 STEP_FROM_ZERO = {"m": 1e-7, "m/s": 1e-4, "rad": 1e-3, "s": 1e-6, "N": 1.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CheckedJacobian:
-    """Derivatives and, for each, what a second route says.
+    """Derivatives and, for each, the result of a second route.
 
     Attributes
     ----------
@@ -64,7 +65,7 @@ class CheckedJacobian:
     value : derivatives, or the mean of both sides where these differ, shape (rows, columns) [row's unit / column's
         unit]
     below, above : one-sided derivatives, same shape
-    differ : where they are not one, same shape
+    differ : where they are not equal, same shape
     at : values of the rows, shape (rows,)
     checks : one for each entry, row by row; all `UNCHECKED` where the check was turned off
     notes : where the laws have no derivative at this state, in words
@@ -87,7 +88,7 @@ class CheckedJacobian:
 
     @property
     def verdict(self) -> Verdict:
-        """Of all entries together: one that disagrees decides, then one that is not checked."""
+        """Verdict of all entries: the worst one; disagreement first, then unchecked."""
         all_of_them = [check.verdict for row in self.checks for check in row]
         for verdict in (Verdict.DISAGREES, Verdict.NOT_CHECKED):
             if verdict in all_of_them:
@@ -210,7 +211,7 @@ def _motion(
         rate = 1.0 if name == TIME else turning_speed(model, numbers)
         speed = abs(driver_angle.shaft_speed(model.manifest, numbers.values))
         step = STEP / speed if speed else STEP_FROM_ZERO["s"]
-        # with the inputs of this instant, as between breakpoints: a gate's jump is no derivative
+        # with the inputs of this instant, as between breakpoints: a gate's jump has no derivative
         return 0.0, step * abs(rate), lambda v: values_of_rows(model, parts, {**there, "t": v / rate})
     if name in model.states:
         k = model.states.index(name)

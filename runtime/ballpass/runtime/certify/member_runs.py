@@ -1,10 +1,10 @@
-"""Values of quantities for many changed parameter sets at once: what difference quotients are made of.
+"""Values of quantities for many changed parameter sets at once, for difference quotients.
 
-In: changes of parameters.  Out: values, shape (runs, quantities).  What steps reduce comes from an ensemble.  All else,
-as values at an angle, amplitudes and outputs that are no channels of the steps, is taken along nodes, one run at a time
-in each thread.
+In: changes of parameters.  Out: values, shape (runs, quantities).  Quantities that the steps reduce come from
+an ensemble.  All others (values at an angle, amplitudes, outputs that are no channels of the steps) are taken along
+nodes, one run at a time in each thread.
 
-Steps end on the kinks of the laws: stepped over, they leave a thousand times the noise in the values.
+Steps end on the kinks of the laws: stepping over them makes the noise in the values a thousand times larger.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ ROUGHNESS = 0.3
 
 
 class MemberRuns:
-    """Quantities of runs beside a run.
+    """Quantities of runs with changed parameters.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class MemberRuns:
     request : what was asked for
     quantities : as well
     fine : method for tight runs
-    progress : told the finished part of each call
+    progress : called with the finished part of each call
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class MemberRuns:
         self._along = QuantityRun(model, list(self._others.values()), rough=ROUGHNESS * ROUGH, along_nodes=True)
 
     def __call__(self, changes: Sequence[Mapping[str, float]]) -> Array:
-        """Values of all quantities for each change; NaN beyond what can be simulated."""
+        """Values of all quantities for each change; NaN where it cannot be simulated."""
         found = np.full((len(changes), self._count), np.nan)
         if self._reduced:
             values = simulate_many(
@@ -109,10 +109,10 @@ class MemberRuns:
 
 
 def _is_near(run: Run, quantity: Quantity) -> bool:
-    """Whether the reductions of steps are as near as the values along nodes.
+    """Whether the reductions of steps are as exact as the values along nodes.
 
-    The most loaded ball carries least where two change rank, which the driver's steps do not end on; its integrals have
-    a kink there.
+    The force of the most loaded ball has a corner where another ball becomes the most loaded one, and the driver's
+    steps do not end there.
     """
     if quantity.channel in run.model.states:
         return True

@@ -1,4 +1,4 @@
-"""A way to integrate that the tool chooses or measures: method, tolerance, kinks."""
+"""A choice of method, tolerance and treatment of kinks, which the tool makes or measures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class MethodChoice:
 
     @property
     def words(self) -> str:
-        """For people: method, tolerance, and kinks where they are located."""
+        """As text: method, tolerance, and kinks where they are located."""
         return f"{self.method}, rtol {self.rtol:g}" + (", kinks located" if self.kinks == LOCATED else "")
 
     def measure(self, quantities: QuantityRun, run: Run, moved: float | np.ndarray = 0.0) -> EvaluatedQuantities:

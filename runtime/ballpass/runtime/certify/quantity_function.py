@@ -4,7 +4,7 @@ In: a model, names of quantities and parameters, how long to run.  Out: a `Quant
 `ballpass.jax` and `ballpass.torch` wrap it.
 
 Values come from ensembles in lanes, which step over the kinks of the laws, derivatives from steps that end on them.
-Kinks that a run with derivatives shows are warned of; `QuantityFunction.certify` compares with differences.
+A warning names kinks that a run with derivatives meets; `QuantityFunction.certify` compares with differences.
 """
 
 from __future__ import annotations
@@ -58,11 +58,10 @@ class QuantityFunction:
     cycles, duration, transient : as for `Model.simulate`
     parameters : values of other parameters, SI.  Default: the scene's
     rtol : error allowed per step of the states [1].  Runs with derivatives have a hundredth
-    kinks : what steps of values do at the kinks of the laws.  By default they go over them, in lanes; ``located`` gives
-        the very bits of `Model.quantities` with the same options
-    failed : what stands for a value or derivative that is not known: ``raise`` an error, or ``nan``, with a warning
-    chaos : ``refuse`` derivatives of a motion that amplifies a tiny change beyond meaning, which takes two more runs
-        each; or ``ignore`` that
+    kinks : treatment of the kinks of the laws in runs for values.  By default steps go over them, in lanes; ``located``
+        gives the same bits as `Model.quantities` with the same options
+    failed : for a value or derivative that is not known: ``raise`` an error, or give ``nan`` with a warning
+    chaos : ``refuse`` derivatives of a chaotic motion (this check takes two more runs each), or ``ignore`` chaos
 
     Attributes
     ----------
@@ -126,7 +125,7 @@ class QuantityFunction:
         self.start = np.array([numbers.parameters[name] for name in self.wrt])
         self._quantities = quantities_of(model, self.of)
         self._request = length_request(model.manifest, cycles, duration, transient)
-        # they are not for two threads at once: each takes one that is free, and puts it back
+        # not for two threads at once: each thread takes a free one and puts it back
         self._free: defaultdict[tuple[int, ...], list[QuantityRun]] = defaultdict(list)
         self._slope_rtol = max(FUNCTION_SLOPES * self._rtol, TOLERANCES[0])
         self._all = tuple(range(len(self.of)))
@@ -139,7 +138,7 @@ class QuantityFunction:
     def __call__(self, x: ArrayLike) -> Array:
         """Values of the quantities, SI, shape (..., quantities), or (...) for one name.
 
-        The values of a row are the same bits whichever rows stand beside it.
+        The values of a row are equal to the bit for any other rows.
 
         Parameters
         ----------
@@ -169,7 +168,7 @@ class QuantityFunction:
         """Derivatives, SI, shape (..., quantities, parameters), or (..., parameters) for one name.
 
         Where a quantity has a kink, as an extreme that passes from one peak to another, it is the derivative on one
-        side, and a `KinkWarning` says so where the run shows it; `certify` compares both sides.
+        side, with a `KinkWarning` where the run shows the kink; `certify` compares both sides.
 
         Parameters
         ----------
@@ -277,7 +276,7 @@ class QuantityFunction:
         )
 
     def check_differentiable(self) -> None:
-        """Refuse what has no derivative, whatever the parameters are.
+        """Refuse quantities without a derivative for any parameters.
 
         Raises
         ------
@@ -346,14 +345,14 @@ class QuantityFunction:
         return [[one[k] for k in self._all] for one in found]
 
     def _known(self, row: Array, of: tuple[int, ...]) -> dict[int, Estimate]:
-        """Quantities of a row; where NaN is asked for, of those that fail together each that is known by itself."""
+        """Quantities of a row; where NaN is asked for and they fail together, one by one."""
         try:
             return dict(zip(of, self._row(row, of), strict=True))
         except (RequestError, SimulationError) as error:
             if self._failed == "raise":
                 kind = RequestError if isinstance(error, RequestError) else SimulationError
                 raise kind(f"{self._told(row)}: {error}") from error
-            # a run that fails has nothing to give, but rings at rest need none
+            # a failed run gives no values, but rings at rest need no run
             at_rest = any(KINDS[self._quantities[k].kind].at_rest is not None for k in of)
             if len(of) > 1 and (at_rest or isinstance(error, RequestError)):
                 return {k: item for one in of for k, item in self._known(row, (one,)).items()}
@@ -376,7 +375,7 @@ class QuantityFunction:
         return found.estimates
 
     def _warn(self, kind: type[BallpassWarning], told: Sequence[tuple[str, Array, str]]) -> None:
-        """Say what there is to mind, once of each quantity."""
+        """Warn, once for each quantity."""
         fresh: dict[str, list[str]] = {}
         for name, row, words in told:
             if (kind, name) not in self._said:

@@ -2,8 +2,9 @@
 
 In: a model, names of quantities and parameters.  Out: a `SensitivityReport`.
 
-Derivatives are those of the stepper's own steps, with their error in the choice of step sizes; a looser run beside it
-says how well they are known.  The certificate compares each with a second route (`certificate.py`).
+Derivatives are those of the stepper's own steps, whose sizes are chosen by the error of the derivatives too.  A second
+run with a looser tolerance gives their uncertainty.  The certificate compares each with a second route
+(`certificate.py`).
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ START_SHARE = 1e-2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Query:
-    """What is asked for; None takes the scene's run settings, or this module's defaults.
+    """The request; None takes the scene's run settings, or this module's defaults.
 
     Attributes
     ----------
@@ -197,7 +198,7 @@ def answer(model: LoadedModel, numbers: Numbers, query: Query) -> SensitivityRep
             slopes=slopes,
         )
         with np.errstate(invalid="ignore", divide="ignore"):
-            # what the routes differ in tells how well quadratures and extremes are known
+            # the difference of the routes gives the uncertainty of quadratures and extremes
             apart = np.nan_to_num(np.abs(values - second.quantities) / np.abs(values))
         own = own + apart[:, None] * np.abs(slopes)
     pairs = []

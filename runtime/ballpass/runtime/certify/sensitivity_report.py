@@ -1,4 +1,4 @@
-"""What a query of sensitivities answers: values, derivatives with their certificates, warnings.
+"""The report of a query of sensitivities: values, derivatives with their certificates, warnings.
 
 In: nothing but numbers.  Out: `SensitivityReport`, which gives JSON and tables.
 """
@@ -27,7 +27,7 @@ STEPS = "steps"
 #: Rows of each section of a table; pairs that disagree are always there, and the JSON has all.
 ROWS = 15
 
-#: What the verdicts mean to a reader.
+#: Verdicts in words.
 _LOOKS: dict[Verdict, Literal["good", "bad", "doubt"]] = {
     Verdict.VERIFIED: "good",
     Verdict.DISAGREES: "bad",
@@ -47,9 +47,9 @@ class Sensitivity:
     dimensionless : (p/Q) dQ/dp; NaN where p or Q is zero: there it says nothing of the parameter's effect
     scale : change of the parameter that is a large one, in its unit: its value; for an angle a radian; where it is
         zero, what positions move by in the run, or the largest value of its unit
-    uncertainty : of the derivative, same unit: that of the steps from a run at a looser tolerance, and from what both
-        routes' values of the quantity are apart; None where the check was turned off
-    route : which route gave the derivative: ``steps``, or that of the check
+    uncertainty : of the derivative, same unit: that of the steps from a run at a looser tolerance, and from the
+        difference of both routes' values of the quantity; None where the check was turned off
+    route : the route that gave the derivative: ``steps``, or that of the check
     by_steps : derivative of the steps, same unit
     check : the certificate
     """
@@ -69,7 +69,7 @@ class Sensitivity:
 
     @property
     def is_nothing(self) -> bool:
-        """Whether the check says no more than that the derivative is below what counts as nothing."""
+        """Whether the check only shows that the derivative is below the bound that counts as zero."""
         return self.check.is_nothing(self.derivative)
 
     @property
@@ -80,14 +80,14 @@ class Sensitivity:
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class SensitivityReport(Reported):
-    """Answer to a query: every pair, with what it takes to judge them.
+    """Answer to a query: every pair, with its certificate.
 
     Attributes
     ----------
     scene : name
     quantities : values
     parameters : names
-    words : what each quantity and parameter is, by name
+    words : description of each quantity and parameter, by name
     pairs : quantity by quantity, parameters in order
     grazing : where the trajectory grazes a kink
     settings : cycles, transient, method, tolerances, steps
@@ -138,7 +138,7 @@ class SensitivityReport(Reported):
     def of(self, quantity: str) -> tuple[Sensitivity, ...]:
         """Pairs of one quantity, ranked by the size of the dimensionless derivative.
 
-        Behind them those that have none, for parameter or quantity is zero, ranked by the change per `scale`.
+        After them come those that have none, because parameter or quantity is zero, ranked by the change per `scale`.
 
         Examples
         --------
@@ -194,7 +194,7 @@ class SensitivityReport(Reported):
 
 
 def _facts(pair: Sensitivity) -> dict[str, Any]:
-    """What the JSON has of a pair beside its numbers."""
+    """Texts of a pair in the JSON, beside its numbers."""
     check = pair.check
     return {
         "parameter_scale": pair.scale,
@@ -225,7 +225,7 @@ def ratio_unit(above: str, below: str) -> str:
 
 
 def _rank(pair: Sensitivity) -> tuple[bool, float]:
-    """Sort key: those with a dimensionless derivative first, larger ones first, what is no number last."""
+    """Sort key: those with a dimensionless derivative first, larger ones first, NaN last."""
     has_one = math.isfinite(pair.dimensionless)
     size = pair.dimensionless if has_one else pair.change
     return not has_one, -abs(size) if math.isfinite(size) else 1.0
@@ -277,7 +277,7 @@ def _row(pair: Sensitivity) -> tuple[Words, ...]:
     apart = "-" if check.disagreement is None else f"{check.disagreement / size:.0e}" if size > 0.0 else "0"
     number, words = f"{pair.derivative:z.4g}", check.verdict.value
     if pair.is_nothing:
-        # digits that nothing vouches for are not shown
+        # digits that no check verifies are not shown
         relative = "~0" if math.isfinite(pair.dimensionless) else relative
         number, apart, words = f"~0 (<{check.quantum:.0e})", "-", f"{words}: ~0"
     elif check.sides is not None:
@@ -291,7 +291,7 @@ def _row(pair: Sensitivity) -> tuple[Words, ...]:
 
 
 def _remarks(report: SensitivityReport) -> list[Words]:
-    """What stands below the tables."""
+    """Sentences below the tables."""
     counts = report.verdicts
     words = ", ".join(f"{count} {verdict.value}" for verdict, count in counts.items() if count)
     route = next((pair.check.route for pair in report.pairs if pair.check.route != "none"), None)
@@ -317,7 +317,7 @@ def _remarks(report: SensitivityReport) -> list[Words]:
     reasons: dict[str, int] = {}
     for pair in report.pairs:
         if pair.check.verdict is Verdict.NOT_CHECKED and pair.check.reason:
-            # numbers differ from pair to pair; what may help is the same
+            # numbers differ from pair to pair; the remedy is the same
             kind = pair.check.reason.split(" by ", 1)[0] + ": " + pair.check.reason.rsplit(": ", 1)[-1]
             kind = pair.check.reason if ": " not in pair.check.reason else kind
             if pair.check.sides is not None:

@@ -1,10 +1,10 @@
-"""What a simpler model of the same machine costs and gains: its error in quantities, and its time, measured.
+"""A simpler model of the same machine: its error in quantities and its time, measured.
 
 In: a model, a simpler one, quantities of interest.  Out: a `Simplification`.
 
-Both are integrated with the same parameter sets around the user's, for contact makes single runs a lottery.  Values are
-those of a tight tolerance, so that only the models differ; a second method says how uncertain they are.  Times are
-those of the scene's own tolerance, taken in turns.
+Both are integrated with the same parameter sets around the user's, because contact makes the error of a single run
+random.  Values are those of a tight tolerance, so that only the models differ; a second method says how uncertain they
+are.  Times are those of the scene's own tolerance, taken in turns.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ballpass.runtime.show.progress import Progress, shown
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Simplification:
-    """A simpler model beside the one that counts as true.
+    """A simpler model compared with the reference model.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Simplification:
 
     @property
     def words(self) -> str:
-        """What it gains and costs, a sentence for people."""
+        """Speed and error as a sentence."""
         worst = max(self.quantities, key=lambda name: self.error[name])
         faster = f"{self.gain:.2g} times as fast" if self.gain >= 1.0 else f"{1.0 / self.gain:.2g} times as slow"
         return (
@@ -80,7 +80,7 @@ class Simplification:
 
 
 def rows(found: Simplification) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Head and rows of a table: quantity, both values, change, and what the change stays within."""
+    """Head and rows of a table: quantity, both values, change, and its 95 % bound."""
     head = ("quantity", "unit", "this scene", "other", "change", f"{PROMISED:.0%} within")
     return head, [
         (
@@ -114,7 +114,7 @@ def measure_simplification(
 
     Parameters
     ----------
-    model : what counts as true
+    model : the reference
     simpler : of the same machine; parameters of one name are the same in both, others keep their defaults
     of : quantities, ``peak_ball_force``, ``rms:inner.y``, ...  Default: those of `measure_trade` that both have
     parameters : overrides of parameters that both have, SI; the members lie around them

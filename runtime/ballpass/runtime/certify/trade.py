@@ -1,12 +1,12 @@
-"""What accuracy costs on a user's own scene: errors and times of methods and tolerances, measured.
+"""Errors and times of methods and tolerances, measured on a user's scene.
 
 In: a model and quantities of interest.  Out: a `Trade`.
 
-Every way (method, tolerance, kinks located or not) integrates the same members: parameter sets around the user's, for
-contact makes the error of a single run a lottery.  The reference of a member is one method at a tight tolerance; a
-second method says how uncertain it is, and no error is claimed below that.  Members are the outer loop and ways the
-inner one, in another order for each member, so that what disturbs the clock disturbs all alike.  Times are those of the
-integration alone, of the processor where the system tells; medians are reported.
+Every choice (method, tolerance, kinks located or not) integrates the same members: parameter sets around the user's,
+because contact makes the error of a single run random.  The reference of a member is one method at a tight tolerance; a
+second method gives its uncertainty, and no error below that is claimed.  Members are the outer loop and choices the
+inner one, in another order for each member, so that other load on the machine affects all alike.  Times are those of
+the integration alone, processor time where the system has it; medians are reported.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import Run
 from ballpass.runtime.show.progress import Progress, shown
 
-#: The reference and the second opinion on it.
+#: The reference and the method that checks it.
 REFERENCE = MethodChoice(method="stepper-rodas5p", rtol=1e-12, kinks=LOCATED)
 SECOND = MethodChoice(method="stepper-dp54", rtol=1e-12, kinks=LOCATED)
 
@@ -64,7 +64,7 @@ def perturbed(
     """Parameter sets around some numbers: every one that is not zero, drawn evenly from its neighbourhood.
 
     The times of a load's table stay: drawn one by one they would change places where the load is steep.  A number that
-    is not allowed is mirrored at the user's, for that one may lie on its bound.
+    is not allowed is mirrored at the user's, which may lie on its bound.
     """
     random = np.random.default_rng(seed)
     manifest = model.manifest

@@ -1,4 +1,4 @@
-"""What a trade holds, for people and for files: a table of what no other way beats, sentences, plain data.
+"""The report of a trade: a table of the choices that no other one beats, sentences, plain data.
 
 In: nothing but numbers.  Out: `Trade`, its report, its rows.
 """
@@ -15,7 +15,7 @@ from ballpass.runtime.report.reported import Reported
 from ballpass.runtime.run.locating import LOCATED
 from ballpass.runtime.show.short import ShortRepr
 
-#: Errors that people ask for [1].
+#: Usual target errors [1].
 TARGETS = (0.1, 0.01, 0.001, 0.0001)
 
 #: Part of the members whose error is at most what is promised.
@@ -24,7 +24,7 @@ PROMISED = 0.95
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Measured(ShortRepr):
-    """What a way to integrate gave.
+    """Results of one choice of method, tolerance and kinks.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class Trade(Reported):
 
 
 def words(trade: Trade) -> list[str]:
-    """What each target costs for each quantity, and what locating kinks costs and gains."""
+    """Time for each target and quantity, and time and error with located kinks."""
     columns: list[tuple[str, str | None]] = [(name, name) for name in trade.quantities]
     if len(columns) > 1:
         columns.append(("all of them", None))
@@ -161,7 +161,7 @@ def table(trade: Trade, quantity: str | None = None) -> tuple[tuple[str, ...], l
 
 
 def percent(error: float) -> str:
-    """A relative error as people read it: 1 %, 0.02 %, 3e-05 %."""
+    """A relative error as text: 1 %, 0.02 %, 3e-05 %."""
     if not math.isfinite(error):
         return "no result"
     value = 100.0 * error
@@ -169,5 +169,5 @@ def percent(error: float) -> str:
 
 
 def milliseconds(seconds: float) -> str:
-    """A time as people read it."""
+    """A time as text."""
     return f"{1e3 * seconds:.2g} ms" if seconds < 0.1 else f"{1e3 * seconds:.0f} ms"

@@ -1,7 +1,7 @@
-"""Which values a model's parameters may have: signs, bounds, and what they must be to each other.
+"""Allowed values of a model's parameters: signs, bounds, and rules between several parameters.
 
 In: the manifest and values, single ones or a column for each parameter.  Out: a mask or messages.  A scene file is
-checked by whoever reads it; these are the same bounds, for numbers given in Python.
+checked when it is read; these are the same bounds, for numbers given in Python.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from ballpass.runtime.contract import Manifest
 
-#: Name of a bound, how a message says it, and what a value must be to it.
+#: Name of a bound, its words in messages, and the comparison that a value must satisfy.
 _BOUNDS: tuple[tuple[str, str, Callable[[Any, float], Any]], ...] = (
     ("above", "above", operator.gt),
     ("least", "from", operator.ge),
@@ -24,7 +24,7 @@ _BOUNDS: tuple[tuple[str, str, Callable[[Any, float], Any]], ...] = (
 
 
 class Bounded(Protocol):
-    """What has bounds; None bounds nothing."""
+    """A number with bounds; None is no bound."""
 
     @property
     def above(self) -> float | None: ...
@@ -53,7 +53,7 @@ def outside(info: Bounded, values: Any) -> Any:
 
 
 def violations(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) -> Iterator[tuple[np.ndarray, str]]:
-    """Masks of values that are not allowed, each with what is allowed.
+    """Masks of values that are not allowed, each with the allowed ones in words.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Packages that not every installation has: the extra that brings each, said where it is missing."""
+"""Optional packages: where one is missing, the error names the extra that installs it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from ballpass.runtime.contract.errors import RequestError
 
-#: Name for people, and extra, of the packages that are loaded where they are needed.
+#: Title and extra of the packages that are imported where they are needed.
 EXTRAS = {
     "dask": ("Dask", "scale"),
     "jax": ("JAX", "jax"),
@@ -43,7 +43,7 @@ def need(module: str) -> Any:
 
 
 def missing(package: str) -> str:
-    """What to say where a package of `EXTRAS` is not installed."""
+    """Message for a package of `EXTRAS` that is not installed."""
     name, extra = EXTRAS[package]
     target = f"'ballpass-runtime[{extra}]'"
     if can_derive():  # ballpass brings figures and analysis

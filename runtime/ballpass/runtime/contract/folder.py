@@ -17,7 +17,7 @@ def read_artefact(folder: str | Path, *, verify: bool = True) -> Manifest:
 
     Parameters
     ----------
-    verify : False takes edited files as they are: the manifest then has the digests of what is there
+    verify : False takes edited files as they are: the manifest then has the digests of the files
 
     Raises
     ------
@@ -74,7 +74,7 @@ def read_manifest(folder: str | Path, *, verify: bool = True) -> Manifest:
         raise ArtefactError(
             f"{folder}: {what} {FILE_NAME}. A generated folder is expected; `ballpass derive SCENE` writes one."
         ) from fault
-    except (OSError, ValueError) as fault:  # no text in UTF-8, no path
+    except (OSError, ValueError) as fault:  # not text in UTF-8, or not a path
         raise ArtefactError(
             f"{path}: cannot be read ({fault}). A folder that `ballpass derive` wrote, and that you may read, "
             "is expected."
@@ -111,7 +111,7 @@ def check_files(folder: str | Path, manifest: Manifest) -> None:
         raise ArtefactError(
             f"{folder}: the files are not those the manifest describes:\n"
             + "\n".join(f"  - {fault}" for fault in faults)
-            + "\nWrite the folder again with `ballpass derive`, or load it with verify=False if the edit is meant."
+            + "\nWrite the folder again with `ballpass derive`, or load it with verify=False if the edit is intended."
         )
 
 

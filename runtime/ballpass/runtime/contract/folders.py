@@ -1,7 +1,7 @@
 """Put files in the place of others: whole files, one process at a time.
 
 A file is written beside its place and moved there, so that it is the old one or the new one.  A folder's files are
-moved one by one, the one with the digests of all others last: where a process is ended in between, the digests do not
+moved one by one, the one with the digests of all others last: where a process ends in between, the digests do not
 fit, and readers refuse the folder.  Files of others are not touched.
 """
 
@@ -50,7 +50,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def read_whole(folder: Path, read: Callable[[], _Content], fault: type[Exception]) -> _Content:
-    """What `read` gives of a folder; where its files do not fit together, read again when nobody writes there.
+    """Result of `read` for a folder; where its files do not fit together, read again when no process writes there.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def replace_file(path: Path, content: bytes) -> None:
             stream.write(content)
         mask = os.umask(0)
         os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)  # mkstemp's 0600 would shut out colleagues
+        os.chmod(temporary, 0o666 & ~mask)  # with mkstemp's 0600 other users could not read it
         os.replace(temporary, path)
     except BaseException:
         os.unlink(temporary)
@@ -87,10 +87,10 @@ def replace_files(
 
     Parameters
     ----------
-    folder : made where it is missing, and deleted again where nothing comes of it
+    folder : made where it is missing, and deleted again where `write` fails
     write : writes all files into the folder it is called with
     last : name of the file that is put in place last
-    owned : names of files that go where the new ones have none of that name; asked when nobody else writes there
+    owned : names of files that are deleted unless a new one has the name; called while no other process writes there
 
     Returns
     -------
@@ -115,7 +115,7 @@ def replace_files(
                 shutil.rmtree(made, ignore_errors=True)
     except BaseException:
         if missing:
-            with contextlib.suppress(OSError):  # somebody else wrote there meanwhile
+            with contextlib.suppress(OSError):  # another process wrote there meanwhile
                 (folder / LOCK).unlink(missing_ok=True)
                 for path in missing:
                     path.rmdir()

@@ -1,4 +1,4 @@
-"""Records from plain values, as JSON gives them, and plain values for JSON, which knows no infinity."""
+"""Records from plain values, as JSON gives them, and plain values for JSON.  JSON has no infinity."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ class CoordinateInfo:
 class QuantityInfo:
     """Something the model can report and differentiate, whether a run reports it or not.
 
-    `group` is the function of ``jacobians.c`` that computes it; the quantities of a group stand one below the other,
+    `group` is the function of ``jacobians.c`` that computes it; the quantities of a group follow each other
     in the order of `Manifest.quantities`, each with `size` rows.
     """
 
@@ -197,7 +197,7 @@ class DampingInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CatalogueInfo:
-    """What the scene takes from a catalogue: see `ballpass.derive.scene.bearing_records.Catalogue`.
+    """Data of a catalogue: see `ballpass.derive.scene.bearing_records.Catalogue`.
 
     `clearance_least` and `clearance_most` bound the group of clearance [m]; ratings are in N.
     """
@@ -213,7 +213,7 @@ class CatalogueInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LubricationInfo:
-    """Film and dirt: see `ballpass.derive.scene.bearing_records.Lubrication`; viscosity in m^2/s."""
+    """Lubricant film and contamination: see `ballpass.derive.scene.bearing_records.Lubrication`; viscosity in m^2/s."""
 
     viscosity_ratio: float | None
     viscosity: float | None
@@ -231,7 +231,7 @@ class DutyInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BearingInfo:
-    """What observables need of a bearing: balls, and the names of its kinematic parameters and constants.
+    """Data of a bearing for observables: balls, and the names of its kinematic parameters and constants.
 
     `name` is empty for the scene's only ``[bearing]``.  Its states and outputs begin with `prefix`, ``""`` or
     ``"<name>."``; its parameters and constants with `path`, ``bearing`` or ``bearings.<name>``.  `inner_body` of its
@@ -253,7 +253,7 @@ class BearingInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MechanismInfo:
-    """What observables need of the linkage: names of the parameters of its driver, joints, points for drawing.
+    """Data of the linkage for observables: names of the parameters of its driver, joints, points for drawing.
 
     The components of an applied force are the parameters ``mechanism.forces.<name>.force.x`` and ``.y``, or
     ``.magnitude`` and ``.direction`` (see `force_components`).  Where its input is a table, that holds the amount, and
@@ -278,7 +278,7 @@ class MechanismInfo:
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Manifest(ShortRepr):
-    """Everything `runtime` knows of a model.
+    """All data of a model that `runtime` uses.
 
     Examples
     --------
@@ -291,7 +291,7 @@ class Manifest(ShortRepr):
     schema: int = SCHEMA
     scene: str
     title: str
-    source: str  # digest of the scene file and of all that derives it; empty where there was no file
+    source: str  # digest of the scene file and of the deriving sources; empty where there was no file
     signature: str
     versions: tuple[tuple[str, str], ...]
     parameters: tuple[ParameterInfo, ...]
@@ -350,7 +350,7 @@ class Manifest(ShortRepr):
     def to_json(self) -> str:
         """Deterministic text: the fields in the order of the records, one per line, ending in a newline.
 
-        The last key is the digest of the text without it: who edits a number there by hand is told.
+        The last key is the digest of the text without it, so that an edit by hand is detected.
 
         Examples
         --------
@@ -394,7 +394,7 @@ class Manifest(ShortRepr):
         if verify and digest != digest_of(document):
             raise ArtefactError(
                 f"{source}: the digest in it, {digest!r:.20}, is not that of its content: edited or cut short. "
-                f"{again}, or load it with verify=False if the edit is meant."
+                f"{again}, or load it with verify=False if the edit is intended."
             )
         try:
             manifest = from_plain(cls, document, "manifest")

@@ -22,15 +22,15 @@ _KINDS = {"s": "time", "Hz": "frequency", "rad": "angle"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Option:
-    """What an option means and what it allows.
+    """Description and allowed values of an option.
 
     Attributes
     ----------
     words : for its help
     example : a value, for help on the command line
-    shown : stands for the value in the help
+    shown : placeholder of the value in the help
     flags : on the command line, the first for messages; that of the parameter's name if there is none
-    unit : of a quantity, which the command line takes as text with a unit; empty for what has none
+    unit : of a quantity, which the command line takes as text with a unit; empty for other options
     least, above, most : bounds of a number
     choices : allowed words; empty for any
     """
@@ -46,7 +46,7 @@ class Option:
     choices: tuple[str, ...] = ()
 
     def flag(self, name: str) -> str:
-        """How the command line calls the option of a parameter."""
+        """Flag of a parameter on the command line."""
         return self.flags[0] if self.flags else f"--{name.strip('_').replace('_', '-')}"
 
     def help(self, name: str) -> str:
@@ -54,11 +54,11 @@ class Option:
         return f"{self.words.removesuffix('.')}: `{self.flag(name)} {self.example}`." if self.example else self.words
 
     def fault(self, name: str, value: Any) -> str | None:
-        """What is wrong with a value: what was given, what is allowed; None where nothing is.
+        """Fault of a value: the given and the allowed one; None where there is none.
 
         Parameters
         ----------
-        name : what the caller calls the option
+        name : name of the option for the caller
         """
         if self.choices and value is not None:
             wrong = [item for item in ([value] if isinstance(value, str) else value) if item not in self.choices]
@@ -82,7 +82,7 @@ class Option:
 
 
 def options_in(annotations: Mapping[str, Any]) -> dict[str, tuple[Any, Option]]:
-    """The options among annotations: the type of each, and what it means."""
+    """The options among annotations: the type and the option of each."""
     return {
         name: (get_args(kind)[0], option)
         for name, kind in annotations.items()
@@ -103,7 +103,7 @@ def refuse_faults(options: Mapping[str, Option], values: Mapping[str, Any]) -> N
 
     Parameters
     ----------
-    options : by what the caller calls them, as are the values
+    options : by their names for the caller, as are the values
 
     Raises
     ------

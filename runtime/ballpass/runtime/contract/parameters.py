@@ -93,13 +93,13 @@ class Numbers(ShortRepr):
 
 
 def resolve_parameters(manifest: Manifest, overrides: Mapping[str, float] | None) -> Parameters:
-    """Defaults with `overrides` put in.
+    """Defaults with `overrides` applied.
 
     Raises
     ------
     RequestError
-        Unknown names (with the nearest known ones), values that are no finite real numbers, or that no scene file
-        could have (see `bounds`); all faults at once.
+        Unknown names (with the nearest known ones), values that are not finite real numbers, or outside the bounds of a
+        scene file (see `bounds`); all faults at once.
     """
     values = {info.name: info.default for info in manifest.parameters}
     if overrides is None:
@@ -194,12 +194,12 @@ def vector(value: object) -> np.ndarray:
 
 
 def unknown_name(what: str, name: object, known: Iterable[str]) -> str:
-    """One line: the name is unknown, the nearest ones, or all where they are few."""
+    """Message for an unknown name: the nearest ones, or all where they are few."""
     names = list(known)
     name = name if not isinstance(name, str) or len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     near = difflib.get_close_matches(str(name), names, n=4, cutoff=0.5)
     if not near:
-        # a remembered last part of the path is the commonest near miss that the ratio of difflib does not see
+        # only the last part of the path given: the commonest slip that the ratio of difflib misses
         tail = str(name).rsplit(".", 1)[-1]
         near = [candidate for candidate in names if tail and tail in candidate][:4]
     if near:

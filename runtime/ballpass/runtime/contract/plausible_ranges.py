@@ -1,4 +1,4 @@
-"""Numbers that are allowed and unusual: said, never refused.
+"""Numbers that are allowed but unusual: a warning names them, none is refused.
 
 In: the manifest and values, single ones or a column for each parameter.  Out: sentences, and warnings.
 """
@@ -18,7 +18,7 @@ from ballpass.runtime.contract.manifest import Manifest, UsualInfo
 
 
 class UnusualWarning(BallpassWarning):
-    """A number, or what a run made of it, is allowed and unlike what bearings and machines have."""
+    """A number, or a result of a run, is allowed but outside what real bearings and machines show."""
 
 
 def unusual(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) -> list[str]:
@@ -38,7 +38,7 @@ def unusual(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) -> li
 
 
 def warn_unusual(manifest: Manifest, columns: Mapping[str, np.ndarray | float]) -> None:
-    """Warn of what `unusual` finds."""
+    """Warn of the results of `unusual`."""
     for text in unusual(manifest, columns):
         warnings.warn(text, UnusualWarning, stacklevel=3)
 
@@ -54,11 +54,11 @@ def _outside(info: UsualInfo, columns: Mapping[str, Any]) -> Any:
         odd = odd | (total < info.least * scale)
     if info.most is not None:
         odd = odd | (total > info.most * scale)
-    return odd & (scale > 0.0)  # a clearance of zero is no scale
+    return odd & (scale > 0.0)  # a clearance of zero cannot be a scale
 
 
 def _sentence(manifest: Manifest, info: UsualInfo, columns: Mapping[str, Any], odd: np.ndarray) -> str:
-    """Which numbers are unusual, what is usual, and what to check; of many members the first."""
+    """Sentence: the unusual numbers, the usual range, what to check; of many members the first."""
     units = {item.name: "" if item.unit == "1" else f" {item.unit}" for item in manifest.parameters}
     k = int(np.argmax(odd))
     values = [float(np.atleast_1d(columns[name])[k]) for name in info.names]

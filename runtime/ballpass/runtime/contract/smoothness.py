@@ -1,8 +1,8 @@
-"""What the words of `Manifest.smoothness` mean, said so that nobody takes Hertz's law for smooth in every sense."""
+"""Meaning of the words of `Manifest.smoothness`: which derivatives of a law are continuous, which are bounded."""
 
 from __future__ import annotations
 
-#: Word of the manifest -> what people read.
+#: Word of the manifest -> description.
 WORDS = {
     "twice smooth": "twice continuously differentiable",
     "smooth": "once continuously differentiable (second derivative unbounded at contact onset)",

@@ -1,10 +1,10 @@
 """Text with a unit to a number in SI.
 
-In: what stands in a scene file ("611.7 kg*mm^2", 0.5).  Out: one float in the SI unit the key asks for.
+In: a value of a scene file ("611.7 kg*mm^2", 0.5).  Out: one float in the SI unit the key asks for.
 
 A scene is data, so nothing in it is evaluated: the grammar below is read by a small parser of its own.  Sizes of the
-names most scenes are written with stand here, equal to pint's; whoever has more names, as `ballpass.derive` has pint's,
-gives a function that looks them up.
+usual units are here, equal to pint's.  A caller with more units, as `ballpass.derive` with pint's, gives a function
+that looks them up.
 
 ::
 
@@ -14,8 +14,8 @@ gives a function that looks them up.
     factor   = ( name | "1" | "(" unit ")" ) [ ("^" | "**") exponent | "²" | "³" ]
     exponent = [sign] decimal | "(" [sign] decimal ["/" decimal] ")"
 
-Two things differ from pint.  The radian counts as a dimension: "Hz" and "rad/s" are different things here, where pint
-would silently lose a factor of 2 pi.  Arithmetic is rational: "0.3567 kg" and "356.7 g" are the same float, and
+Two things differ from pint.  The radian counts as a dimension: "Hz" and "rad/s" are different things here, while pint
+silently loses a factor of 2 pi.  Arithmetic is rational: "0.3567 kg" and "356.7 g" are the same float, and
 1 rpm is 2 pi/60 rad/s rounded once.
 """
 
@@ -37,13 +37,13 @@ MAX_EXPONENT = 12
 
 
 class QuantityError(RequestError):
-    """Text that is no quantity of the unit asked for.
+    """The text is not a quantity of the required unit.
 
     Parameters
     ----------
     problem : what is wrong, in one clause
     given : what was given
-    allowed : what may stand there
+    allowed : the allowed values
     remedy : what to do
     """
 
@@ -90,7 +90,7 @@ LookUp = Callable[[str], UnitSize]
 
 
 class GrammarError(Exception):
-    """Why a text is no unit; `parse_quantity` turns it into a `QuantityError`."""
+    """Why a text is not a unit; `parse_quantity` turns it into a `QuantityError`."""
 
     def __init__(self, problem: str, remedy: str) -> None:
         super().__init__(problem)
@@ -98,7 +98,7 @@ class GrammarError(Exception):
 
 
 def parse_quantity(given: object, unit: str, look_up: LookUp | None = None) -> float:
-    """Value in SI of what stands in a scene file.
+    """Value in SI of a text or number of a scene file.
 
     Parameters
     ----------
@@ -159,12 +159,12 @@ def parse_quantity(given: object, unit: str, look_up: LookUp | None = None) -> f
     if not math.isfinite(value):
         raise refuse("the number is not finite", "give a finite number")
     if value == 0.0 and number != 0:
-        raise refuse("the number is too small to be told from zero", 'write "0" where zero is meant')
+        raise refuse("the number is too small to differ from zero", 'write "0" where zero is meant')
     return value
 
 
 def show(given: object, limit: int = 60) -> str:
-    """What stands in the file, as people would write it, shortened to `limit` characters."""
+    """A value as it is written in the file, shortened to `limit` characters."""
     if isinstance(given, str):
         text = f'"{given[:limit]}"'
     elif isinstance(given, bool):
@@ -182,7 +182,7 @@ def show(given: object, limit: int = 60) -> str:
 
 
 def _show_inner(given: object) -> str:
-    """What stands inside a list or table; the depth of a file's tables has no bound, that of a message has."""
+    """A value inside a list or table; a file's tables may be nested to any depth, a message is short."""
     return "..." if isinstance(given, dict | list) else show(given, 20)
 
 
@@ -370,12 +370,12 @@ COMMON: dict[str, UnitSize] = {
 
 
 def unknown_unit(name: str) -> UnitSize:
-    """GrammarError: the name is not among `COMMON`, and there is nobody to ask."""
+    """Raise GrammarError: the name is not among `COMMON`, and there is no other source."""
     raise GrammarError(f"no unit is called {show(name)} here", unit_hint(name))
 
 
 def unit_hint(name: str) -> str:
-    """What to write instead of a name that is no unit's."""
+    """Remedy for a name that is not a unit."""
     if re.fullmatch(r"[kMm]?N[mn]*m?", name):
         return 'write products with "*", as in "N*m"'
     if re.search(r"\d", name):

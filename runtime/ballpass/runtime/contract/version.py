@@ -1,3 +1,3 @@
-"""Version of ballpass: of both distributions, of what they write, of what the command line says."""
+"""Version of ballpass: of both distributions, of the files they write, of the command line."""
 
 __version__ = "0.1.0"

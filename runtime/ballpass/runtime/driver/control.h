@@ -1,4 +1,4 @@
-/* Family of methods and first step size.  Single runs and ensembles decide alike, where a segment begins and within it
+/* Family of methods and first step size.  Single runs and ensembles decide alike, at the start of a segment and within it
    (family.h). */
 #ifndef BALLPASS_CONTROL_H
 #define BALLPASS_CONTROL_H
@@ -8,14 +8,14 @@
 #include "single.h"
 
 enum {
-    BP_STIFF_STEPS = 12, /* steps at the stability limit before an explicit method gives up */
-    BP_STIFF_LOOK = 8,   /* every so many steps it looks whether it is there */
-    BP_FAMILY_LOOKS = 3, /* looks that a change of family is decided on */
+    BP_STIFF_STEPS = 12, /* steps at the stability limit before an explicit method stops */
+    BP_STIFF_LOOK = 8,   /* steps between two checks whether it is at the limit */
+    BP_FAMILY_LOOKS = 3, /* checks before a change of family is decided */
     BP_FAMILY_REST = 3,  /* decisions without asking for the largest stable step where steps are far below it */
-    BP_PATIENCE = 4      /* decisions that a linearly implicit method gets to show what it is worth */
+    BP_PATIENCE = 4      /* decisions before a linearly implicit method is judged */
 };
 
-/* Step size, in the mean over the looks, by the largest stable step of an explicit method.  Above the first an explicit method is held
+/* Step size, in the mean over the checks, by the largest stable step of an explicit method.  Above the first an explicit method is held
    down by stability and not by accuracy, below the second it is far from it.  Below the third a linearly implicit step, which costs more
    than two explicit ones, is not worth it. */
 static const double BP_LIMITED = 0.9, BP_FAR_FROM_LIMIT = 0.3, BP_WORTH_SOLVING = 1.25;
@@ -131,8 +131,8 @@ static inline double bp_stable_step(const double *restrict A, const double *rest
 }
 
 /* Whether the linearly implicit family fits from the start: where damping is faster than the oscillation it damps, for then an explicit
-   method's step is held down by stability and not by accuracy.  What oscillates fast may have to be followed, and steps must show that it
-   has not (family.h).  A = da/dq, B = da/dv. */
+   method's step is held down by stability and not by accuracy.  A fast oscillation may have to be resolved; only the steps show
+   whether (family.h).  A = da/dq, B = da/dv. */
 static inline int bp_is_stiff(const double *restrict A, const double *restrict B)
 {
     double decay, squared;

@@ -7,7 +7,7 @@
 
 #ifdef BALLPASS_SENSITIVITIES
 /* Largest change of the moving times at a contact: what it adds to a derivative, over its size.  More would be rounding, as where a ball
-   touches at no speed. */
+   touches at zero speed. */
 static const double BP_MOST_MOVED = 1e4;
 
 static const double *step_lead(const bp_run *run) { return is_paced(run) ? lead_of(run) : NULL; }
@@ -124,7 +124,7 @@ static void tangent_accept(bp_run *run)
     }
 }
 
-/* Derivatives at fixed time of the state y behind a part of the step. */
+/* Derivatives at fixed time of the state y after a part of the step. */
 static void tangent_output(bp_run *run, double t, double h, double part, const double *y, int prepared)
 {
     const ballpass_tangents *tangents = run->tangents;

@@ -1,16 +1,16 @@
-/* Events, located: which side of each switching function the state is on, where a step changes it, and when to leave one alone.
+/* Events, located: which side of each switching function the state is on, where a step changes it, and when a kink is no longer located.
 
    switches.h is generated with the scene from the conditions of its laws: switching functions g of a ball's deflection and rate, zero at
    the kinks, and the law with its sides held.  A step is tried with the sides that its start has; where the law can be continued, it is
-   smooth within the step whatever the step does.  The step is looked at in BP_LOOKS places: a side changes where g is beyond zero by more
+   smooth within any step.  The step is checked at BP_LOOKS places: a side changes where g is beyond zero by more
    than a band, which is a part BP_BAND of the error allowed in a step.  Below that a kink does not matter, and a ring that rests on one
-   does not count as crossing it by rounding; between looks the parabola through three of them tells who has been on the other side.  The
-   step is then repeated so that it ends where g is zero on its dense output, and the sides are turned there.
+   does not count as crossing it by rounding; between these places the parabola through three of them shows a ball that has been on the
+   other side.  The step is then repeated so that it ends where g is zero on its dense output, and the sides are turned there.
 
    Work is bounded.  A step is repeated BP_REPEATS times at most for one kink.  A ball may turn its side back at the very place where it
-   turned; the BP_TURNS-th time it is let go.  A crossing that follows the last one of the same ball by less than BP_BRIEF times the step
+   turned; the BP_TURNS-th time it is released.  A crossing that follows the last one of the same ball by less than BP_BRIEF times the step
    tried is brief: such steps do not resolve what crosses (an explicit method at the limit of its stability zigzags about rest), and
-   BP_CHATTER brief ones in a row let go as well.  A ball let go obeys the law as it is, stepped over, for BP_REST steps. */
+   BP_CHATTER brief ones in a row release it as well.  Steps go over the kinks of a released ball for BP_REST steps. */
 #ifndef BALLPASS_KINKS_H
 #define BALLPASS_KINKS_H
 
@@ -32,7 +32,7 @@ static const double BP_FAR = 2.0, BP_LEAST_PACE = 0.25, BP_NEAREST = 0.1, BP_AST
 /* Events of loads start here, those of the balls are before.  Second derivatives of the law are not held, and the clock of sqrt_time.h is
    one of explicit methods: linearly implicit steps with derivatives locate the events of loads alone. */
 #if defined BP_HAS_WINDOWS
-enum { BP_FIRST_LOAD = BP_FIRST_WINDOW }; /* stops come behind them */
+enum { BP_FIRST_LOAD = BP_FIRST_WINDOW }; /* stops follow them */
 #elif defined BP_HAS_STOPS
 enum { BP_FIRST_LOAD = BP_FIRST_STOP };
 #else
@@ -40,17 +40,17 @@ enum { BP_FIRST_LOAD = BP_EVENTS };
 #endif
 
 typedef struct {
-    double border[BP_EVENTS]; /* in place of the zero of g in the held law: -infinity, infinity, or 0 for an event let go */
-    double side[BP_EVENTS];   /* 1 where g > 0, else -1; 0 for an event let go */
-    double seen[BP_LOOKS + 1][BP_EVENTS]; /* g at the start of the step and at its looks */
+    double border[BP_EVENTS]; /* in place of the zero of g in the held law: -infinity, infinity, or 0 for a released event */
+    double side[BP_EVENTS];   /* 1 where g > 0, else -1; 0 for a released event */
+    double seen[BP_LOOKS + 1][BP_EVENTS]; /* g at the start of the step and at its checked places */
     double place[BP_LOOKS + 1];           /* where these are, as parts of the step's time */
     double slope[2][BP_EVENTS];           /* rate of g at the start of the step and at its end, where there is one */
     double last[BP_EVENTS];               /* time of the last crossing [s] */
     double band[BP_EVENTS];
-    unsigned char turn[BP_EVENTS];  /* sides to turn behind the step */
+    unsigned char turn[BP_EVENTS];  /* sides to turn after the step */
     unsigned char brief[BP_EVENTS], still[BP_EVENTS]; /* brief crossings in a row, those without a step between */
-    unsigned char rest[BP_EVENTS];  /* steps for which an event is let go */
-    int resting; /* events let go */
+    unsigned char rest[BP_EVENTS];  /* steps for which an event is released */
+    int resting; /* released events */
     int first;   /* events before this one are not located */
 } bp_sides;
 
@@ -138,16 +138,16 @@ static inline int bp_has_slopes(void)
     return all;
 }
 
-/* Whether a ball has been on its other side between three looks in a row, on its own at all of them, as far as the parabola through them
-   tells. */
+/* Whether, by the parabola through three checked places in a row, a ball that is on its own side at all of them has been on its other
+   side between them. */
 static inline int bp_is_dip(double before, double here, double behind, double band)
 {
     const double bend = before - 2.0 * here + behind, difference = behind - before;
     return (bend > 0.0) & (fabs(difference) <= 2.0 * bend) & (8.0 * (here - band) * bend < difference * difference);
 }
 
-/* Whether a step has to be looked at in earnest: the cubics through the values of the switching functions at its ends and their slopes
-   tell, at these theta of its looks.  `pace`: paces at the ends, times the step's size. */
+/* Whether a step has to be checked on its dense output: estimated by the cubics through the values and slopes of the switching
+   functions at its ends, at these theta of its checked places.  `pace`: paces at the ends, times the step's size. */
 static inline int bp_glance(const bp_sides *restrict s, const double theta[BP_LOOKS + 1], const double pace[2])
 {
     int any = 0;
@@ -178,8 +178,8 @@ static inline double bp_onset(const bp_sides *restrict s)
     return onset;
 }
 
-/* Where an event that all looks find on its side has been on the other between them: the place of the vertex, to be looked at, and the look
-   that it replaces; 0 where there is none. */
+/* Where an event that is on its side at all checked places has been on the other between them: the place of the vertex, to be checked,
+   and the place that it replaces; 0 where there is none. */
 static inline int bp_dip(const bp_sides *restrict s, double *place)
 {
     for (int k = 1; k < BP_LOOKS; k++)
@@ -193,7 +193,7 @@ static inline int bp_dip(const bp_sides *restrict s, double *place)
     return 0;
 }
 
-/* Whether any event is on its other side at a look. */
+/* Whether any event is on its other side at a checked place. */
 static inline int bp_changed(const bp_sides *restrict s, int look)
 {
     int any = 0;
@@ -202,7 +202,7 @@ static inline int bp_changed(const bp_sides *restrict s, int look)
     return any;
 }
 
-/* An event that is left alone for some time. */
+/* An event that is not located for some time. */
 static inline void bp_let_go(bp_sides *s, int e)
 {
     if (s->side[e] != 0.0) s->resting++;
@@ -226,7 +226,7 @@ static inline void bp_turn_sides(bp_sides *s, double time, double step)
     }
 }
 
-/* Behind an accepted step: its end is the next start, and events let go come back in time. */
+/* After an accepted step: its end is the next start, and released events return after their steps. */
 static inline void bp_sides_move_on(bp_sides *s)
 {
     memcpy(s->seen[0], s->seen[BP_LOOKS], sizeof s->seen[0]);

@@ -1,11 +1,11 @@
-/* Steps that end on kinks of the law, and steps about contacts, which have a clock of their own: what kinks.h and sqrt_time.h describe, done in a
-   run.  Without BALLPASS_LOCATED nothing of it is there. */
+/* Steps that end on kinks of the law, and steps near a contact, taken over the square root of time: the use of kinks.h and sqrt_time.h in a
+   run.  Compiled in only where BALLPASS_LOCATED is defined. */
 #ifndef BALLPASS_LOCATE_H
 #define BALLPASS_LOCATE_H
 
 #include "run.h"
 
-enum { NO_KINK = 0, CUT = 1, AT_ONCE = 2 }; /* what a step met: nothing; it was cut to end on a kink; there is one at its start */
+enum { NO_KINK = 0, CUT = 1, AT_ONCE = 2 }; /* result of a step: no kink; cut to end on a kink; a kink at its start */
 
 #ifdef BALLPASS_LOCATED
 /* The step tried, at a part of its time: the cubic through its ends and their slopes where these are known, else its dense output. */
@@ -40,7 +40,7 @@ static void prepare_glance(bp_run *run, double t, double h)
 
 typedef void bp_view(const bp_run *, double, double *);
 
-/* Look at the step tried, before its end by `at`; whether a side changes. */
+/* Check the step tried, before its end by `at`; whether a side changes. */
 static int look(bp_run *run, double t, double h, bp_view *at)
 {
     bp_sides *s = &run->sides;
@@ -62,7 +62,7 @@ static int look(bp_run *run, double t, double h, bp_view *at)
     return changed;
 }
 
-/* Whether the step tried has to be looked at in earnest. */
+/* Whether the step tried has to be checked on its dense output. */
 static int glance(bp_run *run, double t, double h)
 {
     bp_sides *s = &run->sides;
@@ -86,7 +86,7 @@ static double switch_at(const bp_run *run, double t, double h, double part, bp_v
     return g[event];
 }
 
-/* Where a ball changes its side that is found changed at a look: the first root in front of it, by regula falsi (Illinois). */
+/* Where a ball changes the side that is changed at a checked place: the first root before it, by regula falsi (Illinois). */
 static double root_before(const bp_run *run, double t, double h, bp_view *at, int before, int event)
 {
     const bp_sides *s = &run->sides;
@@ -116,7 +116,7 @@ static double root_before(const bp_run *run, double t, double h, bp_view *at, in
     return root;
 }
 
-/* The first change of a side in the step looked at: its part of the step's time, above 1 where there is none; all that change. */
+/* The first change of a side in the checked step: its part of the step's time, above 1 where there is none; all that change. */
 static double first_change(const bp_run *run, double t, double h, bp_view *at, int *which, unsigned char changed[BP_EVENTS])
 {
     const bp_sides *s = &run->sides;
@@ -152,7 +152,7 @@ static double stretched(const bp_run *run, double start, double t, double h, dou
     if (!is_paced(run)) return h * factor;
     const int ahead = run->release.time > t;
     const double from = ahead ? run->release.time - t : (start + t) - run->onset, to = ahead ? from - h : from + h;
-    /* it was made to end where the contact was foreseen to, and the contact goes on: what is left there is rounding */
+    /* the step was made to end with the contact, as predicted, and the contact continues: the rest is rounding */
     if (next && !(to > BP_ARRIVED * from)) return h * factor;
     const double first = sqrt(from), last = sqrt(to > 0.0 ? to : 0.0), reach = factor * fabs(last - first), base = next ? last : first;
     if (!ahead) return reach * (2.0 * base + reach);
@@ -160,8 +160,8 @@ static double stretched(const bp_run *run, double start, double t, double h, dou
 }
 
 /* Where a step of size h that was refused runs over the end of a contact, the next is paced for it, and `next` is the way there.
-   Much shorter than what error control makes of the step it is not taken: what was refused is not to be trusted so far, and a ball that has
-   just landed is on its kink. */
+   Much shorter than what error control makes of the step it is not taken: a refused step predicts no farther, and a ball that has just
+   landed is on its kink. */
 static void foresee(bp_run *run, double t, double h, double *next)
 {
     if (!is_explicit(run->method) || run->release.time > t) return;
@@ -175,8 +175,8 @@ static void foresee(bp_run *run, double t, double h, double *next)
     run->release = (bp_release){t + *next, which};
 }
 
-/* Where the derivatives refuse a step of size h, the end of a contact that comes soon, by the rate of its deflection: in front of it their
-   rate is unbounded, and even steps would come nearer and nearer without ever passing it.  Once from each place, so that the step that
+/* Where the derivatives refuse a step of size h, the end of a contact that comes soon, by the rate of its deflection: before it their
+   rate is unbounded, and even steps would approach it without ever passing it.  Once from each place, so that the step that
    aims there may be refused as well. */
 static void foresee_by_rate(bp_run *run, double t, double h, double *next)
 {
@@ -198,14 +198,14 @@ static void foresee_by_rate(bp_run *run, double t, double h, double *next)
 #ifdef BP_HAS_WINDOWS
 static const double BP_TURN = 6.283185307179586476925286766559;
 
-/* How far an edge is ahead of an angle, in the direction of a way [rad]. */
+/* Distance of an edge ahead of an angle, in the direction of motion [rad]. */
 static double ahead_of(double edge, double angle, double way)
 {
     const double rest = fmod(way < 0.0 ? angle - edge : edge - angle, BP_TURN);
     return rest < 0.0 ? rest + BP_TURN : rest;
 }
 
-/* Part of the step tried that passes no window whole, nor the gap beside one: a look at its ends would see nothing of that. */
+/* Part of the step tried that passes no whole window, nor a whole gap: at its ends that would not show. */
 static double within_windows(const bp_run *run)
 {
     const double from = run->x[BP_DRIVER], way = run->next[BP_DRIVER] - from;
@@ -253,7 +253,7 @@ static int locate(bp_run *run, double start, double t, double *h, double *error,
     for (int e = 0; e < BP_EVENTS; e++)
         if (bp_of_rate[e] == bp_of_rate[which]) scale = fabs(s->seen[0][e]) > scale ? fabs(s->seen[0][e]) : scale;
     const double band = s->band[which], least = 1e-6 * band, rounding = 4.0 * DBL_EPSILON * scale;
-    /* behind a branch point of the law its slope is unbounded: a linearly implicit step stays on the other side */
+    /* after a branch point of the law its slope is unbounded: a linearly implicit step stays on the other side */
     const double clear = is_explicit(run->method) ? 0.0 : bp_ends(which, 1.0) ? -1.0 : bp_ends(which, -1.0) ? 1.0 : 0.0;
     const double goal = clear * (least > rounding ? least : rounding);
     double length = tried; /* of the step at hand */
@@ -283,7 +283,7 @@ static int locate(bp_run *run, double start, double t, double *h, double *error,
             slope = (left - switch_at(run, t, reach, 1.0 - back, state_at, which)) / (back * reach);
         }
         const double moved = reach - (left - goal) / slope;
-        if (aimed && !met && !(s->side[which] * slope < 0.0 && moved <= farthest)) return NO_KINK; /* contact goes on */
+        if (aimed && !met && !(s->side[which] * slope < 0.0 && moved <= farthest)) return NO_KINK; /* contact continues */
         if (!(moved > 0.0 && moved <= farthest)) break;
         if (k + 1 < BP_REPEATS) reach = moved;
     }
@@ -317,7 +317,7 @@ static void segment_inputs(bp_run *run, const double *u)
 #endif
 
 #ifdef BP_HAS_WINDOWS
-/* Note passages of edges: a driver that comes back at once, again and again, has stalled there. */
+/* Note passages of edges: a driver that returns to one at once, many times, has stalled there. */
 static void note_passages(bp_run *run, double time)
 {
     const double speed = fabs(run->x[BP_NQ + BP_DRIVER]);
@@ -366,7 +366,7 @@ static void sides_start(bp_run *run, double t)
 /* No side is turned: the step is refused. */
 static void keep_sides(bp_run *run) { memset(run->sides.turn, 0, sizeof run->sides.turn); }
 
-/* Sides that the method at hand is to have. */
+/* Sides for the current method. */
 static void sides_of_method(bp_run *run)
 {
 #ifdef BALLPASS_SENSITIVITIES
@@ -377,7 +377,7 @@ static void sides_of_method(bp_run *run)
 #endif
 }
 
-/* Pace at the end of the step taken, and whether it is too slow to tell the slope there. */
+/* Pace at the end of the step taken, and whether it is too slow to give the slope there. */
 static double pace_at_end(const bp_run *run) { return bp_pace(run->lead, 1.0); }
 static int stands_at_end(const bp_run *run) { return pace_at_end(run) < BP_LEAST_PACE; }
 
@@ -387,7 +387,7 @@ static void sides_move_on(bp_run *run)
     hold_borders(run);
 }
 
-/* Behind the first step from an onset: how long it might have been. */
+/* After the first step from an onset: how long it could have been. */
 static void remember_touch(bp_run *run, double h, double factor)
 {
     if (run->lead == 0.0) run->touch = h * factor * factor;
@@ -400,7 +400,7 @@ static void forget_release(bp_run *run)
     run->foreseen = NAN;
 }
 
-/* Whether a step is to end where a contact is foreseen to, no farther than `longest`; `h` is the way there then. */
+/* Whether a step is to end at the predicted end of a contact, no farther than `longest`; `h` is then the distance to it. */
 static int aim(bp_run *run, double t, double longest, double resolution, double *h)
 {
     const double ahead = run->release.time - t;

@@ -1,7 +1,7 @@
-/* A generated function at many points in one call: what a loop in Python would cost a thousand times.
+/* Call a generated function at many points in one call; a loop in Python would take a thousand times as long.
 
    Generated functions take arrays of pointers to their arguments and results, and work memory (casadi's interface in C).  An argument
-   that varies moves on by its stride from point to point, one that is fixed has the stride 0.  A result whose pointer is NULL is not
+   that varies advances by its stride from point to point, one that is fixed has the stride 0.  A result whose pointer is NULL is not
    written. */
 #include <stddef.h>
 

@@ -1,4 +1,4 @@
-/* What a run gives while it goes on: states at output times, ends of steps, and reductions (reductions.h). */
+/* Results that a run gives while it integrates: states at output times, ends of steps, and reductions (reductions.h). */
 #ifndef BALLPASS_OBSERVE_H
 #define BALLPASS_OBSERVE_H
 
@@ -23,7 +23,7 @@ static void write_outputs(bp_run *run, double start, double t, double h, double 
             prepared = 1;
             state_at(run, theta > 0.0 ? theta : 0.0, y);
         }
-        /* behind the state: the derivatives use its slopes */
+        /* after the state: the derivatives use its slopes */
         tangent_output(run, t, h, theta > 0.0 ? theta : 0.0, y, tangents_prepared);
         tangents_prepared = tangents_prepared || theta < 1.0;
         result->written++;
@@ -41,7 +41,7 @@ static void note_end(const bp_run *run, double time, int on_kink)
 }
 
 #ifdef BALLPASS_REDUCTIONS
-/* An accepted step, for the reductions: its dense output is ready.  They look at its part from `from` over `span` of it. */
+/* An accepted step, for the reductions: its dense output is ready.  They use its part from `from` over `span` of it. */
 typedef struct {
     const bp_run *run;
     double t, h, from, span;

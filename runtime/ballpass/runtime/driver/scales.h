@@ -1,4 +1,4 @@
-/* Magnitudes of the states of a run, from its most loaded moments: what ballpass.runtime.run.scales does, for one member after another. */
+/* Magnitudes of the states of a run, from its most loaded moments, as in ballpass.runtime.run.scales, for one member after another. */
 #ifndef BALLPASS_SCALES_H
 #define BALLPASS_SCALES_H
 
@@ -77,7 +77,7 @@ static inline double bp_largest(const double *v)
     return most;
 }
 
-/* Masses of the coordinates: what a force through the balls accelerates. */
+/* Masses of the coordinates that a force through the balls accelerates. */
 static inline void bp_masses(const bp_numbers *n, double *mass)
 {
     const double force = 1e12, x[BP_NX] = {0.0};
@@ -91,7 +91,7 @@ static inline void bp_masses(const bp_numbers *n, double *mass)
     for (int k = 0; k < BP_NQ; k++) mass[k] = bp_is_angle[k] ? 1.0 : force / fabs(b[k] - a[k]);
 }
 
-/* Coordinates of a group share a magnitude (bp_group); what counts of one that has a partner (bp_partner) is their difference. */
+/* Coordinates of a group share a magnitude (bp_group); of one that has a partner (bp_partner) the difference counts. */
 static inline double bp_largest_of(const double *v, int group)
 {
     double most = 0.0;
@@ -119,7 +119,7 @@ static inline double bp_apart(const double *x, int group)
     return most;
 }
 
-/* Whether a group has gone too far for the differences in it to be told. */
+/* Whether a group has moved so far that rounding hides the differences in it. */
 static inline int bp_is_gone(const double *x)
 {
     int gone = 0;
@@ -149,7 +149,7 @@ static inline void bp_field_held(const bp_numbers *n, const double *x, double *a
 }
 
 /* Positions at rest with vanishing acceleration, by pseudo-transient continuation; returns 0 when nothing holds them, and -1 when it
-   gets nowhere. */
+   fails. */
 static inline int bp_equilibrium(const bp_numbers *n, const double *mass, double *x)
 {
     double a[BP_NQ], A[BP_NQ * BP_NQ], there[BP_NQ], slopes[BP_NQ * BP_NQ], d[BP_NQ];
@@ -260,7 +260,7 @@ static inline void bp_magnitudes(const double *p, const double *c, const double 
         const int g = bp_group[k];
         const double moving = bp_largest_of(initial + BP_NQ, g);
         double position = fmax(travel[g], bp_largest_of(initial, g));
-        /* nothing holds the body: what it travels in the time at hand, pushed by its load and carried by its initial velocity */
+        /* nothing holds the body: its travel within the horizon by its load and its initial velocity */
         if (!found) position = fmax(position, highest[g] * (horizon / turn) * (horizon / turn));
         if (!found || highest[g] == 0.0) position = fmax(position, moving * (horizon / turn));
         if (bp_has_partners(g) && apart[g] > 0.0) position = fmin(position, BP_SOFT * apart[g]);

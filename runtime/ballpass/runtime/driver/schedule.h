@@ -1,4 +1,4 @@
-/* When loads switch and which inputs hold in between: the run's segments. */
+/* Segments of a run: the times at which loads switch, and the inputs between them. */
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
 
@@ -34,10 +34,10 @@ double schedule_most_segments(const schedule_input *inputs, int count, const dou
    values          parameters and derived constants
    turn            time of a turn [s], or infinity
    edges           on return memory with them, increasing [s]; the caller frees it
-   Returns the number of segments, or -1 where memory is short. */
+   Returns the number of segments, or -1 where the memory is too small. */
 long schedule_edges(const schedule_input *inputs, int count, const double *values, double begin, double end, double turn, double **edges);
 
-/* Moments of a run that are looked at for magnitudes: so many between its edges, and so many evenly spread. */
+/* Moments of a run for magnitudes: so many between its edges, and so many evenly spread. */
 enum { SCHEDULE_MOMENTS = 32 };
 
 /* Inputs at the moments of a run.

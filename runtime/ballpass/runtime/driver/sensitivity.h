@@ -3,7 +3,7 @@
    After a step is accepted, the same formulas (explicit.h, rosenbrock.h) are differentiated at fixed step size, BP_LANES directions at a
    time; what does not depend on the direction (slopes of the law, the small inverse) is computed once for all.
 
-   Derivatives are taken along moving times: with the driver's speed, all that happens at an angle moves in time, and by more in every
+   Derivatives are taken along moving times: with the driver's speed, all events at an angle move in time, and by more in every
    turn.  At fixed time the derivative would be a small difference of two large parts.  Where the time moves by t', which grows by `stretch`
    in time, dx/dt = f(t, x) gives (dx/dt)' = f_x x' + f_t t' + f_p p' + stretch f; steps that stretch with the time have the same formulas,
    and the caller gets x' - f t', the derivative at fixed time.  So t' is free at any time: x' + f d belongs to t' + d.
@@ -15,7 +15,7 @@
    Where a load switches at a time that moves by `shift`, the derivative jumps by (rate before - rate behind) (shift - t').
 
    Where the caller gives tolerances for the derivatives, their embedded error takes part in the choice of the step size.  A step is
-   differentiated before it is judged; the derivatives of the state change only when it is accepted, so that a rejected one leaves no trace.
+   differentiated before it is judged; the derivatives of the state change only when it is accepted, so that a rejected one has no effect.
 
    Compiled in only where BALLPASS_SENSITIVITIES is defined. */
 #ifndef BALLPASS_SENSITIVITY_H
@@ -42,7 +42,7 @@ typedef struct {
 enum { BP_TIMES = (BP_METHOD_STAGES + BP_LANES - 1) / BP_LANES };
 typedef double bp_stage_slopes[BP_TIMES][BP_NJ * BP_LANES];
 
-/* What the directions share at the stages of a step, and the slopes there that are differentiated. */
+/* Common data of the directions at the stages of a step, and the slopes there that are differentiated. */
 typedef struct {
     const bp_numbers *n;
     const bp_linear *plain; /* of a linearly implicit step */
@@ -253,7 +253,7 @@ static inline void bp_rosenbrock_tangent_step(const bp_rosenbrock_method *restri
     }
 }
 
-/* Largest scaled error of the directions' derivatives in the step tried, by whichever method is given; not a number where one is none.
+/* Largest scaled error of the directions' derivatives in the step tried, by the method given; NaN where one is NaN.
 
    The tolerance grows with the derivative: one that the motion multiplies a thousandfold is followed relative to its size. */
 static inline double bp_tangent_error(const ballpass_tangents *tangents, const bp_tangent_block *restrict work,
@@ -269,7 +269,7 @@ static inline double bp_tangent_error(const ballpass_tangents *tangents, const b
         bp_tangent_norm(bp_tangent_state(tangents, b), weight, size);
         for (int l = 0; l < BP_LANES; l++) {
             const double grown = tangents->rtol * size[l], relative = error[l] / (grown > 1.0 ? grown : 1.0);
-            if (!(relative <= worst)) worst = relative; /* also where it is no number */
+            if (!(relative <= worst)) worst = relative; /* also where it is NaN */
             if (!(worst <= DBL_MAX)) return NAN;
         }
     }

@@ -1,7 +1,7 @@
-/* Uneven pace: steps that take the root of the time from a branch point of the law as their clock.
+/* Steps over the square root of the time from a branch point of the law.
 
-   Behind an onset of contact Hertz's force grows like t^(3/2) and tangent damping like t^(1/2), t the time since: no polynomial in t, and a
-   step of any order has little of it.  Over s = sqrt(t) both are smooth.  So is the end of a contact, at the time T, over s = sqrt(T - t).
+   Behind an onset of contact Hertz's force grows like t^(3/2) and tangent damping like t^(1/2), t the time since: no polynomial in t, and so
+   that a method loses its order.  Over s = sqrt(t) both are smooth.  So is the end of a contact, at the time T, over s = sqrt(T - t).
    Where dx/dt = f, dx/ds = dt/ds f, and an explicit method takes that over s as well as the other over t.
 
    Within a step theta goes evenly in s from 0 to 1, and time by the part theta (lead + (1 - lead) theta) of the step: from (s0 + s1)

@@ -1,9 +1,9 @@
 /* Step sizes by the PI controller (Hairer & Wanner, Solving Ordinary Differential Equations II, section IV.2).
 
-   A body as explicit.h, for one run and for a member in each lane.  Of BP_W numbers are BP_NAME(log) and BP_NAME(exp), which is also given
-   what it is of for rejected steps: the error to the power -1/order. */
+   A body as explicit.h, for one run and for a member in each lane.  BP_NAME(log) and BP_NAME(exp) take BP_W numbers;
+   for rejected steps BP_NAME(exp) also gets the error and the order, because the result there is the error to the power -1/order. */
 
-/* By how much the next step is longer than the one tried, which had this scaled error and was accepted or not.
+/* Ratio of the next step to the one tried, which had this scaled error and was accepted or not.
 
    order            of the error
    rejected_last    whether the step before was rejected: then this one does not grow
@@ -30,7 +30,7 @@ BP_INLINE void BP_NAME(step_factor)(double order, const double *restrict error, 
         double up = 0.9 * factor[l];
         up = up < 0.2 ? 0.2 : up;
         up = up > most ? most : up;
-        /* what is no number says nothing about by how much to shrink */
+        /* NaN does not show by how much to shrink */
         double down = error[l] > 1.0 && error[l] <= DBL_MAX ? 0.9 * factor[l] : 0.1;
         down = down < 0.1 ? 0.1 : down;
         down = down > 0.9 ? 0.9 : down;

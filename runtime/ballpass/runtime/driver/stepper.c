@@ -82,7 +82,7 @@ static void begin_segment(bp_run *run, double start, double length, double resol
     run->family = (bp_family){0};
 }
 
-/* Keep what a run needs to go on in another call; returns the status. */
+/* Keep the data that a run needs to continue in another call; returns the status. */
 static int set_aside(bp_run *run, const bp_family *family, double t, int rejected_last, int status)
 {
     run->elapsed = t;
@@ -91,7 +91,7 @@ static int set_aside(bp_run *run, const bp_family *family, double t, int rejecte
     return status;
 }
 
-/* Write what lies in the accepted step from time *t, and move on to its end, unless the run pauses with it. */
+/* Write the outputs within the accepted step from time *t, and go to its end, unless the run pauses with it. */
 static int take_step(bp_run *run, bp_family *family, double start, double end, double *time, int changeable)
 {
     ballpass_result *result = run->result;
@@ -104,7 +104,7 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
         return BALLPASS_PAUSED;
     }
     reduce_step(run, start, t, h);
-    /* a step that was cut, or has its own pace, says nothing about the families */
+    /* a step that was cut, or has its own pace, does not show which family suits */
     const int chosen = changeable && taken.met == NO_KINK && !is_paced(run) ? judge_family(run, family, t, h) : run->method;
     tangent_accept(run);
     memcpy(run->x, run->next, sizeof run->next);
@@ -149,7 +149,7 @@ static int take_step(bp_run *run, bp_family *family, double start, double end, d
     return BALLPASS_DONE;
 }
 
-/* Integrate one segment from `start` to `end`; its clock starts at zero.  `resumed`: it goes on where another call ended. */
+/* Integrate one segment from `start` to `end`; its clock starts at zero.  `resumed`: it continues where another call ended. */
 static int run_segment(bp_run *run, double start, double end, int restart, int changeable, int resumed)
 {
     ballpass_result *result = run->result;

@@ -1,7 +1,7 @@
 /* The stepper's interface: one call integrates a run over any number of segments.
 
    A segment is a stretch of time within which the inputs u are constant; its clock starts at zero.  The driver lands on every
-   segment's end exactly, so that a load that switches there never hides inside a step.
+   segment's end exactly, so that a load never switches within a step.
 
    Compiled with BALLPASS_LOCATED, no step straddles a kink of the law (kinks.h); without, error control steps over them.
 
@@ -28,7 +28,7 @@ enum ballpass_status {
     BALLPASS_TOO_MANY_STEPS = 1, /* max_steps reached */
     BALLPASS_STEP_TOO_SMALL = 2, /* the error test fails at the smallest step */
     BALLPASS_NOT_FINITE = 3,     /* the state or its rate is not a number even for the smallest step */
-    BALLPASS_STALLED = 5,        /* the driver comes back to the edge of a window again and again */
+    BALLPASS_STALLED = 5,        /* the driver returns to the edge of a window many times */
     BALLPASS_PAUSED = 6,         /* all output times are written, and the step that passed the last is kept (`pause`) */
     BALLPASS_BAD_ARGUMENT = 4    /* method unknown, times out of order, an output time outside the run, a count below zero, a tolerance or a
                                    largest step that is not positive, another step that is negative; a number that is none */
@@ -42,11 +42,11 @@ typedef struct {
     double largest_step;     /* [s] */
     const double *tolerance; /* error allowed in a step for each state */
     double *reduction;       /* on-line reductions, see reductions.h; NULL: none.  Only with BALLPASS_REDUCTIONS */
-    void *work;              /* keeps a run that has taken all its steps, so that a later call can go on; NULL: it is not kept */
-    int resume;              /* nonzero: go on with the run kept there */
+    void *work;              /* keeps a run that has taken all its steps, so that a later call can continue it; NULL: it is not kept */
+    int resume;              /* nonzero: continue the run kept there */
     double *before;          /* reductions of the time before the one where `reduction` begins; NULL: none */
     int pause;               /* nonzero, with `work`: end with the step that passes the last output time, before x moves on */
-    double *ends;            /* filled with the end of each accepted step [s] and 1 where it lies on a kink, else 0; NULL: not told */
+    double *ends;            /* filled with the end of each accepted step [s] and 1 where it lies on a kink, else 0; NULL: not written */
     long *ended;             /* how many there are so far, which the caller sets to zero: room for max_steps of a call */
 } ballpass_options;
 
@@ -79,7 +79,7 @@ typedef struct {
    output_states row after row, or NULL
    Returns result->status.
 
-   With `work`, of the bytes that ballpass_sizes tells and aligned for double, a run may be made in several calls: one that ends for
+   With `work`, of the size that ballpass_sizes returns and aligned for double, a run may be made in several calls: one that ends for
    having taken max_steps is followed by one with `resume`, more steps, and all else as the first left it, x, reduction and result as
    well.  Counts are those of all calls, max_steps too, and every bit is that of a run in one call.  Not for runs with derivatives.
    With `pause` as well, the next call brings output times of its own, none below those before, and result->written = 0; those within the

@@ -2,7 +2,7 @@
 
 In: a generated folder.  Out: the model's kernels, the driver with its methods, the scene's numbers, an interface for
 other programs, a main that prints a CSV, a Makefile and a README.  `make` needs gcc, clang or another compiler of C99
-that knows their vector types, and nothing else.
+that supports their vector types, and nothing else.
 
 The program finds the segments of a run in C (``schedule.c``, as ensembles do), the magnitudes
 that tolerances are relative to (``scales.h``, as the stepper does), and evaluates the derived constants there, so that
@@ -35,7 +35,7 @@ from ballpass.runtime.native.driver_library import DRIVER, FLAGS, SWITCHES
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run.locating import has_kinks
 
-#: What of the compiler's flags makes a shared library, or is overruled.
+#: Flags of the compiler for a shared library, or replaced here.
 _LIBRARY_ONLY = ("-O1", "-fPIC", "-shared")
 
 #: Flags of a library for any processor of a kind.
@@ -43,7 +43,7 @@ LIBRARY_FLAGS = (*FLAGS[:1], *(flag for flag in BASE_FLAGS if flag != "-O1"), *F
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 
-#: Includes for what a program that only simulates does not do.
+#: Includes that a program that only simulates does not need.
 _LEFT_OUT = re.compile(r'^#ifdef BALLPASS_(?:SENSITIVITIES|REDUCTIONS)\n(?:#include "[^"]+"\n)+#endif\n', re.MULTILINE)
 
 
@@ -69,7 +69,7 @@ def export_c(folder: str | Path, out: str | Path, *, manifest: Manifest | None =
     """
     place, target = Path(folder).absolute(), Path(out)
     manifest = read_artefact(place) if manifest is None else manifest
-    # in CasADi's virtual machine: nothing has to be compiled to write C
+    # in CasADi's virtual machine: writing C needs no compiler
     texts = program_texts(LoadedModel(place, manifest, None))
     check_files(place, manifest)  # another process may have written there meanwhile
     target.mkdir(parents=True, exist_ok=True)
@@ -112,7 +112,7 @@ def program_texts(model: LoadedModel) -> dict[str, str]:
 
 
 def _with_includes(source: Path, places: Sequence[Path], known: Iterable[str]) -> dict[str, str]:
-    """Text of a source and of all that it includes from `places`; what is in `known` is there already."""
+    """Texts of a source and of its includes from `places`; those in `known` are left out."""
     texts = {source.name: source.read_text(encoding="utf-8")}
     for name in _INCLUDE.findall(_LEFT_OUT.sub("", texts[source.name])):
         if name in known or name in texts or (name == SWITCHES and not (places[-1] / SWITCHES).is_file()):

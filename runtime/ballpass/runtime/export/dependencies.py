@@ -1,7 +1,8 @@
-"""What states, their rates and the outputs of a model depend on, as importers of an FMU ask.
+"""Dependencies of a model's states, their rates and its outputs, for importers of an FMU.
 
 In: a model.  Out: for each of them the names of time, parameters and states that move it: at any moment, and where a
-run starts.  From the sparsity of the generated functions, so that what is not named has no influence at all.
+run starts.  From the sparsity of the generated functions, so that a quantity that is not listed has no influence at
+all.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dependencies:
-    """Names of what moves each state, rate ``der(<state>)`` and output that is no state.
+    """Dependencies of each state, rate ``der(<state>)`` and output that is not a state, by name.
 
     Attributes
     ----------
-    running : among ``time``, parameters and states, at any moment; a state is itself alone
+    running : among ``time``, parameters and states, at any moment; a state depends on itself alone
     initial : among ``time`` and parameters, where a run starts
     """
 
@@ -47,7 +48,7 @@ def dependencies(model: LoadedModel) -> Dependencies:
     manifest = model.manifest
     moment, results = rates_and_outputs(model)
     t, x, u, p, c = (_pattern(results, symbol) for symbol in moment.values())
-    # parameters and derived constants, and what follows from them
+    # parameters and derived constants, and their effects
     names = [*(info.name for info in manifest.parameters), *(info.name for info in manifest.constants)]
     own = np.eye(len(manifest.parameters), dtype=bool)
     both = np.vstack([own, _pattern(model.symbolic("constants")(moment["p"]), moment["p"])])
@@ -70,7 +71,7 @@ def _pattern(result: casadi.SX, symbol: casadi.SX) -> np.ndarray:
 
 
 def _named(item: InputInfo) -> tuple[str, ...]:
-    """Parameters and derived constants that an input follows from."""
+    """Parameters and derived constants that an input depends on."""
     edges = (edge for window in item.windows for edge in window)
     return tuple(name for name in (item.offset, item.rate, *edges, *item.times, *item.values) if name)
 

@@ -56,10 +56,10 @@ from ballpass.runtime.run.magnitudes import model_scales
 #: C of the interface, the standard's headers, and the licence of both.
 FMI = DRIVER / "fmi"
 
-#: Of the program: what an FMU does not need.
+#: Files of the program that an FMU does not need.
 _PROGRAM_ONLY = ("main.c", "example.c", "Makefile", "README.md")
 
-#: Time that files of the archive carry, so that the same scene gives the same bytes.
+#: Time stamp of the files in the archive, so that the same scene gives the same bytes.
 _DATE = (1980, 1, 1, 0, 0, 0)
 
 
@@ -72,7 +72,7 @@ def export_fmu(
     ----------
     folder : what `ballpass derive` wrote
     out : file to write; replaced if it is there
-    inputs : parameters that become inputs, or what their names begin with: ``"mechanism.forces.punch"``
+    inputs : parameters that become inputs, or prefixes of their names: ``"mechanism.forces.punch"``
     manifest : of the folder, where it was read before: the numbers are its own then
 
     Returns
@@ -120,7 +120,7 @@ def input_names(manifest: Manifest, asked: Sequence[str]) -> tuple[str, ...]:
     Raises
     ------
     RequestError
-        A name that is none, or of a number that cannot change in a run.
+        An unknown name, or that of a number that cannot change in a run.
     """
     able, chosen = (*varying(manifest), *([SPEED] if driven(manifest) else ())), set[str]()
     for name in asked:
@@ -266,7 +266,7 @@ def _xml(root: Xml.Element) -> bytes:
 
 
 def _page(manifest: Manifest, inputs: Sequence[str]) -> str:
-    """What the FMU is, for people."""
+    """The page that describes the FMU."""
 
     def rows(names: Sequence[tuple[str, str, str]]) -> str:
         cells = ("".join(f"<td>{html.escape(text)}</td>" for text in row) for row in names)

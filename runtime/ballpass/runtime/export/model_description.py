@@ -1,4 +1,4 @@
-"""What an FMU says of itself: ``modelDescription.xml`` and ``buildDescription.xml`` of FMI 3.0.
+"""The description of an FMU: ``modelDescription.xml`` and ``buildDescription.xml`` of FMI 3.0.
 
 In: a manifest, the names of its inputs.  Out: trees of XML.  Value references are those of ``driver/fmi/fmi.c``: 0 is
 the time; then parameters, states, derivatives of states, outputs that are no states, in the scene's order; then the
@@ -53,7 +53,7 @@ def model_description(
     identifier : C identifier that names the library
     token : instantiation token
     inputs : parameters that are inputs
-    known : what rates and outputs depend on
+    known : dependencies of rates and outputs
     magnitudes : of the states [their units]
     """
     parameters = {info.name: info for info in manifest.parameters}
@@ -212,14 +212,14 @@ def _structure(
     kinds = {"Output": [*(name for name in states if name in wanted), *computed], "ContinuousStateDerivative": rates}
     for kind, names in kinds.items():
         for name in names:
-            # a table whose place an input takes moves nothing in a run
+            # a table that an input replaces has no effect in a run
             add(kind, name, known.running[name], (*speeds, *times))
     for name in (*states, *rates, *computed):
         add("InitialUnknown", name, known.initial[name], times)
 
 
 def initial_speed(manifest: Manifest) -> float:
-    """Speed of the driver at t = 0, as the scene has it [rad/s]."""
+    """Speed of the driver at t = 0 in the scene [rad/s]."""
     assert manifest.mechanism is not None  # it has the driver
     return next(info.default for info in manifest.parameters if manifest.mechanism.speed == info.name)
 

@@ -1,4 +1,4 @@
-"""The C that a scene brings to its stand-alone program: its numbers, constants, outputs, margins of its linkage.
+"""C code of a scene for its stand-alone program: its numbers, constants, outputs, margins of its linkage.
 
 In: a manifest, or a model whose functions CasADi can write.  Out: texts of ``scene.h``, ``scene.c``, ``constants.c``,
 ``outputs.c`` and ``margins.c``.
@@ -67,7 +67,7 @@ def varying(manifest: Manifest) -> tuple[str, ...]:
     """Parameters that may change in a run: forces, torques, loads, speed of a shaft.
 
     Not the speed of a driver: one at constant speed has no acceleration that a change of it would need.  Nor that of a
-    shaft whose cage slips by a table: what the cage has lagged is a multiple of it, so that its angle would jump.
+    shaft whose cage slips by a table: the lag of the cage is a multiple of it, so that its angle would jump.
     """
     lags = any(item.name.endswith("cage.lag") for item in manifest.inputs)
     names = (info.name for info in manifest.parameters if _VARYING.fullmatch(info.name))
@@ -94,7 +94,7 @@ def filled(template: Path, **values: str) -> str:
 
 
 def scene_header(manifest: Manifest) -> str:
-    """Text of ``scene.h``: what the other files know of the scene."""
+    """Text of ``scene.h``: declarations of the scene for the other files."""
     sizes = {
         "SCENE_STATES": len(manifest.states),
         "SCENE_INPUTS": len(manifest.inputs),
@@ -229,7 +229,7 @@ def margins_source(model: LoadedModel) -> str:
     return behind("The linkage's margins", model.symbolic("assembly"), "scene_margins", given, "margins")
 
 
-#: What functions of a moment are given: declarations, and the addresses of the numbers.
+#: Arguments of functions of a moment: declarations, and the addresses of the numbers.
 MOMENT = (
     ("double t", "&t"),
     ("const double *x", "x"),
@@ -244,8 +244,8 @@ def behind(what: str, function: casadi.Function, name: str, given: Sequence[tupl
 
     Parameters
     ----------
-    given : declarations of what the function is given, named as the arguments of CasADi's function, and their addresses
-    result : name of the array for what it returns
+    given : declarations of its arguments, named as those of CasADi's function, and their addresses
+    result : name of the array for its result
     """
     generator = casadi.CodeGenerator(f"{function.name()}.c", {"with_header": False, "with_export": False})
     generator.add(function)

@@ -1,6 +1,6 @@
-"""An ensemble under way: chunks of members in threads, each a stretch of its runs after the other.
+"""Run an ensemble: chunks of members in threads, one stretch of their runs after the other.
 
-In: `Work`.  Out: its rows of reductions and states at the end, filled; who has no results, and why.
+In: `Work`.  Out: its rows of reductions and states at the end, filled; members without results, and why.
 
 A stretch is some turns of all members of a chunk, so that memory does not grow with the runs.  What members carry from
 one stretch to the next is in the driver's `Carried`: steps and bits are those of runs in one go.
@@ -25,16 +25,16 @@ from ballpass.runtime.run.locating import Kinks
 from ballpass.runtime.run.loop import STATUS_OF_END, ReductionRow, RunFailed, RunUnderWay
 from ballpass.runtime.run.resolve import Run
 
-#: Most members of a chunk: enough that lanes which run out of members at its end do not count.
+#: Most members of a chunk: so many that lanes that are empty at its end cost little.
 CHUNK = 128
 
-#: Chunks that an ensemble is cut into at least, as far as its members fill lanes: what threads share.
+#: Fewest chunks of an ensemble, as far as its members fill lanes: threads share them.
 CHUNKS = 16
 
-#: Longest that an interrupt waits to be heard, and that progress is not told [s].
+#: Longest delay of an interrupt, and between two calls of progress [s].
 PATIENCE = 0.2
 
-#: What is counted over all members.
+#: Counts over all members.
 COUNTS = ("steps", "rejected", "evaluations", "switches", "pivoted")
 
 
@@ -47,7 +47,7 @@ class MemberFailure:
     member : its place in the table
     status : a name of `ballpass.runtime.contract.status.Status`, ``REFUSED`` where its numbers cannot be simulated, or
         ``INTERRUPTED``
-    time : how far it came [s]
+    time : reached [s]
     message : cause and remedy
 
     Examples
@@ -66,7 +66,7 @@ class MemberFailure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Work:
-    """What chunks read, and the rows they fill.
+    """Input of the chunks, and the rows that they fill.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Work:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Chunk:
-    """Some members, their places in the table, and how far they have come [s]; each of shape (members,)."""
+    """Some members, their places in the table, and the times they have reached [s]; each of shape (members,)."""
 
     members: np.ndarray
     reached: np.ndarray
@@ -120,7 +120,7 @@ def run_chunks(
     ----------
     able : members to run, in order
     size : members of a chunk
-    progress : told the finished part of all runs, whenever a chunk ends and at least every `PATIENCE`
+    progress : called with the finished part of all runs, whenever a chunk ends and at least every `PATIENCE`
 
     Returns
     -------
@@ -135,7 +135,7 @@ def run_chunks(
             for chunk in chunks:
                 pending[pool.submit(_in_lanes if work.lanes else _one_by_one, work, chunk)] = chunk
             while pending:
-                # with a limit: waiting without one, the main thread would not hear an interrupt on every system
+                # with a limit: without one, an interrupt does not end the wait of the main thread on every system
                 finished, _ = wait(pending, timeout=PATIENCE, return_when=FIRST_COMPLETED)
                 for future in finished:
                     _add(work.counts, future.result())
@@ -202,7 +202,7 @@ def member_run(work: Work, member: int, magnitude: np.ndarray | None = None) -> 
 
 
 def _in_lanes(work: Work, chunk: _Chunk) -> dict[str, int]:
-    """Integrate a chunk's members, several together; one that takes too many steps for that goes on alone."""
+    """Integrate a chunk's members, several together; one that takes too many steps continues alone."""
     which, driver = chunk.members, work.driver
     assert driver is not None  # there are states
     magnitude = _magnitudes(work, which)
@@ -268,7 +268,7 @@ def _alone(
 
     Parameters
     ----------
-    begun : how far it has come in lanes
+    begun : the part that it has run in lanes
     """
     member = int(chunk.members[place])
     duration = float(work.span.durations[member])

@@ -40,7 +40,7 @@ AHEAD = 4
 
 
 #: Settings of workers on this machine.  Dask's own environment lets the C library give back freed memory at once, and
-#: each signal then takes its pages from the system anew: a half longer, measured.  Nobody looks at profiles.
+#: each signal then takes its pages from the system anew: half as long again, measured.  Profiles are not needed.
 LOCAL = {
     "distributed.nanny.pre-spawn-environ": {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")},
     "distributed.worker.profile.enabled": False,
@@ -67,7 +67,7 @@ def pack(model: LoadedModel) -> Packed:
     """The generated folder of a model; ArtefactError where it was written anew since."""
     memory = io.BytesIO()
     with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED) as archive:
-        # names alone: times of files would make other bytes of the same content
+        # names alone: with times of files the same content would give other bytes
         archive.writestr(zipfile.ZipInfo(FILE_NAME), model.manifest.to_json())
         for name, digest in model.manifest.files:
             archive.writestr(zipfile.ZipInfo(name), read_unchanged(model.folder / name, digest), zipfile.ZIP_DEFLATED)
@@ -120,7 +120,7 @@ def _receive(packed: Sequence[Packed]) -> None:
 
 @contextlib.contextmanager
 def _sent(client: Any, packed: Sequence[Packed]) -> Iterator[None]:
-    """Folders on all workers, also on those that come while this lasts."""
+    """Folders on all workers, also on those that start later."""
     distributed = need("dask.distributed")
 
     class Sending(distributed.WorkerPlugin):  # type: ignore[misc, name-defined]
@@ -145,7 +145,7 @@ def run_tasks(
     function: Callable[..., Any],
     tasks: Callable[[Sequence[str]], Iterable[tuple[Any, ...]]],
 ) -> Iterator[Any]:
-    """What `function` gives for each of the tasks, in the order in which they end; a few at a time are under way.
+    """Results of `function` for the tasks, in the order in which they end; a few run at a time.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             "scheduler that runs, or a cluster on this machine."
         )
     if workers is not None and workers < 1:
-        raise RequestError(f"--workers: {workers} workers cannot work. Allowed: a whole number from 1 on.")
+        raise RequestError(f"--workers: {workers} was given. Allowed: a whole number from 1 on.")
     distributed = need("dask.distributed")
     if workers is not None:
         with (

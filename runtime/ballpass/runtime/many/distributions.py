@@ -1,7 +1,7 @@
 """Random numbers of members: distributions by SciPy's names, and a stream of numbers for each member.
 
 In: a seed, the place of a class and of its members, distributions.  Out: columns of values.  A member's numbers depend
-on the seed, its class and its place in the class alone: not on other members, nor on who computes them.
+on the seed, its class and its place in the class alone: not on other members, nor on the worker that computes them.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Distribution:
             support = self._frozen().support()
         except TypeError as fault:
             raise RequestError(f"{self.name}: {self._shown()}. {self._allowed()}.") from fault
-        if not support[0] <= support[1]:  # SciPy answers NaN
+        if not support[0] <= support[1]:  # SciPy gives NaN
             raise RequestError(
                 f"{self.name}: {self._shown()} lie outside the domain of this distribution of scipy.stats. scale is "
                 "above 0; for shape parameters see SciPy's page of it."

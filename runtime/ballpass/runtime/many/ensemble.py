@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnsembleStatistics:
-    """What an ensemble took.
+    """Cost of an ensemble.
 
     Attributes
     ----------
@@ -59,8 +59,8 @@ class EnsembleStatistics:
     pivoted : systems of the linearly implicit method solved with pivoting
     chunk : members of a chunk
     lanes : members that advance together in a thread
-    kinks : what steps did at the kinks of the laws, ``stepped-over`` or ``located``
-    threads : at work
+    kinks : treatment of the kinks of the laws, ``stepped-over`` or ``located``
+    threads : number of threads
     rtol : relative tolerance [1]
     wall_time : [s]
 
@@ -94,10 +94,10 @@ class EnsembleResult(Reported, Mapping[str, np.ndarray]):
     observables : the values
     parameters : the varied parameters, each of shape (members,)
     failures : members without results, in order
-    interrupted : whether the run was stopped by the user; members finished by then are there
-    statistics : what it took
+    interrupted : whether the run was stopped by the user; members finished by then have results
+    statistics : its cost
     manifest : of the model
-    uncertain : where growth was asked for: by observable, members whose digits the tolerance does not bear, each of
+    uncertain : where growth was asked for: by observable, members whose value the tolerance does not determine, each of
         shape (members,)
 
     Examples
@@ -236,7 +236,7 @@ def simulate_many(
     tolerance = relative_tolerance("rtol", manifest.run.rtol if rtol is None else rtol)
     at_kinks = choose_kinks(kinks, chosen_method, manifest, tolerance)
     workers = _threads(threads)
-    # the table first: a wrong one is told before the driver is compiled
+    # the table first: a wrong one is reported before the driver is compiled
     columns = read_table(manifest, table)
     count = max((len(values) for values in columns.values()), default=0)
     # parameters, constants and what belongs to them, as arrays and for the driver: measured, with room to spare
@@ -333,7 +333,7 @@ def _reduced(runs: ReducedRuns, quantity: Quantity) -> np.ndarray:
 
 def _threads(given: int | None) -> int:
     if given is None:
-        # processors that this process may use, where the system tells
+        # processors that this process may use, where the system reports them
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if not (1.0 <= real(given) < math.inf and int(given) == given):
         raise RequestError(f"threads: a whole number from 1 on is expected, not {given!r}.")
@@ -356,7 +356,7 @@ def _span(model: LoadedModel, members: Members, cycles: float | None, duration: 
     speed = mechanism.speed if mechanism is not None else bearing.ring_speed if bearing is not None else None
     speeds = np.abs(members.columns[speed]) if speed is not None else np.zeros(count)
     np.divide(driver_angle.TURN, speeds, out=turns, where=speeds > 0.0)
-    # where there is a run for everybody, in one go; the rules of `check_span`
+    # where all members have a run, at once; the rules of `check_span`
     if 0.0 <= transient < math.inf and (duration is not None or np.all(np.isfinite(turns))):
         durations = np.full(count, float(duration)) if duration is not None else float(cycles or 0.0) * turns
         starts = transient * turns if transient > 0.0 else starts

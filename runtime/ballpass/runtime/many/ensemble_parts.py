@@ -37,7 +37,7 @@ def simulate_parts(
 
     Parameters
     ----------
-    options : of `ballpass.runtime.many.ensemble.simulate_many`, but threads: those of the cluster work
+    options : of `ballpass.runtime.many.ensemble.simulate_many`, except threads: the cluster has its own
     """
     started = clocks.perf_counter()
     manifest = model.manifest

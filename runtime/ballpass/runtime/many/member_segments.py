@@ -71,7 +71,7 @@ def stretches(model: LoadedModel, members: Members, span: Span, which: np.ndarra
 def moments(
     model: LoadedModel, members: Members, span: Span, which: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The moments that `ballpass.runtime.run.magnitudes` looks at, as for a single run with reductions.
+    """The moments that `ballpass.runtime.run.magnitudes` uses, as for a single run with reductions.
 
     Returns
     -------

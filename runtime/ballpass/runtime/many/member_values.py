@@ -1,6 +1,6 @@
 """Quantities that steps do not reduce, member by member of an ensemble.
 
-In: an ensemble under way, quantities.  Out: their values; members for which some are not known, and why.
+In: an ensemble under way, quantities.  Out: their values; members with unknown values, and why.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def measure_members(
             return dict(zip(which, values, strict=True)), None
         except (RequestError, SimulationError) as fault:
             known: dict[int, float] = {}
-            if len(which) > 1:  # each that is known by itself
+            if len(which) > 1:  # one by one
                 for k in which:
                     known |= measure(member, (k,))[0]
             return known, fault

@@ -64,7 +64,7 @@ def read_table(manifest: Manifest, table: Table) -> dict[str, np.ndarray]:
     Raises
     ------
     RequestError
-        Unknown names, columns of unequal length, values that are no finite numbers; all faults at once.
+        Unknown names, columns of unequal length, values that are not finite numbers; all faults at once.
     """
     defaults = {info.name: info.default for info in manifest.parameters}
     raw: dict[str, object] = {}
@@ -136,7 +136,7 @@ def make_members(model: LoadedModel, table: Table, *, bounded: bool = True) -> M
 
     Parameters
     ----------
-    bounded : hold the numbers to their bounds and warn of unusual ones; a difference looks a hair beyond a bound
+    bounded : hold the numbers to their bounds and warn of unusual ones; a difference may step slightly beyond a bound
     """
     manifest = model.manifest
     varied = read_table(manifest, table)
@@ -187,13 +187,13 @@ def _check_knots(manifest: Manifest, columns: Mapping[str, np.ndarray], refused:
 
 
 def _check_assembly(model: LoadedModel, members: Members) -> None:
-    """Note members whose linkage cannot be assembled; each distinct geometry is looked at once."""
+    """Note members whose linkage cannot be assembled; each distinct geometry is checked once."""
     manifest = model.manifest
     mechanism = manifest.mechanism
     if mechanism is None or not mechanism.margins:
         return
     function = model.symbolic("assembly")
-    # a turn shows every angle, whatever speed and start: only whether it turns at all matters of them
+    # a turn has every angle for any speed and start, unless the speed is zero
     timing = [k for k, info in enumerate(manifest.parameters) if info.name in (mechanism.speed, mechanism.start_angle)]
     parts = [members.columns[mechanism.speed][:, None] == 0.0]
     for name, rows in (("p", members.p), ("c", members.c)):
@@ -227,7 +227,7 @@ class Span:
     ----------
     durations : shape (members,) [s]
     turns : time of a turn, infinite when nothing turns, shape (members,) [s]
-    starts : from which time on is reduced, shape (members,) [s]
+    starts : time from which the reductions count, shape (members,) [s]
     """
 
     durations: np.ndarray

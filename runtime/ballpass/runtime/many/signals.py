@@ -34,7 +34,7 @@ PRECISIONS = ("float32", "float64")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Signals:
-    """What is recorded of every member.
+    """The signals to record of every member.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class Made:
 
 
 def make_signals(models: Mapping[int, LoadedModel], signals: Signals, seed: int, members: Sequence[Member]) -> Made:
-    """Simulate some members; one that fails is told, not raised.
+    """Simulate some members; a failure is recorded, not raised.
 
     Parameters
     ----------

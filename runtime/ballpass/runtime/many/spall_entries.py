@@ -13,7 +13,7 @@ from ballpass.runtime.many.members import make_members
 from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.run import driver_angle
 
-#: What the inputs of spalls are called.
+#: Names of the inputs of spalls.
 _GATE = "gate."
 
 
@@ -31,11 +31,11 @@ def entry_times(
     Parameters
     ----------
     parameters : overrides by name, each of shape (members,) [SI]
-    begin, end : of the time that is looked at [s]
+    begin, end : of the interval [s]
 
     Returns
     -------
-    By spall, increasing, shape (members, most entries of a member); NaN behind the last one [s]
+    By spall, increasing, shape (members, most entries of a member); NaN after the last one [s]
     """
     found: dict[str, np.ndarray] = {}
     spalls = spalls_of(model)

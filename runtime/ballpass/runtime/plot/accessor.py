@@ -102,7 +102,7 @@ class SolutionPlot:
 
         Parameters
         ----------
-        relative : to an elastic outer ring, which is what the balls feel; a circle shows half the clearance
+        relative : to an elastic outer ring, which loads the balls; a circle shows half the clearance
 
         Raises
         ------
@@ -204,7 +204,7 @@ class SolutionPlot:
 
         Parameters
         ----------
-        turns : of driver or shaft; without any that turns on, all of the run is shown
+        turns : of driver or shaft; where nothing turns, the whole run is shown
         bearing : the one that a movie shows and a page opens with; default: the first
 
         Raises
@@ -225,11 +225,11 @@ class SolutionPlot:
         return Animation(cast("PointModel", self._solution.model), self._solution, turns, bearing)
 
     def _record(self, bearing: str | None, *names: str) -> Record:
-        """What figures know of the run, of one bearing whose outputs these are."""
+        """Data of the run for figures of the bearing that these outputs belong to."""
         from ballpass.runtime.plot.record import bearing_named, gather
 
         named = None if bearing is None else bearing_named(self._solution.manifest, bearing)
-        model = cast("PointModel", self._solution.model)  # no figure of samples alone asks it
+        model = cast("PointModel", self._solution.model)  # figures of samples alone do not need it
         record = gather(model, self._solution, named)
         if not record.has(*names):
             raise RequestError(_lacks(", ".join(names)))
@@ -298,7 +298,7 @@ def _axes(given: Axes | None) -> Iterator[Axes]:
     pyplot = need("matplotlib.pyplot")
     from ballpass.runtime.plot.style import settings, use
 
-    figure = pyplot.figure(layout="constrained")  # outside: a notebook's backend, loaded here, changes settings
+    figure = pyplot.figure(layout="constrained")  # outside: loading a notebook's backend changes settings
     with settings():
         use()
         yield figure.add_subplot()

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 
 def animation_page(model: PointModel, solution: Solution, *, turns: float = 1.0, bearing: str | None = None) -> str:
-    """Text of an HTML page that moves through the last turns of a run and needs nothing but itself.
+    """Text of an HTML page that animates the last turns of a run, without other files.
 
     Parameters
     ----------
-    turns : of driver or shaft, at the end of the run; without any that turns on, the page shows all of it
+    turns : of driver or shaft, at the end of the run; where nothing turns, the page shows the whole run
     bearing : the one that it opens with; default: the first
 
     Raises
@@ -49,8 +49,8 @@ def write_animation(
 
     Parameters
     ----------
-    path : its ending says which
-    turns : of driver or shaft, at the end of the run; without any that turns on, all of it is shown
+    path : its ending gives the kind
+    turns : of driver or shaft, at the end of the run; where nothing turns, the whole run is shown
     bearing : the one that a movie shows and a page opens with; default: the first
     pictures : of a movie, 72 a turn if None; a page has up to 1000 positions
     progress : called with the part that is done, 0 to 1
@@ -69,7 +69,7 @@ def write_animation(
     """
     target = Path(path)
     if target.suffix.removeprefix(".") not in MOVING:
-        raise RequestError(f"{target}: {target.suffix!r} is no kind of animation. Allowed: .{', .'.join(MOVING)}.")
+        raise RequestError(f"{target}: {target.suffix!r} is not a kind of animation. Allowed: .{', .'.join(MOVING)}.")
     if target.suffix == ".html":
         replace_file(target, animation_page(model, solution, turns=turns, bearing=bearing).encode())
         return target

@@ -100,7 +100,7 @@ def _draw_load(axes: Axes, record: Record, sample: int, shown: list[int], centre
         return
     way = 0.9 * length * load / greatest
     arrow(axes, centre - way, centre + way, SIGNAL, width=3.0)
-    # beside the arrow, as far as the words' half width and half height ask for
+    # beside the arrow, clear of it by the text's half width and half height
     normal = np.array([load[1], -load[0]]) / size
     normal = normal if normal[0] > 0.0 else -normal
     place = centre + (0.54 * abs(normal[0]) + 0.22 * abs(normal[1]) + 0.04) * length * normal

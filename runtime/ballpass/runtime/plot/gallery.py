@@ -1,4 +1,4 @@
-"""Which figures exist, what each needs, and writing them.
+"""List of all figures with their conditions; write them.
 
 In: a model and its `Solution`.  Out: files, the same bytes for the same run.
 """
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class FigureKind:
-    """A figure: name of its file, whether a record has what it needs, how it is drawn, and what it shows."""
+    """A figure: name of its file, whether a record has its data, how it is drawn, and its description."""
 
     name: str
     possible: Callable[[Record], bool]

@@ -20,7 +20,7 @@ from ballpass.runtime.ratings.life import MILLION
 
 Array = NDArray[np.float64]
 
-#: Names and lines of the readings.
+#: Labels and lines of the readings.
 _LOOKS = {
     "mean": FIRST | {"label": "means over time"},
     "miner": SECOND | {"label": "damage added up (Miner)"},
@@ -72,7 +72,7 @@ def pressure(title: str, bearing: BearingStrength, crank: Array, found: Array, r
     panel.set(xlabel="angle of driver or shaft [°]", ylabel="ball", yticks=range(1, balls + 1))
     panel.grid(visible=False)
     words = (
-        f"Peak pressure between each ball and the {ring} ring in the first turn behind the transient; dark is high. "
+        f"Peak pressure between each ball and the {ring} ring in the first turn after the transient; dark is high. "
         "The static limit of ISO 76 is 4200 MPa; the highest pressure of all turns is "
         f"{bearing.inner.peak_pressure / 1e6:.0f} MPa at the inner and {bearing.outer.peak_pressure / 1e6:.0f} MPa at "
         "the outer ring."

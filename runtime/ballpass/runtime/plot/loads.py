@@ -19,12 +19,12 @@ from ballpass.runtime.plot.style import (
     styled,
 )
 
-#: Part of the turns that the closer look at ball loads shows, and part of the time below which high loads are rare.
+#: Part of the turns in the enlarged panel of ball loads, and part of the time below which high loads are rare.
 CLOSER, RARE = 1.0 / 16.0, 0.2
 
 
 def reaction_joints(record: Record) -> tuple[str, ...]:
-    """Joints to show in the load curve: the bearing's, without a bearing all whose reaction was asked for."""
+    """Joints to show in the load curve: the bearing's; without a bearing all whose reactions are outputs."""
     mechanism, bearing = record.manifest.mechanism, record.bearing
     if mechanism is None:
         return ()
@@ -95,7 +95,7 @@ def load_curve(record: Record) -> Figure:
 
 
 def _flatten_noise(panels: list[Axes]) -> None:
-    """A component that is zero but for rounding gets an axis on which it looks so."""
+    """A component that is zero except for rounding gets an axis on which it looks like zero."""
     heights = [max(float(np.max(np.abs(line.get_ydata()))) for line in axes.get_lines()) for axes in panels]
     for axes, height in zip(panels, heights, strict=True):
         if height < 1e-9 * max(heights):

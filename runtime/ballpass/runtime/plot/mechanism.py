@@ -30,7 +30,7 @@ _COMPASS = [np.array([np.cos(angle), np.sin(angle)]) for angle in np.radians(np.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MechanismView:
-    """What pictures of the mechanism at several samples share.
+    """Scales that pictures of the mechanism at several samples share.
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ def draw_mechanism(axes: Axes, record: Record, sample: int, seen: MechanismView 
 
 
 class _Words:
-    """Words of a picture, each where it covers least of what is there."""
+    """Texts of a picture, each placed where it covers least."""
 
     def __init__(self, axes: Axes, seen: MechanismView) -> None:
         assert axes.figure is not None  # the axes were made by a figure
@@ -186,7 +186,7 @@ class _Words:
         self._full: list[tuple[Array, Array, float]] = []  # centre and half the sides of a box, weight
 
     def avoid(self, one: Array, other: Array, weight: float = 0.2) -> None:
-        """Words should not cover the line between two places."""
+        """Keep texts off the line between two places."""
         half = np.full(2, 3.0 * self._point)
         self._full += [(place, half, weight) for place in np.linspace(one, other, 9)]
 
@@ -200,7 +200,7 @@ class _Words:
         fontsize: float,
         color: str = "#212529",
     ) -> None:
-        """Write beside a place, in one of these directions, so far from it."""
+        """Write beside a place, in one of these directions, at a distance."""
         lines = words.splitlines()
         half = 0.5 * fontsize * self._point * np.array([0.68 * max(map(len, lines)), 1.3 * len(lines)])
 
@@ -301,7 +301,7 @@ def _put_names(words: _Words, record: Record, now: Points, size: float) -> None:
 
 
 def _forces(record: Record, now: Points, sample: int) -> list[_ForceArrow]:
-    """Reactions on the frame, applied forces that act, and those of springs on what moves."""
+    """Reactions on the frame, applied forces that act, and those of springs on moving bodies."""
     found = [
         _ForceArrow(name="", at=at, force=force, colour=SIGNAL, pushes=False)
         for at, force in _reactions(record, now, sample)

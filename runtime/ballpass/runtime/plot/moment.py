@@ -57,7 +57,7 @@ def peak_moment(record: Record) -> Figure:
 
 
 def _between_samples(record: Record) -> str:
-    """For the title: the peak between the samples, as a summary tells it, where the samples miss some of it."""
+    """For the title: the peak between the samples, as in the summary, where the samples miss part of it."""
     if len(record.solution) < 3:
         return ""
     name = "ball.force" if record.has("ball.force") else "ball.elastic_force"

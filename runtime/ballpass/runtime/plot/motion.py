@@ -15,14 +15,14 @@ from ballpass.runtime.ask.spectrum import AmplitudeSpectrum, Window, amplitude_s
 from ballpass.runtime.plot.record import Array, Record
 from ballpass.runtime.plot.style import FIRST, GREY, INK, SAND, SECOND, SIGNAL, frame, legend_above, new_figure, styled
 
-#: Points drawn between two samples where velocities are known: a resonance has but ten samples a period.
+#: Points drawn between two samples where velocities are known: a resonance has only ten samples a period.
 _FINER = 8
 
 #: How crank harmonics and multiples of the ball-pass frequency are marked.
 _HARMONICS: dict[str, Any] = {"color": "#adb5bd", "linestyle": (0, (1, 1.5)), "linewidth": 0.7}
 _BALL_PASS: dict[str, Any] = {"color": SIGNAL, "linestyle": (0, (6, 2)), "linewidth": 1.2}
 
-#: Ratio of the extents from which equal scales would leave a sliver.
+#: Ratio of the extents above which equal scales would squeeze the path.
 _SLIVER = 4.0
 
 #: Lines of a spectrum that are drawn as such; more make a curve.
@@ -53,7 +53,7 @@ def _path(record: Record, window: slice, axis: str, *, relative: bool = False) -
 def orbit(record: Record) -> Figure:
     """Path of the inner ring's centre: the last turn dark, the steady turns before it light and wide under it.
 
-    With an elastic outer ring beside it the path relative to that ring, which is what the balls feel.
+    With an elastic outer ring beside it the path relative to that ring, which loads the balls.
     """
     both = record.has("outer.x", "outer.y")
     figure = new_figure(5.0, layout=None)
@@ -93,7 +93,7 @@ def draw_orbit(axes: Axes, record: Record, *, relative: bool = False) -> bool:
     x, y = 1e6 * x, 1e6 * y
     axes.plot(x, y, color=INK, linestyle="-", linewidth=1.1, label="last turn" if record.turns else "path")
     _highlight_windows(axes, record, t, x, y)
-    look: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}  # seen on any ground
+    look: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}  # seen on any colour
     axes.plot(x[0], y[0], marker="o", markersize=9, label="start of the last turn", zorder=4, **look)
     axes.plot(x[-1], y[-1], marker="s", markersize=4.5, label="end of the last turn", zorder=5, **look)
     wide, high = (max(float(np.ptp(values)), 1e-9) for values in (x, y))
@@ -125,7 +125,7 @@ def _highlight_windows(axes: Axes, record: Record, t: Array, x: Array, y: Array)
 def spectra(record: Record) -> Figure:
     """Displacement amplitude spectra along x and y, with crank harmonics and ball-pass frequency marked.
 
-    With a run of many turns at hand a third panel shows ball pass beside the nearest harmonic of the crank.
+    With a longer run a third panel shows ball pass beside the nearest harmonic of the crank.
     """
     source = record.longer or record
     # few turns of a mechanism: its harmonics fall on lines.  Else a window keeps the leakage low
@@ -229,11 +229,11 @@ def shown_range(spectra: list[AmplitudeSpectrum], *, shaft: float) -> float:
 
 
 def _unresolved(ball_pass: float, shaft: float, resolution: float, crank: str) -> str:
-    """A warning where the record is too short to tell ball pass and its nearest crank harmonic apart."""
+    """A warning where the record is too short to separate ball pass from its nearest crank harmonic."""
     order, distance = max(round(ball_pass / shaft), 1), _apart(ball_pass, shaft)
     if distance >= resolution:
         return ""
-    needed = f"; telling them apart takes {int(np.ceil(shaft / distance))} turns" if distance > 1e-6 * shaft else ""
+    needed = f"; separating them takes {int(np.ceil(shaft / distance))} turns" if distance > 1e-6 * shaft else ""
     return f" Ball pass and {crank} harmonic {order} are {distance:.3g} Hz apart, within one line{needed}."
 
 

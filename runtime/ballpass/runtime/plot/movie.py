@@ -58,11 +58,11 @@ def write_movie(
                     writer.grab_frame()
                     progress((number + 1) / len(shown))
         except CalledProcessError as fault:
-            if isinstance(fault.__context__, KeyboardInterrupt):  # which ends ffmpeg too
+            if isinstance(fault.__context__, KeyboardInterrupt):  # an interrupt ends ffmpeg too
                 raise KeyboardInterrupt from None
             said = fault.stderr.strip().splitlines()
             raise RequestError(
-                f"The program ffmpeg ended with code {fault.returncode}: {said[-1] if said else 'it says nothing'}. An "
+                f"The program ffmpeg ended with code {fault.returncode}: {said[-1] if said else 'no message'}. An "
                 "MP4 takes one with the encoder libx264: ffmpeg -encoders lists them. Or take --format gif or html."
             ) from None
         made.replace(path)
@@ -91,7 +91,7 @@ def _palette() -> list[int]:
     for colour, ground in ((INK, "white"), (SIGNAL, "white"), (BAR, "white"), (SAND, "white"), (INK, RING), (INK, BAR)):
         shades.append(np.linspace(to_rgb(colour), to_rgb(ground), 18))
     found = np.vstack(shades)
-    found = found[np.min(found, axis=1) < 0.95]  # what is nearly white becomes white
+    found = found[np.min(found, axis=1) < 0.95]  # nearly white becomes white
     return [int(part) for part in np.rint(255.0 * np.vstack((np.ones((1, 3)), found))[:256]).ravel()]
 
 
@@ -104,7 +104,7 @@ def writer_of(kind: str) -> AbstractMovieWriter:
             "An MP4 is made by the program ffmpeg, which is not on PATH. Install it (apt install ffmpeg, conda install "
             "ffmpeg, brew install ffmpeg), or take --format gif or html, which need nothing."
         )
-    # even numbers of pixels and this layout of colours: what all players take
+    # all players need even numbers of pixels and this layout of colours
     return FFMpegWriter(fps=RATE, codec="libx264", extra_args=["-pix_fmt", "yuv420p", "-crf", "20"])
 
 

@@ -1,6 +1,6 @@
-"""What every figure needs of a run, gathered once.
+"""Data of a run for all figures, gathered once.
 
-In: a model and its `Solution`.  Out: a frozen `Record`: the steady part, its turns, angles, and what a caption says.
+In: a model and its `Solution`.  Out: a frozen `Record`: the steady part, its turns, angles, and text for captions.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Record:
         return f"{self.bearing.prefix}{name}" if self.bearing is not None and ours else name
 
     def has(self, *names: str) -> bool:
-        """Whether all these outputs were asked for, of this bearing where bearings have them."""
+        """Whether all these outputs were kept, of this bearing where bearings have them."""
         return all(self.output(name) in self.solution for name in names)
 
     def values(self, name: str) -> Array:
@@ -107,7 +107,7 @@ class Record:
         return np.zeros_like(time)
 
     def load_windows(self) -> tuple[tuple[float, float], ...]:
-        """Windows of the crank angle in which some load acts, start in [0, 2 pi), end behind it [rad].
+        """Windows of the crank angle in which some load acts, start in [0, 2 pi), end after it [rad].
 
         A load that acts all the turn has none.
         """
@@ -243,7 +243,7 @@ class Record:
         return f"{words}\nbearing {self.bearing.name}" if self.bearing is not None and self.bearing.name else words
 
     def settings(self) -> str:
-        """What a caption says of the run: transient cycles dropped, method, clearance, damping law."""
+        """Text of a caption on the run: transient cycles dropped, method, clearance, damping law."""
         statistics = self.solution.statistics
         dropped = self.solution.transient_cycles
         parts = [f"{dropped:g} transient cycle{'' if dropped == 1 else 's'} dropped"]
@@ -257,7 +257,7 @@ class Record:
 
 
 def _acting_rows(table: InputInfo, parameter: Callable[[str], float]) -> list[tuple[str, str]]:
-    """Where a periodic table is not zero, from knot to knot: pairs of parameters; none where it nowhere stays zero."""
+    """Where a periodic table is not zero, from knot to knot: pairs of parameters; none where no interval is zero."""
     count = len(table.times)
     zero = [parameter(name) == 0.0 for name in table.values]
     rests = [zero[k] and zero[(k + 1) % count] for k in range(count)]  # from knot k to the next one

@@ -37,7 +37,7 @@ GREY = "#6c757d"
 FIRST: dict[str, Any] = {"color": INK, "linestyle": "-", "linewidth": 1.4}
 SECOND: dict[str, Any] = {"color": SIGNAL, "linestyle": (0, (5, 2)), "linewidth": 1.4}
 
-#: Looks of lines that are not told one: 20, each with another pair of colour and dashes.
+#: Styles of lines without their own: 20, each another pair of colour and dashes.
 _CYCLE = cycler(
     color=[INK, SIGNAL, SAND, "#5b8e7d", GREY] * 4,
     linestyle=["-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 2, 1, 2))] * 5,
@@ -67,7 +67,7 @@ _SETTINGS: dict[Any, Any] = {
     "svg.hashsalt": "ballpass",
 }
 
-#: Kinds of files, and what each is told so that its bytes depend on the drawing alone: no date, no version.
+#: Kinds of files, and settings by which their bytes depend on the drawing alone: no date, no version.
 _METADATA: dict[str, dict[str, Any]] = {
     "png": {"Software": None},
     "svg": {"Date": None, "Creator": None},
@@ -92,7 +92,7 @@ P = ParamSpec("P")
 
 @contextmanager
 def settings() -> Iterator[None]:
-    """Settings of this module within, whatever the user's are."""
+    """Context with the settings of this module instead of the user's."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
@@ -100,12 +100,12 @@ def settings() -> Iterator[None]:
 
 
 def use(*_: object) -> None:
-    """Take the settings of this module, and looks of lines, for all axes that follow: in examples and notebooks."""
+    """Use the settings and line styles of this module for all later axes, in examples and notebooks."""
     matplotlib.rcParams.update({**_SETTINGS, "axes.prop_cycle": _CYCLE})
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Draw with the settings of this module, and put the user's back."""
+    """Draw with the settings of this module, then restore the user's."""
 
     @wraps(draw)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> Figure:
@@ -120,7 +120,7 @@ def new_figure(height: float, *, layout: Literal["constrained"] | None = "constr
 
     Parameters
     ----------
-    layout : "constrained" finds room for all words, which takes as long as drawing; None leaves it to `frame`
+    layout : "constrained" finds room for all texts, which takes as long as drawing; None leaves it to `frame`
     """
     return Figure(figsize=(WIDTH, height), dpi=DPI, layout=layout)
 
@@ -154,7 +154,7 @@ def caption(figure: Figure, title: str, text: str) -> None:
 
 
 def caption_of(figure: Figure) -> str:
-    """What stands below the figure where it is printed; it is no part of the picture."""
+    """Caption of the figure where it is printed; it is not part of the picture."""
     return str(figure.get_label())
 
 

@@ -26,18 +26,18 @@ LUMINANCE = LinearSegmentedColormap.from_list("luminance", [(0.0, INK), (0.43, S
 #: Contours of a map, at most.
 CONTOURS = 7
 
-#: Smallest change that is drawn as one, relative to the largest value [1].
+#: Smallest change that is drawn as a change, relative to the largest value [1].
 FLAT = 1e-12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VariedAxis:
-    """A varied parameter as it is drawn.
+    """A varied parameter of a figure.
 
     Attributes
     ----------
     path : of the parameter
-    words : what it is
+    words : description
     unit : of the values
     values : increasing or decreasing, shape (points,) [`unit`]
     logarithmic : whether they are spaced so; they are above zero then
@@ -63,11 +63,11 @@ def draw_sweep(
     Parameters
     ----------
     title : of the scene
-    quantity, words : its name, and what it is
+    quantity, words : its name and description
     axes : one or two varied parameters
     values : of the quantity, shape (points,) or (points of the first, points of the second), NaN where there is none
         [`unit`]
-    text : what else holds for all points
+    text : further text of the caption
 
     Raises
     ------

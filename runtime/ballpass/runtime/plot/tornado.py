@@ -25,7 +25,7 @@ BARS = 15
 #: Below this share of the longest bar a bar cannot be seen.
 VISIBLE = 2e-3
 
-#: Hatches tell the verdicts without colour.
+#: Hatches show the verdicts without colour.
 _LOOKS: dict[Verdict, tuple[str, str, str]] = {
     Verdict.VERIFIED: (INK, "", "verified by the second route"),
     Verdict.NOT_CHECKED: (SAND, "//", "not checked"),

@@ -52,7 +52,7 @@ def draw_lines(
 
     Parameters
     ----------
-    position, height : (m,) of the lines, in the units that `across` and `up` tell
+    position, height : (m,) of the lines, in the units that `across` and `up` name
     marks : characteristic frequencies, in the unit of `position`
     text : for the caption
     """

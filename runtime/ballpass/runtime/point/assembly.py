@@ -1,4 +1,4 @@
-"""Whether a linkage can be assembled: at every angle of a turn, and at one instant."""
+"""Check whether a linkage can be assembled: at every angle of a turn, and at one instant."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ballpass.runtime.run import driver_angle
 if TYPE_CHECKING:
     from ballpass.runtime.contract.parameters import Numbers
 
-#: Angles looked at in a turn; between them minima are refined.
+#: Angles checked in a turn; between them minima are refined.
 ANGLES = 720
 
 #: Sweeps around the smallest sample, each so many times finer than the one before.
@@ -23,7 +23,7 @@ SWEEPS, FINE = 3, 128
 
 
 def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
-    """Look at every margin of the linkage over a turn.
+    """Check every margin of the linkage over a turn.
 
     Raises
     ------
@@ -59,12 +59,12 @@ def check_assembly(model: LoadedModel, numbers: Numbers) -> None:
             body = constant.name.removeprefix("body.").removesuffix(".turns")
             raise RequestError(
                 f"The {body} turns by more than three eighths of a turn while the driver turns by 7.5 degrees: which "
-                "way its bearings' balls went cannot be told. Change lengths so that no joint passes another so near."
+                "way its bearings' balls went is unknown. Change lengths so that no joint passes another so near."
             )
 
 
 def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mapping[str, Any]) -> None:
-    """Look at every margin of the linkage at one instant alone; others of the turn are not looked at.
+    """Check every margin of the linkage at one instant alone, not over the turn.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mappi
     kernel.run(there)
     (margins,) = kernel.outputs.values()
     heights = margins.tolist()
-    if all(height > 0.0 for height in heights):  # no number is no assembly
+    if all(height > 0.0 for height in heights):  # NaN: it cannot be assembled
         return
     angle = math.degrees(driver_angle.crank_angle(model.manifest, numbers.values, t))
     faults = [
@@ -100,7 +100,7 @@ def check_assembled(model: LoadedModel, numbers: Numbers, t: float, there: Mappi
 
 
 def _margins(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> np.ndarray:
-    """Margins at times counted from t = 0, shape (times, margins); no number is no assembly.
+    """Margins at times counted from t = 0, shape (times, margins); NaN: it cannot be assembled.
 
     Where the driver's angle is a state, in place of times angles past the start [rad].
     """

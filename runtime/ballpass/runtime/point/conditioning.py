@@ -1,9 +1,9 @@
-"""How well Eq. (1), A r = b, can be solved over a turn: condition numbers of the reaction matrix A(q).
+"""Condition numbers of the reaction matrix A(q) of Eq. (1), A r = b, over a turn.
 
 In: a model with a mechanism and its numbers.  Out: `Conditioning`: the largest condition number in a turn, of the
 matrix as it stands (SI, with forces beside moments) and of the matrix with rows and columns scaled to like size, with
-the crank angles where they are met.  The second one tells how near the linkage is to a position where it locks: there
-reactions grow like the condition number, and so do errors of lengths and masses in them.
+the crank angles where they are met.  The second one grows near a position where the linkage locks: reactions grow like
+it there, and so does the effect of errors of lengths and masses on them.
 
 Scaling: rows and columns are divided by the roots of their largest entries, in turns (D. Ruiz, A scaling algorithm to
 equilibrate both rows and columns norms in matrices, RAL-TR-2001-034).
@@ -28,16 +28,16 @@ if TYPE_CHECKING:
 #: Name of the generated function with A.
 FUNCTION = "reaction_system"
 
-#: Angles looked at in a turn; around the largest value the maximum is refined.
+#: Angles evaluated in a turn; around the largest value the maximum is refined.
 ANGLES = 360
 
 #: Sweeps around the largest sample, each so many times finer than the one before.
 SWEEPS, FINE = 3, 16
 
-#: Scaled condition number above which reactions are warned about [1].
+#: Scaled condition number above which a warning is given [1].
 BOUND = 1e4
 
-#: Passes of the scaling; each halves the logarithm of what is left to do.
+#: Passes of the scaling; each halves the logarithm of the remaining imbalance.
 PASSES = 12
 
 
@@ -67,7 +67,7 @@ def has_reactions(model: LoadedModel) -> bool:
 
 
 def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
-    """Look at a turn; where nothing turns, at the position that stands.
+    """Condition numbers over a turn; where nothing turns, at the given position.
 
     Warns
     -----
@@ -81,7 +81,7 @@ def conditioning(model: LoadedModel, numbers: Numbers) -> Conditioning:
     span = turn if math.isfinite(turn) else 0.0
 
     def matrix(t: float) -> np.ndarray:
-        """At a time, or so far past the start angle."""
+        """At a time, or at an angle past the start angle."""
         if by_angle:
             (x,) = driver_angle.turned_states(model.manifest, numbers.values, np.array([t]))
             u = driver_angle.inputs_at(model.manifest.inputs, numbers.values, 0.0)

@@ -1,4 +1,4 @@
-"""Static equilibrium: where the rings stand under the load of one instant, and how that place moves with parameters.
+"""Static equilibrium: positions of the rings under the load of one instant, and their derivatives by parameters.
 
 In: a model, numbers, an instant.  Out: a `StaticEquilibrium`.
 
@@ -31,13 +31,13 @@ from ballpass.runtime.run.equilibrium_newton import SearchEnd, settle
 
 Array = NDArray[np.float64]
 
-#: Net force left over, relative to the forces at work.
+#: Allowed residual net force, relative to the acting forces.
 TOLERANCE = 1e-12
 
 #: Most Newton steps, and distance at which nothing holds a ring [m].
 ITERATIONS, FAR = 400, 1.0
 
-#: Largest angle of crank or shaft that is taken for one in radians: who gives more means degrees [rad].
+#: Largest angle of crank or shaft that is taken as radians: a larger one probably means degrees [rad].
 LARGEST_ANGLE = 4.0 * math.pi
 
 #: Stiffness below this fraction of the largest counts as none.
@@ -182,7 +182,7 @@ class StaticEquilibrium(Reported):
             total = slopes
         else:
             if of == RHS:
-                raise RequestError("static equilibrium: rhs is no quantity of it. Name positions or quantities.")
+                raise RequestError("static equilibrium: rhs is not a quantity of it. Name positions or quantities.")
             parts = []
             half = len(self.coordinates)
             for rows in rows_of(self.model, of):
@@ -267,7 +267,7 @@ def start_at_rest(model: LoadedModel, numbers: Numbers) -> Array:
         raise RequestError(
             f'initial = "equilibrium": the load at the start does not hold the rings: along '
             f"{len(found.free_directions)} direction(s), mostly {_mostly(found)}, they can move without force, so that "
-            "they have no one place of rest. Give a negative clearance (preload), another start or ball angle, where "
+            "they have no single rest place. Give a negative clearance (preload), another start or ball angle, where "
             "two balls carry, or a state: initial = model.static_equilibrium().x takes one of the many."
         )
     return found.x
@@ -300,8 +300,8 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
     applied = own if load is None else vector(load)
     if load is not None and not len(own):
         raise RequestError(
-            "load: the bearings of this scene act back on the linkage, so that they take the load that its forces give "
-            "them. Leave load away, or change the scene's forces."
+            "load: the bearings of this scene act back on the linkage, so that its forces load them. "
+            "Omit load, or change the scene's forces."
         )
     if applied.shape != own.shape or not np.all(np.isfinite(applied)):
         words = (
@@ -330,12 +330,12 @@ def _equilibrium(model: LoadedModel, numbers: Numbers, t: float, load: tuple[flo
             matrix[held, held] = np.max(np.abs(matrix))
         return np.asarray(matrix)
 
-    # where bearings act back on the linkage, what acts is all that concentric rings do not hold
+    # where bearings act back on the linkage, the load is the net force with concentric rings
     size = float(np.linalg.norm(applied if len(own) else force(start)))
     clearance = max(abs(numbers.values[f"{bearing.path}.clearance"]) for bearing in model.manifest.bearings)
 
     def done(q: Array, net: Array, matrix: Array) -> bool:
-        # rounding of the forces themselves: stiffness times the last digit of what a deflection is computed from
+        # rounding of the forces: stiffness times the last digit of the numbers that give a deflection
         reach = float(np.max(np.abs(q - start))) + clearance
         rounding = 16.0 * np.finfo(float).eps * float(np.max(np.abs(matrix))) * reach
         return bool(np.max(np.abs(net)) <= TOLERANCE * size + rounding)
@@ -392,7 +392,7 @@ def _force_rows(model: LoadedModel) -> Rows:
 
 
 def _loads(model: LoadedModel) -> list[str]:
-    """Names of the loads on inner rings that do not act back on what loads them."""
+    """Names of the loads on inner rings that are loaded one-way."""
     known = {info.name for info in model.manifest.quantities}
     names = (f"{bearing.prefix}load.{axis}" for bearing in model.manifest.bearings for axis in "xy")
     return [name for name in names if name in known]

@@ -46,7 +46,7 @@ def evaluate_point(
 
 
 def neighbour(model: LoadedModel, numbers: Numbers, change: Mapping[str, float]) -> Numbers:
-    """Numbers beside those of a run.  Bounds do not hold: a difference looks a hair beyond a value at its bound."""
+    """Numbers beside those of a run.  Bounds do not apply: a difference may step slightly beyond a bound."""
     manifest = model.manifest
     parameters = Parameters(manifest.parameters, {**numbers.parameters, **change})
     return unchecked_numbers(manifest, parameters, lambda p: model.kernel("constants")({"p": p}))

@@ -1,8 +1,8 @@
-"""What a model's numbers mean for its integration: breakpoints, smoothness, time scales, and the method they speak for.
+"""Effects of a model's numbers on its integration: breakpoints, smoothness, time scales, and a suitable method.
 
 In: a model and numbers.  Out: `Explanation`.  Time scales are eigenvalues of the derivative of the right-hand side by
 the states, at the equilibria that the ring would rest in under the lightest and the heaviest load of a turn, at rest
-and moving each way (a law that damps approach only shows its damping only then).
+and moving each way (only the motion shows the damping of a law that damps the approach alone).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from ballpass.runtime.show.short import ShortRepr
 #: Instants of a turn that are searched for the lightest and the heaviest load.
 INSTANTS = 360
 
-#: Fastest oscillations in a turn, above which vibrations die out within a small part of it, undamped ones apart.
+#: Fastest oscillations in a turn, above which damped vibrations decay within a small part of it.
 MANY_OSCILLATIONS = 5000.0
 
 
@@ -79,7 +79,7 @@ class TimeScale:
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Explanation(ShortRepr, Reported):
-    """What a run of a model consists of.
+    """Properties of a run of a model.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Explanation(ShortRepr, Reported):
     scales : rates at the lightest and heaviest load, once under a load that does not change; empty for a model without
         states
     unsupported : instants without equilibrium, whose rates are not known
-    method, reason : what ``auto`` takes, and why
+    method, reason : the choice of ``auto``, and why
     unusual : sentences about numbers outside of their usual ranges
 
     Examples
@@ -227,7 +227,7 @@ def _time_scales(
     rest = np.array([values[name] for name in model.manifest.initial])
     rest[half:] *= held_coordinates(model)
     times = (np.arange(INSTANTS) + 0.5) / INSTANTS * span
-    # at the initial position, where the contacts press as they do at t = 0: what differs between instants is the load
+    # at the initial position, so that contact forces are those of t = 0 and only the load differs between instants
     point = {"t": 0.0, "x": rest, "p": numbers.p, "c": numbers.c}
     pull = np.empty(INSTANTS)
     for k, time in enumerate(times):
@@ -287,7 +287,7 @@ def _is_constant(model: LoadedModel, numbers: Numbers, times: np.ndarray) -> boo
 
 
 def _method(model: LoadedModel, scales: tuple[TimeScale, ...], turn: float) -> tuple[str, str]:
-    """What ``auto`` takes for these rates and turns of `turn` [s], and why."""
+    """The choice of ``auto`` for these rates and turns of `turn` [s], and why."""
     if not model.states:
         return "none", "the model has no states: its outputs follow from time alone"
     decay = max((s.decay for s in scales), default=0.0)

@@ -1,8 +1,8 @@
-"""Derivatives of generated functions at a point: of what, along what, and the chain between them.
+"""Derivatives of generated functions at a point, along states, time, angle and parameters, by the chain rule.
 
 In: a model, numbers, a point.  Out: dense arrays.
 
-A generated function depends on (t, x, u, p, c).  A *direction* says how these move when one thing does: a state, the
+A generated function depends on (t, x, u, p, c).  A *direction* holds their derivatives by one variable: a state, the
 time, the crank's angle, or a parameter, which moves the derived constants (groove radius -> elliptic integrals ->
 stiffness), the phases and the tables as well.  Gates are flat: they jump at the edges of their windows, where no
 derivative exists.  Derivatives along parameters are taken at fixed states.
@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 #: Arguments of a generated function, in the order they are differentiated.
 ARGUMENTS = ("t", "x", "u", "p", "c")
 
-#: What can be named besides quantities, states and parameters.
+#: Further names besides quantities, states and parameters.
 RHS, STATES, TIME, CRANK_ANGLE = "rhs", "states", "time", "crank_angle"
 
 
@@ -57,7 +57,7 @@ class Rows:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JacobianDirections:
-    """How the arguments of a function move along each direction, shape (size of the argument, directions)."""
+    """Derivatives of the arguments of a function along each direction, shape (size of the argument, directions)."""
 
     labels: tuple[str, ...]
     units: tuple[str, ...]
@@ -113,7 +113,7 @@ def rows_of(model: LoadedModel, of: str | Sequence[str]) -> list[Rows]:
 
 
 def _merged(found: Sequence[Rows]) -> list[Rows]:
-    """Neighbours of one function taken together; the order of the rows stays."""
+    """Consecutive rows of one function joined; the order of the rows is kept."""
     out: list[Rows] = []
     for rows in found:
         if out and out[-1].function == rows.function:
@@ -224,7 +224,7 @@ def contract(model: LoadedModel, rows: Rows, directions: JacobianDirections, the
 def quantity_values(
     model: LoadedModel, numbers: Numbers, of: str | Sequence[str], *, t: float, x: Sequence[float] | np.ndarray | None
 ) -> Array:
-    """Values of what `jacobian` differentiates, all rows one below the other, shape (rows,)."""
+    """Values of the quantities that `jacobian` differentiates, all rows one below the other, shape (rows,)."""
     return values_of_rows(model, rows_of(model, of), point(model, numbers, checked_time(t), x))
 
 

@@ -1,7 +1,7 @@
 """A Jacobian prepared for many calls: one generated function on fixed memory, with its sparsity pattern.
 
-In: a model, numbers, what to differentiate by what.  Out: a `JacobianFunction`, called with a state in about a
-microsecond: the pattern is found once, and a call copies the state, runs compiled code and picks the entries.
+In: a model, numbers, outputs and variables to differentiate by.  Out: a `JacobianFunction`, called with a state in
+about a microsecond: the pattern is found once, and a call copies the state, runs compiled code and picks the entries.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class JacobianFunction:
     sparsity : where entries can differ from zero
     values : entries of the last call, in the order of `sparsity`; overwritten by the next call
     x : memory of the state, shape (states,)
-    evaluate : the compiled code alone, for whoever writes `x` and reads the memory himself
+    evaluate : the compiled code alone, for callers that write `x` and read `values` directly
 
     Examples
     --------
@@ -169,7 +169,7 @@ class JacobianFunction:
         self._place(numbers, checked_time(t), directions_of(self._model, numbers, self._wrt, t))
 
     def __call__(self, x: Array | Sequence[float]) -> Array:
-        """Entries at a state, in the order of `sparsity`; the same memory each time: copy what is to be kept.
+        """Entries at a state, in the order of `sparsity`; the same memory each time: copy it to keep it.
 
         Examples
         --------

@@ -250,7 +250,7 @@ def _sides(found: Slopes, mass: Array, coordinates: Sequence[str]) -> tuple[str,
 
 
 def onset_notes(model: LoadedModel, there: Point) -> tuple[str, ...]:
-    """Where balls stand at contact onset and the damping law has no derivative there, in words."""
+    """A sentence where balls are at contact onset and the damping law has no derivative there."""
     notes = []
     for bearing in model.manifest.bearings:
         if bearing.damping.in_deflection not in ("kinked", "discontinuous"):
@@ -290,7 +290,7 @@ def _modes_table(result: Linearization) -> ReportTable:
 
 
 def _polar(z: complex) -> str:
-    """Size and phase [deg]; what rounds to nothing has no phase."""
+    """Size and phase [deg]; a size that rounds to zero has no phase."""
     size = f"{abs(z):.2f}"
     phase = round(math.degrees(math.atan2(z.imag, z.real)))
     return "0" if float(size) == 0.0 else f"{size}∠{180 if phase == -180 else phase}°"

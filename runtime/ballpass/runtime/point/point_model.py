@@ -1,4 +1,4 @@
-"""A loaded model and what is asked of it at one instant: numbers, outputs, derivatives, positions at rest."""
+"""A loaded model evaluated at one instant: numbers, outputs, derivatives, positions at rest."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class PointModel(LoadedModel):
-    """What a model answers without a run.  `ballpass.runtime.model.Model` adds runs and what is asked of them."""
+    """Evaluations of a model without a run.  `ballpass.runtime.model.Model` adds runs and their results."""
 
     _looked_usual = b""  # parameters that were last compared with the usual ones
 
@@ -128,8 +128,8 @@ class PointModel(LoadedModel):
         Raises
         ------
         RequestError
-            Unknown names, a state of another shape, or a linkage that cannot be assembled at `t`, as in all that is
-            asked at one instant.  It may lock at others: `check_assembly` looks at a turn.
+            Unknown names, a state of another shape, or a linkage that cannot be assembled at `t`, as in all evaluations
+            at one instant.  It may lock at others: `check_assembly` checks a turn.
 
         Examples
         --------
@@ -167,7 +167,7 @@ class PointModel(LoadedModel):
         ----------
         of : "rhs", or names or patterns of quantities ("ball.force", "reaction.A.*"), whether a run reports them or
             not; `manifest.quantities` lists them
-        wrt : "states", "time", "crank_angle" (time over speed: everything moves on but the rings), names of states or
+        wrt : "states", "time", "crank_angle" (time over speed: everything moves except the rings), names of states or
             parameters, or several of these.  Derivatives along parameters are total: through the derived constants,
             the phases and the tables as well, at fixed state.  Gates are flat (they jump at edges).
         t : time [s]
@@ -181,8 +181,8 @@ class PointModel(LoadedModel):
         Warns
         -----
         KinkWarning
-            Balls rest on the corner of a one-sided law, and what was asked for has two slopes there, of which the mean
-            is given.  Sums over balls, as "rhs", often have one all the same.
+            Balls rest on the corner of a one-sided law, and the quantity has two slopes there, whose mean
+            is given.  Sums over balls, as "rhs", often have a single slope there.
 
         Raises
         ------
@@ -210,7 +210,7 @@ class PointModel(LoadedModel):
     ) -> JacobianFunction:
         """The same, sparse and prepared for many states: ``J = model.jacobian_function("ball.force"); J(x)``.
 
-        Where balls rest on the corner of a one-sided law it gives the slope of the parting side, without a word.
+        Where balls rest on the corner of a one-sided law it gives the slope on the side of release, without a warning.
 
         Examples
         --------

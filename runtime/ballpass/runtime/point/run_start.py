@@ -1,4 +1,4 @@
-"""What a run of a model begins with: numbers with which the linkage can be assembled, and a state."""
+"""The start of a run of a model: numbers with which the linkage can be assembled, and a state."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ballpass.runtime.native.loaded_model import LoadedModel
 from ballpass.runtime.point.assembly import check_assembly
 from ballpass.runtime.run.start import RunEnd, Start
 
-#: State at the start: given, "equilibrium", or the end of a run that another goes on from; None takes the scene's.
+#: State at the start: given, "equilibrium", or the end of a run that this one continues; None takes the scene's.
 Initial = Sequence[float] | np.ndarray | RunEnd | Literal["equilibrium"] | None
 
 
@@ -31,7 +31,7 @@ def run_numbers(model: LoadedModel, parameters: Mapping[str, float] | None) -> N
 
 
 def start_of(model: LoadedModel, numbers: Numbers, initial: Initial) -> Start:
-    """What a run begins with; RequestError for words that are none."""
+    """Start of a run; RequestError for an unknown word."""
     if initial is None or isinstance(initial, RunEnd):
         return initial
     if not isinstance(initial, str):

@@ -1,10 +1,11 @@
-"""Second derivatives at a point, where the laws have them.
+"""Second derivatives at a point, for laws that are smooth enough.
 
-In: a model, numbers, what to differentiate by which pair.  Out: a dense array.
+In: a model, numbers, an output and the pair to differentiate by.  Out: a dense array.
 
 The graph of the function is put together with those of the derived constants and of the inputs, so that second
 derivatives along parameters are total, and differentiated twice by CasADi.  Hertz's law has no bounded second
-derivative at contact onset, d2F/d(delta)2 ~ delta^(-1/2): such a query is refused and the smoothed law offered.
+derivative at contact onset, d2F/d(delta)2 ~ delta^(-1/2): such a query is refused, and the message names the smoothed
+law.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ def hessian(
     Raises
     ------
     RequestError
-        `wrt` is no pair, unknown names, or a law without a bounded second derivative.
+        `wrt` is not a pair, unknown names, or a law without a bounded second derivative.
     SimulationError
         The derivatives are not finite there.
     """
@@ -97,7 +98,7 @@ def _refuse_unbounded(model: LoadedModel, labels: Sequence[str], functions: Sequ
     if rough and asked:
         raise RequestError(
             f"hessian: {asked[0]} depends on laws without a bounded second derivative ({', '.join(rough)}): that of "
-            "Hertz's law grows as deflection^(-1/2) at contact onset, so a number would tell nothing of its "
+            "Hertz's law grows as deflection^(-1/2) at contact onset, so a number would say nothing about its "
             'surroundings. Take the smoothed law: smoothing = "0.05 um" in [bearing.contact], for a one-sided damping '
             'law also smoothing = "1 mm/s" in [bearing.damping].'
         )
@@ -117,7 +118,7 @@ def _input(item: InputInfo, known: dict[str, ca.SX], numbers: Numbers, t: float)
     """An input at the time `t` as a function of parameters: its value there, and what moves it."""
     if item.kind == "phase":
         now = float(driver_angle.inputs_at([item], numbers.values, t)[0])
-        # the angle within the turn, for rounding; what is subtracted and added has the same value
+        # the angle within the turn, for rounding; the subtracted and the added term have the same value
         whole = numbers.values[item.offset] + numbers.values[item.rate] * t
         return known[item.offset] + known[item.rate] * t + (now - whole)
     if item.kind == "border":
@@ -128,7 +129,7 @@ def _input(item: InputInfo, known: dict[str, ca.SX], numbers: Numbers, t: float)
     if piece.rows[0] == piece.rows[1]:
         return ca.SX(0.0) if item.kind == "table_rate" else known[item.values[piece.rows[0]]]
     (t0, t1), (y0, y1) = ([known[names[row]] for row in piece.rows] for names in (item.times, item.values))
-    # angles are counted on beyond a turn; what is added has no derivative
+    # angles are counted beyond a turn; the added whole turns have no derivative
     t0, t1 = (
         k + (v - numbers.values[item.times[r]]) for k, v, r in zip((t0, t1), piece.knots, piece.rows, strict=True)
     )

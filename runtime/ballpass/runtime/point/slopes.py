@@ -2,13 +2,14 @@
 
 In: a model, numbers, a point.  Out: dense arrays.
 
-A one-sided law resists a ball's approach and not its parting: its force has a corner where the deflection's rate is
-zero.  The generated code takes the parting side of every ball there.  A sum over balls may have a derivative all the
-same: with an even number of balls one of two opposite balls approaches whichever way the rings go, and both together
-are a linear dashpot.  So the sum is differentiated, not one ball after the other: where a direction moves the rate of a
-ball at rest, the derivative along it is taken a hair further and a hair back, where each ball is on its side.  The law
-is piecewise linear in the rate, so that both are the one-sided slopes.  Where they agree there is a derivative; where
-they do not, their mean is given, which is what a harmonic motion about the point loses energy by, and both are told.
+A one-sided law damps a ball's approach and not its release: its force has a corner where the deflection's rate is zero.
+The generated code takes the side of release for every ball there.  A sum over balls may have a derivative all the same:
+with an even number of balls one of two opposite balls approaches in either direction of motion, and both together are a
+linear dashpot.  So the sum is differentiated, not one ball after the other: where a direction moves the rate of a ball
+at rest, the derivative along it is taken at a small distance on either side, where each ball is on one side of its law.
+The law is piecewise linear in the rate, so that both are the one-sided slopes.  Where they agree there is a derivative;
+where they do not, their mean is given, which is the damping of a harmonic motion about the point, and both are
+reported.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ STEP = 1e-6
 
 
 class KinkWarning(BallpassWarning):
-    """There is no derivative, as where a law has a corner or two peaks are as high; the warning says what is given."""
+    """There is no derivative, as where a law has a corner or two peaks are equal; the warning names the value given."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,7 +65,7 @@ class Slopes:
 
     @property
     def differ(self) -> NDArray[np.bool_]:
-        """Where the sides are not one: there is no derivative there."""
+        """Where the sides differ: there is no derivative there."""
         size = np.maximum(np.abs(self.below), np.abs(self.above))
         beside = np.max(size, axis=0, initial=0.0)
         found: NDArray[np.bool_] = np.abs(self.above - self.below) > ALIKE * size + ALIKE_BESIDE * beside
@@ -163,7 +164,7 @@ class Deflections:
         return np.flatnonzero(resting & (self.value > 0.0) if self._jumps else resting).tolist()
 
     def reach(self, direction: JacobianDirections, balls: Sequence[int]) -> float:
-        """How far to go along a direction so that these balls are clear of rest; 0 where it leaves them there."""
+        """Step along a direction that moves these balls away from rest; 0 where it does not move them."""
         sizes = [
             float(np.max(np.abs(np.asarray(self._there[name])[moved]) / np.abs(along[moved])))
             for name, along in _arguments(direction)
@@ -191,7 +192,7 @@ class Deflections:
 
 
 def named(balls: Sequence[int]) -> str:
-    """Balls for people, who count from 1."""
+    """Names of balls, counted from 1."""
     return "ball " + ", ".join(str(k + 1) for k in balls)
 
 

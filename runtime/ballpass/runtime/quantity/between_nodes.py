@@ -1,10 +1,10 @@
 """Extremes of channels along a run, found between its nodes.
 
-In: a track, channels along it, and where the driver's reductions saw the extreme.  Out: an `Extreme` for each.
+In: a track, channels along it, and the times of the extremes in the driver's reductions.  Out: an `Extreme` for each.
 
-Around the best nodes, and around the moment that the reductions tell, the run is looked at again on grids that get
-finer until a parabola through three points is exact to rounding.  Where two balls change rank, which is where the most
-loaded ball carries least, the two straight lines through the points are intersected instead.
+Around the best nodes, and around the moment of the reductions, the run is evaluated again on finer and finer grids,
+until a parabola through three points is exact to rounding.  Where two balls carry the same load, the largest ball force
+has its minimum in a corner: there the two straight lines through the points are intersected instead.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ GRID, ROUNDS = 65, 2
 #: Extremes nearer to each other than this share of the run are one.
 APART = 1e-9
 
-#: Nodes that are looked at closely: the best that no neighbour exceeds.
+#: Most nodes to refine around: the best that no neighbour exceeds.
 CANDIDATES = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """An extreme that is asked for.
+    """A requested extreme.
 
     Attributes
     ----------
     channel : state or output
-    ball : column to look at; None for the most loaded ball at each moment
+    ball : its column; None for the most loaded ball at each moment
     sign : 1 for the largest value, -1 for the smallest
-    seen : when the reductions saw it [s]; None where they do not hold it
+    seen : its time in the reductions [s]; None where they do not hold it
     exact : whether that is the moment itself
     """
 
@@ -59,9 +59,9 @@ class Extreme:
     ----------
     value : in the channel's unit
     time : [s]
-    segment, fraction : where it lies
+    segment, fraction : its place
     column : ball, counted from 0
-    other : ball that changes rank with it there, else None
+    other : ball that carries the same load there, else None
     rate, other_rate : time derivatives of both where there is another [channel's unit / s]
     """
 
@@ -77,7 +77,7 @@ class Extreme:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class _Bracket:
-    """A time within one segment that holds an extreme, and the grid it was looked at last."""
+    """An interval within one segment that holds an extreme, and its last grid."""
 
     wanted: Wanted
     segment: int
@@ -98,7 +98,7 @@ def find_extremes(
     Parameters
     ----------
     signals : the channels along the track
-    look : the channels of the same run along other nodes
+    look : function that gives the channels of the same run along other nodes
     """
     edges = track.edges
     brackets = [[] if item.exact else _brackets(item, track, signals[item.channel].value) for item in wanted]
@@ -121,7 +121,7 @@ def find_extremes(
 
 
 def _seen(wanted: Wanted, track: Track, values: Array) -> list[Extreme]:
-    """The moment that the reductions saw, and the best nodes elsewhere, as they are: they only show what competes."""
+    """The moment of the reductions, and the best nodes elsewhere without refinement, as competing extremes."""
     nodes, edges = track.nodes, track.edges
     assert wanted.seen is not None  # it is exact
     height = wanted.sign * np.max(values, axis=1)
@@ -156,7 +156,7 @@ def _tops(nodes: Nodes, height: Array) -> NDArray[np.int_]:
 
 
 def _brackets(wanted: Wanted, track: Track, values: Array) -> list[_Bracket]:
-    """Times around the best nodes that no neighbour in the same segment exceeds, and around the moment seen."""
+    """Times around the best nodes that no neighbour in the same segment exceeds, and around that of the reductions."""
     nodes, edges = track.nodes, track.edges
     height = wanted.sign * (values[:, wanted.ball] if wanted.ball is not None else np.max(values, axis=1))
     same, ranked = np.diff(nodes.segment) == 0, _tops(nodes, height)
@@ -177,7 +177,7 @@ def _brackets(wanted: Wanted, track: Track, values: Array) -> list[_Bracket]:
 
 
 def _nodes(edges: Edges, t: Array, segment: NDArray[np.int_]) -> Nodes:
-    """Nodes that stand still and carry no weight."""
+    """Nodes at fixed times, without weight."""
     still = np.zeros((len(t), 0))
     held = edges.segment[segment]
     zeros = np.zeros(len(t))
@@ -190,7 +190,7 @@ def _height(bracket: _Bracket) -> Array:
 
 
 def _top(height: Array) -> int:
-    """Place of the largest; of a plateau, as where no ball carries anything, the middle: beside its ends is more."""
+    """Place of the largest; of a plateau, as where no ball is loaded, its middle: beside it values are larger."""
     equal = np.flatnonzero(height == np.max(height))
     return int(equal[len(equal) // 2])
 
@@ -208,7 +208,7 @@ def _extreme(bracket: _Bracket, edges: Edges) -> Extreme:
 
     result = at(float(times[k]), float(found[k, column]))
     if k in (0, GRID - 1):
-        return result  # at an edge of the segment, or where the neighbour's bracket goes on
+        return result  # at an edge of the segment, or where the neighbour's bracket continues
     step = float(times[1] - times[0])
     around = np.argmax(found[k - 1 : k + 2], axis=1)
     if ball is None and around[0] != around[2]:

@@ -1,4 +1,4 @@
-"""Characteristic frequencies of the bearings of a model, and which of them a line of a spectrum is.
+"""Characteristic frequencies of the bearings of a model, and the one that a line of a spectrum belongs to.
 
 In: a manifest and numbers.  Out: frequencies, or orders of the driver's or shaft's speed, with names.
 
@@ -23,7 +23,7 @@ NEARLY_AS_SIMPLE = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CharacteristicLine:
-    """A frequency at which a bearing is heard.
+    """A characteristic frequency of a bearing.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ def identify(frequency: float, lines: Sequence[CharacteristicLine], resolution: 
     Parameters
     ----------
     frequency : of the line
-    resolution : distance of two lines of the spectrum; as much may a name be beside it
+    resolution : distance of two lines of the spectrum: largest distance of a name from the line
     """
     fits: list[tuple[int, float, str]] = []
     for line in lines:

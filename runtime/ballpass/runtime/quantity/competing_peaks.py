@@ -1,9 +1,9 @@
-"""Other peaks that take a largest value's place after a small change of a parameter: there its derivative jumps.
+"""Other peaks that become the largest after a small change of a parameter: there the derivative of the maximum jumps.
 
 In: an extreme of a run with derivatives; the next ones, and where no ball is named the other balls at its moment.
 Out: a sentence, empty where none is near.
 
-One of about the same derivative does not count, as the same peak in another turn.
+A peak of about the same derivative does not count, for example the same peak in another turn.
 """
 
 from __future__ import annotations
@@ -49,6 +49,6 @@ def competing_peak(view: View, quantity: Quantity, mark: Mark) -> str:
 
 
 def _scale(view: View, name: str) -> float:
-    """What a change of a parameter is measured in: its value; of an angle a radian."""
+    """Scale of a change of a parameter: its value; of an angle a radian."""
     unit = next(info.unit for info in view.manifest.parameters if info.name == name)
     return 1.0 if unit == "rad" else abs(view.numbers.parameters[name])

@@ -1,4 +1,4 @@
-"""Names of quantities: numbers that a run is asked for, in every command and call.
+"""Names of quantities (numbers computed from a run), alike in every command and call.
 
 In: a name, `parse_quantity`.  Out: a `Quantity`, which `ballpass.runtime.quantity.quantity_run` evaluates along a run.
 
@@ -25,7 +25,7 @@ from ballpass.runtime.quantity.registry import ALSO, KINDS
 from ballpass.runtime.run.reductions import channel_names
 from ballpass.runtime.run.request import no_output
 
-#: What is asked for of each bearing when nothing is named.
+#: Default quantities of each bearing.
 DEFAULTS = (
     *(("max", "ball.force"), ("rms", "inner.x"), ("rms", "inner.y")),
     *(("range", "inner.y"), ("rms", "outer.y")),
@@ -66,7 +66,7 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
     Raises
     ------
     RequestError
-        No such kind, output, ball or place; the nearest known names are told.
+        No such kind, output, ball or place; the message has the nearest known names.
     """
     channels = channels_of(manifest)
     whole, _, place = str(text).partition("@")
@@ -102,7 +102,7 @@ def parse_quantity(manifest: Manifest, text: str) -> Quantity:
 
 
 def channels_of(manifest: Manifest) -> dict[str, tuple[int, str]]:
-    """What quantities can be of: states, outputs, and what the steps give of the balls; columns and unit of each."""
+    """Channels of quantities: states, outputs, and ball forces of the steps; columns and unit of each."""
     known = {info.name: (info.size, info.unit) for info in (*manifest.states, *manifest.outputs)}
     every = {info.name: (info.size, info.unit) for info in manifest.quantities}
     balls = [name for name in channel_names(manifest) if name not in known]
@@ -110,7 +110,7 @@ def channels_of(manifest: Manifest) -> dict[str, tuple[int, str]]:
 
 
 def _names(manifest: Manifest, channels: Mapping[str, tuple[int, str]]) -> dict[str, tuple[Kind, str]]:
-    """What can be written without a ball, in front of a place: -> kind and channel."""
+    """Names without ball and place: -> kind and channel."""
     found: dict[str, tuple[Kind, str]] = {}
     for kind in KINDS.values():
         for written, channel in _written(manifest, channels, kind):
@@ -142,7 +142,7 @@ def _written(manifest: Manifest, channels: Mapping[str, tuple[int, str]], kind: 
 
 
 def _explain_alone(manifest: Manifest, channels: Mapping[str, tuple[int, str]], text: str, name: str) -> None:
-    """Raise `RequestError` for a kind that this scene has not, or of which it has several."""
+    """Raise `RequestError` for a kind that this scene does not have, or has several times."""
     kind = KINDS.get(name)
     if kind is None:
         return
@@ -158,24 +158,24 @@ def _explain_alone(manifest: Manifest, channels: Mapping[str, tuple[int, str]], 
 def _check_place(manifest: Manifest, text: str, kind: Kind, place: str) -> None:
     if kind.place is None:
         if place:
-            raise RequestError(f"{text}: {kind.name} takes nothing behind @. Leave @{place} away.")
+            raise RequestError(f"{text}: {kind.name} takes nothing after @. Omit @{place}.")
         return
     # rings at rest stand where the run starts, unless an instant is named
     if kind.takes == "bearing at rest" and not place:
         return
     if not kind.place.is_valid(manifest, place):
         raise RequestError(
-            f"{text}: behind @ {kind.place.words} is expected, not {place!r}. Example: {kind.place.example}."
+            f"{text}: after @ {kind.place.words} is expected, not {place!r}. Example: {kind.place.example}."
         )
 
 
 def _usable(manifest: Manifest, channels: Mapping[str, tuple[int, str]]) -> list[str]:
-    """Names that can be asked for as they stand, for suggestions."""
+    """Names of quantities without a ball or place, for suggestions."""
     return [name for name, (kind, _) in _names(manifest, channels).items() if kind.place is None or kind.at_rest]
 
 
 def quantity_words(manifest: Manifest, quantity: Quantity) -> str:
-    """What a quantity is, for figures: "Position of the centre of the inner ring along y, rms"."""
+    """Description of a quantity for figures: "Position of the centre of the inner ring along y, rms"."""
     kind = KINDS[quantity.kind]
     if kind.takes != "channel":
         named = (one.name for one in manifest.bearings if one.name and quantity.channel.startswith(one.prefix))
@@ -190,7 +190,7 @@ def quantity_words(manifest: Manifest, quantity: Quantity) -> str:
 
 
 def default_quantities(manifest: Manifest) -> tuple[str, ...]:
-    """What is asked for when nothing is named: ball forces and motion of the rings, else loads of the mechanism."""
+    """Default quantities: ball forces and motion of the rings, else loads of the mechanism."""
     channels = channels_of(manifest)
     wanted = [(kind, f"{bearing.prefix}{channel}") for bearing in manifest.bearings for kind, channel in DEFAULTS]
     found = [f"{kind}:{channel}" for kind, channel in wanted if channel in channels]

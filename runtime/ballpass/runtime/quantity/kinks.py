@@ -2,10 +2,11 @@
 
 In: deflections of the balls and other signals along a run.  Out: times.
 
-Where a ball comes into contact, its force starts like a power of time, under the tangent law with infinite slope; where
-a law damps one way only, it has a corner; where two balls change rank, the force of the most loaded one has.  At such a
+Where a ball comes into contact, its force starts like a power of time, under the tangent law with infinite slope.
+Where a law damps one way only, the force has a corner.  Where another ball becomes the most loaded one, the largest
+force has a corner.  At such a
 moment the derivative of the force by a parameter jumps or is unbounded.  A quadrature that runs across it converges
-slowly; one whose panels end there, and get finer towards it, does not notice.  What is integrated does not jump, so
+slowly; one whose panels end there, and get finer towards it, converges fast.  The integrand does not jump there, so
 that the panels need not move with the kink.
 """
 
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 #: The output that shows where contacts begin and end.
 DEFLECTION = "ball.deflection"
 
-#: Kinks nearer to each other, or to an edge, than this share of the time that counts are one [1].
+#: Kinks nearer to each other, or to an edge, than this share of the time that counts are taken as one [1].
 APART = 1e-9
 
 #: Halvings that locate a kink on the cubic through four nodes.
@@ -113,7 +114,7 @@ def find_kinks(
         pairs = {
             (int(best[k]), int(best[k + 1])) for k in np.flatnonzero((np.diff(best) != 0) & (np.diff(segment) == 0))
         }
-        # a crossing of two balls that carry less is a kink of nothing, and does no harm
+        # a crossing of two less loaded balls is no kink; the extra cut does no harm
         signals += [table[:, a] - table[:, b] for a, b in sorted({(min(pair), max(pair)) for pair in pairs})]
     kept: list[float] = []
     for time in np.sort(crossings(t, segment, *signals)).tolist():

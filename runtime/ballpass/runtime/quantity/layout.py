@@ -1,8 +1,8 @@
-"""Where in the steps of a run each quantity is evaluated.
+"""The nodes within the steps of a run at which each quantity is evaluated.
 
 In: a run, the ends of its steps, quantities.  Out: `Layout` of all that share their nodes.
 
-A quantity's nodes depend on nothing but itself and the run, so that its value is the same bits whatever else is asked.
+A quantity's nodes depend only on itself and the run, so that its value is the same to the bit beside any others.
 Integrals have Gauss's nodes in every step, and finer ones where their channel needs it; extremes that the steps do not
 hold are searched between such nodes; a moment is a node of its own.
 """
@@ -83,11 +83,11 @@ class Layout:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Sort:
-    """What decides about the first nodes of a quantity.
+    """Properties that decide about the first nodes of a quantity.
 
     Attributes
     ----------
-    moment : whether it has none but a moment
+    moment : whether a moment is its only node
     still : whether it follows from time alone
     graded : whether panels get finer towards kinks; states are smooth where contacts begin
     """
@@ -189,7 +189,7 @@ class NodeLayer:
                 found.append(here)
                 continue
             here = self._along(run, replace(here, edges=edges, passages=passages), panels)
-            # steps say at once how fine nodes have to be; a grid of its own is refined again
+            # steps show at once how fine nodes have to be; a separate grid is refined repeatedly
             found += self._refined(run, here, ends, kinks, passes - 1) if layout.still and passes > 1 else [here]
         return found
 
@@ -199,7 +199,7 @@ class NodeLayer:
         assert layout.panels is not None
         within = np.flatnonzero(layout.track.nodes.weight)
         signal = layout.signals[item.channel].value[within]
-        # what is integrated of loads is steeper than they are
+        # integrands of loads are steeper than the loads
         each = [signal, *([np.maximum(signal, 0.0) ** 3] if kind_of(item).steep else [])]
         # places of a raceway are hat functions of the balls' angles, whose corners no panel ends at
         least = HATS if kind_of(item).beside else 1
@@ -207,7 +207,7 @@ class NodeLayer:
         return parts if len(GAUSS) * np.sum(parts) <= most else np.ones_like(parts)
 
     def _kinks(self, run: Run, track: Track, signals: Mapping[str, Signal], item: Quantity) -> Array:
-        """Times of kinks of a channel that is integrated, beside those that steps end on [s]."""
+        """Times of kinks of an integrated channel, beside those on which steps end [s]."""
         if kind_of(item).extremes or item.channel in self.model.states:
             return np.zeros(0)
         of_balls = ".ball." in f".{item.channel}"
@@ -264,7 +264,8 @@ class NodeLayer:
     def _is_found(self, quantity: Quantity) -> bool:
         """Whether its moments are known before nodes are laid: places, and extremes that the steps hold.
 
-        The most loaded ball carries least where two change rank, which steps do not end on.
+        The force of the most loaded ball has its minimum where another ball becomes the most loaded one; steps do not
+        end there.
         """
         kind = kind_of(quantity)
         top = set(kind.extremes) <= {"max"} or quantity.channel in self.model.states
@@ -303,7 +304,7 @@ def is_reduced(model: LoadedModel, quantity: Quantity) -> bool:
 
 
 def around(layout: Layout, extreme: Extreme) -> tuple[tuple[int, float], ...]:
-    """Points before and behind an extreme, within its panel; none where that ends beside it."""
+    """Points before and after an extreme, within its panel; none where that ends beside it."""
     panels = layout.panels
     if panels is None:
         return ()
@@ -319,7 +320,7 @@ def around(layout: Layout, extreme: Extreme) -> tuple[tuple[int, float], ...]:
 
 
 def _beside(extreme: Extreme, layout: Layout) -> Extreme:
-    """An extreme where a load begins or ends is at the corner of what the load drives, and moves with it."""
+    """An extreme where a load begins or ends is at a corner of the channel, and moves with it."""
     edges, passages = layout.edges, layout.passages
     beside = np.flatnonzero(np.abs(passages.times - extreme.time) < passages.near)
     if not len(beside):

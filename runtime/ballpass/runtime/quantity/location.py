@@ -1,4 +1,4 @@
-"""What stands behind ``@`` in the name of a quantity: an angle, a time, a frequency, and how it moves with parameters.
+"""The part after ``@`` in the name of a quantity: an angle, a time or a frequency, and its derivative by parameters.
 
 In: a `Quantity` and the numbers of a run.  Out: a time [s] or a frequency [Hz], each with its derivative.
 """
@@ -42,7 +42,7 @@ class Moment:
 
 
 def named_place(quantity: Quantity) -> Moment:
-    """The place written behind ``@``: an angle or a time."""
+    """The place written after ``@``: an angle or a time."""
     form = _PLACE.fullmatch(quantity.place)
     assert form is not None  # checked when read
     number = float(form["number"])
@@ -89,13 +89,13 @@ def check_instant(manifest: Manifest, _values: Mapping[str, float], quantity: Qu
 
 
 def check_frequency(manifest: Manifest, _values: Mapping[str, float], quantity: Quantity) -> None:
-    """Raise `RequestError` for a frequency that counts on the speed where the driver's changes."""
+    """Raise `RequestError` for a frequency that depends on the speed where the driver's changes."""
     if not quantity.place.endswith("Hz"):
         _refuse_driven(manifest, quantity, "has no one speed. Name a frequency instead, as in @250Hz")
 
 
 def _refuse_driven(manifest: Manifest, quantity: Quantity, words: str) -> None:
-    """Refuse what counts on a constant speed where the driver's changes."""
+    """Refuse a place that needs a constant speed where the driver's changes."""
     if manifest.mechanism is not None and manifest.mechanism.angle:
         raise RequestError(f"{quantity.name}: the driver's speed changes in this scene: the driver {words}.")
 
@@ -125,7 +125,7 @@ def place_slope(
 
 
 def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
-    """The frequency written behind ``@`` [Hz], and its derivative along the directions, shape (directions,)."""
+    """The frequency written after ``@`` [Hz], and its derivative along the directions, shape (directions,)."""
     manifest, values = view.manifest, view.numbers.values
     place = quantity.place
     form = _PLACE.fullmatch(place)
@@ -139,7 +139,7 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
     if form is not None:
         order = float(form["number"])
         return order * abs(speed) / driver_angle.TURN, order * math.copysign(1.0, speed) * faster / driver_angle.TURN
-    # the bearing that the channel is one of, else the first
+    # the bearing of the channel, else the first
     bearings = sorted(manifest.bearings, key=lambda one: not (one.prefix and quantity.channel.startswith(one.prefix)))
     bearing = bearings[0]
     at, what = bearing.path, _FREQUENCIES[place]
@@ -159,7 +159,7 @@ def frequency(view: View, quantity: Quantity) -> tuple[float, Array]:
 
 
 def is_frequency(manifest: Manifest, place: str) -> bool:
-    """Whether what stands behind ``@`` is a frequency of this model."""
+    """Whether the part after ``@`` is a frequency of this model."""
     form = _PLACE.fullmatch(place)
     if form is not None:
         return form["unit"] in ("Hz", "x")
@@ -167,7 +167,7 @@ def is_frequency(manifest: Manifest, place: str) -> bool:
 
 
 def is_instant(manifest: Manifest, place: str) -> bool:
-    """Whether what stands behind ``@`` is a time, or an angle of something that turns."""
+    """Whether the part after ``@`` is a time, or an angle where something turns."""
     form = _PLACE.fullmatch(place)
     turning = manifest.mechanism is not None or bool(manifest.bearings)
     return form is not None and (form["unit"] == "s" or (form["unit"] in ("deg", "rad") and turning))
@@ -186,7 +186,7 @@ def check_first_turns(_manifest: Manifest, _values: Mapping[str, float], quantit
         )
 
 
-#: What kinds expect behind ``@``.
+#: Places that kinds expect after ``@``.
 INSTANT = Place(
     words="a crank angle (240deg, 4.19rad) or a time (0.41s)", example="value:inner.y@240deg", is_valid=is_instant
 )

@@ -1,9 +1,9 @@
-"""Where a run is evaluated: points at fixed fractions of its segments, which move with the parameters.
+"""Nodes at which a run is evaluated: at fixed fractions of its segments, which move with the parameters.
 
 In: a run.  Out: `Edges` with their derivatives, a `NodePlan`, and `Nodes`, the plan put onto the edges.
 
 A load switches at an edge, and outputs may jump there; speed and windows move the edges.  Nodes that keep their
-fraction of a segment never cross one, so that whatever is summed over nodes is a smooth function of the parameters:
+fraction of a segment never cross one, so that sums over nodes are smooth functions of the parameters:
 integrals by Gauss's rule on panels within the segments (`panels.py`), values at both sides of each edge for extremes.
 """
 
@@ -101,7 +101,7 @@ def make_edges(run: Run, segments: Segments, chain: Chain | None) -> Edges:
     Raises
     ------
     RequestError
-        Several loads switch at one time, each of which could move on its own.
+        Several loads switch at one time, and each could move separately.
     """
     times, near = segments.times, 1e-9 * min(run.turn, run.duration)
     first = int(np.argmin(np.abs(times - run.start)))
@@ -186,7 +186,7 @@ def joined_nodes(parts: Sequence[Nodes]) -> Nodes:
 
 
 def find(edges: Edges, time: float) -> tuple[int, float]:
-    """Interval and fraction of a time; an edge belongs to what follows."""
+    """Interval and fraction of a time; an edge belongs to the interval after it."""
     last = len(edges.times) - 2
     k = min(max(int(np.searchsorted(edges.times, time, side="right")) - 1, 0), last)
     left, right = float(edges.times[k]), float(edges.times[k + 1])

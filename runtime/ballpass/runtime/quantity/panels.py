@@ -1,11 +1,11 @@
-"""Into which panels a run is cut for quadratures: its own steps, and finer where its signals need it.
+"""Panels of a run for quadratures: its own steps, cut finer where its signals need it.
 
 In: ends of the steps of a run, and signals along the nodes of coarser panels.  Out: `Panels`, and the `NodePlan` of
 their nodes.
 
 The integrator chooses its steps so that the motion is smooth within each; where it ends them on the kinks of the laws,
 so do the panels.  Outputs may be rougher than states: Gauss's rule of four nodes is exact for polynomials of degree
-seven, and how large the part of third degree is that its nodes see tells how many times finer a panel has to be.
+seven, and the size of the part of third degree at its nodes gives how many times finer a panel has to be.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ Array = NDArray[np.float64]
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 GAUSS, WEIGHTS = 0.5 * (1.0 + _GAUSS), 0.5 * _WEIGHTS
 
-#: What times the nodes' values gives the part of third degree (Legendre).
+#: Weights of the nodes' values that give the part of third degree (Legendre).
 _THIRD = 7.0 * WEIGHTS * (2.5 * _GAUSS**3 - 1.5 * _GAUSS)
 
 #: Fewest panels in a turn where no steps are taken: of outputs that follow from time alone.
 FEWEST = 256
 
 #: Part of third degree that is allowed in a panel, relative to the channel's extent: at a vibration a quarter of a
-#: radian a panel.  Derivatives, which are not evaluated here, are rougher by much: at 1e-3 that of the crank-shaper's
+#: radian a panel.  Derivatives, which are not evaluated here, are much rougher: at 1e-3 that of the crank-shaper's
 #: rms by the speed was 0.4 % off, where the value had nine digits.
 ROUGH = 1e-4
 
@@ -46,9 +46,9 @@ APART = 1e-9
 class Panels:
     """Panels within intervals between edges, in order of time.
 
-    A panel is a part of a span in s, which goes from 0 to 1 over the span.  From a kink on the place in the span is
-    ``s^2``, up to one ``1 - (1 - s)^2``, between two ``s^2 (3 - 2 s)``, else s: what grows like the square root of time
-    behind a kink is smooth in s.
+    A panel is a part of a span in s, which goes from 0 to 1 over the span.  After a kink the place in the span is
+    ``s^2``, before one ``1 - (1 - s)^2``, between two ``s^2 (3 - 2 s)``, else s: a function that grows like the square
+    root of time after a kink is smooth in s.
 
     Attributes
     ----------

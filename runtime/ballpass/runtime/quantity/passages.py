@@ -20,8 +20,8 @@ from ballpass.runtime.run.resolve import Run
 
 Array = NDArray[np.float64]
 
-#: What is given of an edge holds so much before it, in parts of a turn: well above rounding, so that states and rates
-#: there are of one side.
+#: Data of an edge are taken this part of a turn before it: well above rounding, so that states and rates are of one
+#: side.
 BEFORE = 1e-8
 
 
@@ -33,7 +33,7 @@ class Passages:
     ----------
     times : shape (passages,) [s]
     edges : parameter that is the angle of each edge
-    near : what is so near to one of the times is there [s]
+    near : times as near as this to one of them count as equal [s]
     """
 
     times: Array
@@ -42,7 +42,7 @@ class Passages:
 
 
 def find_passages(run: Run, track: Track) -> Passages:
-    """Passages of all edges along a track; none where no window counts on an angle that is a state."""
+    """Passages of all edges along a track; none where no window has an angle that is a state."""
     manifest, nodes = run.model.manifest, track.nodes
     before = BEFORE * min(run.turn, run.duration)
     found: list[tuple[float, str]] = []
@@ -55,7 +55,7 @@ def find_passages(run: Run, track: Track) -> Passages:
     found = [item for item in sorted(found) if np.min(np.abs(track.edges.times - item[0])) > apart]
     times = np.array([time for time, _ in found])
     if found:
-        # by Newton from where the nodes tell
+        # by Newton, from the sign changes at the nodes
         seen = _there(run, track, times)
         angle, speed = seen.x[:, driver], seen.x[:, len(run.model.states) // 2 + driver]
         left = [
@@ -82,7 +82,7 @@ def passage_slopes(run: Run, track: Track, passages: Passages, chain: Chain, sen
 def _there(
     run: Run, track: Track, times: Array, chain: Chain | None = None, sensitivity_rtol: float | None = None
 ) -> Track:
-    """The run at these times, which stand still."""
+    """The run at these fixed times."""
     still = np.zeros((len(times), 0 if chain is None else len(chain.names)))
     held = np.searchsorted(track.segments.times, times) - 1
     zeros = np.zeros(len(times))

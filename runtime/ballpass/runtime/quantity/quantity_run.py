@@ -50,11 +50,11 @@ Array = NDArray[np.float64]
 #: Fractions nearer than this to an edge are at it.
 AT_EDGE = 1e-12
 
-#: Numbers that a node takes for each state, and those that each direction adds: states, channels, and what they are
-#: made of, on the way from the driver to the quantities.  Lanes without a direction are counted where they are made.
+#: Numbers in memory for each state at a node, and those that each direction adds: states, channels, and intermediate
+#: values.  Lanes without a direction are counted where they are made.
 VALUES, SLOPES = 16, 8
 
-#: Time of this thread on its processor where the system counts it finely: other programs do not enter.
+#: Processor time of this thread where the system measures it finely, without other programs.
 _now = clocks.thread_time if clocks.get_clock_info("thread_time").resolution < 1e-5 else clocks.perf_counter
 
 
@@ -68,7 +68,7 @@ class EvaluatedQuantities:
     track : states along nodes of the whole run; None where there are none
     row : reductions, None where nothing was run
     seconds : of the plain integration alone [s]
-    steps, rejected : it took
+    steps, rejected : of the integration
     """
 
     estimates: tuple[Estimate, ...]
@@ -95,7 +95,7 @@ class QuantityRun:
     Parameters
     ----------
     model : the model
-    quantities : what is asked for
+    quantities : the requested ones
     rough : see `panels.parts_needed` [1]
     along_nodes : evaluate along nodes also what reductions hold: integrals are then cut where balls change rank
     motion : reduce all states as well, for `Values.row`
@@ -127,7 +127,7 @@ class QuantityRun:
         Raises
         ------
         RequestError
-            A place that the run does not reach, or nothing left of it behind the transient.
+            A place that the run does not reach, or a run that ends within its transient.
         SimulationError
             The computation failed.
         """
@@ -144,7 +144,7 @@ class QuantityRun:
         ------
         RequestError
             An unknown parameter, several loads that switch at one time, or an extreme of an output that jumps at the
-            edge of a window whose time the motion decides.
+            edge of a window whose time depends on the motion.
         SimulationError
             The computation failed.
         """
@@ -196,7 +196,7 @@ class QuantityRun:
     def _measure(
         self, run: Run, noded: Sequence[Quantity], directions: int = 0
     ) -> tuple[EvaluatedQuantities, list[Layout]]:
-        """Values, and the nodes of `noded`; what reductions hold is taken from there.
+        """Values, and the nodes of `noded`; values that the reductions hold are taken from there.
 
         Parameters
         ----------
@@ -241,7 +241,7 @@ class QuantityRun:
         return values, layouts
 
     def _plain_view(self, run: Run, layout: Layout) -> View:
-        """What kinds see of a run without derivatives."""
+        """Data for kinds, of a run without derivatives."""
         nodes, marks = _with_moments(run, layout, layout.edges, place(layout.plan, layout.edges), None)
         signals = layout.signals
         if layout.track is None:
@@ -306,7 +306,7 @@ def _moving_edges(run: Run, layout: Layout, chain: Chain, sensitivity_rtol: floa
 
 
 def _by_nodes(layout: Layout) -> list[Layout]:
-    """What is integrated over the run, and what is taken at some points, which costs nothing between them."""
+    """Quantities that are integrated over the run, and those at single points, which cost nothing between them."""
     parts = []
     for integrated in (True, False):
         items = tuple(item for item in layout.items if _is_integrated(item) is integrated)
@@ -358,7 +358,7 @@ def _of_reductions(runs: ReducedRuns, quantity: Quantity) -> Estimate:
 
 
 def _appended(nodes: Nodes, edges: Edges, time: float, slope: Array, moment: Moment) -> Nodes:
-    """Nodes with one more at a time of its own; at an edge the loads behind it hold, at the end those before."""
+    """Nodes with one more at a time of its own; at an edge the loads after it hold, at the end those before."""
     segment, _ = find(edges, time)
     return Nodes(
         t=np.append(nodes.t, edges.times[-1] if moment.kind == "end" else time),

@@ -1,4 +1,4 @@
-"""What a quantity is, what its kind declares, what it sees of a run, and what it gives: records alone."""
+"""Records: a quantity, the declaration of its kind, the data of a run that it gets, its result."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Quantity:
     kind : name of its `Kind`
     channel : state or output, "" for a quantity that names none; of one at rest the prefix of its bearing
     ball : which ball, counted from 1; None for the most loaded one, and for outputs without balls
-    place : what stands behind ``@``
+    place : the part after ``@``
     unit : of the value
     """
 
@@ -47,7 +47,7 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """What a kind expects behind ``@``.
+    """The place that a kind expects after ``@``.
 
     Attributes
     ----------
@@ -62,27 +62,27 @@ class Place:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kind:
-    """A kind of quantity: all that the rest of the program knows of it.
+    """A kind of quantity: its declaration for the rest of the program.
 
     Attributes
     ----------
     name : in front of the colon
-    summary : one line for people
-    words : for figures, behind those of the channel; "" for the name
+    summary : one line for help
+    words : for figures, after those of the channel; "" for the name
     also : other names
     takes : what follows the name: a state or output, nothing, or the bearing that it is of, in motion or at rest
-    channel : output that a kind which takes nothing is made of
-    place : what is expected behind ``@``; None for nothing
+    channel : output that a kind without a named one uses
+    place : the expected part after ``@``; None for none
     unit : of the value; "" for that of the channel
     unit_of : unit of the value from that of the channel, where it is another
-    check : raises `RequestError` where it cannot be evaluated for a model with its default numbers, whatever the run
+    check : raises `RequestError` where it cannot be evaluated for a model with its default numbers in any run
     evaluate : value and derivative along the nodes of a run; None for rings at rest
-    at_rest : value and derivative where nothing is run
+    at_rest : value and derivative without a run
     extremes : extremes of the channel that it needs
-    around : whether it looks at nodes around its extreme as well
-    at_moment : whether it looks at one moment, wherever nodes lie
-    steep : whether the third power of the channel is integrated, which has to be resolved
-    beside : channels that it looks at as well, behind the bearing's prefix
+    around : whether it needs nodes around its extreme as well
+    at_moment : whether it needs one moment only, for any nodes
+    steep : whether the third power of the channel is integrated, which needs finer nodes
+    beside : further channels that it needs, after the bearing's prefix
     reduced : value from the reductions of runs, shape (runs,); None where they do not hold it
     needs : channels that are reduced for it, from its own; None for that one
     """
@@ -121,7 +121,7 @@ class Mark:
     other : column that the channel's most loaded ball changes to or from at this very moment; None elsewhere
     rate, other_rate : time derivatives of both columns there, where there is another
     at_edge : whether the extreme lies at an edge of a load or of the window
-    around : nodes at equal distances before and behind it, the same number of both
+    around : nodes at equal distances before and after it, the same number of both
     competing : the next extremes elsewhere in the run
     """
 
@@ -139,7 +139,7 @@ class Mark:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class View:
-    """What a kind sees of a run.
+    """Data of a run for a kind.
 
     Attributes
     ----------
@@ -245,8 +245,8 @@ class Estimate:
     value : in the quantity's unit
     slope : derivative along the directions, shape (directions,)
     time, ball : of an extreme: when [s], and which ball, counted from 1
-    notes : what to mind
-    kink : why the derivative is that of one side, or of none; empty where there is one
+    notes : remarks
+    kink : why there is no derivative, or one on each side; empty where there is one
     """
 
     value: float

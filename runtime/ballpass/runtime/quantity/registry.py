@@ -1,6 +1,6 @@
 """Every kind of quantity by its name.
 
-A kind is one file in `kinds`, which no other file has to know: a `Kind` in its ``KINDS`` is there in every command.
+A kind is one file in `kinds`, which no other file names: a `Kind` in its ``KINDS`` is available in every command.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ In: a run, edges and nodes.  Out: a `Track`, and `Signal` for each channel asked
 
 Derivatives are taken along the moving nodes: with x' at fixed time and the node's own t', that of the state is
 ``x' + f t'``.  Across an edge where a load switches x' jumps by ``(f_before - f_behind) t_edge'``, and the sum does
-not: it is one number for both sides of the edge.
+not: it has one value for both sides of the edge.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def follow(
     start_run(run, [samples]).go_on()
     states = samples.x
     if made is not None:
-        # the driver gives an edge's derivative as it is before the edge
+        # the driver gives the derivative before the edge
         before = np.clip(np.searchsorted(segments.times, times, side="left") - 1, 0, None)
         given = {
             "t": times - segments.times[before],
@@ -180,7 +180,7 @@ class ChannelValues:
         self._parts: dict[tuple[str, ...], ChannelValues] = {}
 
     def only(self, channels: Collection[str]) -> ChannelValues:
-        """The same for some of the channels: what nobody asked for at a node costs nothing there."""
+        """The same for some of the channels: others cost nothing at these nodes."""
         names = tuple(name for name in self.channels if name in channels)
         return self if names == self.channels else self._parts.setdefault(names, ChannelValues(self._model, names))
 
@@ -303,7 +303,7 @@ class ChannelValues:
 
 
 def jumps(model: LoadedModel, channel: str) -> bool:
-    """Whether a channel depends on which side of a window's edge an angle is that is a state."""
+    """Whether a channel jumps at a window's edge, where the angle is a state."""
     windows = {k for k in model.manifest.borders if model.manifest.inputs[k].windows}
     if not windows or channel in model.states:
         return False

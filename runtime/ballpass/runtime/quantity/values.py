@@ -1,4 +1,4 @@
-"""Quantities of one run by their names, for people.
+"""Quantities of one run by their names, for tables and notebooks.
 
 In: a model, numbers, a request, names.  Out: a `QuantityValue` of each.
 """
@@ -19,7 +19,7 @@ from ballpass.runtime.run.resolve import resolve
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuantityValue:
-    """A quantity's value: name, number, unit; time and ball of an extreme; what to mind."""
+    """A quantity's value: name, number, unit; time and ball of an extreme; remarks."""
 
     name: str
     value: float

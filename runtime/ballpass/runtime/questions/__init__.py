@@ -15,7 +15,7 @@ from ballpass.runtime.questions.steady import steady
 
 
 class Questions:
-    """What can be asked of a model, as its methods; the command line lists the same."""
+    """Questions about a model, as its methods; the command line lists the same."""
 
     checked_jacobian = checked_jacobian
     life = life

@@ -1,4 +1,4 @@
-"""Derivatives at one instant, each with a second opinion."""
+"""Derivatives at one instant, each checked by differences."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ Wrt = Annotated[
 State = Annotated[
     str,
     Option(
-        words="Where the rings are: `equilibrium` (static, under the load of that instant) or `initial`.",
+        words="Position of the rings: `equilibrium` (static, under the load of that instant) or `initial`.",
         choices=("equilibrium", "initial"),
     ),
 ]
 
 
 def _report(result: CheckedJacobian) -> Report:
-    """Entries with their second opinion, and the notes; what does not depend at all is left out, and counted."""
+    """Entries with their check, and the notes; entries that are structurally zero are left out and counted."""
     from ballpass.runtime.certify.certificate import Verdict
 
     facts = result.to_dict()
@@ -83,7 +83,7 @@ def checked_jacobian(
     check: Check = True,
     parameters: Mapping[str, float] | None = None,
 ) -> CheckedJacobian:
-    """Derivatives of quantities at one instant, from generated code, each with a second opinion.
+    """Derivatives of quantities at one instant, from generated code, each checked by differences.
 
     The exit code of the command is 1 where the two disagree.
 

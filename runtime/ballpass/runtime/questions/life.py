@@ -63,7 +63,7 @@ def life(
 
     Parameters
     ----------
-    parameters : overrides, SI; those of a state of the duty cycle come behind them
+    parameters : overrides, SI; a state of the duty cycle may override them
     initial, progress : as for `simulate`
 
     Raises
@@ -98,7 +98,7 @@ def life(
 def _pressure(
     model: AnyModel, info: BearingInfo, bearing: BearingStrength, overrides: Mapping[str, float], title: str
 ) -> Figure:
-    """The ring with the higher pressure, over a turn behind the transient."""
+    """The ring with the higher pressure, over a turn after the transient."""
     from ballpass.runtime.ask.wear import load_samples
     from ballpass.runtime.plot import life as figures
     from ballpass.runtime.ratings.of_bearing import contacts_of

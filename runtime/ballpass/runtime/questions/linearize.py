@@ -34,7 +34,7 @@ def linearize(
     Warns
     -----
     KinkWarning
-        The damping law has no derivative at this state; the warning says what is given.
+        The damping law has no derivative at this state; the warning names the value given.
 
     Raises
     ------

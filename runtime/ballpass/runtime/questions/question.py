@@ -1,8 +1,8 @@
-"""What makes a function a question: its options, its report, how the command line shows it.
+"""The declaration of a question: its function, options, report, and how the command line shows it.
 
 A question is a function of a model.  Parameters with a type of `contract.options` are its options; ``parameters`` are
-overrides of the numbers; ``progress`` is told how far it is.  Its module imports inside functions what computes:
-the command line reads all modules before it knows which question is asked.
+overrides of the numbers; ``progress`` gets the part that is done.  Modules with heavy work are imported inside
+functions: the command line imports all questions before it knows which one is asked.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ballpass.runtime.report.report import Report
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: A `Model`.  It lists the questions, and so stands above them.
+#: A `Model`, which imports the questions and cannot be imported here.
 AnyModel = Any
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
@@ -33,7 +33,7 @@ class Question:
     ----------
     name : of the command; the function's if there is none
     report : of an answer
-    stage : what is announced while it computes
+    stage : words of its progress
     check : of values of the options: RequestError where they contradict each other; the command does it before anything
         is derived
     runs : whether it integrates, so that the stepper is compiled first
@@ -71,7 +71,7 @@ _DECLARED: dict[Callable[..., Any], Question] = {}
 
 
 def declared(ask: Callable[..., Any]) -> Question:
-    """How a question was declared."""
+    """The declaration of a question."""
     return _DECLARED[ask]
 
 

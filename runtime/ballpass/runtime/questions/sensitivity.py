@@ -1,4 +1,4 @@
-"""Which parameters move what, with a certificate for each number."""
+"""Derivatives of quantities by parameters, with a certificate for each number."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ def sensitivity(
 ) -> SensitivityReport:
     """Differentiate quantities of interest by parameters, and check every derivative by a second route.
 
-    Where the two routes disagree the command reports both numbers, and its exit code is 1. Charts rank what moves a
-    quantity most.
+    Where the two routes disagree the command reports both numbers, and its exit code is 1. Charts rank the parameters
+    by their effect.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The lines of a signal, and which characteristic frequency of which bearing each is."""
+"""The spectral lines of a signal, and the characteristic frequency of a bearing that each belongs to."""
 
 from __future__ import annotations
 
@@ -145,9 +145,9 @@ class SignalSpectrum(ShortRepr, Reported):
 def _check(values: Mapping[str, Any]) -> None:
     need("scipy")
     if values["orders"] and values["scaling"] != "amplitude":
-        raise RequestError("--orders gives amplitudes, and --scaling was given as well. Leave one of the two away.")
+        raise RequestError("--orders gives amplitudes, and --scaling was given as well. Omit one of the two.")
     if values["orders"] and values["spectrogram"]:
-        raise RequestError("--orders and --spectrogram were both given. Leave one of the two away.")
+        raise RequestError("--orders and --spectrogram were both given. Omit one of the two.")
 
 
 def _figures(_model: AnyModel, found: SignalSpectrum, _parameters: Any) -> Iterator[tuple[str, Figure]]:
@@ -207,7 +207,7 @@ def spectrum(
     rtol: Rtol = None,
     progress: Progress = None,
 ) -> SignalSpectrum:
-    """The highest lines of a signal of the steady motion, and what each is: BPFO, BPFI, 2 BSF, FTF, the shaft.
+    """The highest lines of a signal of the steady motion, each with its name: BPFO, BPFI, 2 BSF, FTF, the shaft.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def spectrum(
     if isinstance(model, Solution):
         if any(item is not None for item in (sample_rate, cycles, duration, rtol, parameters or None)):
             raise RequestError(
-                "This is a run that is done: options of a simulation have no place. Allowed: --of, --envelope, "
+                "This is a finished run: options of a simulation do not apply. Allowed: --of, --envelope, "
                 "--orders, --spectrogram, --window, --scaling, --top, --transient."
             )
         run = model if transient is None else replace(model, transient_cycles=transient)
@@ -291,7 +291,7 @@ def spectrum(
 
 
 def _angle(solution: Solution) -> np.ndarray:
-    """Angle of driver or shaft at the samples, counted on beyond a turn [rad]."""
+    """Angle of driver or shaft at the samples, counted beyond a turn [rad]."""
     from ballpass.runtime.run.driver_angle import shaft_speed
 
     mechanism = solution.manifest.mechanism
@@ -299,7 +299,7 @@ def _angle(solution: Solution) -> np.ndarray:
         return solution[mechanism.angle]
     speed = shaft_speed(solution.manifest, {**solution.parameters, **solution.constants})
     if speed == 0.0:
-        raise RequestError("--orders: nothing turns in this scene, so that there are no orders. Leave it away.")
+        raise RequestError("--orders: nothing turns in this scene, so that there are no orders. Omit it.")
     return np.asarray(speed * solution.t)
 
 

@@ -17,7 +17,7 @@ def smaller(a: Any, b: Any) -> Any:
 
 
 def interpolated(x: Any, knots: Sequence[float], values: Sequence[float]) -> Any:
-    """Piecewise linear through a table; beyond it the first and the last slope go on.
+    """Piecewise linear through a table; beyond it the first and the last slope continue.
 
     Parameters
     ----------

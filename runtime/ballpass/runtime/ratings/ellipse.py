@@ -1,8 +1,8 @@
 """Contact of a ball and a groove by Hertz: ellipse, peak pressure, and the load of a pressure.
 
 In: curvatures, elastic constants, load.  Out: semi-axes and pressures.  A model's own constants hold ellipticity and
-curvature sum of its bearings (``inner_ellipticity``, ``inner_curvature_sum``); what is found here instead is for
-geometry that no model was derived for, as that of ISO 76.
+curvature sum of its bearings (``inner_ellipticity``, ``inner_curvature_sum``); the functions here are for
+other geometry, such as that of ISO 76.
 
 Source: Harris & Kotzalas, Essential Concepts of Bearing Technology, 5th ed., 2006, chapter 6.
 """

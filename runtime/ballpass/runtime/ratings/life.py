@@ -53,7 +53,7 @@ def static_safety(static_rating: Any, load: Any) -> Any:
 
 
 def reference_viscosity(speed: float, pitch_diameter: float) -> float:
-    """Viscosity ν_1 that just parts the surfaces [m²/s]; ISO 281:2007.
+    """Viscosity ν_1 that just separates the surfaces [m²/s]; ISO 281:2007.
 
     The two branches of the standard do not meet: at 1000 rpm the upper one is 2 % lower.
 
@@ -120,7 +120,7 @@ def modified_life(life: Any, factor: Any, reliability: float = 0.90) -> Any:
 def ball_ratings(
     dynamic_rating: Any, balls: Any, gamma: Any, grooves: tuple[Any, Any] = REFERENCE_GROOVES
 ) -> tuple[Any, Any]:
-    """Q_ci and Q_ce, loads of a ball that inner and outer ring bear for a million turns [N]; ISO 16281:2008.
+    """Q_ci and Q_ce, loads of a ball for a life of a million turns of inner and outer ring [N]; ISO 16281:2008.
 
     Parameters
     ----------

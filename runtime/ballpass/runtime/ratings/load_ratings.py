@@ -15,7 +15,7 @@ from ballpass.runtime.ratings.branches import interpolated, larger, smaller
 REFERENCE_GROOVES = (0.52, 0.53)
 #: Peak pressure at the heaviest ball that ISO 76 allows [Pa].
 STATIC_PRESSURE = 4.2e9
-#: ISO 281's factor for contemporary steel and making, deep groove ball bearings.
+#: ISO 281's factor for contemporary steel and manufacture, deep groove ball bearings.
 MATERIAL_FACTOR = 1.3
 #: Elastic constants of ISO/TR 10657: Young's modulus [Pa], Poisson's ratio.
 STEEL = (207e9, 0.3)
@@ -119,6 +119,6 @@ def dynamic_rating(
 def fatigue_limit(static_rating: Any, pitch_diameter: Any) -> Any:
     """Fatigue load limit C_u [N], simplified: C_0r/22, less for pitch diameters above 100 mm; ISO 281:2007, Annex B.
 
-    Makers' limits come from the stress at the contacts and differ: theirs should be given where they are known.
+    Limits of catalogues come from the stress at the contacts and differ: give them where they are known.
     """
     return static_rating / 22.0 * (0.1 / larger(pitch_diameter, 0.1)) ** 0.5

@@ -1,4 +1,4 @@
-"""What mounting and temperature take from the clearance of a bearing: thick rings by Lamé.
+"""Reduction of the clearance of a bearing by mounting and temperature: thick rings by Lamé.
 
 In: interferences, diameters, temperatures.  Out: reductions of the diametral clearance [m].
 Source: Harris & Kotzalas, Essential Concepts of Bearing Technology, 5th ed., 2006.

@@ -1,4 +1,4 @@
-"""The ratings of a model's bearing: those its scene gives, else what follows from its geometry; and its contacts.
+"""The ratings of a model's bearing: those that its scene gives, else those of its geometry; and its contacts.
 
 In: the manifest's record of a bearing, and values of parameters by name (floats, or CasADi's symbols).  Out: `Ratings`,
 `Contact`.
@@ -71,7 +71,7 @@ def ratings_of(bearing: BearingInfo, values: Mapping[str, Any]) -> Ratings:
     )
 
 
-#: Slower than this part of the driver, rings do not turn against each other [1].
+#: Rings turn against each other above this part of the speed of the driver [1].
 TURNS = 1e-9
 
 

@@ -1,4 +1,4 @@
-"""Readings of a history of ball loads as rating life: mean over time, Miner's rule, sectors of the raceways.
+"""Ways to get a rating life from a history of ball loads: mean over time, Miner's rule, sectors of the raceways.
 
 In: mean powers of the loads over time.  Out: equivalent loads of both rings [N], lives [turns].
 
@@ -24,7 +24,7 @@ from ballpass.runtime.ratings.of_bearing import Ratings
 
 KILO = 1e3
 
-#: Readings, and what each is.
+#: Readings, and their descriptions.
 READINGS = {
     "mean": "ISO 16281, inner ring turning against the load, outer ring standing, means over time",
     "miner": "the same, the damage of the outer ring added up instant by instant",
@@ -68,7 +68,7 @@ def equivalent_loads(powers: LoadPowers) -> Mapping[str, tuple[Any, Any]]:
 
 
 def lives(ratings: Ratings, powers: LoadPowers) -> dict[str, Any]:
-    """Life by every reading [turns], infinite where nothing is carried."""
+    """Life by every reading [turns], infinite without a load."""
     balls = ratings.inner_ball, ratings.outer_ball
     with np.errstate(divide="ignore"):
         return {name: reference_life(balls, loads) for name, loads in equivalent_loads(powers).items()}

@@ -1,1 +1,1 @@
-"""What an answer says, as one record, and one writer for each format: text, HTML, plain data, pandas."""
+"""The report of an answer as one record, and one writer for each format: text, HTML, plain data, pandas."""

@@ -20,7 +20,7 @@ def to_plain(report: Report) -> dict[str, Any]:
 
 
 def json_text(plain: Any) -> str:
-    """Plain data as JSON for people and programs."""
+    """Plain data as indented JSON."""
     return json.dumps(plain, indent=2, allow_nan=False) + "\n"
 
 

@@ -58,15 +58,15 @@ class ReportTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """What an answer says.
+    """The report of an answer.
 
     Attributes
     ----------
-    title : what this is
+    title : of the answer
     parts : sentences and tables, in the order of reading
     facts : everything as plain data, SI
     records, index : rows of the table for pandas, and the columns that name them
-    warnings : what to mind before the numbers are used
+    warnings : to read before the numbers are used
     fault : why the numbers must not be relied on; the command then ends with exit code 1
     """
 

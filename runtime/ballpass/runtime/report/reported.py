@@ -1,4 +1,4 @@
-"""What answers have in common: text, HTML, plain data and a table of pandas, written from their report."""
+"""Base class of answers: text, HTML, plain data and a table of pandas, written from their report."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Reported:
         raise NotImplementedError
 
     def report(self) -> Report:
-        """What the answer says: sentences, tables, plain data.
+        """The report of the answer: sentences, tables, plain data.
 
         Examples
         --------

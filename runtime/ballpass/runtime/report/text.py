@@ -1,4 +1,4 @@
-"""A report as text of 80 columns, or as wide as the terminal: one look, names and numbers always whole.
+"""A report as text of 80 columns, or as wide as the terminal: one style, names and numbers always whole.
 
 A name or a number is never cut or broken.  A table wider than the terminal is printed in blocks of columns below each
 other, the first columns in each; elsewhere, as in a pipe or a file, it is as wide as it must be.
@@ -17,10 +17,10 @@ from rich.text import Text
 
 from ballpass.runtime.report.report import Marked, Report, ReportTable, Words
 
-#: Columns of text where no terminal says how many.
+#: Columns of text without a terminal.
 WIDTH = 80
 
-#: Measures what cells take.
+#: Measures the width of cells.
 _WIDE = Console(width=10_000, emoji=False)
 
 #: Styles of the terminal, by what marked text means.

@@ -1,4 +1,4 @@
-"""What a run to a named error asked, chose and found; `ballpass.runtime.certify.error_target` makes it."""
+"""Record of a run to a named error: request, choice and result; `ballpass.runtime.certify.error_target` makes it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ballpass.runtime.show.short import ShortRepr
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Accuracy(ShortRepr):
-    """What was asked, chosen and found.
+    """Request, choice and result of a run to a named error.
 
     Attributes
     ----------
@@ -22,7 +22,7 @@ class Accuracy(ShortRepr):
     estimates : of each quantity [1]
     method, rtol, kinks : chosen
     check : words for the second run: method, tolerance, kinks
-    tried : words for the ways that were integrated before and did not meet the target, with their estimates
+    tried : choices that were integrated before and did not meet the target, in words, with their estimates
     time : of the chosen integration [s]
     check_time : of all others [s]
 
@@ -53,7 +53,7 @@ class Accuracy(ShortRepr):
 
     @property
     def words(self) -> str:
-        """One paragraph for people, on choice and cost; `values` and `estimates` are a table of their own."""
+        """One paragraph on choice and cost; `values` and `estimates` are a table of their own."""
         worst = max(self.estimates, key=lambda name: self.estimates[name])
         after = f", after {len(self.tried)} other ways" if self.tried else ""
         return (

@@ -24,7 +24,7 @@ def integrate(
     trajectory: Trajectory,
     progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Fill the samples of `trajectory`, and note what it took; without integrator there are no states, nothing to fill.
+    """Fill the samples of `trajectory`, and count steps; without integrator there are no states to fill.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def _segment(
         trajectory.finished = k
         # a multistep method starts with tiny steps: where samples lie evenly, one start for all
         if trajectory.even and stop - k > 1:
-            # a call that fails gives nothing: its samples are walked through again, to keep those before the failure
+            # a failed call gives no samples: they are computed one by one, to keep those before the failure
             with contextlib.suppress(Interrupted):
                 fill(stop - k)
         for _ in range(stop - k):

@@ -1,4 +1,4 @@
-"""Which method integrates a run: the one asked for, or for ``auto`` the one that suits the model.
+"""Choose the method that integrates a run: the one asked for, or for ``auto`` the one that suits the model.
 
 In: a model, a name.  Out: the name of a method, and the reason for it.
 """

@@ -1,11 +1,11 @@
-"""How large a change of each parameter is a large one: what the tolerance of a derivative is relative to.
+"""Scales of the parameters: the tolerance of a derivative is relative to them.
 
 In: a model's manifest, parameter values, magnitudes of the states.  Out: a scale for each parameter.
 
 The error allowed in a derivative dx/dp is ``rtol * magnitude of x / scale of p``: that of the change of x which a
 change of p by its scale would bring.  Scales are
 
-- an angle: a radian, for its value depends on where one counts from;
+- an angle: a radian, because its value depends on the choice of zero;
 - a state at the start: its own magnitude, or its value where that is larger;
 - anything else: its value; where that is zero, the largest value among the parameters of the same unit, else one unit.
 """

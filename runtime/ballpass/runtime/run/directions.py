@@ -1,8 +1,8 @@
-"""Directions of a run: what the stepper needs to differentiate its steps along parameters.
+"""Directions of a run: input of the stepper to differentiate its steps along parameters.
 
 The chain from a parameter goes through the derived constants (groove radius, elliptic integrals, stiffness), through
 the phases, and through the times at which loads switch: where such a time moves, the derivative at fixed time jumps by
-the difference of the rates before and behind.
+the difference of the rates before and after it.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class Chain:
         Raises
         ------
         RequestError
-            Several loads switch at that time, each of which could move on its own.
+            Several loads switch at that time, and each could move separately.
         """
         shift = np.zeros(len(self.names))
         for name, slope in driver_angle.breakpoint_derivative(self._inputs, self._values, time):
@@ -118,7 +118,7 @@ class Directions:
     model, numbers : the model and the run's numbers
     names : parameters
     samples : number of samples of the run
-    kinks : what the run does at the kinks of the laws
+    kinks : treatment of the kinks of the laws
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which inputs hold at a time, and when they change: phases, gates, tables.
+"""Values of the inputs at a time, and the times at which they change: phases, gates, tables.
 
 In: the manifest's inputs and a look-up of values by name.  Out: numbers for ``u``, times of breakpoints.
 
@@ -78,7 +78,7 @@ def driver_at(manifest: Manifest, values: Values, t: float) -> tuple[float, floa
 
 
 def turned_states(manifest: Manifest, values: Values, angles: np.ndarray) -> np.ndarray:
-    """States with the driver so far past its start [rad], all else zero, shape (angles, states)."""
+    """States with the driver at these angles past its start [rad], all else zero, shape (angles, states)."""
     assert manifest.mechanism is not None  # it has the driver
     found = np.zeros((len(angles), len(manifest.states)))
     at = [info.name for info in manifest.states].index(manifest.mechanism.angle)
@@ -95,7 +95,7 @@ def inputs_at(inputs: Sequence[InputInfo], values: Values, t: float, inside: flo
     values : parameters and derived constants by name
     t : reference time of phases and table values [s]
     inside : a time within the open interval for which gates and slopes hold [s].  Default: `t`, where an edge belongs
-        to what follows in angle (gates) and in time (tables).
+        to the interval that follows in angle (gates) and in time (tables).
 
     Returns
     -------
@@ -227,7 +227,7 @@ def breakpoint_derivative(inputs: Sequence[InputInfo], values: Values, t: float)
     Raises
     ------
     RequestError
-        Several loads switch at that time, each of which could move on its own.
+        Several loads switch at that time, and each could move separately.
     """
     found: dict[tuple[tuple[str, float], ...], None] = {}
     for item in inputs:
@@ -310,7 +310,7 @@ def _table(item: InputInfo, values: Values, t: np.ndarray, inside: np.ndarray) -
         knots, heights = np.append(knots, knots[0] + TURN), np.append(heights, heights[0])
     k = np.searchsorted(knots, begin, side="right")
     within = (k > 0) & (k < len(knots))
-    # pieces before the first knot and behind the last are flat; a table over the angle has none
+    # pieces before the first knot and after the last are flat; a table over the angle has none
     slopes = np.concatenate([[0.0], np.diff(heights) / np.diff(knots), [0.0]])[k]
     if item.kind == "table_rate":
         return np.asarray(slopes)

@@ -1,9 +1,9 @@
-"""Newton's method for positions at rest, from a start where nothing may touch.
+"""Newton's method for positions at rest, also from a start without any contact.
 
-In: forces on the coordinates and their stiffness.  Out: positions where the forces vanish, or how far they got.
+In: forces on the coordinates and their stiffness.  Out: positions where the forces vanish, or the last positions.
 
-Pseudo-transient continuation: ``q += (h I + K)^-1 f(q)`` with h falling as the residual falls.  Where nothing
-touches (K = 0) this is a walk along the force, and where something does it is Newton's method.  (Kelley and Keyes, SIAM
+Pseudo-transient continuation: ``q += (h I + K)^-1 f(q)`` with h falling as the residual falls.  Without
+contact (K = 0) this moves along the force; with contact it is Newton's method.  (Kelley and Keyes, SIAM
 J. Numer. Anal. 35 (1998) 508, doi:10.1137/S0036142996304796.)
 """
 
@@ -24,7 +24,7 @@ FREE = 1e-10
 
 
 class SearchEnd(Enum):
-    """How a search for rest ended."""
+    """How a search for equilibrium ended."""
 
     FOUND = "found"
     UNHELD = "nothing holds the body"
@@ -59,10 +59,10 @@ def settle(
     force, stiffness : force on each coordinate, and -d(force)/d(position)
     start : positions, shape (coordinates,)
     weights : of the coordinates in the residual that has to fall
-    done : whether the forces count as none, from positions, force and stiffness there
+    done : whether the forces count as zero, from positions, force and stiffness there
     gone : whether these positions are so far away that nothing holds the body
     iterations : most of them
-    free : least stiffness that is put in place of none, relative to the largest
+    free : smallest stiffness, also in place of zero, relative to the largest
     """
     q, net = start.copy(), force(start)
     size = float(np.linalg.norm(weights * net))

@@ -1,4 +1,4 @@
-"""Where a machine stood when a run ended early: crank angle and the ball that was pressed most, for messages."""
+"""State of a machine when a run ended early: crank angle and the most loaded ball, for messages."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class FailureLocation:
 
     @property
     def words(self) -> str:
-        """The ball in a sentence, or nothing."""
+        """A sentence on the ball; empty without one."""
         if self.ball is None:
             return ""
         angle = math.degrees(self.ball_angle)
@@ -49,7 +49,7 @@ class FailureLocation:
 
 
 def locate_failure(model: LoadedModel, numbers: Numbers, time: float, state: np.ndarray) -> FailureLocation:
-    """Look at a state.
+    """The instant of a state.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""How much work a run may take before it is given up, so that no request runs for hours unseen.
+"""Limits of the work of a run: it is stopped beyond them, so that no request runs for hours unnoticed.
 
 A step takes some 0.2 to 0.5 microseconds, with reductions up to one, so a run of some turns that reaches its limit has
 taken seconds.  The limits are far above what any method needs that fits its model: a turn of a press takes a thousand
-steps.  What meets them is an explicit method on an overdamped contact, whose steps are bounded by 3.3 / decay, and
-motion that grows without bound.  They are the same for runs with samples, runs with reductions, and each member of an
-ensemble.
+steps.  They are reached by an explicit method on an overdamped contact, whose steps are bounded by 3.3 / decay, and
+by motion that grows without bound.  They are the same for runs with samples, runs with reductions, and each member of
+an ensemble.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ STEPS_A_TURN = 10_000_000
 STEPS_A_SECOND = 1_000_000
 
 #: So many steps must bring a run so far, as a fraction of it, or as far as the limits of a turn and of a second allow,
-#: whichever is less.  What does not come so far diverges or chatters, or is an explicit method on a stiff model: in a
-#: long run it would crawl for hours before the run's own limit is met.
+#: whichever is less.  A slower run diverges or chatters, or is an explicit method on a stiff model: a long
+#: run would take hours before its own limit.
 STEPS_A_LOOK = 1_000_000
 LEAST_PROGRESS = 0.01
 
-#: Steps of a run that others wait for: a member in lanes, which goes on alone behind them, and one of many trials.
+#: Steps of a run that others wait for: a member in lanes, which then continues alone, and one of many trials.
 BRIEF_A_RUN = 1_000_000
 BRIEF_A_TURN = 100_000
 
@@ -48,7 +48,7 @@ def brief_limit(duration: float, turn: float) -> int:
 
 
 def least_progress(duration: float, turn: float, part: float, steps: int) -> float:
-    """How far so many steps must bring a run [s].
+    """Least time that so many steps must cover [s].
 
     Parameters
     ----------
@@ -61,14 +61,14 @@ def least_progress(duration: float, turn: float, part: float, steps: int) -> flo
 
 @dataclass(slots=True)
 class Allowance:
-    """What a run may still take, and whether it comes on.
+    """Steps that a run has left, and check of its progress.
 
     Attributes
     ----------
     left : steps, accepted and rejected
-    least : how far `STEPS_A_LOOK` steps must come [s]
-    time : of the last look [s]
-    since : steps since
+    least : least time for `STEPS_A_LOOK` steps [s]
+    time : of the last check [s]
+    since : steps since then
     """
 
     left: int
@@ -77,7 +77,7 @@ class Allowance:
     since: int = 0
 
     def spend(self, steps: int, time: float) -> bool:
-        """Note steps that brought the run to a time; whether it has to be given up."""
+        """Note steps that brought the run to a time; whether it has to be stopped."""
         self.left -= steps
         self.since += steps
         if self.left <= 0:
@@ -91,6 +91,6 @@ class Allowance:
 
 
 def allowance(duration: float, turn: float, begin: float = 0.0, taken: int = 0) -> Allowance:
-    """What a run may take that has come to `begin` [s] in so many steps."""
+    """Budget of a run that has reached `begin` [s] in so many steps."""
     least = least_progress(duration, turn, LEAST_PROGRESS, STEPS_A_LOOK)
     return Allowance(left=max(step_limit(duration, turn) - taken, 1), least=least, time=begin)

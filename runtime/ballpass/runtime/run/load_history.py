@@ -1,8 +1,8 @@
 """Loads of the balls along a run, added up until the lives that follow from them settle.
 
-In: a model, numbers, a request.  Out: `LoadHistory`.  The balls meet the load's peak in other places each turn, so the
-life of two turns depends on the balls' first angle: the press of the paper repeats after 134 turns.  The turns are
-doubled, and the run goes on, until that changes no life by more than `LIVES` and no highest ball force by more than
+In: a model, numbers, a request.  Out: `LoadHistory`.  The balls are at other places at the load's peak in each turn, so
+the life of two turns depends on the balls' first angle: the press of the paper repeats after 134 turns.  The turns are
+doubled, and the run continues, until that changes no life by more than `LIVES` and no highest ball force by more than
 `PEAKS` of settle.
 """
 
@@ -27,7 +27,7 @@ from ballpass.runtime.run.request import Request
 from ballpass.runtime.run.resolve import resolve
 from ballpass.runtime.run.settle import LEAST, MOST, PEAKS
 
-#: Change of a life, relative to itself, that counts as none [1].
+#: Relative change of a life that counts as zero [1].
 LIVES = 1e-2
 
 
@@ -131,7 +131,7 @@ def _history(going: ReducedRun) -> LoadHistory:
 
 
 def _compared(going: ReducedRun, before: LoadHistory) -> LoadHistory:
-    """Loads so far, with what has changed since."""
+    """Loads so far, with the change since the last ones."""
     found = _history(going)
     values = going.run.numbers.values
     life, peak = 0.0, 0.0

@@ -23,7 +23,7 @@ STEPPED_OVER: Kinks = "stepped-over"
 LOCATED: Kinks = "located"
 CHOICES: tuple[Kinks, ...] = (STEPPED_OVER, LOCATED)
 
-#: Tolerances from which on the stepper locates kinks by itself: there it takes less time to an equal error.  First
+#: Tolerances from which on the stepper locates kinks by default: there it takes less time to an equal error.  First
 #: where the motion has kinks, then where a law jumps [1].
 TIGHT, TIGHT_JUMPS = 3e-7, 1e-6
 
@@ -46,10 +46,10 @@ def check_kinks(asked: str) -> Kinks:
 
 
 def has_kinks(manifest: Manifest) -> bool:
-    """Whether the motion has kinks; where the laws are smoothed it has none, and both choices are one.
+    """Whether the motion has kinks; where the laws are smoothed it has none, and both choices are the same.
 
-    One-sided damping of the rate alone has a kink in the force of each ball, but opposite balls take it out of the
-    motion: the generated folder tells.  Hertz's law always has one.
+    One-sided damping of the rate alone has a kink in the force of each ball, but opposite balls cancel it in the
+    motion: the manifest says so.  Hertz's law always has one.
     """
     written = any(name == SWITCHES for name, _ in manifest.files)
     laws = dict(manifest.smoothness)
@@ -58,7 +58,7 @@ def has_kinks(manifest: Manifest) -> bool:
 
 
 def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float) -> Kinks:
-    """What a run does at kinks.
+    """Choice of a run at kinks.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def choose_kinks(asked: str | None, method: str, manifest: Manifest, rtol: float
 
 
 def tight_below(manifest: Manifest) -> float:
-    """Tolerance from which on `stepper` locates kinks by itself [1]."""
+    """Tolerance from which on `stepper` locates kinks by default [1]."""
     if manifest.borders:
         return ALWAYS
     return TIGHT_JUMPS if any(word == "discontinuous" for _, word in manifest.smoothness) else TIGHT
@@ -102,7 +102,7 @@ def check_located(asked: str, method: str) -> Kinks:
 
 
 def refuse_with_error(kinks: str | None, error: object) -> None:
-    """Raise `RequestError` where a run to a named error is told what to do at kinks."""
+    """Raise `RequestError` where kinks are chosen for a run to a named error."""
     if kinks is not None and error is not None:
         raise RequestError(
             f"kinks = {kinks!r} and an error were both given: a run to a named error chooses its own way. Leave kinks "
@@ -111,9 +111,9 @@ def refuse_with_error(kinks: str | None, error: object) -> None:
 
 
 def kinks_with_derivatives(asked: str | None, manifest: Manifest) -> Kinks:
-    """What runs with derivatives do at kinks: located at any tolerance, where there are some, unless told otherwise.
+    """Choice of runs with derivatives at kinks: by default located at any tolerance, where there are some.
 
-    Stepped over, the derivative of a step is not that of the motion; and where loads switch as the motion decides, it
+    Stepped over, the derivative of a step is not that of the motion; and where the motion switches loads, it
     jumps, so that steps have to end there.
 
     Raises

@@ -1,10 +1,10 @@
-"""The loop around the project's own stepper, for all that runs a model by it.
+"""The loop around the project's own stepper, for everything that runs a model with it.
 
 In: a `Run`, and sinks that take what it passes: samples, reductions, ends of steps.  Out: the sinks, filled.
 
 A run is cut into windows of so many segments (`segments.run_windows`), each one run of the driver, made in calls
-of so many steps: between calls progress is shown, and an interrupt or the wish of an ensemble to stop is heard.  What
-sinks there are, and how many steps a call takes, changes no bit of the motion.
+of so many steps: between calls progress is shown, and an interrupt or a stop of the ensemble takes effect.  The
+sinks, and the number of steps in a call, change no bit of the motion.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 #: Steps, accepted and rejected, that one call of the stepper takes: a fraction of a second.
 STEPS_A_CALL = 50_000
 
-#: What the ways of the stepper to end mean to people.
+#: Status of a run for each end of the stepper.
 STATUS_OF_END = {
     End.TOO_MANY_STEPS: Status.TOO_MANY_STEPS,
     End.STEP_TOO_SMALL: Status.STEP_TOO_SMALL,
@@ -49,8 +49,8 @@ class RunFailed(SimulationError):
     Attributes
     ----------
     end, time, step, state : how it ended, when [s], the last step size [s], the state there, shape (states,)
-    place : where the machine stood
-    detail : what else there is to say
+    place : angle and most loaded ball then
+    detail : further text of the message
     """
 
     def __init__(
@@ -63,19 +63,19 @@ class RunFailed(SimulationError):
 
 
 class Sink(Protocol):
-    """What takes something of a run."""
+    """Takes data of a run."""
 
     def arguments(self, segments: Segments, goes_on: bool) -> dict[str, Any]:
-        """What `Stepper.run` is given for it.
+        """Arguments of `Stepper.run` for it.
 
         Parameters
         ----------
         segments : of the call
-        goes_on : whether the call goes on with the one before, whose segments were the same
+        goes_on : whether the call continues the one before, whose segments were the same
         """
 
     def take(self, outcome: Outcome) -> None:
-        """Note what a call gave."""
+        """Note the results of a call."""
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -109,7 +109,7 @@ class Samples:
         stop = len(self.times) if right >= self.end else int(np.searchsorted(self.times, right - self.near))
         first = self._first = self.finished
         stop = max(stop, first)
-        # a sample that rounding puts beside an edge lies on it
+        # a sample beside an edge by rounding lies on it
         self._given = {
             "output_times": np.clip(self.times[first:stop], left, right),
             "output_states": self.x[first:stop],
@@ -166,19 +166,19 @@ class StepEnds:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class RunUnderWay:
-    """A run by the stepper, as far as it has come.
+    """A run by the stepper, up to the time reached.
 
     Attributes
     ----------
     run : what runs
-    sinks : what takes what it passes
+    sinks : take its data
     state : at `time`, shape (states,)
-    time : from where it can go on [s]
-    reached : how far it has come [s]
+    time : from which it can continue [s]
+    reached : time reached [s]
     stop : ends it between calls when it becomes nonzero
-    stepper : a driver that is there already; None for the one that the run needs
+    stepper : an existing driver; None for the one that the run needs
     steps, rejected, located, calls : counts; `located` of kinks
-    families : what an automatic choice ended with, call by call
+    families : the last family of an automatic choice, call by call
     """
 
     run: Run
@@ -195,19 +195,19 @@ class RunUnderWay:
     families: list[str] = field(default_factory=list)
 
     def go_on(self, until: float | None = None) -> None:
-        """Integrate to the end of the run, or to a time, which may lie behind it [s].
+        """Integrate to the end of the run, or to a time, which may lie after it [s].
 
         Raises
         ------
         RunFailed
-            The driver could not reach the end, or crawls.
+            The driver could not reach the end, or its steps are too small.
         """
         run, until = self.run, self.run.end if until is None else until
         directions = next((sink.directions for sink in self.sinks if isinstance(sink, Samples)), None)
         stepper = self.stepper or stepper_for(run.model, run.kinks, derivatives=directions is not None)
         allowed = allowance(until - run.begin, run.turn, self.time, self.steps + self.rejected)
         windows = run_windows(run.model, run.numbers, (self.time, until), run.turn, run.start)
-        # a derivative at fixed time jumps with a load, and a call knows no rate from before its start
+        # a derivative at fixed time jumps with a load, and a call does not have the rate before its start
         for left in joined_segments(windows) if directions is not None else windows:
             held, taken, first_step = (stepper.hold() if directions is None else None), 0, 0.0
             goes_on = False

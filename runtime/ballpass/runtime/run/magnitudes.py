@@ -1,7 +1,8 @@
 """Magnitudes of the states of a run, from its most loaded moments (see `ballpass.runtime.run.scales`).
 
 In: a model, numbers, the length of a run.  Out: one magnitude for each state, which tolerances are relative to.  Where
-the stepper runs, its own C finds them; elsewhere Python does, and the rates with them that tell a stiff model.
+the stepper runs, its own C finds them; elsewhere Python does, and with them the rates that show whether a model is
+stiff.
 """
 
 from __future__ import annotations
@@ -93,7 +94,7 @@ def _moments(
     begin: float,
     edges: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
-    """Inputs at the moments that are looked at, shape (moments, inputs), and the time that bounds travel [s]."""
+    """Inputs at the moments, shape (moments, inputs), and the time that bounds travel [s]."""
     horizon = min(duration, turn)
     if edges is None:
         edges = segment_edges(model, numbers, begin, begin + duration, turn)

@@ -1,4 +1,4 @@
-"""NetCDF-4 files in memory: a disk that is full then fails in one plain write, not somewhere within HDF5; their seal.
+"""Write NetCDF-4 files in memory, so that a full disk fails in one plain write, not within HDF5; add their seal.
 
 In: variables with dimensions, units and descriptions.  Out: the bytes of a file that xarray and `h5netcdf` read.
 """
@@ -19,7 +19,7 @@ SEAL_LENGTH = 82
 
 
 def seal(digest: str) -> bytes:
-    """What stands behind the data of a saved file, which HDF5 does not look at: the SHA-256 digest of all bytes before.
+    """Last bytes of a saved file, which HDF5 ignores: the SHA-256 digest of all bytes before.
 
     The HDF5 library may end the process, or give other numbers, where bytes of a file have changed; so they are checked
     first.

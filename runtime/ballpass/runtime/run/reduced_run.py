@@ -20,7 +20,7 @@ from ballpass.runtime.run.resolve import Run, resolve
 
 
 def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reductions:
-    """Integrate and reduce; what the request leaves open is as the scene's run settings say.
+    """Integrate and reduce; what the request leaves open is taken from the scene's run settings.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def reduce_run(model: LoadedModel, numbers: Numbers, request: Request) -> Reduct
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ReducedRun:
-    """A run that keeps reductions, as far as it has come.
+    """A run that keeps reductions, up to the time reached.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ def start_reducing(run: Run, channels: Collection[str]) -> ReducedRun:
     Raises
     ------
     RequestError
-        Nothing is left of the run behind its transient.
+        The run ends within its transient.
     """
     row = reduction_rows(run.model.manifest).empty(1, run.check_steady().start, channels)[0]
     return ReducedRun(going=start_run(run, [ReductionRow(row=row)]), row=row, channels=tuple(channels))

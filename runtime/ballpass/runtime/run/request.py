@@ -1,4 +1,4 @@
-"""What a run is asked for, and the bounds of what may be asked: length, tolerance, memory, names of outputs.
+"""The request of a run, and its bounds: length, tolerance, memory, names of outputs.
 
 `ballpass.runtime.run.resolve` makes a `Run` of a request; `ballpass.runtime.run.sampling` the times of its samples.
 """
@@ -22,8 +22,8 @@ from ballpass.runtime.run.start import Start
 if TYPE_CHECKING:
     from ballpass.runtime.contract import Manifest, RunInfo
 
-#: Longest run, in turns and in time [s].  A press takes days for so many turns, and an edge of a window within the last
-#: of them is known to a thousandth of a turn.
+#: Longest run, in turns and in time [s].  A press takes days of computing for so many turns, and
+#: the angle of an edge within the last of them is exact to a thousandth of a turn.
 MOST_TURNS, MOST_TIME = 1e9, 1e9
 
 #: Most numbers that the samples of a run may hold, its derivatives, or its segments: 4 GiB.
@@ -39,7 +39,7 @@ ON_REQUEST = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """What to simulate; None takes the scene's run settings.
+    """The request of a run; None takes the scene's run settings.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Request:
     times : sample times instead, increasing, shape (samples,) [s]
     sample_rate : samples at whole multiples of one over this, instead [Hz]
     outputs : names of the outputs to evaluate; None: all of the scene
-    initial : state at the start, shape (states,), or the end of a run that this one goes on from
+    initial : state at the start, shape (states,), or the end of a run that this one continues
     transient_cycles : turns from t = 0 on that `Solution.steady` leaves out
     kinks : "stepped-over" or "located"; None: as the tolerance is
     progress : called with the finished fraction of the run
@@ -73,12 +73,12 @@ class Request:
 
 
 def check_memory(what: str, rows: float, columns: int, remedy: str) -> None:
-    """Refuse what would hold more than `MAX_NUMBERS`, before there is memory for any of it.
+    """Refuse arrays of more than `MAX_NUMBERS` in all, before memory is allocated.
 
     Parameters
     ----------
     what : words for the rows, which "... numbers would not fit into memory" follows
-    rows : how many there would be; may be infinite
+    rows : their number; may be infinite
     columns : numbers of a row
     remedy : what to do instead
 
@@ -92,7 +92,7 @@ def check_memory(what: str, rows: float, columns: int, remedy: str) -> None:
 
 
 def on_request(name: object) -> str:
-    """What to do about a name of an output that a model has on request only; "" for another name."""
+    """Remedy for the name of an output that a model has on request only; "" for another name."""
     if not any(fnmatchcase(str(name), pattern) for pattern in ON_REQUEST):
         return ""
     return (
@@ -102,7 +102,7 @@ def on_request(name: object) -> str:
 
 
 def no_output(manifest: Manifest, name: object, known: Sequence[str], what: str = "output") -> str:
-    """Why a name is no output, and what to do: the scene may not ask for it, or there is no such thing.
+    """Why a name is not an output, and the remedy: the scene does not name it, or it does not exist.
 
     Parameters
     ----------
@@ -119,12 +119,12 @@ def no_output(manifest: Manifest, name: object, known: Sequence[str], what: str 
 
 
 def asked_length(run: RunInfo, cycles: float | None, duration: float | None) -> tuple[float | None, float | None]:
-    """Turns or time [s] to run, one of them None: as given, else as the scene's run settings say.
+    """Turns or time [s] to run, one of them None: as given, else from the scene's run settings.
 
     Raises
     ------
     RequestError
-        Both were given, or one that is no number above 0.
+        Both were given, or one is not a number above 0.
     """
     if cycles is not None and duration is not None:
         raise RequestError(f"cycles = {cycles!r} and duration = {duration!r} were both given: give one of them.")
@@ -140,7 +140,7 @@ def asked_length(run: RunInfo, cycles: float | None, duration: float | None) -> 
 
 
 def run_length(model: LoadedModel, request: Request, turn: float) -> float:
-    """Length of the run that is asked for [s]; RequestError as for `asked_length`, or for turns of what never turns."""
+    """Length of the run that is asked for [s]; RequestError as for `asked_length`, or for turns where nothing turns."""
     cycles, duration = asked_length(model.manifest.run, request.cycles, request.duration)
     if duration is not None:
         return duration

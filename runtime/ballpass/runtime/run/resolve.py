@@ -1,4 +1,4 @@
-"""The run that a request means: every open question answered once, for all that runs a model.
+"""The run that a request means: every open choice made once, for everything that runs a model.
 
 In: a model, numbers, a `Request`.  Out: a `Run`.
 """
@@ -23,17 +23,17 @@ from ballpass.runtime.run.magnitudes import model_scales, stepper_magnitudes
 from ballpass.runtime.run.request import Request, asked_length, check_length, run_length, tolerance
 from ballpass.runtime.run.start import start_state, start_time
 
-#: Turns of a run that are looked at for the magnitudes of its states.
+#: Turns of a run from which the magnitudes of its states are taken.
 SCALED_TURNS = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Run:
-    """A run without open questions.
+    """A run with all choices made.
 
     Attributes
     ----------
-    model, numbers : what runs
+    model, numbers : to run
     begin, end : [s]
     turn : time of a turn, infinite where nothing turns [s]
     turns : how many were asked for; None where a time was
@@ -42,7 +42,7 @@ class Run:
     initial : state at the start, shape (states,)
     method, reason : name of the method, and why it was chosen; "none" for a model without states
     rtol : relative tolerance [1]
-    kinks : what steps do at the kinks of the laws
+    kinks : treatment of the kinks of the laws
     magnitude : of the states, shape (states,)
     progress : called with the finished fraction of the run
     """
@@ -146,7 +146,7 @@ def resolve(
     Raises
     ------
     RequestError
-        What was asked for is wrong, with what is allowed.
+        The request is wrong; the message says what is allowed.
     """
     settings = model.manifest.run
     turn = driver_angle.period(model.manifest, numbers.values)

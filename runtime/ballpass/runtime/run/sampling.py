@@ -44,7 +44,7 @@ class Sampling:
 
 
 def sampling_of(model: LoadedModel, request: Request, turn: float) -> Sampling:
-    """Check what a request says of samples and outputs.
+    """Check samples and outputs of a request.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def sampling_of(model: LoadedModel, request: Request, turn: float) -> Sampling:
     Raises
     ------
     RequestError
-        What was asked for is wrong, with what is allowed.
+        The request is wrong; the message says what is allowed.
     """
     outputs = output_names(model, request.outputs)
     duration, times = _sample_times(model, request, turn, outputs)
@@ -114,7 +114,7 @@ def _sample_times(
         duration = run_length(model, request, turn)
         if times[-1] > (begin + duration) * (1.0 + driver_angle.TIME_RESOLUTION):
             raise RequestError(
-                f"times: the run ends at {begin + duration!r} s, and {float(times[-1])!r} s lies behind it. Run "
+                f"times: the run ends at {begin + duration!r} s, and {float(times[-1])!r} s lies after it. Run "
                 "longer, or leave cycles and duration out: the run then ends at the last time."
             )
     check_length(begin + duration, turn)

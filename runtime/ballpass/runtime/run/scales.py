@@ -1,7 +1,7 @@
-"""How large the states get and how stiff the model is, asked of the model itself.
+"""Magnitudes of the states and stiffness of a model, from the model's own right-hand side.
 
-Tolerances are relative to magnitudes.  With magnitudes taken from the momentary state, an error control asks for
-nonsense when a coordinate passes zero; so they are found once a run, from the model's own right-hand side, at the
+Tolerances are relative to magnitudes.  With magnitudes taken from the current state, the allowed error would
+vanish when a coordinate passes zero; so they are found once a run, from the model's own right-hand side, at the
 moments that load it most:
 
 Coordinates that share a magnitude make a group, as the rings of a bearing do; some have a partner, as the other ring's
@@ -9,14 +9,14 @@ coordinate along the same axis.  An angle, which grows as the driver turns, has 
 spread over a turn of it, it keeps its initial velocity, and stays where it is while an equilibrium is sought.
 
 1. For each group the moments with its largest acceleration at the initial positions, at rest, are picked from the run.
-2. At each, the positions of static equilibrium are found (`equilibrium_newton`).  What has to fall is the residual of
-   the accelerations; where that gets stuck, that of the forces: a ring of a milligramme has enormous accelerations on
-   the way.  The walk ends where both rings have gone too far for the distance between them to be told: nothing holds
-   them, but the balls between them have found their deflection.
+2. At each, the positions of static equilibrium are found (`equilibrium_newton`).  The residual of the accelerations
+   has to fall; where it does not, that of the forces: a ring of a milligramme has enormous accelerations on the way.
+   The search ends where both rings have moved so far that rounding hides the distance between them: nothing holds
+   them, but the balls between them have reached their deflection.
 3. Position magnitude: the group's largest coordinate among these equilibria and the initial state; for a bearing, half
    the clearance and the deflection.  At most `SOFT` times the largest difference between partners: in a soft housing
    both rings move far, and the balls feel the small difference.  Velocity magnitude: ``sqrt(acceleration x
-   position)``, the speed gained on falling through that distance; for a linear oscillator, amplitude times natural
+   position)``, the speed after that acceleration over that distance; for a linear oscillator, amplitude times natural
    frequency.
 4. Stiffness: eigenvalues of the Jacobian at those equilibria, at rest and moving in each direction (laws that damp
    one way only show their damping only then).
@@ -38,7 +38,7 @@ LOADED_MOMENTS = 3
 #: Most iterations of the continuation for one equilibrium.
 ITERATIONS = 80
 
-#: Residual left over, relative to that at the start [1].
+#: Allowed residual, relative to that at the start [1].
 SETTLED = 1e-6
 
 #: Largest coordinate over the difference to its partner at which that difference still has digits [1].
@@ -96,7 +96,7 @@ class Groups:
         return float(np.max(np.abs(x[own] - other)))
 
     def gone(self, x: np.ndarray) -> bool:
-        """Whether a group has gone too far for the differences in it to be told."""
+        """Whether a group has moved so far that rounding hides the differences in it."""
         return any(np.max(np.abs(x[own])) > FAR * self.apart(name, x) for name, own in self.members.items())
 
 
@@ -104,7 +104,7 @@ class Groups:
 Field = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-# numbers that overflow end a search or a run further down, with words
+# numbers that overflow end a search or a run later, with a message
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def find_scales(
     rhs: Field,
@@ -122,7 +122,7 @@ def find_scales(
     rhs, jacobian : right-hand side and its derivative along the states
     inputs : inputs at moments spread over the run
     initial : state at the start, shape (states,)
-    horizon : a turn, or the run [s]; bounds the travel of a body that nothing holds
+    horizon : a turn, or the run [s]; bounds the travel of an unsupported body
     groups : which coordinates share a magnitude
     masses : of the coordinates [kg].  Default: equal ones
     """
@@ -180,9 +180,9 @@ def find_scales(
 def _equilibrium(
     rhs: Field, jacobian: Field, groups: Groups, u: np.ndarray, start: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, bool] | None:
-    """State at rest with vanishing acceleration, True; or where it got to as nothing holds a group, False.
+    """State at rest with vanishing acceleration, True; or the last one where nothing holds a group, False.
 
-    None when the continuation gets nowhere.
+    None when the continuation fails.
     """
     half = len(start) // 2
     free = ~groups.angles

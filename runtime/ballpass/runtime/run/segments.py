@@ -1,4 +1,4 @@
-"""Into which segments a run falls: split where a load switches and at every whole turn.
+"""Segments of a run: it is split where a load switches and at every whole turn.
 
 In: a model, numbers, an interval of time.  Out: edges, and the inputs that hold between them.  Within a segment gates
 and slopes are constant and the phases are taken anew at its start, so that angles stay small in the thousandth turn as
@@ -137,7 +137,7 @@ def _joined(parts: Sequence[Segments]) -> Segments:
 
 
 def check_count(inputs: Sequence[InputInfo], numbers: Numbers, length: float, turn: float, columns: int = WORK) -> None:
-    """Refuse a time with more segments than fit into memory: the most that there can be, before any is made.
+    """Refuse a time with more segments than fit into memory: by their largest possible number, before any is made.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def part_of(segments: Segments, first: int, last: int) -> Segments:
 
 
 def rest_of(segments: Segments, time: float, inputs: Sequence[InputInfo], numbers: Numbers) -> Segments | None:
-    """What is left of segments at a time within them; no load jumps there.  None where nothing is left."""
+    """The rest of segments from a time within them, at which no load jumps.  None where nothing is left."""
     k = int(np.searchsorted(segments.times, time, side="right")) - 1
     if k >= len(segments.inputs):
         return None

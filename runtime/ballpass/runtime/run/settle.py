@@ -1,4 +1,4 @@
-"""How many turns make a peak: a run that goes on until its extremes and means settle.
+"""Find the number of turns for a peak: a run continues until its extremes and means settle.
 
 In: a model, numbers, a request.  Out: `Settled`.  The balls meet the load's peak in other places each turn, so the peak
 of two turns depends on the balls' first angle.  The turns are doubled until that changes no extreme of any channel by
@@ -27,7 +27,7 @@ from ballpass.runtime.run.start import RunEnd, start_time
 from ballpass.runtime.show import html
 from ballpass.runtime.show.short import ShortRepr
 
-#: Change of extremes, relative to the channel's range, and of rms, relative to itself, that counts as none [1].
+#: Change of extremes, relative to the channel's range, and of rms, relative to itself, that counts as zero [1].
 PEAKS, MEANS = 5e-3, 1e-2
 
 #: Steady turns that are compared with twice as many at first, and the most that are run.
@@ -60,7 +60,7 @@ class Settled(ShortRepr):
 
     @property
     def words(self) -> str:
-        """A sentence for people."""
+        """The result as a sentence."""
         name = max(self.changes, key=lambda channel: max(self.changes[channel]))
         peak, mean = self.changes[name]
         state = "settled" if self.settled else "not settled"
@@ -71,7 +71,7 @@ class Settled(ShortRepr):
 
 
 def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = MOST) -> Settled:
-    """Run on until twice the turns change nothing.
+    """Continue a run until twice the turns change nothing.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
         The computation failed.
     """
     if request.cycles is not None or request.duration is not None:
-        raise RequestError("settle: the number of turns is what it finds; give neither cycles nor duration.")
+        raise RequestError("settle: it finds the number of turns itself; give neither cycles nor duration.")
     if not (real(most) >= 2 * LEAST and int(most) == most):
         raise RequestError(f"settle: most = {most!r}; a whole number of turns from {2 * LEAST} on is expected.")
     settings = model.manifest.run
@@ -110,7 +110,7 @@ def settle(model: LoadedModel, numbers: Numbers, request: Request, most: int = M
 
 
 def look_further(model: LoadedModel, numbers: Numbers, solution: Solution) -> Settled | None:
-    """What `LEAST` turns, or as many as `STEPS` steps reach, change in the extremes and rms of a run.
+    """Change of the extremes and rms of a run by `LEAST` turns, or by as many as `STEPS` steps reach.
 
     None where the run is about as long, nothing turns, a table gives the speed over time, or another method than the
     project's own stepper ran.

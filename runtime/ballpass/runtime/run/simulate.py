@@ -2,8 +2,8 @@
 
 In: a model, numbers, a request.  Out: a `Solution`.
 
-1. The request is checked, and what it leaves open taken from the scene (`resolve`, `sampling`).
-2. The method fills the samples (`loop`: the project's own stepper; `pieces`: CasADi's).
+1. The request is checked, and what it leaves open is taken from the scene (`resolve`, `sampling`).
+2. The method fills the samples (`loop`: the project's own stepper; `casadi_run`: CasADi's).
 3. The outputs asked for are evaluated at all samples at once (`trajectory`).
 """
 
@@ -54,7 +54,7 @@ def simulate(
     """
     started = clocks.perf_counter()
     sampling = sampling_of(model, request, driver_angle.period(model.manifest, numbers.values))
-    # derivatives first: what would not fit into memory is told before there is memory for the rest
+    # derivatives first: too many for the memory are refused before memory for the rest is allocated
     directions = prepare(len(sampling.times)) if prepare is not None else None
     run = resolve(model, numbers, request, duration=sampling.duration, stepper=False)
     if directions is not None:
@@ -123,7 +123,7 @@ def simulate(
 
 
 def _note(trajectory: Trajectory, samples: Samples, going: RunUnderWay) -> None:
-    """How far the stepper has filled a trajectory."""
+    """Note how many samples the stepper has filled."""
     trajectory.finished, trajectory.calls = samples.finished, going.calls
     trajectory.steps, trajectory.rejected = going.steps, going.rejected
     edges = trajectory.segments.times[:-1]

@@ -1,4 +1,4 @@
-"""What a simulation gives: samples of states and outputs, with all that is needed to read them later; its file."""
+"""The solution of a simulation: samples of states and outputs with their names and units; its file."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ class Statistics:
     calls : calls of the integrator
     wall_time : time the simulation took [s]
     compiled : whether generated C ran, else CasADi's virtual machine
-    kinks : "stepped-over" or "located"; None for methods that do not know the kinks of the laws
+    kinks : "stepped-over" or "located"; None for methods that cannot locate kinks
     located : kinks located, None where they are stepped over
     initial : state at its start; None where an earlier version wrote the solution
-    begin : time at its start, above 0 where it goes on from another run [s]
-    duration : length of the run, which may end behind the last sample [s]; None as for `initial`
+    begin : time at its start, above 0 where it continues another run [s]
+    duration : length of the run, which may end after the last sample [s]; None as for `initial`
 
     Examples
     --------
@@ -88,15 +88,15 @@ class Solution:
     ----------
     t : times, increasing, not always evenly spaced, shape (samples,) [s]
     x : states, shape (samples, states), in the order of the manifest
-    outputs : output name to samples; at a breakpoint, the value behind it
+    outputs : output name to samples; at a breakpoint, the value after it
     parameters, constants : numbers of the run by name
     cycle_length : time of one turn [s], where its speed changes at the initial one; None where nothing turns
     transient_cycles : turns from t = 0 on that `steady` leaves out
     manifest : names, units and descriptions
     statistics : how the solution came about
     status : how the simulation ended
-    accuracy : what was asked, chosen and estimated, where an error was named instead of a method
-    reductions : extremes, means and rms found in every step of the run, whatever its samples: of the states, and of
+    accuracy : target, choice and estimate, where an error was named instead of a method
+    reductions : extremes, means and rms found in every step of the run, for any samples: of the states, and of
         the most loaded ball for those outputs that are kept.  None for other methods than the project's own stepper,
         beside derivatives, and where no output is kept
     steady_reductions : the same from the end of the transient on
@@ -143,8 +143,7 @@ class Solution:
             return self.x[:, names.index(name)]
         if any(name == info.name for info in self.manifest.outputs):
             raise RequestError(
-                f"{name!r} was not kept in this run: name it in simulate(outputs=...), or leave outputs away to keep "
-                "all."
+                f"{name!r} was not kept in this run: name it in simulate(outputs=...), or omit outputs to keep all."
             )
         known = tuple(dict.fromkeys((*self.outputs, *names)))
         raise RequestError(no_output(self.manifest, name, known, "output or state"))
@@ -199,7 +198,7 @@ class Solution:
         return tuple(state.name for state in self.manifest.states)
 
     def steady(self) -> Solution:
-        """The samples behind the transient cycles; times are kept.
+        """The samples after the transient cycles; times are kept.
 
         Raises
         ------
@@ -229,7 +228,7 @@ class Solution:
 
     @property
     def end(self) -> RunEnd:
-        """Where the run has come to at its last sample: ``simulate(initial=solution.end)`` goes on from there.
+        """End of the run at its last sample: ``simulate(initial=solution.end)`` continues from there.
 
         Raises
         ------
@@ -242,7 +241,7 @@ class Solution:
 
     @property
     def period(self) -> float | None:
-        """Time after which the machine is where it was [s]; None where nothing turns, or the speed changes."""
+        """Period of the machine [s]; None where nothing turns, or the speed changes."""
         mechanism = self.manifest.mechanism
         return None if mechanism is not None and mechanism.angle else self.cycle_length
 

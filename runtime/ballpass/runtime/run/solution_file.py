@@ -1,6 +1,6 @@
 """Read a solution that was saved: by `Solution.save`, `Model.stream`, or ``ballpass run``.
 
-In: a file.  Out: its `Solution`, or a refusal of a file that is none of ours, cut short or edited.
+In: a file.  Out: its `Solution`, or an error where the file has another format, is cut short or was edited.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def load_solution(path: str | Path) -> Solution:
     Raises
     ------
     RequestError
-        There is no such file, it is none of ours, or it was cut short or edited.
+        There is no such file, it has another format, or it was cut short or edited.
 
     Examples
     --------
@@ -60,7 +60,7 @@ def read_bytes(path: str | Path, content: bytes) -> Solution:
 
 
 def _read(path: str | Path, content: bytes) -> Solution:
-    """Solution from the bytes of a file that nobody has touched."""
+    """Solution from the bytes of an unchanged file."""
     import h5netcdf
 
     with h5netcdf.File(io.BytesIO(content), "r") as stored:

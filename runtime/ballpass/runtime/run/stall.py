@@ -1,4 +1,4 @@
-"""Where a driver has stalled, and what torque it lacks there, in words."""
+"""The message for a driver that has stalled: its angle and the missing torque."""
 
 from __future__ import annotations
 

@@ -19,13 +19,13 @@ from ballpass.runtime.run import driver_angle
 from ballpass.runtime.run.ball_angles import ball_angles
 from ballpass.runtime.show.short import ShortRepr
 
-#: Angles of driver and balls that differ by less are one, but for the rounding of many turns [rad].
+#: Angles of driver and balls that differ by less are equal, up to the rounding of many turns [rad].
 SAME_ANGLE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class RunEnd(ShortRepr):
-    """Where a run has come to: another one goes on from it, ``initial=solution.end``.
+    """End of a run, from which another one continues: ``initial=solution.end``.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class RunEnd(ShortRepr):
     parameters: Mapping[str, float] = field(repr=False)
 
 
-#: What may be given as start; None is the scene's.
+#: Type of a given start; None is the scene's.
 Start = np.ndarray | RunEnd | None
 
 
@@ -63,7 +63,7 @@ def start_state(model: LoadedModel, numbers: Numbers, given: Start) -> np.ndarra
     Raises
     ------
     RequestError
-        Another shape, a run of other states, or of parameters with which driver or balls stood elsewhere.
+        Another shape, a run of other states, or of parameters with which driver or balls have another place.
     """
     if given is None:
         return np.array([numbers.values[name] for name in model.manifest.initial], dtype=float)
@@ -88,7 +88,7 @@ def start_state(model: LoadedModel, numbers: Numbers, given: Start) -> np.ndarra
 
 
 def _check_driver(model: LoadedModel, numbers: Numbers, time: float, x: np.ndarray) -> None:
-    """Refuse a start at which the driver has not the speed of its table."""
+    """Refuse a start at which the driver does not have the speed of its table."""
     if all(item.name != DRIVER_ACCELERATION for item in model.manifest.inputs):
         return
     assert model.manifest.mechanism is not None  # it has the driver
@@ -97,12 +97,12 @@ def _check_driver(model: LoadedModel, numbers: Numbers, time: float, x: np.ndarr
     if abs(given - speed) > SAME_ANGLE * max(abs(speed), 1.0):
         raise RequestError(
             f"initial: the driver's speed {given:.9g} rad/s was given, and its table has {speed:.9g} rad/s at "
-            f"t = {time:g} s. Give that speed; to go on with a run give its end, initial=solution.end."
+            f"t = {time:g} s. Give that speed; to continue a run give its end, initial=solution.end."
         )
 
 
 def _refuse_jump(model: LoadedModel, numbers: Numbers, end: RunEnd) -> None:
-    """Refuse to go on with numbers that put driver or balls elsewhere at that time than the run before."""
+    """Refuse to continue with numbers that give driver or balls another place at that time than the run before."""
     known = {name: value for name, value in end.parameters.items() if name in numbers.parameters}
     changed = [name for name, value in known.items() if numbers.parameters[name] != value]
     if not changed:
@@ -122,7 +122,7 @@ def _refuse_jump(model: LoadedModel, numbers: Numbers, end: RunEnd) -> None:
         what = "the driver" if moved[0] == np.max(moved) else "balls"
         raise RequestError(
             f"initial: with {', '.join(changed)} changed, {what} would jump by "
-            f"{math.degrees(float(np.max(moved))):.4g} deg at t = {end.time:.6g} s, where the run goes on. Allowed: "
+            f"{math.degrees(float(np.max(moved))):.4g} deg at t = {end.time:.6g} s, where the run continues. Allowed: "
             "parameters that leave driver and balls where they are. Give them as they were, or start anew from the "
             "state alone: initial=solution.end.x."
         )

@@ -2,7 +2,7 @@
 
 In: a model, numbers, a request with a sampling rate.  Out: a NetCDF-4 file of the layout of `Solution.save`.
 
-The run is made of pieces of some million numbers, each of which goes on where the one before ended and is written
+The run is made of pieces of some million numbers, each of which starts where the one before ended and is written
 before the next begins.  A piece ends on a sample, where a step of the integrator ends as well: the samples are those of
 one run within its tolerance.  Extremes of every step (`Solution.reductions`) are not kept.
 """

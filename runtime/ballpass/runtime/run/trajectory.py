@@ -1,7 +1,7 @@
-"""Samples of a run on the way: their times, states, and what outputs are evaluated with.
+"""Samples of a run: their times and states, and the arguments of their outputs.
 
 In: sample times and the segments of a run.  Out: a `Trajectory`, which an integrator fills, and the outputs at its
-samples.  A sample that meets an edge shows the state there with the loads behind it.
+samples.  A sample on an edge has the loads that act after it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Trajectory:
     finished : samples filled
     passed : segments integrated, at least in part
     calls : calls of the integrator
-    steps, rejected : it took
+    steps, rejected : of the integration
     """
 
     begin: float

@@ -1,6 +1,6 @@
-"""HTML of objects in notebooks: one look, no script but that of framed pages, everything escaped.
+"""HTML of objects in notebooks: one style, no script except in framed pages, everything escaped.
 
-In: heads and rows of text.  Out: HTML that stands alone, light on dark as dark on light.
+In: heads and rows of text.  Out: HTML that needs nothing else, for light and dark pages.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def framed_page(page: str, height: int = 720) -> str:
 
 
 def title(words: str, note: str = "") -> str:
-    """A line that says what this is, and a fainter one about it."""
+    """A title line, and a fainter line below it."""
     return f'<p><span class="title">{escape(words)}</span></p>' + (paragraph(note) if note else "")
 
 

@@ -1,7 +1,7 @@
 """Progress of long calls: a bar on a terminal or in a notebook, nothing in pipes, logs and other processes.
 
 A bar appears when a call has taken `PATIENCE`.  One shows at a time: calls within calls, and in other threads, are
-silent, and so are those of a program that says itself what goes on (`silent`).
+silent, and so are those of a program that shows its own progress (`silent`).
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from functools import partial
 from html import escape
 from typing import Any
 
-#: Who is told the finished fraction; False for nobody; None for a bar where somebody looks; True for one although
-#: `SWITCH` is 0.
+#: Function that is called with the finished fraction; False: no progress; None: a bar on a terminal or in a notebook;
+#: True: a bar although `SWITCH` is 0.
 Progress = Callable[[float], None] | bool | None
 
 #: Time that a call takes before its bar appears, and between two pictures of the bar [s].
 PATIENCE, REFRESH = 1.0, 0.2
 
-#: Set to 0, no bar appears but where a call asks for one.
+#: Set to 0, bars appear only where a call asks for one.
 SWITCH = "BALLPASS_PROGRESS"
 
 _one_bar = threading.Lock()
@@ -32,7 +32,7 @@ _one_bar = threading.Lock()
 
 @contextmanager
 def shown(words: str, progress: Progress = None) -> Iterator[Callable[[float], None] | None]:
-    """What to tell the finished fraction within; None for nobody.
+    """Context with the function to call with the finished fraction; None for none.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def shown(words: str, progress: Progress = None) -> Iterator[Callable[[float], N
 def shown_steps(
     words: str, progress: Callable[[str, float], None] | bool | None = None
 ) -> Iterator[Callable[[str, float], None] | None]:
-    """The same for calls that say as well what they do: told words and a finished fraction."""
+    """The same for calls with named stages: the function takes words and a finished fraction."""
     if callable(progress):
         yield progress
         return
@@ -79,7 +79,7 @@ def silent() -> Iterator[None]:
 
 
 def _someone_looks() -> bool:
-    """Whether a person sits before the output of this process, and wants to know."""
+    """Whether the output of this process is interactive, and progress is not switched off."""
     workers = sys.modules.get("multiprocessing")  # its import takes longer than a run
     if os.environ.get(SWITCH) == "0" or (workers is not None and workers.parent_process() is not None):
         return False
@@ -94,12 +94,12 @@ def _notebook() -> Any:
 
 
 class _LateBar:
-    """A bar from `PATIENCE` on, drawn by a thread of its own: runs may tell nothing for long, or very often."""
+    """A bar from `PATIENCE` on, drawn by its own thread: runs may report rarely, or very often."""
 
     def __init__(self, words: str) -> None:
         self._told: tuple[str, float | None] = (words, None)
         self._over = threading.Event()
-        # the context says to which cell of a notebook the bar belongs
+        # the context holds the cell of a notebook that the bar belongs to
         self._thread = threading.Thread(target=contextvars.copy_context().run, args=(self._draw,), daemon=True)
         self._thread.start()
 

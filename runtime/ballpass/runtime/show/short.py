@@ -1,4 +1,4 @@
-"""Short reprs of records: a line or a few, whatever arrays and tables they hold."""
+"""Short reprs of records: a few lines for any size of arrays and tables."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class _ShortValues(reprlib.Repr):
 
 
 class ShortRepr:
-    """Gives a dataclass (with ``repr=False``) a repr that does not print what it holds to the last number."""
+    """Gives a dataclass (with ``repr=False``) a short repr, without all numbers of its arrays."""
 
     __slots__ = ()
 

@@ -1,4 +1,4 @@
-"""What a law of a drive's torque is: its name, its keys in the scene file, its torque over the speed."""
+"""The interface of a law of a drive's torque: its name, its keys in the scene file, its torque over the speed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class TorqueLaw(ABC):
 
     Attributes
     ----------
-    name : what stands in the scene file
+    name : as in the scene file
     smoothness : of the torque over the speed
     """
 
@@ -31,7 +31,7 @@ class TorqueLaw(ABC):
 
     @abstractmethod
     def words(self) -> str:
-        """What drives, for people: "a constant torque"."""
+        """Name of the drive in texts: "a constant torque"."""
 
     def check(self, checker: Checker) -> None:  # noqa: B027  not every law has a number that could be wrong
         """Note faults of its numbers."""
@@ -45,16 +45,16 @@ def not_zero(checker: Checker, speed: SceneNumber, word: str) -> None:
             f"the {word} is zero",
             checker.show(speed),
             "a speed other than zero, negative for a motor that turns clockwise",
-            "give the speed of the motor, seen at the driver's joint",
+            "give the speed of the motor, reduced to the driver's joint",
         )
 
 
 def same_sign(checker: Checker, torque: SceneNumber, speed: SceneNumber, words: str) -> None:
-    """Note a fault where a motor turns the other way than its torque."""
+    """Note a fault where speed and torque of a motor have opposite signs."""
     if torque.value * speed.value < 0.0:
         checker.fault(
             torque.path,
-            f"the signs of {words} differ: the motor would drive beyond that speed",
+            f"the signs of {words} differ: the motor would accelerate beyond that speed",
             f"{checker.show(torque)}, {checker.show(speed)}",
             "both positive, or both negative for a motor that turns clockwise",
             "change the sign of one of the two",

@@ -17,7 +17,7 @@ from ballpass.derive.terms import Smoothness, symbol_of
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedTable(TorqueLaw):
-    """Rows of `speed` [rad/s], increasing, and `amount` [N*m]; constant before the first and behind the last."""
+    """Rows of `speed` [rad/s], increasing, and `amount` [N*m]; constant before the first and after the last."""
 
     name: ClassVar[str] = "table"
     smoothness: ClassVar[Smoothness] = Smoothness.KINKED

@@ -1,4 +1,4 @@
-"""Assur dyads: the kinds that a linkage may be made of.  A new kind is a file here and an entry in `DYADS`."""
+"""Assur dyads, of which linkages are made.  A new kind is a file here and an entry in `DYADS`."""
 
 from ballpass.derive.mechanism.dyads.dyad import Dyad, Margin, Placement
 from ballpass.derive.mechanism.dyads.rpr import RPR

@@ -1,4 +1,4 @@
-"""What an Assur dyad is: a way to place two bodies at once, and to solve their joint reactions.
+"""The interface of an Assur dyad: it places two bodies at once and solves their joint reactions.
 
 Each kind is one class in a file of its own, listed in `dyads/__init__.py`.  It says which joints form it and what its
 branches are called (find), gives the poses of its bodies in closed form (place), and walks its balances (reactions).
@@ -55,7 +55,7 @@ class Dyad(ABC):
     kind : R (revolute) or P (prismatic) for each of outer joint of the first body, inner joint, outer joint of the
         second
     branches : values of `Joint.branch` at the inner joint; the first has the sign +1
-    words : what it is made of, for messages
+    words : its joints, for messages
     bodies : in the order of `kind`; where that can be read from both ends, in the order of the inner joint's bodies
     hosts : the bodies already placed that carry them
     outer, inner : joints, `outer` in the order of `bodies`
@@ -105,7 +105,7 @@ class Dyad(ABC):
 
     @abstractmethod
     def branch_meaning(self) -> str:
-        """What the branch decides, as "on which side of ... the joint lies"."""
+        """The choice between the branches, as "on which side of ... the joint lies"."""
 
     @abstractmethod
     def place(self, ledger: Ledger, mechanism: Mechanism, poses: Mapping[str, Pose], play: Play) -> Placement:

@@ -31,7 +31,7 @@ __all__ = [
 ]
 __all__ += ["PointForce", "Windows", "derive_forces", "drawn_forces", "drawn_springs"]
 
-#: In the order in which their numbers are listed; of its pathways and laws those whose key is there, else the last.
+#: In the order in which their numbers are listed; a force has the pathway and law whose key is given, else the last.
 FORCE_TABLES: tuple[ForceTable, ...] = (
     ForceTable("forces", "force", "body, point and force", (PointForce,), (Windows, AngleTable, ConstantForce)),
     ForceTable("torques", "torque", "body and torque", (BodyTorque,), (Windows, AngleTable, ConstantForce)),

@@ -19,10 +19,10 @@ from ballpass.derive.variables import Input, Output, StateSwitch
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Forces:
-    """What acts on the bodies, and the definitions, inputs and outputs that come with it.
+    """Loads on the bodies, with their definitions, inputs and outputs.
 
-    `of_each` are the loads by the label of their force, `requested` are outputs on request, `smoothness` is that of
-    what jumps or has a kink where the motion decides, by name, and `switches` are the places.
+    `of_each` are the loads by the label of their force, `requested` are outputs on request, `smoothness` is by name, of
+    loads with jumps or kinks that depend on the motion, and `switches` are their places.
     """
 
     loads: tuple[AppliedLoad, ...]
@@ -57,7 +57,7 @@ def derive_forces(mechanism: Mechanism, linkage: Linkage, drive: Drive) -> Force
 def drawn_forces(mechanism: Mechanism) -> tuple[tuple[str, str, str, str], ...]:
     """Forces on points: name, body, point, and input that gates it or holds its amount, or "" (acts always).
 
-    Where the driver's angle is a coordinate there is no such input: the angle tells when it acts, and how much.
+    Where the driver's angle is a coordinate there is no such input: time and amount follow from the angle.
     """
     return tuple(
         (force.name, force.pathway.body, force.pathway.point, _input(force))
@@ -67,7 +67,7 @@ def drawn_forces(mechanism: Mechanism) -> tuple[tuple[str, str, str, str], ...]:
 
 
 def drawn_springs(mechanism: Mechanism) -> tuple[tuple[str, str, str, str, str], ...]:
-    """Springs and stops along a line: what their outputs begin with, body and point of both ends."""
+    """Springs and stops along a line: prefix of their outputs, body and point of both ends."""
     return tuple(
         (force.label, path.bodies[0], path.points[0], path.bodies[1], path.points[1])
         for force in mechanism.forces

@@ -1,4 +1,4 @@
-"""Law: what the pathway names acts always."""
+"""Law: the force or torque of the pathway acts always."""
 
 from __future__ import annotations
 

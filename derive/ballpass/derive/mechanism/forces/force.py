@@ -1,4 +1,4 @@
-"""What a force on a linkage is made of: a pathway, which bodies it acts on and along what, and a law, how large it is.
+"""A force on a linkage has a pathway (on which bodies it acts, along which line) and a law (how large it is).
 
 ::
 
@@ -36,9 +36,9 @@ __all__ = ["Action", "ForceTable", "Law", "Measure", "Pathway", "Points", "Setti
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """What forces act in, and what they add: definitions, inputs, outputs.
+    """The linkage that forces act in, and their definitions, inputs and outputs.
 
-    `requested` are outputs on request, `switched` are the definitions of what changes with the driver's angle, which
+    `requested` are outputs on request, `switched` are definitions that change with the driver's angle and that
     others use.
     """
 
@@ -54,7 +54,7 @@ class Setting:
     switches: list[StateSwitch] = field(default_factory=list)
 
     def over_angle(self, found: OverAngle) -> sp.Expr:
-        """Take what changes with the driver's angle; its value."""
+        """Add a term that changes with the driver's angle; return its value."""
         self.inputs.extend(found.inputs)
         self.switched.extend(found.definitions)
         self.smoothness.extend(found.smoothness)
@@ -64,7 +64,7 @@ class Setting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measure:
-    """What a pathway measures, "length" in "m" as "40 mm", and the amount that acts along it, "tension" in "N"."""
+    """The size of a pathway, "length" in "m" as "40 mm", and the amount that acts along it, "tension" in "N"."""
 
     size: str
     size_unit: str
@@ -79,7 +79,7 @@ class Action:
 
     Attributes
     ----------
-    loads : what an amount does to the bodies
+    loads : on the bodies, by an amount
     excess : of the pathway's size over a free one [m] or [rad]; None where the pathway has no size
     rate : of the size [m/s] or [rad/s]
     """
@@ -90,13 +90,13 @@ class Action:
 
 
 class Pathway(ABC):
-    """Which bodies a force acts on, and along what; a frozen record of the scene.
+    """The bodies a force acts on, and its line of action; a frozen record of the scene.
 
     Attributes
     ----------
-    key : the key of the scene that asks for it; empty for the pathway of a table where no other is asked for
-    measure : what a law may depend on; None where there is nothing to measure
-    column, unit : what a law gives that is no factor: "force" in "N"
+    key : the key of the scene that selects it; empty for the default pathway of a table
+    measure : the size that a law may depend on; None where there is none
+    column, unit : of a law that gives an amount, not a factor: "force" in "N"
     """
 
     __slots__ = ()
@@ -135,7 +135,7 @@ class Pathway(ABC):
 
     @abstractmethod
     def words(self) -> str:
-        """What it is, for people: "force on slider.C"."""
+        """Its name in texts: "force on slider.C"."""
 
 
 class Law(ABC):
@@ -143,8 +143,8 @@ class Law(ABC):
 
     Attributes
     ----------
-    key : the key of the scene that asks for it; empty for the law that holds where no other is asked for
-    factor : it gives a factor [1] for the force or torque that the pathway names, not an amount of its own
+    key : the key of the scene that selects it; empty for the default law
+    factor : it gives a factor [1] for the force or torque of the pathway, not an amount
     """
 
     __slots__ = ()
@@ -166,7 +166,7 @@ class Law(ABC):
         """Factor [1], force [N] or torque [N*m]."""
 
     def words(self) -> str:
-        """What it adds to the pathway's words, for people."""
+        """Its part of the description, after the pathway's."""
         return ""
 
     def check(self, checker: Checker) -> None:  # noqa: B027  most have no number that could be wrong
@@ -179,8 +179,8 @@ class Law(ABC):
 
 @dataclass(frozen=True, slots=True)
 class ForceTable:
-    """A table of the scene file, ``[mechanism.<key>.<name>]``: what one entry is called and holds for example, the
-    pathways and the laws that may stand there: each the one whose key is there, else the last."""
+    """A table of the scene file, ``[mechanism.<key>.<name>]``: name and example of an entry, its allowed pathways and
+    laws.  An entry has the pathway and the law whose key is given, else the last one."""
 
     key: str
     word: str
@@ -202,7 +202,7 @@ class ForceTable:
                 allowed=f"either {column} with a window, or a table",
                 remedy="delete one of the two; rows of a table may be zero",
             )
-            data.missing = True  # which keys are missing depends on what stays
+            data.missing = True  # the missing keys depend on the key that stays
             law = next(law for law in asked if law.factor == (column in data.data))
         fill = pathway.fill(name, str(data.data.get("body", "")))
         return Force(name=name, table=self.key, pathway=pathway.read(data, fill, points, law), law=law.read(data, fill))

@@ -22,7 +22,7 @@ from ballpass.runtime.contract.manifest import UsualInfo
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Friction(Law):
-    """``viscous * rate + coulomb * tanh(rate / smoothing)``; what the scene does not name has no term.
+    """``viscous * rate + coulomb * tanh(rate / smoothing)``; terms that the scene does not name are zero.
 
     At a revolute joint in [N*m*s/rad], [N*m] and [rad/s], at a guide in [N*s/m], [N] and [m/s].
     """
@@ -50,7 +50,7 @@ class Friction(Law):
         r"\epsilon_{INDEX}",
         "EXAMPLE",
         when="required with `AMOUNT`, else refused",
-        remedy="give a small rate: within it friction grows, beyond it the friction is whole",
+        remedy="give a small rate: below it friction grows, above it friction is full",
     )
 
     @classmethod
@@ -91,9 +91,9 @@ class Friction(Law):
         return f", {' and '.join(parts)}"
 
     def usual(self, driver: Driver) -> Iterable[UsualInfo]:
-        """At a constant speed of the drive friction turns round well below it: above it is mostly viscous."""
+        """The smoothing rate is far below a constant speed of the drive; above that friction is mostly viscous."""
         if self.smoothing is not None and driver.torque is None and self.smoothing.unit == driver.speed.unit:
-            hint = "Coulomb friction is whole only at rates well above it: give a smaller one."
+            hint = "Coulomb friction is full only at rates well above it: give a smaller one."
             yield UsualInfo(names=(self.smoothing.path,), least=None, most=0.1, of=driver.speed.path, hint=hint)
 
 

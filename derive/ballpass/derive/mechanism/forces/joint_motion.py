@@ -1,4 +1,4 @@
-"""Pathways: what a joint lets its two bodies do, turn against each other or slide along each other."""
+"""Pathways: the relative motion that a joint allows, the angle of a hinge or the distance along a guide."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class JointMotion(Pathway):
     )
 
     def act(self, force: Force, setting: Setting) -> Action:
-        """Rate of the joint, and what an amount does to its bodies."""
+        """Rate of the joint, and the loads on its bodies by an amount."""
         joints = {joint.name: joint for joint in setting.mechanism.joints}
         joint = joints.get(self.joint)
         if joint is None or joint.kind != self.kind:
@@ -68,7 +68,7 @@ class JointTurn(JointMotion):
     )
 
     def along(self, joint: Joint, setting: Setting) -> Action:
-        """Relative angular velocity; no play of the joint changes it."""
+        """Relative angular velocity; play of the joint does not change it."""
         one, two = (setting.linkage.pose(body) for body in joint.bodies)
         return Action(
             loads=lambda torque: tuple(

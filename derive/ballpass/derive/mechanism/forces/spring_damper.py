@@ -22,8 +22,8 @@ from ballpass.derive.variables import Output
 class SpringDamper(Law):
     """``preload + stiffness * x + cubic_stiffness * x**3 + damping * rate``, with x = size - free size.
 
-    What the scene does not name has no term.  Along a line in [N], [N/m], [N/m^3], [N*s/m] and [m]; between two bodies
-    in [N*m], [N*m/rad], [N*m/rad^3], [N*m*s/rad] and [rad].
+    Terms that the scene does not name are zero.  Along a line in [N], [N/m], [N/m^3], [N*s/m] and [m]; between two
+    bodies in [N*m], [N*m/rad], [N*m/rad^3], [N*m*s/rad] and [rad].
     """
 
     stiffness: SceneNumber | None = not_negative(
@@ -104,7 +104,7 @@ class SpringDamper(Law):
                 rf"\dot\Delta_{{{mark}}}",
             )
             terms.append(symbol_of(self.damping) * rate)
-            taken, words = symbol_of(self.damping) * rate**2, f"What the damper of {force.name} takes"
+            taken, words = symbol_of(self.damping) * rate**2, f"Power loss of the damper of {force.name}"
             setting.requested.append(Output(name=f"{label}.loss", expression=taken, unit="W", description=words))
         words = f"{measure.amount} of {force.name}, spring and damper"
         amount = ledger.define(f"{label}.{measure.amount}", sp.Add(*terms), measure.amount_unit, words, f"F_{{{mark}}}")

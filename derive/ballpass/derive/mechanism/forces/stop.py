@@ -42,7 +42,7 @@ class Stop(Law):
     )
 
     def amount(self, force: Force, action: Action, setting: Setting) -> sp.Expr:
-        """What the stop pushes, as a tension: negative."""
+        """Force of the stop as a tension: negative."""
         measure, label, mark = force.pathway.measure, force.label, subscript(force.name)
         assert action.excess is not None
         assert action.rate is not None

@@ -1,4 +1,4 @@
-"""Law: what the pathway names acts within windows of the driver's angle."""
+"""Law: the force or torque of the pathway acts within windows of the driver's angle."""
 
 from __future__ import annotations
 

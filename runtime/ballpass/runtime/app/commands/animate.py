@@ -46,7 +46,7 @@ def animate(
     """Simulate a scene and write its last turn as a moving picture: linkage, bearings, forces and signals.
 
     The page has a slider, ball forces as colours, arrows of the reactions, and signals with a cursor. Open it in a
-    browser; a place in the turn can be named behind its address: animation.html#angle=90.
+    browser; its address takes an angle of the turn: animation.html#angle=90.
     """
     with command(scene) as stages:
         stages("read")
@@ -55,7 +55,7 @@ def animate(
         if format_ != "html":
             from ballpass.runtime.plot.animate import count_pictures
 
-            count_pictures(f".{format_}", last, pictures)  # what cannot be made is refused before anything is simulated
+            count_pictures(f".{format_}", last, pictures)  # impossible requests: refused before the simulation
         asked = read_asked(scene, set_, duration, transient)
         folder = results_folder(out, scene)
         path = folder / f"animation.{format_}"

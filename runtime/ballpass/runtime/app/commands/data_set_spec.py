@@ -1,4 +1,4 @@
-"""A file that says what a data set is made of, as ``ballpass dataset`` reads it.
+"""Read the specification of a data set, for ``ballpass dataset``.
 
 In: the path of a TOML file.  Out: a `DataSetSpec`: scenes, distributions and what is recorded, in SI, all checked.  The
 schema is in `docs/reference/data_sets.md`.  `ballpass.derive` is imported inside functions.
@@ -56,7 +56,7 @@ class DataSetSpec:
 
 
 def read_spec(path: Path) -> DataSetSpec:
-    """Read the specification of a data set, and the scenes it names; scenes lie beside it unless a path says more.
+    """Read the specification of a data set, and the scenes it names; scenes lie in its folder unless a path is given.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def read_spec(path: Path) -> DataSetSpec:
         if found and not any(scene is None or name in units for scene, _, _, units in found):
             known = sorted({key for _, _, _, units in found for key in units})
             collector.faults.append(_unknown(f'parameters."{name}"', name, known))
-    if collector.faults or signals is None:  # a fault of what classes share is found with each
+    if collector.faults or signals is None:  # a fault of shared keys is found with each class
         raise SceneError(dict.fromkeys(collector.lines.place(collector.faults)), source=path)
     specs = [
         ClassSpec(label=label, scene=scene, members=members, parameters=parameters)
@@ -110,7 +110,7 @@ def read_spec(path: Path) -> DataSetSpec:
 
 
 def _read_signals(root: Table) -> tuple[Signals | None, list[str]]:
-    """What is recorded, and the names of the outputs; None where something is wrong."""
+    """The signals to record, and the names of the outputs; None where something is wrong."""
     from ballpass.derive.scene.keys import ChoiceKey, QuantityKey
 
     before = len(root.collector.faults)
@@ -145,7 +145,7 @@ def _read_signals(root: Table) -> tuple[Signals | None, list[str]]:
 
 
 def _names(root: Table, key: str, example: str) -> Any:
-    """A list of names; what is none is reported."""
+    """A list of names; anything else is reported."""
     given = root.take(key, example)
     if given is not None and not (isinstance(given, list) and given and all(isinstance(name, str) for name in given)):
         allowed = f"a list of names such as {example}"

@@ -34,9 +34,9 @@ def dataset(
     workers: options.Workers = None,
     json_: options.Json = False,
 ) -> None:
-    """Make a data set of labelled signals, or what is missing of it: a second call goes on where the first one ended.
+    """Make a data set of labelled signals, or its missing part: a second call continues where the first one ended.
 
-    A member that fails is named and has NaN for samples; the others are kept. Exit code 1 where all fail.
+    A member that fails is named and has NaN for samples; the others are kept. Exit code 1 if all fail.
     """
     with command() as stages:
         stages("read")

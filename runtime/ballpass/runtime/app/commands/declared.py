@@ -50,7 +50,7 @@ def as_command(function: Callable[..., None]) -> Callable[..., None]:
 
 
 def question_command(ask: Callable[..., Any]) -> Callable[..., None]:
-    """The command of a question: a scene, the question's options, and what becomes of the report."""
+    """The command of a question: a scene, the question's options, and the options of the report."""
     question, kinds = declared(ask), options_of(ask)
     own = inspect.signature(ask).parameters
     parameters = [
@@ -89,12 +89,12 @@ def _read(kinds: Mapping[str, tuple[Any, Option]], given: Mapping[str, Any]) -> 
             values[name] = _band(flag, text, option)
         else:
             value = read_value(flag, text, option.unit)
-            # the unit was written out, so that many turns are meant as such
+            # the unit was written, so that a number of many turns is meant
             values[name] = math.fmod(value, math.tau) if option.unit == "rad" else value
     for pair in (("cycles", "duration"), ("turns", "cycles"), ("turns", "duration"), ("crank_angle", "t")):
         if all(values.get(name) is not None for name in pair):
             both = " and ".join(kinds[name][1].flag(name) for name in pair)
-            raise RequestError(f"{both} were both given. Allowed: one of them. Leave one away.")
+            raise RequestError(f"{both} were both given. Allowed: one of them. Omit one.")
     flags = {option.flag(name): option for name, (_, option) in kinds.items()}
     refuse_faults(flags, {option.flag(name): values[name] for name, (_, option) in kinds.items()})
     return values
@@ -114,7 +114,7 @@ def _band(flag: str, text: str, option: Option) -> tuple[float, float]:
 
 
 def _typer_option(parameter: inspect.Parameter, kind: Any, option: Option) -> inspect.Parameter:
-    """The parameter as typer takes it: quantities are texts, and what may be repeated is a list."""
+    """The parameter as typer takes it: quantities are texts, and repeated options are lists."""
     required = parameter.default is inspect.Parameter.empty
     if is_of(kind, Sequence):
         kind = list[str] if required else list[str] | None
@@ -151,7 +151,7 @@ def _ask(
     figures: bool = True,
     format_: list[str] | None = None,
 ) -> None:
-    """Ask, write and print."""
+    """Run the question, write and print."""
     with command(scene) as stages:
         if question.check is not None:
             question.check(values)
@@ -208,12 +208,12 @@ def _place(
 def _source(
     question: Question, scene: Path, set_: list[str] | None, values: Mapping[str, Any], stages: Stages
 ) -> tuple[Any, dict[str, float]]:
-    """What is asked, the scene's model or the run in a file, and numbers of ``--set``."""
+    """The scene's model or the run in a file, and numbers of ``--set``."""
     if question.takes_runs and scene.suffix == ".nc":
         from ballpass.runtime.run.solution_file import load_solution
 
         if set_:
-            raise RequestError(f"--set: {scene} holds a run that is done. Allowed: a scene. Leave --set away.")
+            raise RequestError(f"--set: {scene} holds a finished run. Allowed: a scene. Omit --set.")
         return load_solution(scene), {}
     asked = read_asked(scene, set_, values.get("duration"), values.get("transient"))
     method = (values.get("method") or asked.run.method) if question.runs else "none"
@@ -222,7 +222,7 @@ def _source(
 
 
 def _progress(stages: Stages) -> Callable[..., None]:
-    """Told a finished fraction, and words in front of it by calls with several stages."""
+    """Called with the finished fraction, after words by calls with several stages."""
     begun: list[str] = []
 
     def tell(*told: Any) -> None:

@@ -1,4 +1,4 @@
-"""``ballpass explain``: what a scene models and why, what it does not, what that costs, and what it means for a run."""
+"""``ballpass explain``: what a scene models and what it leaves out, the reasons, the cost, and the effects on a run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 #: Names of derivatives and of the values that they are taken of, which the table sums up.
 _DERIVATIVE = re.compile(r"_jac(_[a-z])?$|_tangent$|_quantities$|^static_forces$")
 
-#: What no scene can ask for; said, so that nobody takes the model for more than it is.
+#: Effects that no scene can ask for; listed to show the limits of the model.
 _NEVER = (
     "lubricant film and friction of the contacts",
     "slip of the cage and of the balls; their inertia and centrifugal force",
@@ -33,7 +33,7 @@ _NEVER = (
 
 
 def explain(scene: options.SceneFile, set_: options.Settings = None, json_: options.Json = False) -> None:
-    """Say what a scene models and which of its lines asked for it, what it does not, the cost of each part, and the
+    """Say what a scene models and which of its lines asked for it, what it leaves out, the cost of each part, and the
     time scales that decide about the method. Simulates nothing."""
     with command(scene) as stages:
         stages("read")
@@ -43,7 +43,7 @@ def explain(scene: options.SceneFile, set_: options.Settings = None, json_: opti
 
         stages("counting operations")
         counted = cost(read)
-        stages("looking at time scales")
+        stages("computing time scales")
         said = model.explain(overrides)
     report = _report(scene, read, counted, said, model.manifest)
     if json_:
@@ -53,7 +53,7 @@ def explain(scene: options.SceneFile, set_: options.Settings = None, json_: opti
 
 
 def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest: Manifest) -> dict[str, Any]:
-    """All that is said, as plain numbers and text; angles in degrees, everything else SI."""
+    """The whole report as plain numbers and text; angles in degrees, everything else SI."""
     from ballpass.derive.features import features
     from ballpass.derive.scene.toml_lines import index_lines
 
@@ -66,7 +66,7 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
     contacts = [f"{bearing.path}.contact" for bearing in scene.bearings]
     for part in named:
         added = counted.added.get(part.name)
-        # of several bearings the last one's row has what all of them share
+        # of several bearings the row of the last one has their common operations
         rest = added is None and part.path in contacts[-1:] and "rhs" in counted.functions
         parts.append(
             {
@@ -92,7 +92,7 @@ def _report(path: Path, scene: Scene, counted: Cost, said: Explanation, manifest
 
 
 def _rest(shares: list[tuple[str, int]], counted: Cost) -> int:
-    """Operations of the right-hand side that no part adds by itself; a part within another counts with that one."""
+    """Operations of the right-hand side that belong to no single part; a part within another counts with that one."""
     paths = [path for path, _ in shares]
     within = [any(path.startswith(f"{other}.") for other in paths) for path in paths]
     return counted.functions["rhs"] - sum(v for (_, v), inner in zip(shares, within, strict=True) if not inner)
@@ -113,13 +113,13 @@ def _step(kernels: dict[str, int], bearings: Sequence[Bearing]) -> dict[str, int
 
 
 def _of_drive(scene: Scene) -> list[str]:
-    """What a drive at constant speed leaves out."""
+    """Effects that a drive at constant speed leaves out."""
     uneven = scene.mechanism is not None and scene.mechanism.driver.turns_unevenly
     return [] if uneven else ["variation of the drive's speed"]
 
 
 def _absent(scene: Scene) -> list[str]:
-    """What this scene could name and does not, and how it would."""
+    """Effects that this scene leaves out, and the keys that would add them."""
     from ballpass.derive.bearing.effects import EFFECTS
 
     out = []

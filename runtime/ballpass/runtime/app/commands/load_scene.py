@@ -1,4 +1,4 @@
-"""What a command was asked for: numbers of ``--set`` and other options, checked before anything is derived.
+"""Read a scene with the numbers of ``--set`` and other options, all checked before anything is derived.
 
 In: a scene file and texts.  Out: values in SI.  `ballpass.derive` is imported inside functions, where it is needed.
 """
@@ -36,11 +36,11 @@ RUN_OPTIONS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """What a command needs of a scene before it has a model.
+    """Data of a scene that a command needs before it has a model.
 
     Attributes
     ----------
-    run : its run settings, with what was asked for instead
+    run : its run settings, with the options of the command applied
     overrides : numbers of ``--set`` by path [SI]
     speed : of driver or shaft, with the overrides; 0 where nothing turns [rad/s]
     """
@@ -53,10 +53,10 @@ class Asked:
 def read_asked(
     path: Path, settings: list[str] | None, duration: float | None = None, transient: float | None = None
 ) -> Asked:
-    """What is asked of a scene by ``--set``, ``--duration`` [s] and ``--transient`` [turns].
+    """Read a scene with ``--set``, ``--duration`` [s] and ``--transient`` [turns] applied.
 
-    Where the generated folder is fresh its manifest tells all that is needed; the scene is read where it is not, and
-    where something is wrong, to say so in the scene's words.  A generated folder may stand in place of the scene.
+    Where the generated folder is fresh its manifest has all that is needed; else, and where something is wrong, the
+    scene is read, so that the message has the line of the file.  A generated folder may stand in place of the scene.
     """
     if path.is_dir():
         present = read_manifest(path)
@@ -104,14 +104,14 @@ def _overrides_of(manifest: Manifest, settings: list[str]) -> dict[str, float]:
         if path not in units:
             raise RequestError(f"--set {text}: {unknown_name('parameter', path, units)}")
         if path in found:
-            raise RequestError(f"--set {path}: the number is set twice. Allowed: one value. Leave one --set away.")
+            raise RequestError(f"--set {path}: the number is set twice. Allowed: one value. Omit one --set.")
         found[path] = read_value(f"--set {path}", value, units[path])
     resolve_parameters(manifest, found)
     return found
 
 
 def read_value(option: str, text: str, unit: str) -> float:
-    """What an option gives [unit]; with the units that pint knows where it is there."""
+    """Value of an option [unit]; all units of pint where it is installed."""
     from ballpass.runtime.contract.units import QuantityError, parse_quantity
 
     try:
@@ -137,7 +137,7 @@ def _asked_run(run: _Run, duration: float | None, transient: float | None) -> _R
 
 
 def _plain_overrides(manifest: Manifest, settings: list[str]) -> dict[str, float] | None:
-    """Numbers of ``--set`` by path, where the manifest's bounds alone tell that they are right; else None."""
+    """Numbers of ``--set`` by path, where the manifest's bounds alone show that they are right; else None."""
     # ends of windows and knots of tables are checked against each other when a scene is read
     paths = [text.partition("=")[0].strip() for text in settings]
     if any("window" in path or path.startswith(("load.", "loads.")) for path in paths):
@@ -180,7 +180,7 @@ def read_with_settings(
                     problem="the number is set twice",
                     given=f"{texts[name]} and {given}",
                     allowed="one value for a number",
-                    remedy="leave one --set away",
+                    remedy="omit one --set",
                 )
             )
         overrides[name], texts[name] = value, given

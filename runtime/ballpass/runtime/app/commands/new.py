@@ -34,11 +34,11 @@ def new(
         ),
     ] = None,
     folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Folder to copy it to, made where it is not there.")
+        Path, typer.Argument(metavar="DIR", help="Folder to copy it to; made if it does not exist.")
     ] = Path(),
     list_: Annotated[bool, typer.Option("--list", help="Print the names and titles of all scenes.")] = False,
 ) -> None:
-    """Copy a scene that comes with ballpass into a folder. A file that is there is left as it is."""
+    """Copy a scene that comes with ballpass into a folder. An existing file is not overwritten."""
     with command():
         from ballpass.derive.scene.shipped import shipped_scenes, title_of
 
@@ -55,8 +55,8 @@ def new(
             raise RequestError(f"new: {unknown_name('scene', name, scenes)}")
         if folder.suffix == ".toml" or folder.is_file():
             raise RequestError(
-                f"new: {folder} is to be the folder that the copy, {source.name}, is written into. Allowed: a folder, "
-                "there or not. Copy first and rename the file then."
+                f"new: {folder} must be the folder for the copy, {source.name}. Allowed: a folder, "
+                "existing or not. Copy first and rename the file then."
             )
         folder.mkdir(parents=True, exist_ok=True)
         target = folder / source.name
@@ -65,7 +65,7 @@ def new(
                 copy.write(source.read_text(encoding="utf-8"))
         except FileExistsError:
             raise RequestError(
-                f"{target} is there already and is left as it is. Allowed: a folder without it. Give another folder, "
+                f"{target} exists already and was not overwritten. Allowed: a folder without it. Give another folder, "
                 "or move the file."
             ) from None
         show(f"{target}\nNext: ballpass run {shlex.quote(str(target))}")

@@ -15,13 +15,13 @@ SceneFile = Annotated[
     Path, typer.Argument(metavar="SCENE", help="Scene file (TOML); `ballpass new` copies one.", show_default=False)
 ]
 
-#: Of commands that need only what `ballpass derive` wrote.
+#: Of commands that need only the generated folder.
 SceneOrFolder = Annotated[
     Path,
     typer.Argument(metavar="SCENE", help="Scene file (TOML), or a generated folder in its place.", show_default=False),
 ]
 
-#: Of questions that take a run that is done as well.
+#: Of questions that also take a finished run.
 SceneFolderOrRun = Annotated[
     Path,
     typer.Argument(
@@ -64,9 +64,7 @@ FigureFormats = Annotated[
 
 Scheduler = Annotated[
     str | None,
-    typer.Option(metavar="ADDRESS", help="Let the workers of this scheduler of Dask do it: tcp://192.168.0.10:8786."),
+    typer.Option(metavar="ADDRESS", help="Run on the workers of this Dask scheduler: tcp://192.168.0.10:8786."),
 ]
 
-Workers = Annotated[
-    int | None, typer.Option(metavar="N", help="Let N processes of a Dask cluster on this machine do it.")
-]
+Workers = Annotated[int | None, typer.Option(metavar="N", help="Run on N processes of a Dask cluster on this machine.")]

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 #: Most members of a sweep.
 MOST = 1_000_000
 
-#: The number of a quantity; what stands behind it is its unit.
+#: The number of a quantity; its unit follows.
 _NUMBER = re.compile(r"\s*[+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?")
 
 _EXAMPLE = '--vary bearing.clearance="5 um:40 um:8"'
@@ -62,7 +62,7 @@ class Range:
 
 
 class _SceneNumbers:
-    """The numbers of a scene: what ranges are checked with, and how faults are said."""
+    """The numbers of a scene: checks of ranges, and the messages of their faults."""
 
     def __init__(self, scene: Scene) -> None:
         from ballpass.derive.reading.values import value_bounds
@@ -90,7 +90,7 @@ class _SceneNumbers:
         return SceneError(faults, source="--vary")
 
     def check(self, path: str) -> None:
-        """Structure and settings of the run are no numbers of the model."""
+        """Refuse structure and settings of the run: they are not numbers of the model."""
         from ballpass.derive.reading.values import check_path
 
         refuse_run_setting(path)
@@ -131,7 +131,7 @@ class _ModelNumbers:
             raise RequestError(f"--vary: {unknown_name('parameter', path, self.units)}")
 
     def group(self, path: str, name: str) -> tuple[float, ...] | None:
-        """Groups of clearance stand in the table of bearings, which the runtime has not."""
+        """None: groups of clearance are in the table of bearings, which the runtime does not have."""
         return None
 
     def value(self, path: str, text: str) -> float:
@@ -168,7 +168,7 @@ def read_ranges(source: Scene | Manifest, texts: Sequence[str], settings: Mappin
         if path in settings or path in seen:
             other = f"--vary {seen[path]}" if path in seen else f"--set {path}"
             given = f"--vary {text} and {other}"
-            allowed, remedy = "one range or one value for a number", "leave one of them away"
+            allowed, remedy = "one range or one value for a number", "omit one of them"
             errors.append(numbers.fault(path, "the number is given twice", given, allowed, remedy))
             continue
         seen[path] = text
@@ -207,19 +207,19 @@ def _read_range(numbers: _SceneNumbers | _ModelNumbers, text: str) -> Range:
         parts = [*(f"{1e6 * end:.12g} um" for end in group), parts[1]]
     logarithmic = len(parts) == 4 and parts[3] == "log"
     whole = bool(equals) and (len(parts) == 3 or logarithmic)
-    require(whole, "this is no range", "PATH=A:B:N or PATH=A:B:N:log", f"write it as in {_EXAMPLE}")
+    require(whole, "this is not a range", "PATH=A:B:N or PATH=A:B:N:log", f"write it as in {_EXAMPLE}")
     ends = tuple(numbers.value(path, end) for end in parts[:2])
     count = int(parts[2]) if re.fullmatch(r"[0-9]{1,18}", parts[2]) else 0
-    remedy = f"write a count behind the ends, as in {_EXAMPLE}"
+    remedy = f"write a count after the ends, as in {_EXAMPLE}"
     require(count >= 2, "the count of values is wrong", "a whole number from 2 on", remedy)
     remedy = f'for one value write --set {path}="{parts[0]}"'
     require(ends[0] != ends[1], "both ends are the same", "two ends that differ", remedy)
-    remedy = 'leave ":log" away: equal steps instead'
+    remedy = 'omit ":log" for equal steps'
     positive = not logarithmic or min(ends) > 0.0
     require(positive, "numbers from zero down have no logarithm", "two ends above zero", remedy)
     require(count <= MOST, "these are too many values", f"at most {MOST}", "take fewer values")
     bounds = numbers.bounds.get(path)
-    if bounds is not None:  # what lies between the ends is then within them as well
+    if bounds is not None:  # values between the ends are then within the bounds as well
         problem, allowed = "an end lies outside the bounds of this number", f"numbers {bounds_text(bounds)}"
         require(not outside(bounds, np.array(ends)).any(), problem, allowed, "give other ends")
     unit = numbers.units[path]

@@ -1,4 +1,4 @@
-"""What the commands of ``ballpass`` share: errors as messages, stages on stderr, folders, loading a model.
+"""Functions that the commands of ``ballpass`` share: errors as messages, stages on stderr, folders, loading a model.
 
 Like every module here it serves both halves and imports `ballpass.derive` inside functions.  Messages and
 progress go to stderr, results to stdout.  Exit codes: 0 done, 1 the computation failed, 2 the request was wrong, 130
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ballpass.runtime.model import Model
     from ballpass.runtime.run.locating import Kinks
 
-errors_console = Console(stderr=True, emoji=False)  # A:B:N is no picture
+errors_console = Console(stderr=True, emoji=False)  # A:B:N is not an emoji
 
 #: Times that a folder is derived and read while another process writes its own scene there.
 ATTEMPTS = 100
@@ -97,7 +97,7 @@ def command(scene: Path | None = None) -> Iterator[Stages]:
             raise
         complain(NO_DERIVE)
         raise typer.Exit(2) from None
-    except BrokenPipeError:  # the reader has seen enough, as in `ballpass equations SCENE | head`
+    except BrokenPipeError:  # the reader has closed the pipe, as in `ballpass equations SCENE | head`
         raise
     except OSError as error:
         where = f" {os.fspath(error.filename)!r}" if error.filename else ""
@@ -155,7 +155,7 @@ class Stages:
     """Progress on stderr: on a terminal bars that move, elsewhere one line when a stage begins."""
 
     def __init__(self) -> None:
-        # rich's own answer is yes under FORCE_COLOR, also for a file
+        # with FORCE_COLOR rich takes a file for a terminal as well
         self._moving = sys.stderr.isatty() and errors_console.is_interactive
         self._progress = Progress(
             SpinnerColumn(),
@@ -214,7 +214,7 @@ def generated_folder(scene: Path) -> Path:
 
 
 def can_draw() -> bool:
-    """Whether figures can be drawn; says what is missing where they cannot."""
+    """Whether figures can be drawn; a message names the missing package where they cannot."""
     for package in ("matplotlib", "scipy"):
         if not is_installed(package):
             note(f"No figures are drawn. {missing(package)}")
@@ -230,13 +230,13 @@ def results_folder(out: Path | None, scene: Path) -> Path:
 
 
 def check_folder(folder: Path) -> None:
-    """Refuse a folder of results that cannot be made or written, before the simulation instead of behind it."""
+    """Refuse a folder of results that cannot be made or written, before the simulation instead of after it."""
     place = folder.absolute()
     while not os.path.lexists(place):
         place = place.parent
     why = None
     if not place.is_dir():
-        why = f"{place} is no folder"
+        why = f"{place} is not a folder"
     elif not os.access(place, os.W_OK | os.X_OK):
         why = f"{place} may not be written"
     if why is not None:
@@ -247,7 +247,7 @@ def check_folder(folder: Path) -> None:
 
 
 def checked_kinks(kinks: str | None, method: str, error: str | None = None) -> Kinks | None:
-    """What to do at kinks; what no run can do is refused before anything is derived or written."""
+    """What to do at kinks; impossible choices are refused before anything is derived or written."""
     from ballpass.runtime.run.locating import check_located, refuse_with_error
 
     refuse_with_error(kinks, error)
@@ -257,14 +257,14 @@ def checked_kinks(kinks: str | None, method: str, error: str | None = None) -> K
 def read_own(
     scene: Path, stages: Stages, read: Callable[[Path], _Read], manifest: Callable[[_Read], Manifest]
 ) -> _Read:
-    """What `read` gives of the scene's folder, derived where it is stale; of a generated folder, as it is.
+    """Result of `read` for the scene's folder, derived where it is stale; a generated folder is read as it is.
 
     Scenes of one file name in different folders share a generated folder: where another process has written its own
     scene there between writing and reading, both are done again.
 
     Parameters
     ----------
-    manifest : of what was read
+    manifest : function that gives the manifest of the result
     """
     if scene.is_dir():
         return read(scene)

@@ -1,7 +1,7 @@
 """`ballpass export --fmu --input mechanism.driver.speed` where the scene's driver turns at constant speed.
 
-In: a scene file.  Out: a generated folder of the same scene with the driver's speed as a table over time, which has the
-driver's angle and speed as states, and an acceleration for a speed that changes.  The table's rows are equal.
+In: a scene file.  Out: a generated folder of the same scene with the driver's speed as a table over time, whose rows
+are equal.  There the driver's angle and speed are states, so that the speed may change.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ballpass.runtime.export.model_description import SPEED
 
 
 def speed_becomes_input(manifest: Manifest, inputs: Sequence[str]) -> bool:
-    """Whether these are to be inputs of a scene whose driver's speed is constant, and that speed is among them."""
+    """Whether the inputs include the driver's speed of a scene in which that speed is constant."""
     mechanism = manifest.mechanism
     return mechanism is not None and not mechanism.angle and not {SPEED, "mechanism.driver"}.isdisjoint(inputs)
 
@@ -30,7 +30,7 @@ def with_speed_over_time(scene: Path, stages: Stages) -> Iterator[Path]:
     Raises
     ------
     RequestError
-        The scene has what a driver with a table of its speed cannot have.
+        The scene has a feature that a driver with a table of its speed does not allow.
     """
     from ballpass.derive import SceneError, generate, read_scene
 
@@ -45,7 +45,7 @@ def with_speed_over_time(scene: Path, stages: Stages) -> Iterator[Path]:
     except SceneError as error:
         raise RequestError(
             f"input {SPEED!r}: with a speed that changes, here [mechanism.driver.table], this scene is refused. Leave "
-            f"the speed a parameter, or mend this:\n{error}"
+            f"the speed a parameter, or correct this:\n{error}"
         ) from error
     with tempfile.TemporaryDirectory() as place:
         yield generate(changed, Path(place) / scene.stem, progress=stages)

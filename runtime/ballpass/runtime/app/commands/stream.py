@@ -26,7 +26,7 @@ def stream(
     set_: options.Settings = None,
     rtol: Rtol = None,
 ) -> None:
-    """Simulate into a file, piece by piece, however long; ballpass spectrum and ballpass run --initial read it."""
+    """Simulate into a file, piece by piece, for any length; ballpass spectrum and ballpass run --initial read it."""
     with command(scene) as stages:
         stages("read")
         asked = read_asked(scene, set_, duration)

@@ -39,13 +39,13 @@ if TYPE_CHECKING:
     from ballpass.derive import Scene
     from ballpass.runtime.contract import Manifest
 
-#: Members that the terminal shows one by one; of more, the extremes.
+#: Most members that the terminal shows one by one; of more only the extremes.
 ROWS = 24
 
 #: Failures that the terminal names; all are in the files.
 NAMED = 5
 
-#: Members up to which each is run twice where nothing else is said, to see whether its numbers have digits.
+#: Up to so many members each is run twice by default, to see whether its numbers have digits.
 TWINS = 1000
 
 
@@ -56,7 +56,7 @@ def sweep(
         typer.Option(
             metavar="PATH=A:B:N",
             help='N values of a number of the scene from A to B: --vary bearing.clearance="5 um:40 um:8". '
-            "With :log behind N they are spaced by a factor. May be repeated: all combinations run.",
+            "With :log after N they are spaced by a factor. May be repeated: all combinations run.",
         ),
     ] = None,
     of: Annotated[
@@ -104,7 +104,7 @@ def sweep(
 ) -> None:
     """Run a scene for all values of one or more of its numbers; write table, grid and figures.
 
-    A member that fails is named and has no number in its place; the others are kept. Exit code 1 where all fail.
+    A member that fails is named and has no number in its place; the others are kept. Exit code 1 if all fail.
     """
     import numpy as np
 
@@ -175,7 +175,7 @@ def sweep(
     if swept.uncertain:
         warn(
             f"{len(swept.uncertain)} of {count} members amplify small errors: a start moved by the tolerance changes "
-            f"numbers marked ~ by more than four digits bear. First: {swept.place(min(swept.uncertain))}. Take "
+            f"numbers marked ~ in their first four digits. First: {swept.place(min(swept.uncertain))}. Take "
             "statistics over more turns (--cycles), and compare no single extremes of them."
         )
     if result.interrupted:

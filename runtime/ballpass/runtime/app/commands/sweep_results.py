@@ -1,4 +1,4 @@
-"""What a sweep gives: the grid as a dataset, the table, the report, figures, and tables for the terminal."""
+"""Results of a sweep: the grid as a dataset, the table, the report, figures, and tables for the terminal."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Sweep:
         return self.result.attributes()
 
     def grid(self) -> bytes:
-        """A NetCDF-4 file with a dimension for each varied parameter; ``status`` is how each member ended."""
+        """Write a NetCDF-4 file with a dimension for each varied parameter; ``status`` says how each member ended."""
         facts = self._attributes
         paths = tuple(one.path for one in self.ranges)
         status = np.full(math.prod(self.shape), "DONE", dtype=object)
@@ -86,7 +86,7 @@ class Sweep:
         return [float(one.values[k]) for one, k in zip(self.ranges, indices, strict=True)]
 
     def place(self, member: int) -> str:
-        """Where a member lies, in words and the units of the request."""
+        """Parameters of a member, in words and the units of the request."""
         return ", ".join(
             f"{one.path} = {value / one.factor:.6g} {one.shown_unit}".removesuffix(" 1")
             for one, value in zip(self.ranges, self.point(member), strict=True)
@@ -102,7 +102,7 @@ class Sweep:
         return found
 
     def report(self) -> dict[str, Any]:
-        """What ran and what it gave, in SI; members in the order of the table."""
+        """The request and its results, in SI; members in the order of the table."""
         result = self.result
         paths = [one.path for one in self.ranges]
         return {
@@ -138,7 +138,7 @@ class Sweep:
         }
 
     def write(self, folder: Path, formats: Sequence[str]) -> list[str]:
-        """Write all files, figures of these formats, and take those of an earlier sweep away.  Returns their names."""
+        """Write all files, figures of these formats, and delete those of an earlier sweep.  Returns their names."""
 
         def write_all(made: Path) -> list[str]:
             self._write_table(made / TABLE)

@@ -1,4 +1,4 @@
-"""``ballpass trade``: what accuracy costs on a user's own scene."""
+"""``ballpass trade``: error and time of methods and tolerances on a user's scene."""
 
 from __future__ import annotations
 
@@ -95,12 +95,12 @@ def _simpler(scene: Path, against: str) -> Model:
 
 
 def read_error(text: str | None, method: str | None, rtol: float | None) -> float | None:
-    """A relative error as people write it: 1%, 1 %, 0.01.
+    """A relative error from a text: 1%, 1 %, 0.01.
 
     Raises
     ------
     RequestError
-        It is no such thing, or asked for together with a method or a tolerance.
+        The text is not an error, or a method or a tolerance is given as well.
     """
     if text is None:
         return None
@@ -114,5 +114,5 @@ def read_error(text: str | None, method: str | None, rtol: float | None) -> floa
     except ValueError:
         value = math.nan
     if not 0.0 < value < math.inf:
-        raise RequestError(f"--error: {text!r} is no relative error. Allowed: a number above 0 as 1% or 0.01.")
+        raise RequestError(f"--error: {text!r} is not a relative error. Allowed: a number above 0 as 1% or 0.01.")
     return value

@@ -18,10 +18,10 @@
 
 enum { FIRST_STATE = 1 + SCENE_PARAMETERS, FIRST_RATE = FIRST_STATE + SCENE_STATES, FIRST_OUTPUT = FIRST_RATE + SCENE_STATES };
 
-/* Where an instance is, as the standard calls it. */
+/* State of an instance, as the standard names it. */
 typedef enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, TERMINATED = 8 } mode;
 
-/* What an instance has that is kept and restored with the simulation. */
+/* Data of an instance that are kept and restored with the simulation. */
 typedef struct {
     mode where;
     int prepared; /* whether the run is begun with the values at hand */
@@ -39,7 +39,7 @@ typedef struct {
     int early_return;
 } instance_of;
 
-/* A kept state, also as it is serialized: sums of its bytes tell one that was torn or made by another FMU. */
+/* A kept state, also as it is serialized: sums of its bytes detect one that is damaged or of another FMU. */
 typedef struct {
     char token[sizeof FMU_TOKEN];
     uint64_t sum;
@@ -181,7 +181,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     if (!at) return fmi3Error;
     if (!(isfinite(startTime) && startTime >= 0.0) || (FMU_STARTS_AT_ZERO && startTime != 0.0) || (stopTimeDefined && !(stopTime > startTime && isfinite(stopTime))))
         return fail(at, "fmi3EnterInitializationMode: a run from %g s to %g s was asked for. Allowed: %s.", startTime, stopTimeDefined ? stopTime : INFINITY,
-                    FMU_STARTS_AT_ZERO ? "a start at 0, a stop behind it" : "a start from 0 on, a stop behind it");
+                    FMU_STARTS_AT_ZERO ? "a start at 0, a stop after it" : "a start from 0 on, a stop after it");
     if (toleranceDefined && !(tolerance >= 1e-13 && tolerance <= 0.1))
         return fail(at, "fmi3EnterInitializationMode: the tolerance %g was given. Allowed: a number from 1e-13 to 0.1.", tolerance);
     at->own.asked = ballpass_default(at->simulation);
@@ -334,7 +334,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     const double last = at->own.asked.end;
     if (at->own.end_known && there - last > 1e-9 * (fabs(last) + communicationStepSize))
         return fail(at, "%s: a step to %.9g s was given. Allowed: times up to the stop time, %.9g s.", call, there, last);
-    /* a driver that stays as fast as it is has the bits of one without such an input */
+    /* with an unchanged speed results equal those without such an input to the bit */
     if (FMU_DRIVEN && at->own.speed != ballpass_states(at->simulation)[scene_driver]) at->own.driven = 1;
     if (at->own.driven && answered(at, call, ballpass_drive(at->simulation, at->own.speed)) != fmi3OK) return fmi3Error;
     if (at->early_return) {
@@ -367,7 +367,7 @@ static fmi3Status seeds(instance_of *at, const char *call, const fmi3ValueRefere
         if (what == TIME) *dt += seed[k];
         else if (what == STATE) dx[first] += seed[k];
         else if (what == PARAMETER) dp[first] += seed[k];
-        else if (what == SPEED) { /* in a run it moves nothing before the next step */
+        else if (what == SPEED) { /* in a run it has no effect before the next step */
             for (int row = 0; row < FMU_SPEEDS && at->own.where == INITIALIZATION; row++) dp[fmu_table[row]] += seed[k];
         } else return fail(at, "%s: the known %u was given. Allowed: time, states, inputs and parameters.", call, (unsigned)knowns[k]);
     }
@@ -397,7 +397,7 @@ static fmi3Status ready(instance_of *at, const char *call)
 {
     double columns[1 + SCENE_STATES + SCENE_OUTPUTS];
     if (!at || prepare(at, call) != fmi3OK) return fmi3Error;
-    return answered(at, call, ballpass_read(at->simulation, columns)); /* and so values that were set have arrived */
+    return answered(at, call, ballpass_read(at->simulation, columns)); /* so that values that were set are in use */
 }
 
 /* Derivatives of unknowns along seeds of knowns. */
@@ -524,7 +524,7 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte seriali
     return fmi3OK;
 }
 
-/* what this FMU has not */
+/* functions that this FMU does not have */
 
 static fmi3Status lacks(fmi3Instance instance, const char *call, const char *what)
 {

@@ -13,10 +13,10 @@ void scene_tangent(double t, const double *x, const double *u, const double *p, 
                    const double *dp, const double *dc, double *moved);
 
 /* The same of a simulation, along a direction of time, states and parameters.  Angles of driver and cages follow the parameters that make
-   them at fixed time, but for those that may change in a run: a shaft whose speed is set turns on from where it is. */
+   them at fixed time, except for those that may change in a run: a shaft whose speed is set continues from its angle. */
 void ballpass_tangent(const ballpass *simulation, double dt, const double *dx, const double *dp, double *moved);
 
-/* Adds to a direction of the initial states what follows from one of the parameters. */
+/* Adds the effect of one of the parameters to a direction of the initial states. */
 void ballpass_initial_tangent(const ballpass *simulation, const double *dp, double *dx);
 
 #endif

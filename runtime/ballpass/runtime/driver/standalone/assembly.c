@@ -8,10 +8,10 @@
 
 static const double TURN = 6.283185307179586476925286766559;
 
-/* Angles looked at in a turn; then sweeps around the smallest, each so many times finer than the one before. */
+/* Angles checked in a turn; then sweeps around the smallest, each so many times finer than the one before. */
 enum { ANGLES = 720, SWEEPS = 3, FINE = 128 };
 
-/* A margin at a time, from the inputs at t = 0; no number is no assembly. */
+/* A margin at a time, from the inputs at t = 0; NaN: it cannot be assembled. */
 static double margin_at(const double *values, const double *inputs, int row, double time)
 {
     double margins[SCENE_MARGINS];

@@ -7,7 +7,7 @@
 /* Says which dyads cannot be assembled, and at which crank angle they are worst.
 
    values   parameters and derived constants
-   turn     time of a turn [s], or infinity: then the linkage stands as it starts */
+   turn     time of a turn [s], or infinity: then the linkage stays at its start */
 void refuse_unassembled(const double *values, double turn, ballpass_faults *faults);
 
 #endif

@@ -1,5 +1,5 @@
 /* See ballpass.h.  A run is cut into segments (schedule.h), these are integrated some hundred to a call of the stepper, and a call is paused
-   with the step that passes the time asked for: what is read has no influence on the steps. */
+   with the step that passes the time asked for: reading has no influence on the steps. */
 #include "ballpass.h"
 
 #include <math.h>
@@ -14,7 +14,7 @@
 #include "stepper.h"
 
 /* Segments of one call. */
-enum { SEGMENTS_A_CALL = 600, SCALED_TURNS = 16 }; /* turns that are looked at for the magnitudes, run/resolve.py */
+enum { SEGMENTS_A_CALL = 600, SCALED_TURNS = 16 }; /* turns for the magnitudes, as in run/resolve.py */
 
 /* Numbers that segments may take while they are sought, 4 GiB; and how many one takes, in lists that grow twofold. */
 static const double MOST_NUMBERS = 536870912.0, SEGMENT_NUMBERS = 6.0;
@@ -36,7 +36,7 @@ static const char *const STATUS[] = {
 
 enum { PLACES = SCENE_PARAMETERS + SCENE_CONSTANTS + SCENE_INPUTS, INPUTS = SCENE_INPUTS > 0 ? SCENE_INPUTS : 1 };
 
-/* All that a run is, but for what follows from it. */
+/* All independent data of a run. */
 typedef struct {
     double values[PLACES];
     int started, changed, failed;
@@ -146,7 +146,7 @@ static void refuse_outside(ballpass *s, int i, double value)
 {
     const scene_parameter *info = &scene_parameters[i];
     char allowed[200] = "a number";
-    /* not a number is no pass */
+    /* NaN does not pass */
     if (isfinite(value) && value > info->above && value >= info->least && value <= info->most && value < info->below) return;
     size_t used = strlen(allowed);
     const double bounds[] = {info->above, info->least, info->most, info->below};
@@ -175,7 +175,7 @@ int ballpass_set_at(ballpass *s, int place, double value)
         for (int k = 0; k < SCENE_INPUTS; k++) old[k] = scene_inputs[k].rate >= 0 ? values[scene_inputs[k].rate] : 0.0;
         values[place] = value;
         scene_constants(values, values + SCENE_PARAMETERS);
-        /* where a rate changes the angle goes on from where it is */
+        /* where a rate changes, the angle continues from its value */
         for (int k = 0; k < SCENE_INPUTS; k++)
             if (scene_inputs[k].rate >= 0 && values[scene_inputs[k].rate] != old[k])
                 angles[k] += (old[k] - values[scene_inputs[k].rate]) * s->run.time;
@@ -188,7 +188,7 @@ int ballpass_set_at(ballpass *s, int place, double value)
 static int refuse_name(ballpass *s, const char *name)
 {
     clear(s);
-    return refuse(s, "parameter", name, "names that ballpass_parameter tells.");
+    return refuse(s, "parameter", name, "names that ballpass_parameter returns.");
 }
 
 int ballpass_set(ballpass *s, const char *name, double value)
@@ -310,7 +310,7 @@ static void check_request(ballpass *s, const ballpass_request *asked)
     if (!(isfinite(asked->begin) && isfinite(asked->end) && asked->begin >= 0.0 && asked->end > asked->begin)) {
         const int still = !isfinite(asked->end) && !isfinite(time_of_turn(s->run.values));
         add_fault(&s->faults, "a run from %g s to %g s was asked for. Allowed: %s.", asked->begin, asked->end,
-                  still ? "a time, for nothing turns in this model (its speed is zero)" : "finite times, from 0 on, the end behind the begin");
+                  still ? "a time, for nothing turns in this model (its speed is zero)" : "finite times, from 0 on, the end after the begin");
     }
     if (!(asked->rtol >= SMALLEST_RTOL && asked->rtol <= LARGEST_RTOL))
         add_fault(&s->faults, "tolerance: %g was given. Allowed: a number from 1e-13 to 0.1.", asked->rtol);
@@ -400,7 +400,7 @@ static int start_anew(ballpass *s, double end)
     return BALLPASS_OK;
 }
 
-/* As long again behind the end, and twice that the next time: where does not depend on the times that are asked for. */
+/* As long again after the end, and twice that the next time: independent of the times that are asked for. */
 static int go_beyond(ballpass *s)
 {
     const double end = s->run.asked.end + s->run.farther;
@@ -413,10 +413,10 @@ static int run_call(ballpass *s, double time)
 {
     run_state *r = &s->run;
     const double *edges = s->edges + r->first, *p = r->values, *c = r->values + SCENE_PARAMETERS;
-    /* a time that rounding puts beside an edge lies on it */
+    /* a time beside an edge by rounding lies on it */
     const double wanted = time < edges[0] ? edges[0] : time > edges[r->segments] ? edges[r->segments] : time;
     const double length = r->asked.end - r->asked.begin;
-    /* far above what any method needs that fits the model: what meets it crawls */
+    /* far above the steps of any suitable method */
     const double steps = 2e7 + 1e7 * ceil(length / time_of_turn(r->values)) + 1e6 * length;
     const ballpass_options options = {.method = r->asked.method,
                                       .max_steps = steps < 2e9 ? (long)steps : 2000000000L,
@@ -512,7 +512,7 @@ int ballpass_run_to(ballpass *s, double time)
     return fault;
 }
 
-/* What is read */
+/* Reading */
 
 int ballpass_columns(void) { return 1 + SCENE_STATES + SCENE_OUTPUTS; }
 

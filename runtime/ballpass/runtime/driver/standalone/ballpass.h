@@ -11,7 +11,7 @@
        ballpass_free(press);
 
    Any number of instances, each of them for one thread at a time; there is no static state.  How often a run is read does not change it:
-   it has the bits of a run of the same length in one go.  For C99 and C++. */
+   its results equal those of an uninterrupted run to the bit.  For C99 and C++. */
 #ifndef BALLPASS_H
 #define BALLPASS_H
 
@@ -24,10 +24,10 @@ extern "C" {
 /* One simulation of the scene. */
 typedef struct ballpass ballpass;
 
-/* What a call returns; of all but BALLPASS_OK, ballpass_error tells the reason. */
+/* Result of a call; for all but BALLPASS_OK, ballpass_error has the reason. */
 enum ballpass_answer {
     BALLPASS_OK = 0,
-    BALLPASS_FAILED = 1, /* the computation cannot go on: the motion is no longer finite, memory is short, ... */
+    BALLPASS_FAILED = 1, /* the computation failed: the motion is no longer finite, the memory is too small, ... */
     BALLPASS_REFUSED = 2 /* a name, number or order of calls that is not allowed; nothing was changed */
 };
 
@@ -39,7 +39,7 @@ typedef struct {
     int located;       /* 1: steps end on the kinks of the laws; 0: they are stepped over; -1: as in Python, by the tolerance */
 } ballpass_request;
 
-/* A new instance with the scene's parameters; NULL where memory is short.  Free it with ballpass_free, which takes NULL as well. */
+/* A new instance with the scene's parameters; NULL where the memory is too small.  Free it with ballpass_free, which takes NULL as well. */
 ballpass *ballpass_make(void);
 void ballpass_free(ballpass *simulation);
 
@@ -49,7 +49,7 @@ const char *ballpass_parameter(int place, const char **unit, const char **descri
 int ballpass_place(const char *name);
 
 /* Value of a parameter [SI].  Before ballpass_start any may be set; in a run those that ballpass_varies names: forces, torques, loads,
-   speed of a shaft.  They hold from the time reached on; a shaft whose speed is set turns on from the angle that it has. */
+   speed of a shaft.  They hold from the time reached on; a shaft whose speed is set continues from its angle. */
 int ballpass_set(ballpass *simulation, const char *name, double value);
 int ballpass_set_at(ballpass *simulation, int place, double value);
 int ballpass_get(ballpass *simulation, const char *name, double *value);
@@ -67,7 +67,7 @@ ballpass_request ballpass_default(const ballpass *simulation);
    instance may be started again, with the parameters that it has. */
 int ballpass_start(ballpass *simulation, const ballpass_request *request);
 
-/* Bring the run to a time, not before the one reached [s].  Beyond the end that was asked for it goes on. */
+/* Bring the run to a time, not before the one reached [s].  It may go beyond the end that was asked for. */
 int ballpass_run_to(ballpass *simulation, double time);
 
 /* Time, states and outputs that the run has reached: how many numbers, their names and units, and the numbers. */
@@ -75,11 +75,11 @@ int ballpass_columns(void);
 const char *ballpass_column(int column, const char **unit);
 int ballpass_read(ballpass *simulation, double *columns);
 
-/* The next time at which a load switches, behind the time reached [s]; infinite where none does before the run's end. */
+/* The next time at which a load switches, after the time reached [s]; infinite where none does before the run's end. */
 double ballpass_next_switch(ballpass *simulation);
 
-/* A copy of all that an instance is, in so many bytes, for instances of the same program on machines of the same kind.  A run that goes on
-   from it has the same bits. */
+/* A copy of all data of an instance, in so many bytes, for instances of the same program on machines of the same kind.  A run that
+   continues from it has the same bits. */
 size_t ballpass_state_size(void);
 void ballpass_save(const ballpass *simulation, void *bytes);
 int ballpass_restore(ballpass *simulation, const void *bytes, size_t size);

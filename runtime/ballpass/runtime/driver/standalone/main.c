@@ -1,5 +1,5 @@
-/* Runs the scene and prints its states and outputs as CSV.  --help tells the options, --list the parameters.  Of an instance it asks what
-   ballpass.h offers, but for the check of values that are only listed. */
+/* Runs the scene and prints its states and outputs as CSV.  --help prints the options, --list the parameters.  It uses an instance only
+   through ballpass.h, except for the check of values that are only listed. */
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -52,7 +52,7 @@ static int refuse(const char *what, const char *given, const char *allowed)
     return BALLPASS_REFUSED;
 }
 
-/* Each line that the instance says, behind the word error; returns the exit code. */
+/* Print each line of the message of the instance after the word error; return the exit code. */
 static int complain(const ballpass *simulation, int code)
 {
     const char *text = ballpass_error(simulation);
@@ -113,7 +113,7 @@ static int set_parameter(ballpass *simulation, unsigned char *given, const char 
     for (int i = 0; i < SCENE_PARAMETERS; i++) {
         if (strlen(scene_parameters[i].name) != length || strncmp(scene_parameters[i].name, text, length) != 0) continue;
         if (!sign || !number(sign + 1, &value)) return refuse(scene_parameters[i].name, sign ? sign + 1 : "nothing", "a number in SI units, as in name=1e-5.");
-        if (given[i]) return refuse(scene_parameters[i].name, "more than one value", "one value for a number. Leave the others away.");
+        if (given[i]) return refuse(scene_parameters[i].name, "more than one value", "one value for a number. Omit the others.");
         given[i] = 1;
         ballpass_put(simulation, i, value);
         return 0;
@@ -129,7 +129,7 @@ static int known_option(const char *name)
     return 0;
 }
 
-/* The request from the command line; 0, or an exit code, or -1 where everything is said already. */
+/* The request from the command line; 0, or an exit code, or -1 where the request was only to print. */
 static int read_request(int count, char **arguments, request *asked, ballpass *simulation)
 {
     unsigned char given[SCENE_PARAMETERS] = {0}; /* parameters that have a value from there */
@@ -150,14 +150,14 @@ static int read_request(int count, char **arguments, request *asked, ballpass *s
             if (value) *value++ = '\0';
             if (!known_option(text)) return refuse("option", text, "those that --help names.");
             if (!value && i + 1 < count) value = arguments[++i];
-            if (!value) return refuse(text, "nothing", "a value behind it.");
+            if (!value) return refuse(text, "nothing", "a value after it.");
             fault = set_option(asked, text, value);
         } else {
             fault = set_parameter(simulation, given, text);
         }
         if (fault) return fault;
     }
-    if (asked->turns_given && asked->time_given) return refuse("--cycles, --duration", "each of them", "one of the two. Leave the other away.");
+    if (asked->turns_given && asked->time_given) return refuse("--cycles, --duration", "each of them", "one of the two. Omit the other.");
     if (listed) {
         if (ballpass_check_bounds(simulation)) return complain(simulation, BALLPASS_REFUSED);
         list(simulation);

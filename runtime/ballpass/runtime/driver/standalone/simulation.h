@@ -1,13 +1,13 @@
-/* What main.c and the interface of FMI ask of an instance besides ballpass.h. */
+/* Functions of an instance for main.c and the interface of FMI, besides ballpass.h. */
 #ifndef BALLPASS_SIMULATION_H
 #define BALLPASS_SIMULATION_H
 
 #include "ballpass.h"
 
-/* Sets a parameter that is looked at later, with all others. */
+/* Sets a parameter that is checked later, with all others. */
 void ballpass_put(ballpass *simulation, int place, double value);
 
-/* Looks at bounds and relations of all values. */
+/* Checks bounds and relations of all values. */
 int ballpass_check_bounds(ballpass *simulation);
 
 /* Parameters and, behind them, derived constants; states and time reached. */

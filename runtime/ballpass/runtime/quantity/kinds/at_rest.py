@@ -1,4 +1,4 @@
-"""Quantities of the rings at rest under the load of one instant: nothing is run for them."""
+"""Quantities of the rings at rest under the load of one instant: they need no run."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def at_rest(model: LoadedModel, numbers: Numbers, quantity: Quantity, chain: Cha
     """
     time, moved = 0.0, np.zeros(0 if chain is None else len(chain.names))
     if quantity.place:
-        # an angle is that of the first turn, as in `Model.static_equilibrium`: the balls stand where they do there
+        # an angle is that of the first turn, as in `Model.static_equilibrium`: so are the places of the balls
         kind = named_place(quantity)
         by_angle = kind.kind == "angle"
         time = instant(model, numbers, None if by_angle else kind.number, kind.number if by_angle else None)

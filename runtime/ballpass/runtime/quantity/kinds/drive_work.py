@@ -15,7 +15,7 @@ def _drive_work(view: View, quantity: Quantity) -> Estimate:
     mechanism = view.manifest.mechanism
     assert mechanism is not None  # it has a drive torque
     value, slope = view.mean(*view.channel(quantity))
-    # mean torque times the angle of a turn, which no parameter changes
+    # mean torque times the angle of a turn, which does not depend on parameters
     angle = math.copysign(TURN, view.numbers.values[mechanism.speed])
     return Estimate(value=angle * value, slope=angle * slope)
 

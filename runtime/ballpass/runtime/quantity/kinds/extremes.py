@@ -7,7 +7,7 @@ import numpy as np
 from ballpass.runtime.quantity.competing_peaks import competing_peak
 from ballpass.runtime.quantity.records import Array, Estimate, Kind, Mark, Quantity, ReducedRuns, View
 
-#: What times seven values at equal distances h gives their derivative, over h, and their second one, over h^2.
+#: Weights of seven values at equal distances h for their first derivative, times h, and their second one, times h^2.
 FIRST = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 SECOND = np.array([2.0, -27.0, 270.0, -490.0, 270.0, -27.0, 2.0]) / 180.0
 
@@ -18,12 +18,12 @@ def _extreme(view: View, quantity: Quantity, kind: str) -> Estimate:
     slope = signal.slope[mark.node, mark.ball]
     notes = []
     if mark.other is not None and mark.rate != mark.other_rate:
-        # two balls change rank; the moment moves so that both stay equal
+        # two balls carry the same load; the moment moves so that both stay equal
         slope = slope + mark.rate * _rank_change(view, quantity, mark)
         notes.append(f"balls {mark.ball + 1} and {mark.other + 1} change rank there")
     if mark.at_edge:
         notes.append("at an edge: the moment moves with it")
-    # the least of the most loaded ball is no extreme of any one
+    # the minimum over the most loaded balls is not an extreme of one ball
     ranked = kind == "min" and signal.value.shape[1] > 1 and quantity.ball is None
     kink = "" if ranked else competing_peak(view, quantity, mark)
     ball = _ball(view, quantity, mark)
@@ -35,7 +35,7 @@ def _ball(view: View, quantity: Quantity, mark: Mark) -> int | None:
 
 
 def _rank_change(view: View, quantity: Quantity, mark: Mark) -> Array:
-    """Derivative of the time at which two balls change rank, beside that of its node, shape (directions,)."""
+    """Derivative of the time at which two balls carry the same load, less that of its node, shape (directions,)."""
     slope = view.signals[quantity.channel].slope
     apart = slope[mark.node, mark.ball] - slope[mark.node, mark.other]
     return np.asarray(-apart / (mark.rate - mark.other_rate))
@@ -48,7 +48,7 @@ def _time(view: View, quantity: Quantity, kind: str) -> Estimate:
     if mark.other is not None and mark.rate != mark.other_rate:
         moved = moved + _rank_change(view, quantity, mark)
     elif mark.around:
-        # the rate is zero there: it moves by what parameters change of the rate, over the curvature
+        # the rate is zero there: the time moves by the change of the rate over the curvature
         half = len(mark.around) // 2
         nodes = [*mark.around[:half], mark.node, *mark.around[half:]]
         distance = (view.nodes.t[nodes[-1]] - view.nodes.t[nodes[0]]) / (len(nodes) - 1)

@@ -1,4 +1,4 @@
-"""Kurtosis: how much of a signal is in its peaks, which a damaged raceway raises before its rms does."""
+"""Kurtosis: the weight of the peaks in a signal.  A damaged raceway raises it before the rms."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ballpass.runtime.quantity.records import Estimate, Kind, Quantity, View
 def _kurtosis(view: View, quantity: Quantity) -> Estimate:
     value, slope = view.channel(quantity)
     mean, moved = view.mean(value, slope)
-    # about the mean: of a small vibration on a large offset raw moments have no digits left
+    # about the mean: with a small vibration on a large offset raw moments lose all digits
     apart, its = value - mean, slope - moved
     square, square_slope = view.mean(apart**2, 2.0 * apart[:, None] * its)
     fourth, fourth_slope = view.mean(apart**4, 4.0 * apart[:, None] ** 3 * its)

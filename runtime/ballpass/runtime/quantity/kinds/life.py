@@ -1,6 +1,6 @@
 """Rating life along a run, and its derivative.
 
-In: what a kind of quantity sees of a run.  Out: an `Estimate` in turns of the inner ring against the outer one.
+In: the data of a run for a kind of quantity.  Out: an `Estimate` in turns of the inner ring against the outer one.
 """
 
 from __future__ import annotations

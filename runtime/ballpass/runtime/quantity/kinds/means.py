@@ -32,7 +32,7 @@ def _rms(view: View, quantity: Quantity) -> Estimate:
 
 
 def zero(view: View, note: str, moved: Array) -> Estimate:
-    """A size that is zero; `moved` are derivatives of what it is the size of."""
+    """A norm that is zero; `moved` are derivatives of the quantity inside."""
     kink = "it is zero and has a corner there; the derivative given is zero" if np.any(moved) else ""
     return Estimate(value=0.0, slope=np.zeros(view.directions), notes=(note,), kink=kink)
 
