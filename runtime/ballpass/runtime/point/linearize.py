@@ -269,10 +269,10 @@ def _faster_note(model: LoadedModel, modes: Sequence[Mode], faster: Sequence[Mod
     laws = {bearing.damping.law for bearing in model.manifest.bearings if bearing.damping.corner_at_rest}
     least, other = (min((m.damping_ratio for m in some if not m.rigid), default=math.nan) for some in (modes, faster))
     return (
-        f"the law {' and '.join(sorted(laws))} damps approach only, and the balls pass at up to {passing:.2g} m/s while "
-        "the rings rest: a ball that parts, however slowly, counts as undamped, and one that approaches as damped all "
-        "the time. That holds for slower vibrations. In any faster one each ball damps half of the time: the least "
-        f"ratio is then {other:.3g} instead of {least:.3g}."
+        f"the law {' and '.join(sorted(laws))} damps approach only, and the balls pass at up to {passing:.2g} m/s "
+        "while the rings rest: a ball that parts, however slowly, counts as undamped, and one that approaches as "
+        "damped all the time. That holds for slower vibrations. In any faster one each ball damps half of the time: "
+        f"the least ratio is then {other:.3g} instead of {least:.3g}."
     )
 
 
